@@ -39,12 +39,24 @@ def clouds(
 
 
 def grain(rng: np.random.Generator, height: int, width: int) -> Field:
-    """White noise, (height, width), with mean 0 and standard deviation 1."""
+    """White noise, (height, width), with mean 0 and standard deviation 1.
+
+    Args:
+        rng: Random generator.
+        height: Height, pixels.
+        width: Width, pixels.
+    """
     return rng.standard_normal((height, width), np.float32)
 
 
 def blend(ground: Field, colour: tuple[float, float, float], share: Field | float) -> Field:
-    """Paint a colour over `ground`, (H, W, 3), with the opacity `share`, (H, W), 0 to 1."""
+    """Paint a colour over a picture.
+
+    Args:
+        ground: Picture, (H, W, 3).
+        colour: Red, green and blue, 0 to 1.
+        share: Opacity, 0 to 1, (H, W) or a number.
+    """
     over = np.asarray(share, np.float32)[..., None]
     return ground + over * (np.asarray(colour, np.float32) - ground)
 

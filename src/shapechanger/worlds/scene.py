@@ -11,16 +11,7 @@ from numpy.typing import NDArray
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.look import Colour, Look
 from shapechanger.worlds.paint import texture
-from shapechanger.worlds.surfaces import (
-    Light,
-    Patches,
-    ceiling_patches,
-    ground_patches,
-    lamp_patches,
-    obstacle_patches,
-    verge_patches,
-    wall_patches,
-)
+from shapechanger.worlds.surfaces import Patches, Surfaces
 
 # Two geoms collide if the contype of one shares a bit with the conaffinity of the other.
 _SOLID_TYPE: Final = 1
@@ -125,7 +116,7 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     """
     _set_camera(spec)
     _add_collision(spec, course)
-    light = Light(course, look)
+    surfaces = Surfaces(course, look)
     mirrored = look.gloss > 0.0
     walls, plain = look.tone(look.wall), look.tone()
 
@@ -135,26 +126,26 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
             picture = texture(name, look.texture_seed)
             _add_surface(spec, f"world/{name}", patches, picture, colour, mirrored=mirrored)
 
-    for surface, patches in wall_patches(course, light).items():
+    for surface, patches in surfaces.walls().items():
         show(surface, patches, walls)
     if course.ceiling_m > 0.0:
-        show("ceiling", ceiling_patches(course, light), plain)
+        show("ceiling", surfaces.ceiling(), plain)
     else:
         # The tone is in the texture, because MuJoCo does not light skyboxes.
         sky = (texture("sky", look.texture_seed) * np.array(plain)).astype(np.uint8)
         _add_texture(spec, "world/sky", sky, mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     if course.world == "yard":
-        show("grass", verge_patches(course, light), plain)
-    show("things", obstacle_patches(course, light), plain)
+        show("grass", surfaces.verges(), plain)
+    show("things", surfaces.obstacles(), plain)
     if course.lamps and course.ceiling_m > 0.0:
         # They stay bright in dim light, as they do for a camera.
         red, green, blue = (c ** (1.0 / 4.0) for c in plain)
         picture = texture("things", look.texture_seed)
-        lamps = lamp_patches(course)
+        lamps = surfaces.lamps()
         _add_surface(spec, "world/lamps", lamps, picture, (red, green, blue), mirrored=mirrored)
     # The ground is last, because it is blended over the mirrored course.
     picture = texture(_GROUND.get(course.world, _DEFAULT_GROUND), look.texture_seed)
-    ground, colour = ground_patches(course, light), look.tone(look.ground)
+    ground, colour = surfaces.ground(), look.tone(look.ground)
     _add_surface(spec, "world/floor", ground, picture, colour, opacity=1.0 - look.gloss)
 
 

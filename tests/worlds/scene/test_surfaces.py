@@ -9,13 +9,13 @@ import pytest
 
 from shapechanger.worlds.course import Course, Lamp, Wall
 from shapechanger.worlds.look import Look
-from shapechanger.worlds.surfaces import Light, wall_patches
+from shapechanger.worlds.surfaces import Surfaces
 from tests.worlds.scene.courses import square, with_walls
 
 
 def pieces(course: Course, surface: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners (n, 4, 3), texture coordinates (n, 4, 2) and lights (n, 4) of a surface."""
-    patches = wall_patches(course, Light(course, Look.of(course.world)))[surface]
+    patches = Surfaces(course, Look.of(course.world)).walls()[surface]
     points, places, lights, _ = patches.arrays(mirrored=False)
     return points.reshape(-1, 4, 3), places.reshape(-1, 4, 2), lights.reshape(-1, 4)
 

@@ -145,12 +145,8 @@ def _response_of(
     vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, full_robot: bool
 ) -> SteeringResponse:
     """Measure the response of a simulated vehicle, once in a process."""
-    if full_robot:
-        env: VehicleEnv | RangesEnv = VehicleEnv(
-            vehicle, world=world, robot=robot, image=False, put_back=True, courses=(0,)
-        )
-    else:
-        env = RangesEnv(vehicle, world=world, robot=robot, put_back=True, courses=(0,))
+    common: dict[str, Any] = {"world": world, "robot": robot, "courses": (0,), "put_back": True}
+    env = VehicleEnv(vehicle, image=False, **common) if full_robot else RangesEnv(vehicle, **common)
     try:
         places = env.observation_layout.slices
         return measure_response(env, places["speed"].start, places["yaw_rate"].start)
@@ -214,11 +210,13 @@ class WaypointEnv(DrivingEnv):
         EzPickle.__init__(self, vehicle, **arguments)
         body = vehicle_model(vehicle)
         world = world or ("harbour" if body.floats else "corridor")
-        common: dict[str, Any] = {"world": world, "robot": robot, "courses": courses}
+        common: dict[str, Any] = {
+            "world": world, "robot": robot, "courses": courses, "put_back": put_back,
+        }  # fmt: skip
         self._env: VehicleEnv | RangesEnv = (
-            VehicleEnv(vehicle, size=_SIZE, state=True, put_back=put_back, **common)
+            VehicleEnv(vehicle, size=_SIZE, state=True, **common)
             if full_robot
-            else RangesEnv(vehicle, camera=_SIZE, put_back=put_back, **common)
+            else RangesEnv(vehicle, camera=_SIZE, **common)
         )
         self.parts, self._world, self._draw = self._env.parts, self._env.world, self._env._draw
         self.response = _response_of(vehicle, world, robot, full_robot)
