@@ -1,4 +1,4 @@
-"""A family: one model, and the bodies that have a name."""
+"""Families of bodies."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ FAMILY = Family("Leg", {"Leg": (), "LongLeg": (Stretch("thigh", 2.0),)}, {"knee"
 
 
 def test_bodies_are_found_by_name() -> None:
-    """The first is the model as it is."""
+    """The first body is the unedited model."""
     assert FAMILY.body("Leg") == ()
     assert FAMILY.body("LongLeg") == (Stretch("thigh", 2.0),)
 
 
 def test_a_name_that_is_not_there_is_named() -> None:
-    """With the nearest, and the family."""
+    """The error names the family and the nearest body."""
     with pytest.raises(
         UnknownName, match=r"No body of the family Leg matches 'LongLegs'\. Did you"
     ):
@@ -32,7 +32,7 @@ def test_a_name_that_is_not_there_is_named() -> None:
 
 
 def test_bodies_may_be_edits_or_their_json() -> None:
-    """JSON is told from a name by how it begins."""
+    """Edits and JSON are accepted as well as names."""
     edits = (Stretch("thigh", 2.0), Mass("shin", scale=2.0))
     text = to_json(edits)
     for value in (edits, list(edits), iter(edits), text, f"  {text}\n"):
@@ -43,13 +43,13 @@ def test_bodies_may_be_edits_or_their_json() -> None:
 
 @pytest.mark.parametrize("value", ["[1]", "{}", "[", 3, None, ["LongLeg"]])
 def test_what_is_no_body_is_refused(value: Any) -> None:
-    """As everywhere."""
+    """Invalid bodies raise an error."""
     with pytest.raises(MorphologyError):
         FAMILY.body(value)
 
 
 def test_a_model_is_loaded_with_names(tmp_path: Path) -> None:
-    """Those of the file, those that the family chooses, and those that follow."""
+    """Elements have names from the file, the family, or defaults."""
     path = tmp_path / "leg.xml"
     path.write_text(LEG.replace('<body name="shin"', "<body"))
     for given in (path, str(path)):

@@ -1,4 +1,4 @@
-"""The named bodies: what they are called, and what the release's numbers make of them."""
+"""Named bodies, with the numbers of the 2017 release."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ _BODIES = [(family, name) for family in (ANT, PENDULUM) for name in family.bodie
 
 @pytest.mark.parametrize("family", [ANT, PENDULUM], ids=lambda family: family.name)
 def test_a_family_is_called_after_its_first_body(family: Family) -> None:
-    """Which is the model as it is."""
+    """The family's name is that of its unedited body."""
     assert next(iter(family.bodies)) == family.name
     assert family.body(family.name) == ()
 
 
 @pytest.mark.parametrize(("family", "name"), _BODIES)
 def test_named_bodies_are_values(family: Family, name: str) -> None:
-    """Fit for a set and for JSON."""
+    """Bodies are hashable and round-trip through JSON."""
     body = family.body(name)
     assert from_json(to_json(body)) == body
     assert hash(body) == hash(from_json(to_json(body)))
 
 
 def test_legs_are_in_the_order_of_the_motors() -> None:
-    """And each points into the quarter that is given for it."""
+    """Legs follow the motors, with the given directions."""
     model = built(ant())
     motors = [model.actuator(i).name for i in range(model.nu)]
     assert motors == [f"{joint}_{leg}" for leg in LEGS for joint in ("hip", "ankle")]
@@ -52,7 +52,7 @@ def test_legs_are_in_the_order_of_the_motors() -> None:
     ],
 )
 def test_dimensions_of_the_ants(name: str, nq: int, nu: int) -> None:
-    """Only the extended ants have more joints."""
+    """Degrees of freedom and motors of the ants."""
     model = built(ant(), *ANT.body(name))
     assert (model.nq, model.nu) == (nq, nu)
 
@@ -62,7 +62,7 @@ def test_dimensions_of_the_ants(name: str, nq: int, nu: int) -> None:
     [("InvertedPendulum", 0.6), ("SmallInvertedPendulum", 0.3), ("BigInvertedPendulum", 1.2)],
 )
 def test_lengths_of_the_poles(name: str, length: float) -> None:
-    """The lean of 1 mm stays."""
+    """Poles have the release's lengths and lean."""
     model = built(pendulum(), *PENDULUM.body(name))
     assert 2.0 * model.geom("cpole").size[1] == pytest.approx(math.hypot(length, 0.001))
     assert (model.nq, model.nu) == (2, 1)

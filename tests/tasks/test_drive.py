@@ -1,4 +1,4 @@
-"""The reward of driving, as laws."""
+"""Properties of the driving reward."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ seconds = st.floats(0.0, 1.0)
 
 @given(speed=speeds, dt=seconds)
 def test_backwards_costs_what_forwards_pays(speed: float, dt: float) -> None:
-    """Nobody gets rich by reversing (gym-donkeycar#70)."""
+    """Reversing costs as much as driving forward earns (gym-donkeycar#70)."""
     forth, back = (DriveReward().terms(v, None, None, dt) for v in (speed, -speed))
     assert forth["reward_velocity"] == -back["reward_velocity"]
 
 
 @given(speed=speeds, dt=seconds)
 def test_the_way_pays_and_not_the_number_of_steps(speed: float, dt: float) -> None:
-    """Two half steps are one step, so a robot with another control rate earns the same."""
+    """The velocity reward does not depend on the control rate."""
     whole = DriveReward().terms(speed, False, True, dt)
     half = DriveReward().terms(speed, False, True, dt / 2)
     for name in whole:
@@ -44,12 +44,12 @@ def test_the_way_pays_and_not_the_number_of_steps(speed: float, dt: float) -> No
 def test_what_nobody_measures_has_no_term(
     quantities: tuple[float | None, bool | None, bool | None], names: set[str]
 ) -> None:
-    """A zero would claim that the robot stood still and hit nothing."""
+    """Quantities that are not measured have no term."""
     assert set(DriveReward().terms(*quantities, 0.1)) == names
 
 
 def test_the_terms_are_what_the_weights_say() -> None:
-    """Metres, collisions and seconds of being stuck."""
+    """Terms are weights times metres, collisions and stalled seconds."""
     reward = DriveReward(velocity=2.0, collision=-5.0, stall=-3.0)
     assert reward.terms(1.5, True, True, 0.1) == {
         "reward_velocity": pytest.approx(0.3),
@@ -64,12 +64,12 @@ def test_the_terms_are_what_the_weights_say() -> None:
 def test_a_collision_ends_it_where_the_profile_says_so(
     ends: bool, collided: bool | None, over: bool
 ) -> None:
-    """A bumper car goes on."""
+    """Collisions end the episode if the weight says so."""
     assert DriveReward(collision_ends_episode=ends).ends(collided) is over
 
 
 def test_weights_come_by_name() -> None:
-    """As the link carries them, where a truth is 1 or 0; the others keep their default."""
+    """Weights are set by name; others keep their defaults."""
     given_ = DriveReward.from_weights({"velocity": 3, "collision_ends_episode": 0.0})
     assert given_ == DriveReward(velocity=3.0, collision_ends_episode=False)
     assert DriveReward.from_weights({}) == DriveReward()

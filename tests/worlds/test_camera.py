@@ -1,4 +1,4 @@
-"""Pictures of a camera on board."""
+"""The on-board camera."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _model(colour: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_it_sees_what_is_ahead_of_it() -> None:
-    """A red wall is red, and after another model was given a green one is green."""
+    """The camera renders the selected model."""
     camera = OnboardCamera((32, 16))
     for colour, brightest in (("1 0 0", 0), ("0 1 0", 1)):
         model, data = _model(colour)
@@ -45,7 +45,7 @@ def test_it_sees_what_is_ahead_of_it() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_pictures_share_no_memory() -> None:
-    """Whoever keeps one keeps it."""
+    """Each picture is a new array."""
     camera = OnboardCamera((32, 16))
     model, data = _model("1 0 0")
     camera.look_through(model, "eye")
@@ -58,7 +58,7 @@ def test_pictures_share_no_memory() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_two_draw_side_by_side() -> None:
-    """Each has a context of its own, which it makes current."""
+    """Two cameras can render in turn."""
     cameras = [OnboardCamera((32, 16)), OnboardCamera((16, 16))]
     models = [_model("1 0 0"), _model("0 0 1")]
     for camera, (model, _) in zip(cameras, models, strict=True):
@@ -73,7 +73,7 @@ def test_two_draw_side_by_side() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_who_forgets_to_close_it_loses_nothing() -> None:
-    """It frees its context itself, and closing twice does no harm."""
+    """An unclosed camera frees its context, and `close` can be called twice."""
     model, data = _model("1 0 0")
     for _ in range(3):
         camera = OnboardCamera((32, 16))
@@ -87,7 +87,7 @@ def test_who_forgets_to_close_it_loses_nothing() -> None:
 
 
 def test_a_camera_that_looks_at_nothing_says_so() -> None:
-    """Before the first model, and after it was closed."""
+    """`picture` raises before a model is selected and after `close`."""
     model, data = _model("1 0 0")
     camera = OnboardCamera((32, 16))
     with pytest.raises(RenderError, match="has no model"):
@@ -100,13 +100,13 @@ def test_a_camera_that_looks_at_nothing_says_so() -> None:
 
 @pytest.mark.parametrize("size", [(0, 16), (16, 0), (-1, -1)])
 def test_no_picture_has_no_pixels(size: tuple[int, int]) -> None:
-    """The sentence says which size was asked for."""
+    """Sizes below 1 pixel raise an error with the size."""
     with pytest.raises(RenderError, match=f"cannot be {size[0]} x {size[1]} pixels"):
         OnboardCamera(size)
 
 
 def test_a_fork_of_who_draws_is_told_how_to_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Mesa's threads do not come along, and it would wait for them for ever."""
+    """A process forked after rendering raises an error instead of a deadlock."""
     monkeypatch.setattr(module, "_drawing", {os.getpid() + 1})
     camera = OnboardCamera((32, 16))
     model, data = _model("1 0 0")

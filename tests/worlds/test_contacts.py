@@ -1,4 +1,4 @@
-"""What counts as a collision, and what the bumper feels of it."""
+"""Counting of collisions, and the bumper."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import mujoco
 import pytest
 
-from shapechanger.bodies.vehicles import PlanarPose
+from shapechanger.bodies.vehicles import Motion
 from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, ContactTracker
 
 _DT = 0.01
@@ -29,15 +29,15 @@ class _Bench:
         self.touch = ContactTracker(self.model)
 
     def stand(self, x: float, seconds: float = _DT, heading: float = 0.0) -> None:
-        """Stand somewhere for some time."""
+        """Stay at x for some time."""
         self.data.qpos[:3] = x, 0.0, 0.1
         mujoco.mj_forward(self.model, self.data)
         for _ in range(round(seconds / _DT)):
-            self.touch.follow(self.data, lambda: PlanarPose(x, 0.0, heading), _DT)
+            self.touch.follow(self.data, Motion(x, 0.0, heading, 0.0, 0.0, 0.0), _DT)
 
 
 def test_the_ground_is_nothing_to_run_into() -> None:
-    """A vehicle stands on it all the time."""
+    """Contact with the ground is no collision."""
     bench = _Bench()
     bench.stand(0.0)
     assert bench.data.ncon > 0
@@ -46,7 +46,7 @@ def test_the_ground_is_nothing_to_run_into() -> None:
 
 
 def test_a_wall_is() -> None:
-    """A touch counts once, however long it lasts."""
+    """A lasting contact is one collision."""
     bench = _Bench()
     bench.stand(0.91, seconds=3.0)
     assert bench.touch.touches
@@ -56,7 +56,7 @@ def test_a_wall_is() -> None:
 
 
 def test_a_vehicle_that_bounces_ran_into_it_once() -> None:
-    """What comes within half a second belongs to the same collision; what comes later does not."""
+    """Contacts within 0.5 s are one collision, later ones another."""
     bench = _Bench()
     bench.stand(0.91)
     bench.stand(0.5, seconds=0.9 * APART_S)
@@ -68,7 +68,7 @@ def test_a_vehicle_that_bounces_ran_into_it_once() -> None:
 
 
 def test_after_it_was_lifted_off_the_next_one_counts() -> None:
-    """Whoever was put back and runs into a wall again at once has run into it twice."""
+    """A contact after `release` is a new collision."""
     bench = _Bench()
     bench.stand(0.91)
     bench.touch.release()
@@ -78,7 +78,7 @@ def test_after_it_was_lifted_off_the_next_one_counts() -> None:
 
 
 def test_a_reset_forgets() -> None:
-    """An episode counts its own."""
+    """`reset` clears the counter and the bumper."""
     bench = _Bench()
     bench.stand(0.91)
     bench.touch.reset()
@@ -90,9 +90,9 @@ def test_a_reset_forgets() -> None:
     ("off", "felt"), [(0.0, True), (0.9, True), (-0.9, True), (1.1, False), (math.pi, False)]
 )
 def test_the_bumper_is_at_the_front(off: float, felt: bool) -> None:
-    """A knock on the side or at the back is a collision that no bumper tells.
+    """Contacts at the side or rear are collisions without a bump.
 
-    `off` is how far the wall is off the heading, as a share of how far the bumper reaches.
+    `off` is the bearing of the wall over `BUMPER_SPREAD`, or pi for behind.
     """
     bench = _Bench()
     bench.stand(0.91, heading=off if off == math.pi else off * BUMPER_SPREAD)

@@ -1,4 +1,4 @@
-"""Every vehicle has a home in which it can drive."""
+"""Default worlds of the vehicles."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ from shapechanger.worlds.layout import WORLDS
 
 
 def test_every_vehicle_is_at_home_somewhere() -> None:
-    """The table grows with the fleet, and names worlds that there are."""
+    """`HOME` lists every vehicle with an existing world."""
     assert set(HOME) == set(VEHICLES)
     assert set(HOME.values()) == set(WORLDS)

@@ -1,4 +1,4 @@
-"""What lenses do to pictures."""
+"""Camera faults."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _ALL = pytest.mark.parametrize("change", LENSES.values(), ids=LENSES)
 
 
 def _picture(height: int = 120, width: int = 160) -> Picture:
-    """Something with edges and all levels."""
+    """Return a picture with edges and all levels."""
     rng = np.random.default_rng(0)
     rough = rng.integers(0, 256, (height // 8 + 1, width // 8 + 1, 3), np.uint8)
     return np.kron(rough, np.ones((8, 8, 1), np.uint8))[:height, :width].copy()
@@ -21,7 +21,7 @@ def _picture(height: int = 120, width: int = 160) -> Picture:
 @_ALL
 @pytest.mark.parametrize("size", [(120, 160), (64, 64), (33, 47)])
 def test_a_lens_gives_a_picture_of_the_same_size(change: Lens, size: tuple[int, int]) -> None:
-    """It can stand between any camera and any policy."""
+    """A lens keeps the shape and dtype."""
     before = _picture(*size)
     kept = before.copy()
     after = change(before, 3)
@@ -34,18 +34,18 @@ def test_a_lens_gives_a_picture_of_the_same_size(change: Lens, size: tuple[int, 
 
 @_ALL
 def test_a_lens_is_a_function_of_picture_and_seed(change: Lens) -> None:
-    """A trial can be drawn again."""
+    """A lens is a function of picture and seed, and does not change its input."""
     np.testing.assert_array_equal(change(_picture(), 5), change(_picture(), 5))
 
 
 @pytest.mark.parametrize("change", [night, glare, dirt])
 def test_another_seed_gives_another_picture(change: Lens) -> None:
-    """Each episode has its own dirt and its own sun."""
+    """Another seed changes the result."""
     assert not np.array_equal(change(_picture(), 5), change(_picture(), 6))
 
 
 def test_night_leaves_half_of_the_brightness_and_its_noise_moves() -> None:
-    """A white wall is half as bright; the next picture has other noise."""
+    """Night halves the brightness, and its noise varies between pictures."""
     white = np.full((120, 160, 3), 255, np.uint8)
     dark = night(white, 0)
     assert dark.mean(axis=(0, 1)) == pytest.approx([117.3, 127.5, 168.3], abs=0.5)
@@ -56,7 +56,7 @@ def test_night_leaves_half_of_the_brightness_and_its_noise_moves() -> None:
 
 
 def test_glare_only_adds_light() -> None:
-    """At its middle it is nearly white, and it lifts all of the picture."""
+    """Glare brightens all pixels and saturates its middle."""
     black = np.zeros((120, 160, 3), np.uint8)
     lit = glare(black, 1)
     assert lit.max() > 225
@@ -64,7 +64,7 @@ def test_glare_only_adds_light() -> None:
 
 
 def test_blur_keeps_the_light_and_spreads_a_point() -> None:
-    """A point's light is as much as before, with a deviation of 1.25 % of the width."""
+    """Blur keeps the sum, with a standard deviation of 1.25 % of the width."""
     point = np.zeros((121, 161, 3), np.uint8)
     point[56:65, 76:85] = 255
     soft = blur(point, 0).astype(float)[..., 0]
@@ -75,7 +75,7 @@ def test_blur_keeps_the_light_and_spreads_a_point() -> None:
 
 
 def test_dirt_stays_where_it_is() -> None:
-    """The same spots lie on each picture of an episode, and most of it stays clean."""
+    """Spots do not move between pictures, and most pixels stay clean."""
     white = np.full((120, 160, 3), 255, np.uint8)
     grey = np.full((120, 160, 3), 200, np.uint8)
     spots = dirt(white, 2)[..., 0] < 230
@@ -85,7 +85,7 @@ def test_dirt_stays_where_it_is() -> None:
 
 
 def test_an_unknown_lens_names_the_nearest() -> None:
-    """Names come from the command line."""
+    """The error suggests the nearest name."""
     assert find_lens("night") is night
     with pytest.raises(UnknownName, match="Did you mean 'glare'"):
         find_lens("glair")

@@ -1,4 +1,4 @@
-"""Looks as values."""
+"""Random and default looks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shapechanger.worlds.look import LOOKS, VARIANTS, Look
 
 @pytest.mark.parametrize("world", LOOKS)
 def test_a_random_look_stays_in_its_ranges(world: str) -> None:
-    """The ranges are those that its docstring states."""
+    """Random looks stay within the documented ranges."""
     usual = Look.of(world)
     for seed in range(200):
         look = Look.random(world, np.random.default_rng(seed))
@@ -29,7 +29,7 @@ def test_a_random_look_stays_in_its_ranges(world: str) -> None:
 
 
 def test_a_random_look_follows_from_its_generator_and_varies_in_everything() -> None:
-    """The same seed gives the same light; another changes each of its parts."""
+    """Equal seeds give equal looks; another seed changes each attribute."""
     one, same, other = (Look.random("corridor", np.random.default_rng(seed)) for seed in (1, 1, 2))
     assert one == same
     for part in dataclasses.fields(Look):
@@ -37,14 +37,14 @@ def test_a_random_look_follows_from_its_generator_and_varies_in_everything() -> 
 
 
 def test_tone_is_a_colour_whatever_the_light() -> None:
-    """MuJoCo cuts off what is brighter than white."""
+    """Tones stay within 0 to 1."""
     for light in (0.0, 0.5, 1.0, 3.0):
         assert all(0.0 <= c <= 1.0 for c in Look(light=light, warmth=1.0).tone())
     assert Look(light=0.5, warmth=0.0).tone() == (0.5, 0.5, 0.5)
 
 
 def test_an_unknown_world_is_refused() -> None:
-    """And the nearest is named."""
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
         Look.of("harbor")
     with pytest.raises(UnknownName, match="Did you mean 'yard'"):

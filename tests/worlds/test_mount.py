@@ -1,4 +1,4 @@
-"""A camera that is off its place, and one that is off its vehicle."""
+"""Errors of the camera's pose."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ def _moved(jitter: CameraJitter) -> mujoco.MjModel:
 
 
 def _axes(model: mujoco.MjModel) -> NDArray[np.float64]:
-    """Columns: to the right, up, and backward, as the camera has them."""
+    """Return the axes of the camera as columns: right, up and backward."""
     axes = np.empty(9)
     mujoco.mju_quat2Mat(axes, model.camera("eye").quat)
     return axes.reshape(3, 3)
 
 
 def test_none_is_none() -> None:
-    """A camera that is off by nothing stays."""
+    """A zero error keeps the pose."""
     assert _moved(CameraJitter()).camera("eye").pos == pytest.approx([0.05, 0.0, 0.12])
     np.testing.assert_allclose(_axes(_moved(CameraJitter()))[:, 2], [-1, 0, 0], atol=1e-9)
 
 
 def test_places_are_up_and_left() -> None:
-    """Seen from above, the left of a vehicle that looks along x is y."""
+    """Offsets are upwards and to the left."""
     place = _moved(CameraJitter(up_m=0.01, left_m=0.02)).camera("eye").pos
     assert place == pytest.approx([0.05, 0.02, 0.13])
 
 
 def test_each_angle_turns_the_way_it_says() -> None:
-    """Down, to the left, and clockwise."""
+    """Pitch turns down, yaw to the left, and roll clockwise."""
     few = 0.05
     ahead_down = -_axes(_moved(CameraJitter(pitch_rad=few)))[:, 2]
     np.testing.assert_allclose(ahead_down, [math.cos(few), 0.0, -math.sin(few)], atol=1e-9)
@@ -57,7 +57,7 @@ def test_each_angle_turns_the_way_it_says() -> None:
 
 
 def test_random_ones_are_small_and_of_both_signs() -> None:
-    """A draw is within what it promises, and comes from its generator alone."""
+    """Random errors are within their ranges, of both signs and reproducible."""
     drawn = [CameraJitter.random(np.random.default_rng(seed)) for seed in range(200)]
     for name, most in {
         "up_m": 0.015,
@@ -76,13 +76,13 @@ def test_random_ones_are_small_and_of_both_signs() -> None:
     "jitter", [CameraJitter(up_m=-0.115), CameraJitter(up_m=1.0), CameraJitter(left_m=-1.5)]
 )
 def test_a_camera_stays_on_its_vehicle(jitter: CameraJitter) -> None:
-    """In the floor, or in the air, it is no camera of this vehicle."""
+    """Errors that move the camera off its vehicle are refused."""
     with pytest.raises(WorldError, match=r"camera would be off its vehicle or in the floor, at \("):
         _moved(jitter)
 
 
 @pytest.mark.parametrize("jitter", [CameraJitter(left_m=math.nan), CameraJitter(roll_rad=math.inf)])
 def test_a_camera_is_off_by_numbers(jitter: CameraJitter) -> None:
-    """What is no number would turn the picture black."""
+    """Errors must be finite."""
     with pytest.raises(WorldError, match="must be finite, got"):
         _moved(jitter)

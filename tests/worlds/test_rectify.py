@@ -1,4 +1,4 @@
-"""One virtual camera for all vehicles: the horizon and the walls lie where they lie for others."""
+"""Rectified pictures, and measuring a camera."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SIZE = (160, 120)
 
 
 def _horizon(pitch_deg: float, fovy_deg: float) -> NDArray[np.uint8]:
-    """A picture of a level camera's world: white above the horizon, black below."""
+    """Return a picture that is white above the horizon and black below."""
     wide, high = _SIZE
     focal = 0.5 * high / math.tan(math.radians(fovy_deg) / 2.0)
     row = 0.5 * high - focal * math.tan(math.radians(pitch_deg))
@@ -40,7 +40,7 @@ def _horizon(pitch_deg: float, fovy_deg: float) -> NDArray[np.uint8]:
     ("pitch_deg", "fovy_deg"), [(0.0, 48.8), (3.0, 48.8), (-2.0, 48.8), (4.0, 60.0), (0.0, 90.0)]
 )
 def test_the_horizon_is_level(pitch_deg: float, fovy_deg: float) -> None:
-    """However a camera is mounted, the horizon is in the same row."""
+    """The horizon is in the same row for all mounts."""
     seen = Rectifier(CameraGeometry(pitch_deg, fovy_deg), _SIZE)(_horizon(pitch_deg, fovy_deg))
     assert seen.shape == (CANONICAL_SIZE[1], CANONICAL_SIZE[0], 3)
     assert (seen[:21] == 255).all()
@@ -50,7 +50,7 @@ def test_the_horizon_is_level(pitch_deg: float, fovy_deg: float) -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_rectified_pictures_of_vehicles_agree() -> None:
-    """From one place, the tank's and the truck's pictures become nearly the car's."""
+    """Rectified pictures of tank and truck are close to the car's."""
     raw: dict[str, NDArray[np.float64]] = {}
     rectified: dict[str, NDArray[np.float64]] = {}
     for vehicle in ("car", "tank", "truck"):
@@ -77,7 +77,7 @@ def test_rectified_pictures_of_vehicles_agree() -> None:
 
 
 def test_a_camera_that_looks_elsewhere_is_refused() -> None:
-    """A policy for all vehicles cannot see what the camera does not."""
+    """Cameras that do not cover the virtual view are refused."""
     with pytest.raises(WorldError, match=r"looks 30 degrees down .* misses 60 %"):
         Rectifier(CameraGeometry(30.0, 48.8), _SIZE)
     with pytest.raises(WorldError, match="vertical field of view of 20 degrees misses"):
@@ -85,7 +85,7 @@ def test_a_camera_that_looks_elsewhere_is_refused() -> None:
 
 
 def test_pictures_of_another_size_are_refused() -> None:
-    """A place in a picture is a direction only if the size is known."""
+    """Pictures of another size are refused."""
     rectify = Rectifier(CameraGeometry(0.0, 48.8), _SIZE)
     with pytest.raises(WorldError, match=r"have the shape \(120, 160, 3\), got \(60, 80, 3\)"):
         rectify(np.zeros((60, 80, 3), np.uint8))
@@ -98,7 +98,7 @@ def board_picture(
     roll_deg: float = 0.0,
     size: tuple[int, int] = (320, 240),
 ) -> NDArray[np.uint8]:
-    """A board of 7 x 5 inner corners that stands upright 12 squares before a camera, with noise."""
+    """Draw an upright board of 7 x 5 inner corners, 12 squares away, with noise."""
     wide, high = size
     focal = 0.5 * high / math.tan(0.5 * math.radians(fovy_deg))
     x, y = np.meshgrid(np.arange(0.25, wide, 0.5), np.arange(0.25, high, 0.5))
@@ -125,7 +125,7 @@ def board_picture(
 def test_a_board_tells_pitch_and_field_of_view(
     pitch_deg: float, fovy_deg: float, turned_deg: float, roll_deg: float
 ) -> None:
-    """To a tenth of a degree, and half a degree of the field of view."""
+    """The pitch is measured to 0.1 degrees and the field of view to 0.5."""
     found = measure_camera(board_picture(pitch_deg, fovy_deg, turned_deg, roll_deg), (7, 5))
     assert found.geometry.pitch_deg == pytest.approx(pitch_deg, abs=0.15)
     assert found.geometry.fovy_deg == pytest.approx(fovy_deg, abs=0.5)
@@ -136,7 +136,7 @@ def test_a_board_tells_pitch_and_field_of_view(
 
 
 def test_a_board_that_faces_the_camera_needs_the_field_of_view() -> None:
-    """A near board in a wide field of view looks like a far one in a narrow one."""
+    """A board seen straight on needs a given field of view."""
     picture = board_picture(3.0, 48.8, 0.0)
     with pytest.raises(WorldError, match="field of view"):
         measure_camera(picture, (7, 5))
@@ -146,7 +146,7 @@ def test_a_board_that_faces_the_camera_needs_the_field_of_view() -> None:
 
 
 def test_pictures_without_the_board_are_refused() -> None:
-    """With what was looked for."""
+    """The message describes the board that was searched."""
     with pytest.raises(WorldError, match="no checkerboard of 7 x 5 inner corners"):
         measure_camera(np.full((120, 160, 3), 90, np.uint8), (7, 5))
     with pytest.raises(WorldError, match="at least 3 inner corners"):
@@ -155,7 +155,7 @@ def test_pictures_without_the_board_are_refused() -> None:
 
 @pytest.mark.parametrize(("pitch_deg", "fovy_deg"), [(0.0, 48.8), (5.0, 48.8), (-3.0, 62.0)])
 def test_a_horizon_tells_the_pitch(pitch_deg: float, fovy_deg: float) -> None:
-    """As the picture of one shows."""
+    """The row of the horizon gives the pitch."""
     high = _SIZE[1]
     row = float((_horizon(pitch_deg, fovy_deg)[:, 0, 0] == 255).sum())
     assert pitch_of_horizon(row, high, fovy_deg) == pytest.approx(pitch_deg, abs=0.3)
@@ -164,7 +164,7 @@ def test_a_horizon_tells_the_pitch(pitch_deg: float, fovy_deg: float) -> None:
 
 
 def test_the_drawing_shows_the_horizon() -> None:
-    """The dotted line lies where the horizon does."""
+    """`draw_view` marks the horizon."""
     geometry = CameraGeometry(3.0, 48.8)
     picture = _horizon(3.0, 48.8)
     drawn = draw_view(picture, geometry)

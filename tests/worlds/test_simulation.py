@@ -1,4 +1,4 @@
-"""A vehicle on a course: what it does, what it senses, and what is refused."""
+"""A simulated vehicle on a course."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _drive(world: MujocoWorld, outputs: Mapping[str, float | None], seconds: flo
 
 
 def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
-    """The pose that looks straight at the middle of the longest wall from so far away."""
+    """Return a pose that faces the middle of the longest wall at this distance."""
     ends = [np.array((wall.start, wall.end)) for wall in world.course.walls]
     start, end = max(ends, key=lambda wall: float(np.hypot(*(wall[1] - wall[0]))))
     along = (end - start) / np.hypot(*(end - start))
@@ -47,7 +47,7 @@ def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
 
 @_EACH
 def test_a_vehicle_begins_at_home_and_at_rest(vehicle: str) -> None:
-    """It stands on a free lane of the place where it belongs."""
+    """A vehicle starts in its default world, at rest and free."""
     world = _world(vehicle)
     seen = world.inputs()
     assert world.course.world == HOME[vehicle]
@@ -59,7 +59,7 @@ def test_a_vehicle_begins_at_home_and_at_rest(vehicle: str) -> None:
 
 @_EACH
 def test_driving_ahead_is_progress(vehicle: str) -> None:
-    """Half of the voltage for two seconds brings each of them along its lane."""
+    """Half throttle for two seconds makes progress."""
     world = _world(vehicle)
     _drive(world, _AHEAD[vehicle], 2.0)
     assert world.truth()["progress_m"] > 0.3
@@ -68,7 +68,7 @@ def test_driving_ahead_is_progress(vehicle: str) -> None:
 
 
 def test_the_same_happens_again() -> None:
-    """A seed and the outputs decide every number."""
+    """Simulation is deterministic."""
     poses = []
     for _ in range(2):
         world = _world()
@@ -78,7 +78,7 @@ def test_the_same_happens_again() -> None:
 
 
 def test_it_does_not_matter_how_time_is_cut() -> None:
-    """Time that is no whole step waits for the next call; longer calls update less often."""
+    """The remainder of a step is carried over to the next call."""
     cut, steps, whole = _world(), _world(), _world()
     for _ in range(300):
         cut.advance(SIM_DT / 3.0, _AHEAD["car"])
@@ -93,7 +93,7 @@ def test_it_does_not_matter_how_time_is_cut() -> None:
 
 
 def test_placing_begins_anew_where_the_seed_says() -> None:
-    """The same start is the same pose, at rest; another seed is another start."""
+    """`place` resets motion and progress, and its seed gives the pose."""
     world = _world()
     world.place(5)
     first = world.pose
@@ -107,7 +107,7 @@ def test_placing_begins_anew_where_the_seed_says() -> None:
 
 
 def test_the_odometer_counts_through_every_start() -> None:
-    """An encoder does not know that its car was lifted."""
+    """`place` keeps the travelled distance."""
     world = _world()
     _drive(world, _AHEAD["car"], 1.0)
     before = world.inputs().travelled_m
@@ -118,7 +118,7 @@ def test_the_odometer_counts_through_every_start() -> None:
 
 
 def test_another_course_is_another_course() -> None:
-    """Laying out takes the place away from under the vehicle."""
+    """`lay_out` changes the course, reproducibly."""
     world = _world()
     walls = world.course.walls
     world.lay_out(4)
@@ -129,7 +129,7 @@ def test_another_course_is_another_course() -> None:
 
 
 def test_the_battery_gives_way_under_load() -> None:
-    """Its voltage falls with the current that the motor draws, and by what is left in it."""
+    """The battery's voltage drops with current and with `resting_v`."""
     world = _world()
     idle = world.inputs()
     assert RESTING_V - 0.2 < idle.battery_v < RESTING_V
@@ -142,14 +142,14 @@ def test_the_battery_gives_way_under_load() -> None:
 
 
 def test_a_wall_ahead_is_as_far_as_it_is() -> None:
-    """What an HC-SR04 would measure is the way from the bumper to the wall."""
+    """`distance_m` is measured from the front bumper."""
     world = _world()
     world.put(_before_a_wall(world, 0.9))
     assert world.distance_m() == pytest.approx(0.9 - world.vehicle.nose_m, abs=0.005)
 
 
 def test_running_into_a_wall_is_one_collision_that_the_bumper_tells() -> None:
-    """And the car stops there."""
+    """A crash stops the car, presses the bumper and counts once."""
     world = _world()
     world.put(_before_a_wall(world, 0.7))
     _drive(world, _AHEAD["car"], 2.0)
@@ -161,7 +161,7 @@ def test_running_into_a_wall_is_one_collision_that_the_bumper_tells() -> None:
 
 
 def test_who_is_put_back_can_drive_on() -> None:
-    """It stands on a free line near by, looks along the course, and what was counted stays."""
+    """After `put_back` the vehicle is free nearby, and collisions and progress are kept."""
     world = _world()
     world.put(_before_a_wall(world, 0.7))
     _drive(world, _AHEAD["car"], 2.0)
@@ -179,7 +179,7 @@ def test_who_is_put_back_can_drive_on() -> None:
 
 
 def test_acceleration_is_what_it_feels() -> None:
-    """Forward when it sets off, and to the inside of a bend."""
+    """Acceleration is forward at a start and centripetal in a bend."""
     world = _world()
     _drive(world, _AHEAD["car"], 0.05)
     assert world.inputs().acceleration_x > 0.1
@@ -190,7 +190,7 @@ def test_acceleration_is_what_it_feels() -> None:
 
 
 def test_a_current_sets_a_boat_adrift() -> None:
-    """Whoever does nothing on water that flows does not stay."""
+    """A boat without thrust drifts with the current."""
     world = _world("boat")
     start, flow = world.pose, world.course.current_mps
     assert math.hypot(*flow) > 0.0
@@ -200,7 +200,7 @@ def test_a_current_sets_a_boat_adrift() -> None:
 
 
 def test_without_a_camera_there_is_no_picture() -> None:
-    """The sentence says what to give."""
+    """The error names the missing argument."""
     with pytest.raises(WorldError, match="has no camera: pass a `size`"):
         _world().picture()
 
@@ -213,13 +213,13 @@ def test_without_a_camera_there_is_no_picture() -> None:
     ],
 )
 def test_who_cannot_drive_there_hears_why(vehicle: str, world: str, sentence: str) -> None:
-    """Water is for those who float, and for nobody else."""
+    """Boats need water, and other vehicles land."""
     with pytest.raises(WorldError, match=sentence):
         MujocoWorld(vehicle, world, size=None)
 
 
 def test_names_that_nothing_bears() -> None:
-    """A slip of the pen is met with the name that was meant."""
+    """Errors suggest the nearest name."""
     with pytest.raises(UnknownName, match=r"No vehicle matches 'tnak'. Did you mean 'tank'"):
         MujocoWorld("tnak", "corridor", size=None)
     with pytest.raises(UnknownName, match=r"No world matches 'yrad'. Did you mean 'yard'"):
@@ -229,7 +229,7 @@ def test_names_that_nothing_bears() -> None:
 
 
 def test_what_is_refused_leaves_the_world_as_it_was() -> None:
-    """A course that there is not, or a camera in the floor, must not leave half a world behind."""
+    """A failed `lay_out` leaves the world unchanged."""
     world = _world()
     model, course, look = world.model, world.course, world.look
     with pytest.raises(WorldError, match="Seeds of courses count from 0"):
@@ -242,7 +242,7 @@ def test_what_is_refused_leaves_the_world_as_it_was() -> None:
 
 
 def test_a_course_that_comes_out_too_tight_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error of whoever lays courses out comes through, and the old course stays."""
+    """An error of the layout propagates and keeps the old course."""
     world = _world()
 
     def too_tight(kind: str, seed: int) -> Course:
@@ -257,7 +257,7 @@ def test_a_course_that_comes_out_too_tight_is_told_of(monkeypatch: pytest.Monkey
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_picture_shows_the_course_and_its_light() -> None:
-    """It is of the size that was asked for, not one colour, and darker with less light."""
+    """Pictures have the requested size and show the look."""
     world = MujocoWorld("car", seed=3, size=(64, 48))
     bright = world.picture()
     assert bright.shape == (48, 64, 3)
@@ -272,7 +272,7 @@ def test_a_picture_shows_the_course_and_its_light() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_a_moved_camera_sees_something_else() -> None:
-    """And the one after it is at its place again."""
+    """A camera error lasts until the next layout."""
     world = MujocoWorld("car", seed=3, size=(64, 48))
     usual = world.picture()
     world.lay_out(3, camera=CameraJitter(yaw_rad=0.05))
@@ -285,7 +285,7 @@ def test_a_moved_camera_sees_something_else() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_lenses_spoil_pictures_and_nothing_else() -> None:
-    """The same seed is the same course, seen through a dark glass."""
+    """Lenses change pictures only."""
     clear = MujocoWorld("car", seed=3, size=(64, 48))
     night = MujocoWorld("car", seed=3, size=(64, 48), lenses=("night", "dirt"))
     assert night.pose == clear.pose

@@ -129,12 +129,14 @@ class RobotSpaces:
         self.has_image = has_camera if image is None else image
         self._has_state = state or not self.has_image
         self._state_layout = Layout.from_json(welcome.state_layout)
+        self._state_size = self._state_layout.size
         self._places: dict[str, int] = {
             name: place.start for name, place in self._state_layout.slices.items()
         }
         self.action_layout = Layout.from_json(welcome.action_layout)
+        self._low, self._high = self.action_layout.low, self.action_layout.high
         self.action_space = gym.spaces.Box(
-            self.action_layout.low.astype(np.float32), self.action_layout.high.astype(np.float32)
+            self._low.astype(np.float32), self._high.astype(np.float32)
         )
         self.observation_layout = self._layout()
         self.observation_space = self._space()
@@ -155,8 +157,7 @@ class RobotSpaces:
                 f"An action of this robot is {len(self.action_layout)} finite numbers "
                 f"({', '.join(self.action_layout.names)}), got {array.tolist()}."
             )
-        clipped = np.clip(array, self.action_layout.low, self.action_layout.high)
-        return tuple(clipped.tolist())
+        return tuple(np.clip(array, self._low, self._high).tolist())
 
     @property
     def rest(self) -> tuple[float, ...]:
@@ -170,8 +171,11 @@ class RobotSpaces:
             message: An observation.
             name: Name of the quantity, such as "speed".
         """
-        value = self._number(message, name)
-        return None if math.isnan(value) or self.source(message, name) == _ABSENT else value
+        place = self._places.get(name)
+        if place is None or message.sources.get(name, _ABSENT) == _ABSENT:
+            return None
+        value = message.state[place]
+        return None if math.isnan(value) else value
 
     def source(self, message: Observation, name: str) -> str:
         """Return the source of a quantity: name of the sensor, "estimated" or "absent".
@@ -180,13 +184,8 @@ class RobotSpaces:
             message: An observation.
             name: Name of the quantity, such as "speed".
         """
-        if math.isnan(self._number(message, name)):
-            return _ABSENT
-        return message.sources.get(name, _ABSENT)
-
-    def _number(self, message: Observation, name: str) -> float:
-        place = self._places.get(name)
-        return math.nan if place is None else message.state[place]
+        is_measured = self.quantity(message, name) is not None
+        return message.sources[name] if is_measured else _ABSENT
 
     def shows(self, received: Received) -> bool:
         """Decode the frame of an observation. Return False if there is none, or it is invalid.
@@ -216,9 +215,9 @@ class RobotSpaces:
             LinkError: If the state does not fit the layout, or there is no picture yet.
         """
         message = received.message
-        if len(message.state) != self._state_layout.size:
+        if len(message.state) != self._state_size:
             raise LinkError(
-                f"The state layout has {self._state_layout.size} numbers, and the robot sent "
+                f"The state layout has {self._state_size} numbers, and the robot sent "
                 f"{len(message.state)}."
             )
         state, absent = self._state(message)

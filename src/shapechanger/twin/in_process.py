@@ -294,9 +294,10 @@ class InProcessRobot:
         guard, board = self._guard, self._board
         if guard is None:
             raise RobotError("This robot is closed.")
-        end_ns = board.now_ns() + ns
-        while board.now_ns() < end_ns:
-            now_ns = min(board.now_ns() + self._tick_ns, end_ns)
+        now_ns = board.now_ns()
+        end_ns = now_ns + ns
+        while now_ns < end_ns:
+            now_ns = min(now_ns + self._tick_ns, end_ns)
             board.advance(now_ns)
             guard.round(now_ns)
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 from shapechanger.errors import UnknownName
 
@@ -79,10 +80,9 @@ def blur(picture: Picture, seed: int) -> Picture:
     variance = (_BLUR * picture.shape[1]) ** 2
     # Two box filters over w = 2 r + 1 pixels have the variance 2 (w^2 - 1) / 12 = 2 (r^2 + r) / 3.
     reach = max(1, round(0.5 * (np.sqrt(6.0 * variance + 1.0) - 1.0)))
-    result = picture.astype(np.float32)
-    for axis in (0, 0, 1, 1):
-        result = _summed(result, reach, axis)
-    result *= np.float32((2 * reach + 1) ** -4)
+    result, size = picture.astype(np.float64), (2 * reach + 1, 2 * reach + 1, 1)
+    for _ in range(2):
+        result = uniform_filter(result, size, mode="nearest")
     return _bytes(result)
 
 
@@ -115,7 +115,7 @@ def find_lens(name: str) -> Lens:
         raise UnknownName("lens", name, LENSES) from None
 
 
-def _bytes(levels: NDArray[np.float32]) -> Picture:
+def _bytes(levels: NDArray[np.floating[Any]]) -> Picture:
     """Levels rounded and clipped to 0 to 255; `levels` is overwritten."""
     levels += 0.5
     return np.clip(levels, 0.0, 255.0, out=levels).astype(np.uint8)
@@ -138,18 +138,6 @@ def _noise(picture: Picture, seed: int) -> NDArray[np.float32]:
     mixed = (int(picture.sum(dtype=np.int64)) * 2_654_435_761 + seed * 40_503) & 0xFFFF_FFFF
     start = mixed % (_STRIP - picture.size)
     return _strip()[start : start + picture.size].reshape(picture.shape)
-
-
-def _summed(picture: NDArray[np.float32], reach: int, axis: int) -> NDArray[np.float32]:
-    """Sum over the pixels up to `reach` away along an axis, with edge pixels repeated outside."""
-    pads = [(0, 0)] * picture.ndim
-    pads[axis] = (reach, reach)
-    padded = np.pad(picture, pads, mode="edge")
-    size = picture.shape[axis]
-    total = np.zeros_like(picture)
-    for shift in range(2 * reach + 1):
-        total += padded[shift : shift + size] if axis == 0 else padded[:, shift : shift + size]
-    return total
 
 
 @functools.lru_cache(_KEPT)

@@ -9,7 +9,7 @@ from typing import Any, Final
 from zlib import crc32
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import UnknownName
 
@@ -39,12 +39,24 @@ def clouds(
 
 
 def grain(rng: np.random.Generator, height: int, width: int) -> Field:
-    """White noise, (height, width), with mean 0 and standard deviation 1."""
+    """White noise, (height, width), with mean 0 and standard deviation 1.
+
+    Args:
+        rng: Random generator.
+        height: Height, pixels.
+        width: Width, pixels.
+    """
     return rng.standard_normal((height, width), np.float32)
 
 
 def blend(ground: Field, colour: tuple[float, float, float], share: Field | float) -> Field:
-    """Paint a colour over `ground`, (H, W, 3), with the opacity `share`, (H, W), 0 to 1."""
+    """Paint a colour over a picture.
+
+    Args:
+        ground: Picture, (H, W, 3).
+        colour: Red, green and blue, 0 to 1.
+        share: Opacity, 0 to 1, (H, W) or a number.
+    """
     over = np.asarray(share, np.float32)[..., None]
     return ground + over * (np.asarray(colour, np.float32) - ground)
 
@@ -68,7 +80,7 @@ _FRAME: Final = (0.24, 0.22, 0.19)
 _STEEL: Final = (0.75, 0.75, 0.72)
 
 
-def _plain(colour: tuple[float, float, float], height: int, width: int) -> Field:
+def _plain(colour: ArrayLike, height: int = _SIZE, width: int = _SIZE) -> Field:
     return np.tile(np.asarray(colour, np.float32), (height, width, 1))
 
 
@@ -76,7 +88,7 @@ def plaster(rng: np.random.Generator) -> Field:
     """Painted wall, 2.4 m high, with a dark skirting board, and sometimes a socket or a notice."""
     height, width = _SIZE, _SIZE
     hue = np.array([0.83, 0.79, 0.62]) + rng.uniform(-0.05, 0.05, 3)
-    image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
+    image = _plain(hue, height, width)
     image *= 1.0 + 0.03 * clouds(rng, height, width, 2, 3)[..., None]
     up = np.linspace(1.0, 0.0, height, dtype=np.float32)[:, None, None]
     image *= 0.86 + 0.14 * up  # Brighter near the lamps.
@@ -108,7 +120,7 @@ def door(rng: np.random.Generator) -> Field:
     """Wooden door in its frame, 2.1 m high, with a handle, a kick plate or a small window."""
     height, width = _TALL, _SIZE
     hue = np.array([0.46, 0.26, 0.12]) * rng.uniform(0.75, 1.25) + rng.uniform(-0.04, 0.04, 3)
-    image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
+    image = _plain(hue, height, width)
     image *= 1.0 + 0.10 * clouds(rng, height, width, 2, 24, 2)[..., None]
     if rng.random() < 0.5:  # Panels.
         for top, bottom in ((0.10, 0.42), (0.52, 0.88)):
@@ -189,7 +201,7 @@ def floor(rng: np.random.Generator) -> Field:
     """Polished concrete, 3 m wide, with blotches and specks."""
     height, width = _TALL, _TALL
     hue = np.array([0.56, 0.54, 0.42]) + rng.uniform(-0.04, 0.04, 3)
-    image = _plain((float(hue[0]), float(hue[1]), float(hue[2])), height, width)
+    image = _plain(hue, height, width)
     image *= 1.0 + 0.10 * clouds(rng, height, width, 5, 5, 4)[..., None]
     image *= 1.0 + 0.05 * grain(rng, height, width)[..., None]
     image *= 1.0 - 0.12 * np.clip(clouds(rng, height, width, 3, 3, 5), 0.0, 2.0)[..., None]
@@ -236,7 +248,7 @@ def fence(rng: np.random.Generator) -> Field:
 def shed(rng: np.random.Generator) -> Field:
     """Painted horizontal boards above a plinth."""
     hue = np.array([(0.50, 0.16, 0.11), (0.25, 0.34, 0.42), (0.42, 0.40, 0.33)][rng.integers(3)])
-    image = np.tile(hue.astype(np.float32), (_SIZE, _SIZE, 1))
+    image = _plain(hue)
     image *= 1.0 + 0.07 * clouds(rng, _SIZE, _SIZE, 40, 3, 2)[..., None]
     image[np.arange(_SIZE) % 16 < 2] *= 0.55
     image[-20:] = (0.34, 0.33, 0.31)
@@ -269,7 +281,7 @@ def rock(rng: np.random.Generator) -> Field:
 
 def asphalt(rng: np.random.Generator) -> Field:
     """Worn asphalt, 3 m wide, with stones, cracks and leaves."""
-    image = np.tile(np.asarray((0.40, 0.39, 0.37), np.float32), (_GROUND, _GROUND, 1))
+    image = _plain((0.40, 0.39, 0.37), _GROUND, _GROUND)
     image *= 1.0 + 0.11 * clouds(rng, _GROUND, _GROUND, 4, 4, 4)[..., None]
     image *= 1.0 + 0.13 * grain(rng, _GROUND, _GROUND)[..., None]
     cracks = np.abs(clouds(rng, _GROUND, _GROUND, 4, 4, 3)) < 0.025
@@ -280,7 +292,7 @@ def asphalt(rng: np.random.Generator) -> Field:
 
 def grass(rng: np.random.Generator) -> Field:
     """Short grass with bare patches."""
-    image = np.tile(np.asarray((0.30, 0.42, 0.15), np.float32), (_SIZE, _SIZE, 1))
+    image = _plain((0.30, 0.42, 0.15))
     image *= 1.0 + 0.22 * clouds(rng, _SIZE, _SIZE, 40, 40, 2)[..., None]
     bare = np.clip(clouds(rng, _SIZE, _SIZE, 3, 3, 3) - 0.6, 0.0, 1.0)
     return blend(image, (0.42, 0.36, 0.22), bare * 0.7)
@@ -359,19 +371,19 @@ CELLS: Final[Mapping[str, int]] = MappingProxyType({name: i for i, name in enume
 """Index of each cell in the obstacles' texture, row by row from the top left."""
 
 
-def stuffs(rng: np.random.Generator) -> Field:
+def things(rng: np.random.Generator) -> Field:
     """Texture of all obstacles, with one cell for each material, (256, 256, 3)."""
     image = np.zeros((ROWS * _CELL, ROWS * _CELL, 3), np.float32)
     for name, colour in _COLOURS.items():
         row, column = divmod(CELLS[name], ROWS)
         cell = image[row * _CELL : (row + 1) * _CELL, column * _CELL : (column + 1) * _CELL]
-        cell[:] = _cell(name, np.asarray(colour, np.float32), rng)
+        cell[:] = _cell(name, colour, rng)
     return image
 
 
-def _cell(name: str, colour: Field, rng: np.random.Generator) -> Field:
+def _cell(name: str, colour: ArrayLike, rng: np.random.Generator) -> Field:
     """One cell, (64, 64, 3)."""
-    cell = np.tile(colour, (_CELL, _CELL, 1))
+    cell = _plain(colour, _CELL, _CELL)
     if name == "lamp":
         return cell
     cell *= 1.0 + rng.uniform(-0.1, 0.1, 3).astype(np.float32)
@@ -408,25 +420,28 @@ def _cell(name: str, colour: Field, rng: np.random.Generator) -> Field:
 
 PAINTERS: Final[Mapping[str, Callable[[np.random.Generator], Field]]] = MappingProxyType(
     {
-        "plaster": plaster,
-        "panel": panel,
-        "door": door,
-        "window": window,
-        "brick": brick,
-        "board": board,
-        "glass": glass,
-        "floor": floor,
-        "ceiling": ceiling,
-        "hedge": hedge,
-        "fence": fence,
-        "shed": shed,
-        "quay": quay,
-        "rock": rock,
-        "asphalt": asphalt,
-        "grass": grass,
-        "water": water,
-        "sky": sky,
-        "things": stuffs,
+        painter.__name__: painter
+        for painter in (
+            plaster,
+            panel,
+            door,
+            window,
+            brick,
+            board,
+            glass,
+            floor,
+            ceiling,
+            hedge,
+            fence,
+            shed,
+            quay,
+            rock,
+            asphalt,
+            grass,
+            water,
+            sky,
+            things,
+        )
     }
 )
 """Painters of the textures by name."""

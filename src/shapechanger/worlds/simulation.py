@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Final
 
@@ -12,12 +12,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.vehicles import SIM_DT, PlanarPose, add_vehicle, vehicle_model
+from shapechanger.bodies.vehicles import SIM_DT, Motion, add_vehicle, vehicle_model
 from shapechanger.errors import WorldError
 from shapechanger.worlds.camera import CameraJitter, OnboardCamera, move_camera
 from shapechanger.worlds.course import HOME, Course, require_element
 from shapechanger.worlds.expert.line import CourseProgress
-from shapechanger.worlds.expert.path import CoursePath, plan_path_for
+from shapechanger.worlds.expert.path import CoursePath, plan_path
 from shapechanger.worlds.expert.traits import traits_of
 from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.lens import find_lens
@@ -112,12 +112,12 @@ class MujocoWorld:
     @property
     def progress_m(self) -> float:
         """Distance along the course since the vehicle was placed, m; backwards counts down."""
-        return self._progress.update(*self._bound.pose()[:2])
+        return self._progress.update(*self._motion[:2])
 
     @property
     def pose(self) -> Pose:
         """Pose of the vehicle."""
-        return Pose(*self._bound.pose())
+        return Pose(*self._motion[:3])
 
     def lay_out(
         self, seed: int, look: Look | None = None, camera: CameraJitter | None = None
@@ -181,7 +181,7 @@ class MujocoWorld:
         Raises:
             WorldError: If there is no path around the course for this vehicle.
         """
-        path, here = self.path(), self._bound.pose()
+        path, here = self.path(), self._motion
         i = path.index(path.nearest(here.x, here.y).station)
         x, y = path.points[i]
         self._rest_at(Pose(float(x), float(y), float(path.heading[i])))
@@ -208,7 +208,7 @@ class MujocoWorld:
         if steps:
             self._rest_s -= steps * SIM_DT
             self._step(outputs, steps)
-        x, y, _ = self._bound.pose()
+        x, y = self._motion[:2]
         before_x, before_y = self._updated_at
         if math.hypot(x - before_x, y - before_y) > _PROGRESS_M:
             self._updated_at = x, y
@@ -216,22 +216,22 @@ class MujocoWorld:
 
     def inputs(self) -> Readings:
         """Quantities that sensors measure; see `World.inputs`."""
-        bound = self._bound
+        x, y, heading, speed, _, yaw_rate = self._motion
         return Readings(
-            pose=self.pose,
-            speed=bound.speed(),
+            pose=Pose(x, y, heading),
+            speed=speed,
             travelled_m=self._travelled_m,
             acceleration_x=self._acceleration[0],
             acceleration_y=self._acceleration[1],
-            yaw_rate=bound.yaw_rate(),
+            yaw_rate=yaw_rate,
             bumped=self._contacts.bumped,
-            battery_v=self._battery_v,
+            battery_v=self.resting_v - _INNER_OHM * self._current_a,
             current_a=self._current_a,
         )
 
     def distance_m(self) -> float:
         """Distance by the shortest of three rays; see `World.distance_m`."""
-        pose = self._bound.pose()
+        pose = self._motion
         height = 0.5 * self.vehicle.camera.z
         start = np.array((pose.x, pose.y, height))
         hit = np.zeros(1, np.int32)
@@ -258,7 +258,7 @@ class MujocoWorld:
         Returns:
             Distances, m, (n,).
         """
-        pose, nose = self._bound.pose(), self.vehicle.nose_m
+        pose, nose = self._motion, self.vehicle.nose_m
         start = np.array(
             (
                 pose.x + nose * math.cos(pose.heading),
@@ -309,25 +309,21 @@ class MujocoWorld:
         mujoco.mj_resetData(self.model, self.data)
         self._bound.place(pose.x, pose.y, pose.heading)
         mujoco.mj_forward(self.model, self.data)
+        self._motion = self._bound.motion()
         self._rest_s = 0.0
-        self._speed = 0.0
         self._acceleration = (0.0, 0.0)
         self._rolled_m = self._bound.travelled_m()
         self._current_a = _IDLE_A
 
-    @property
-    def _battery_v(self) -> float:
-        return self.resting_v - _INNER_OHM * self._current_a
-
     def _step(self, outputs: Mapping[str, float | None], steps: int) -> None:
         """Take simulation steps with the same outputs and the same voltage of the battery."""
         bound, dt_s = self._bound, steps * SIM_DT
-        bound.drive(outputs, self._battery_v)
+        bound.drive(outputs, self.resting_v - _INNER_OHM * self._current_a)
         mujoco.mj_step(self.model, self.data, nstep=steps)
-        self._contacts.follow(self.data, bound.pose, dt_s)
-        speed = bound.speed()
-        self._acceleration = ((speed - self._speed) / dt_s, speed * bound.yaw_rate())
-        self._speed = speed
+        before, now = self._motion, bound.motion()
+        self._motion = now
+        self._contacts.follow(self.data, now, dt_s)
+        self._acceleration = ((now.speed - before.speed) / dt_s, now.speed * now.yaw_rate)
         rolled_m = bound.travelled_m()
         self._travelled_m += rolled_m - self._rolled_m
         self._rolled_m = rolled_m
@@ -347,7 +343,10 @@ def _compiled(vehicle: str, world: str, seed: int, look: Look) -> tuple[Course, 
 @lru_cache(maxsize=_KEPT_COURSES)
 def _planned(vehicle: str, world: str, seed: int) -> CoursePath:
     """Return a path around a course for a vehicle."""
-    return plan_path_for(lay_out(world, seed), traits_of(vehicle))
+    traits = traits_of(vehicle)
+    return plan_path(
+        lay_out(world, seed), traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m
+    )
 
 
 class ContactTracker:
@@ -379,12 +378,12 @@ class ContactTracker:
         self.bumped = self.touches = False
         self._since_s = math.inf
 
-    def follow(self, data: mujoco.MjData, pose: Callable[[], PlanarPose], dt_s: float) -> None:
+    def follow(self, data: mujoco.MjData, motion: Motion, dt_s: float) -> None:
         """Update from the contacts of a simulation step.
 
         Args:
             data: State after the step.
-            pose: Returns the pose of the vehicle.
+            motion: Pose of the vehicle.
             dt_s: Length of the step, s.
         """
         self._since_s += dt_s
@@ -403,7 +402,6 @@ class ContactTracker:
         if self._since_s > APART_S:
             self.collisions += 1
         self._since_s = 0.0
-        here = pose()
         for x, y, _ in data.contact.pos[hits]:
-            bearing = math.atan2(y - here.y, x - here.x) - here.heading
+            bearing = math.atan2(y - motion.y, x - motion.x) - motion.heading
             self.bumped |= abs(math.remainder(bearing, math.tau)) <= BUMPER_SPREAD

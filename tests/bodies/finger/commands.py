@@ -1,4 +1,4 @@
-"""Fingers and commands that several tests drive them with."""
+"""Fingers and commands for several tests."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def made(
 
 
 def at_rest(model: mujoco.MjModel, parameters: FingerParameters = NOMINAL) -> mujoco.MjData:
-    """A state in the posture of a hand at rest, with every tendon just taut."""
+    """Return a state in the resting posture with taut tendons."""
     data = mujoco.MjData(model)
     data.qpos[: len(JOINTS)] = JOINT_REST
     if parameters.gives:
@@ -46,7 +46,7 @@ def at_rest(model: mujoco.MjModel, parameters: FingerParameters = NOMINAL) -> mu
 
 
 def harsh_commands(rng: np.random.Generator) -> Iterator[tuple[str, np.ndarray]]:
-    """Names and commands, each (n, 7) and 20 ms long: what nobody should ask for, and may."""
+    """Return extreme commands by name, each (n, 7) for steps of 20 ms."""
     yield "random", rng.uniform(-1.0, 1.0, (50, 7))
     yield "bang-bang", rng.choice([-1.0, 1.0], (50, 7))
     yield "bang-bang, slower", np.repeat(rng.choice([-1.0, 1.0], (5, 7)), 10, axis=0)

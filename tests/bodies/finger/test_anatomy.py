@@ -1,4 +1,4 @@
-"""That the numbers of the finger follow from where they are said to be from."""
+"""The constants of the finger agree with their sources."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FDS, _DI = 1, 5
 
 
 def test_moment_arms_follow_from_what_was_measured_at_a_fingertip() -> None:
-    """To the rounding of the table, with the posture that the table is said to assume."""
+    """Moment arms follow from the measured fingertip forces."""
     aside, along, across, torque = map(np.array, (_ASIDE, _ALONG, _ACROSS, _TORQUE))
     # Two tendons have no arm at the end joint: that tells where the joint is, seen from the tip.
     y = torque[_DI] / across[_DI]
@@ -41,5 +41,5 @@ def test_moment_arms_follow_from_what_was_measured_at_a_fingertip() -> None:
 
 
 def test_no_tendon_is_pulled_harder_than_its_muscle_can() -> None:
-    """And none with more than 30 % of that."""
+    """Tension limits are at most 30 % of the muscles' force."""
     assert (MOST_TENSION_N <= 0.3 * FORCE_POTENTIAL_N + 1e-12).all()

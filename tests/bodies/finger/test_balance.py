@@ -1,4 +1,4 @@
-"""What tendons that only pull can hold, and with how little."""
+"""Tensions that balance a torque."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MICRO = 1e-6
 
 
 def test_the_tendons_of_a_finger_give_every_torque() -> None:
-    """Without a tendon that pushes; and any torque is theirs, up to scale, by adding to all."""
+    """Non-negative tensions of the finger span all torques."""
     assert spans_all_torques(MOMENT_ARMS)
     for j in range(len(JOINTS)):
         for sign in (1.0, -1.0):
@@ -29,7 +29,7 @@ def test_the_tendons_of_a_finger_give_every_torque() -> None:
 
 
 def test_co_contraction_moves_nothing() -> None:
-    """Every tendon pulls, the weakest with 1, and no joint feels it."""
+    """Co-contraction has no torque and a smallest tension of 1."""
     tensions = co_contraction(MOMENT_ARMS)
     assert tensions is not None
     assert tensions.min() == pytest.approx(1.0)
@@ -37,7 +37,7 @@ def test_co_contraction_moves_nothing() -> None:
 
 
 def test_which_tendons_a_finger_cannot_do_without() -> None:
-    """Nothing else flexes as the two flexors do, or pulls to the ulnar side as the PI does."""
+    """Without FDP, FDS or PI, some torques are out of reach; the other tendons are redundant."""
     needed = [
         name
         for i, name in enumerate(TENDONS)
@@ -47,7 +47,7 @@ def test_which_tendons_a_finger_cannot_do_without() -> None:
 
 
 def test_arms_that_do_not_span_are_refused() -> None:
-    """Flexors alone; a joint that no tendon passes; and no arms at all."""
+    """Arms that do not span all torques are detected."""
     assert not spans_all_torques(np.abs(MOMENT_ARMS))
     assert co_contraction(np.abs(MOMENT_ARMS)) is None
     numb = MOMENT_ARMS.copy()
@@ -72,7 +72,7 @@ def test_arms_that_do_not_span_are_refused() -> None:
 
 @given(seed=st.integers(0, 10_000))
 def test_spanning_is_what_it_says(seed: int) -> None:
-    """For any arms, where they span every torque is a sum of pulls, and elsewhere one is not."""
+    """`spans_all_torques` agrees with solving for random torques."""
     rng = np.random.default_rng(seed)
     arms = MOMENT_ARMS * (1.0 + rng.uniform(-0.8, 0.8, MOMENT_ARMS.shape))
     directions = np.concatenate([np.eye(4), -np.eye(4)]) * 1e-3
@@ -84,7 +84,7 @@ def test_spanning_is_what_it_says(seed: int) -> None:
 
 
 def _problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Arms, torque and bounds: half of the torques come of tensions within the bounds."""
+    """Draw arms, a torque and bounds; half of the torques are feasible."""
     rng = np.random.default_rng(seed)
     arms = MOMENT_ARMS * (1.0 + rng.uniform(-0.3, 0.3, MOMENT_ARMS.shape))
     low = rng.uniform(0.0, 2.0, 7)
@@ -97,7 +97,7 @@ def _problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 @pytest.mark.parametrize("seed", range(40))
 def test_tensions_stay_within_bounds_and_say_whether_they_are_enough(seed: int) -> None:
-    """To a micronewton-metre; and where they are not enough, none would be nearer."""
+    """Tensions keep to the bounds, and the flag tells whether they give the torque."""
     arms, torque, low, high = _problem(seed)
     tensions, is_enough = tensions_for_torque(arms, torque, low, high)
     assert (tensions >= low - 1e-9).all()
@@ -113,7 +113,7 @@ def test_tensions_stay_within_bounds_and_say_whether_they_are_enough(seed: int) 
 
 @pytest.mark.parametrize("seed", range(0, 40, 2))
 def test_no_other_tensions_hold_it_with_less(seed: int) -> None:
-    """Among those that give the torque: what scipy finds weighs no less, from any weight on it."""
+    """No other solution has less co-contraction."""
     arms, torque, low, high = _problem(seed)
     tensions, _ = tensions_for_torque(arms, torque, low, high)
     matrix = np.concatenate([1e5 * arms.T, 1e-2 * np.eye(7)])
@@ -124,7 +124,7 @@ def test_no_other_tensions_hold_it_with_less(seed: int) -> None:
 
 
 def test_nothing_asked_is_nothing_given() -> None:
-    """The torque of the least tensions takes the least tensions."""
+    """The torque of the smallest tensions gives the smallest tensions."""
     least = np.full(7, LEAST_TENSION_N)
     tensions, is_enough = tensions_for_torque(
         MOMENT_ARMS, MOMENT_ARMS.T @ least, LEAST_TENSION_N, MOST_TENSION_N
@@ -134,7 +134,7 @@ def test_nothing_asked_is_nothing_given() -> None:
 
 
 def test_too_much_is_not_enough() -> None:
-    """A torque that no finger has."""
+    """An impossible torque is reported."""
     tensions, is_enough = tensions_for_torque(
         MOMENT_ARMS, [5.0, 0.0, 0.0, 0.0], LEAST_TENSION_N, MOST_TENSION_N
     )

@@ -1,4 +1,4 @@
-"""What a command means in each mode."""
+"""Tendon drives of the modes of action."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _REST = -MOMENT_ARMS @ JOINT_REST
 
 @pytest.mark.parametrize("mode", DRIVES)
 def test_a_command_asks_for_the_tension_that_asked_for_it(mode: str) -> None:
-    """`command` undoes `tension`, at any length and speed; more command is more tension."""
+    """`command` inverts `tension`, and tension grows with the command."""
     rng = np.random.default_rng(0)
     drive = drive_of(mode, NOMINAL)
     command, length, speed = rng.uniform(-1, 1, (3, 7)) * [[1.0], [0.01], [0.2]]
@@ -32,14 +32,14 @@ def test_a_command_asks_for_the_tension_that_asked_for_it(mode: str) -> None:
 
 @pytest.mark.parametrize("mode", ["tension", "impedance"])
 def test_a_tension_goes_from_its_least_to_its_most(mode: str) -> None:
-    """At the length of rest, whichever of the two it is."""
+    """At rest length, commands span the range of tensions."""
     drive = drive_of(mode, NOMINAL)
     np.testing.assert_allclose(drive.tension(-np.ones(7), _REST, _STILL), LEAST_TENSION_N)
     np.testing.assert_allclose(drive.tension(np.ones(7), _REST, _STILL), MOST_TENSION_N)
 
 
 def test_a_muscle_resists_being_stretched() -> None:
-    """By 3 N for a centimetre, and by its speed; a commanded tension does not."""
+    """Impedance adds stiffness and damping; tension does not."""
     longer = _REST + 0.01
     muscle, plain = drive_of("impedance", NOMINAL), drive_of("tension", NOMINAL)
     more = muscle.tension(_STILL, longer, _STILL) - muscle.tension(_STILL, _REST, _STILL)
@@ -51,7 +51,7 @@ def test_a_muscle_resists_being_stretched() -> None:
 
 
 def test_lengths_go_from_the_longest_to_the_shortest() -> None:
-    """At -1 no posture has a pull; at 1 every posture has the full one."""
+    """Length commands span all postures."""
     drive = drive_of("length", NOMINAL)
     rng = np.random.default_rng(0)
     for angles in rng.uniform(JOINT_RANGE[:, 0], JOINT_RANGE[:, 1], (50, 4)):
@@ -61,6 +61,6 @@ def test_lengths_go_from_the_longest_to_the_shortest() -> None:
 
 
 def test_a_mode_that_there_is_not_is_named() -> None:
-    """With the nearest spelling, and those that exist."""
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"'tensions'. Did you mean 'tension'\? There are: imped"):
         drive_of("tensions", NOMINAL)

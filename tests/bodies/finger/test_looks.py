@@ -1,4 +1,4 @@
-"""The anatomy that is shown: where it should be, and of no weight."""
+"""Visual anatomy of the finger."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.bodies.finger.commands import STRETCHED, at_rest, made, modes
 @pytest.mark.parametrize("mode", modes())
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
 def test_what_is_shown_moves_nothing(parameters: FingerParameters, mode: str) -> None:
-    """Bit by bit: angles, speeds and tensions are those of the finger without it."""
+    """Anatomy does not change the simulation."""
     found = []
     for anatomy in (False, True):
         model = made(parameters, mode, anatomy=anatomy)
@@ -39,7 +39,7 @@ def test_what_is_shown_moves_nothing(parameters: FingerParameters, mode: str) ->
 
 
 def test_what_is_not_drawn_is_not_there() -> None:
-    """No spatial tendon, no site and no geom more than the finger needs."""
+    """Without anatomy, the model has no visual elements."""
     plain, shown = made(), made(anatomy=True)
     assert (plain.ntendon, plain.nsite, plain.ngeom, plain.ntex) == (7, 1, 5, 0)
     assert (plain.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT).all()
@@ -48,14 +48,14 @@ def test_what_is_not_drawn_is_not_there() -> None:
 
 
 def _site(model: mujoco.MjModel, data: mujoco.MjData, body: str, at: int) -> np.ndarray:
-    """The point `at` (first 0, last -1) of a spatial tendon, in the axes of a body, m."""
+    """Return point `at` of a spatial tendon in the frame of a body, m."""
     world = data.site_xpos[at]
     k = model.body(body).id
     return data.xmat[k].reshape(3, 3).T @ (world - data.xpos[k])
 
 
 def _stops(model: mujoco.MjModel, course: str) -> list[tuple[str, int]]:
-    """Body and number of each site that a course passes, from the wrist on."""
+    """Return body and number of each site of a route, from the wrist on."""
     tendon = model.tendon(course).id
     start, n = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
     return [
@@ -80,7 +80,7 @@ def _stops(model: mujoco.MjModel, course: str) -> list[tuple[str, int]]:
     ],
 )
 def test_each_tendon_ends_at_its_bone(tendon: str, ends_at: str) -> None:
-    """And begins in the hand, and passes the bones in their order."""
+    """Routes start in the hand, pass the bones in order and end at the insertion."""
     model = made(anatomy=True)
     order = ["hand", "proximal", "middle", "distal"]
     for course in route_names(tendon):
@@ -91,7 +91,7 @@ def test_each_tendon_ends_at_its_bone(tendon: str, ends_at: str) -> None:
 
 
 def _places(tendon: str, body: str) -> np.ndarray:
-    """Where the courses of a tendon pass a bone of the straight finger, in its axes, m, (n, 3)."""
+    """Return the points of a tendon's routes on a bone, in its frame, m, (n, 3)."""
     model = made(anatomy=True)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -106,7 +106,7 @@ def _places(tendon: str, body: str) -> np.ndarray:
 
 
 def test_tendons_run_where_anatomy_has_them() -> None:
-    """Flexors below the bones, extensors above, the interossei and the lumbrical at their sides."""
+    """Flexors are palmar, extensors dorsal, and intrinsic tendons lateral."""
     for tendon, side in itertools.product(("FDP", "FDS"), ("hand", "proximal", "middle")):
         assert (_places(tendon, side)[:, 2] < -0.002).all()
     for tendon, side in itertools.product(("EIP", "EDC"), ("hand", "proximal", "middle", "distal")):
@@ -124,7 +124,7 @@ def test_tendons_run_where_anatomy_has_them() -> None:
 
 
 def test_what_is_shown_pulls_as_what_moves() -> None:
-    """In mid-range each course shortens where its fixed tendon does, of arms above 2.5 mm."""
+    """Routes shorten with their fixed tendons, for arms above 2.5 mm."""
     model = made(anatomy=True)
     data = mujoco.MjData(model)
     arms = []
@@ -146,7 +146,7 @@ def test_what_is_shown_pulls_as_what_moves() -> None:
 
 
 def test_no_tendon_is_cut_short_or_thrown_by_any_posture() -> None:
-    """Over all corners of the joints' ranges lengths stay within some centimetres."""
+    """Route lengths stay bounded at all joint limits."""
     model = made(anatomy=True)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -159,7 +159,7 @@ def test_no_tendon_is_cut_short_or_thrown_by_any_posture() -> None:
 
 
 def test_each_tendon_has_a_colour_of_its_own() -> None:
-    """Also for those who see no difference between red and green: lightness or blue differs."""
+    """Tendon colours are distinct, also for the colour-blind."""
     assert tuple(TENDON_COLOURS) == TENDONS
     # As deuteranopes see them: red and green become one, weighted as Viénot et al. 1999 do.
     seen = [(0.29 * r + 0.71 * g, b) for r, g, b in TENDON_COLOURS.values()]
@@ -168,7 +168,7 @@ def test_each_tendon_has_a_colour_of_its_own() -> None:
 
 
 def test_a_figure_takes_the_posture_it_is_shown_in() -> None:
-    """With its tendons as thick as they are pulled, and the target in its place."""
+    """`show` sets posture, tendon widths and target."""
     figure = FingerFigure()
     pulled = np.linspace(0.0, 1.2, 7)
     figure.show(JOINT_REST, pulled, np.array([0.05, 0.01, -0.04]))

@@ -1,4 +1,4 @@
-"""The finger's model: what each tendon does, and that nothing it is told throws it."""
+"""The MuJoCo model of the finger."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _ANATOMY = {
 def test_each_tendon_moves_the_joints_as_anatomy_says(
     parameters: FingerParameters, tendon: str
 ) -> None:
-    """Pulled alone for 0.08 s from the posture of rest, without weight, by a degree and more."""
+    """Each tendon moves its joints in the anatomical direction."""
     model = made(parameters)
     model.opt.gravity[:] = 0.0
     ends = {}
@@ -58,7 +58,7 @@ def test_each_tendon_moves_the_joints_as_anatomy_says(
 
 @pytest.mark.parametrize("tendon", TENDONS)
 def test_a_newton_of_tension_is_its_moment_arms_in_torque(tendon: str) -> None:
-    """MuJoCo's torque about each joint is minus the length's change with the angle: the arm."""
+    """MuJoCo's torque per newton is the moment arm."""
     model = made()
     data = at_rest(model)
     i = TENDONS.index(tendon)
@@ -73,7 +73,7 @@ def test_a_newton_of_tension_is_its_moment_arms_in_torque(tendon: str) -> None:
 @pytest.mark.parametrize("mode", modes())
 @pytest.mark.parametrize("finger", ["nominal", "stretched", *GAPS])
 def test_nothing_diverges_whatever_is_commanded(finger: str, mode: str) -> None:
-    """No warning, no joint far beyond its stop, no tendon that pushes or pulls too hard."""
+    """Extreme commands keep the simulation stable and within limits."""
     parameters = {"nominal": NOMINAL, "stretched": STRETCHED}.get(finger)
     if parameters is None:
         parameters = GAPS[finger].draw(np.random.default_rng(3))
@@ -102,7 +102,7 @@ def test_nothing_diverges_whatever_is_commanded(finger: str, mode: str) -> None:
 
 
 def test_commands_beyond_their_range_are_those_at_its_end() -> None:
-    """A motor that is told 100 gives what it has."""
+    """Commands are clipped to their range."""
     model = made()
     ends = []
     for command in (1.0, 100.0):
@@ -114,7 +114,7 @@ def test_commands_beyond_their_range_are_those_at_its_end() -> None:
 
 
 def test_a_stretched_tendon_is_slack_until_the_backlash_is_wound_up() -> None:
-    """Spools that turn by less than it move nothing."""
+    """Within the backlash, motors do not move the finger."""
     parameters = STRETCHED.replace(backlash=2e-3)
     model = made(parameters)
     data = at_rest(model, parameters)
@@ -129,7 +129,7 @@ def test_a_stretched_tendon_is_slack_until_the_backlash_is_wound_up() -> None:
 
 
 def test_lengths_are_those_beyond_the_straight_finger() -> None:
-    """0 when straight; flexion shortens flexors by their arms and lengthens extensors."""
+    """Lengths are relative to the straight finger."""
     model = made()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -140,7 +140,7 @@ def test_lengths_are_those_beyond_the_straight_finger() -> None:
 
 
 def test_the_finger_has_the_size_and_weight_of_one() -> None:
-    """9 cm from knuckle to tip, and some 25 g."""
+    """The finger is about 9 cm long and weighs about 25 g."""
     model = made()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -151,7 +151,7 @@ def test_the_finger_has_the_size_and_weight_of_one() -> None:
 
 
 def test_a_command_acts_after_its_delay() -> None:
-    """Nothing before, and then as without a delay."""
+    """A delayed command acts later, and otherwise equally."""
     late = NOMINAL.replace(command_delay=0.030)
     tensions = []
     for parameters in (NOMINAL, late):

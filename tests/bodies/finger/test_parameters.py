@@ -1,4 +1,4 @@
-"""The numbers of a finger: what they may be, and that they survive being written down."""
+"""Validation and JSON of finger parameters."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tests.bodies.finger.commands import STRETCHED
 
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["nominal", "stretched"])
 def test_parameters_survive_json(parameters: FingerParameters) -> None:
-    """To the last bit, as text and as bytes."""
+    """JSON round trips are exact, as text and bytes."""
     text = parameters.to_json()
     assert FingerParameters.from_json(text) == parameters
     assert FingerParameters.from_json(text.encode()) == parameters
 
 
 def test_what_is_left_out_is_nominal() -> None:
-    """In Python and in JSON."""
+    """Omitted parameters are nominal, in Python and in JSON."""
     changed = NOMINAL.replace(tendon_friction=1.0)
     assert changed != NOMINAL
     assert FingerParameters(tendon_friction=1.0) == changed
@@ -34,7 +34,7 @@ def test_what_is_left_out_is_nominal() -> None:
 
 
 def test_arms_are_a_copy() -> None:
-    """Whoever changes them changes no finger."""
+    """Changing `arms` does not change the parameters."""
     NOMINAL.arms[:] = 0.0
     np.testing.assert_array_equal(NOMINAL.arms, MOMENT_ARMS)
 
@@ -59,7 +59,7 @@ def test_arms_are_a_copy() -> None:
     ],
 )
 def test_numbers_that_no_finger_has_are_refused(changes: dict[str, Any], sentence: str) -> None:
-    """By name, with what must be."""
+    """Invalid numbers are refused by name."""
     with pytest.raises(FingerError, match=sentence):
         NOMINAL.replace(**changes)
 
@@ -76,6 +76,6 @@ def test_numbers_that_no_finger_has_are_refused(changes: dict[str, Any], sentenc
     ],
 )
 def test_json_that_is_no_finger_is_refused(text: str | bytes, sentence: str) -> None:
-    """In one sentence, whatever is wrong with it."""
+    """Invalid JSON raises FingerError."""
     with pytest.raises(FingerError, match=sentence):
         FingerParameters.from_json(text)

@@ -1,4 +1,4 @@
-"""Even ground, still water and a wall, for vehicles to drive on and into."""
+"""Ground, water and a wall to test vehicles on."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import mujoco
 
 from shapechanger.bodies.vehicles import BoundVehicle, VehicleModel, add_vehicle
+from shapechanger.bodies.vehicles.parts import BATTERY_V
 
 LAND = ("car", "tank", "truck")
 ALL = (*LAND, "boat")
@@ -29,13 +30,13 @@ TO_THE_LEFT: Mapping[str, Mapping[str, float]] = {
 
 
 def scaled(outputs: Mapping[str, float], factor: float) -> dict[str, float]:
-    """The same outputs with other values."""
+    """Return the outputs, scaled."""
     return {part: factor * value for part, value in outputs.items()}
 
 
 @dataclass
 class Ground:
-    """A vehicle on even ground, or in water.
+    """A vehicle on flat ground or in water.
 
     Attributes:
         kind: What kind it is.
@@ -52,27 +53,27 @@ class Ground:
     def drive(
         self, seconds: float, outputs: Mapping[str, float | None], battery_v: float | None = None
     ) -> None:
-        """Let time go by with these outputs."""
-        volts = self.kind.battery_v if battery_v is None else battery_v
+        """Simulate with constant outputs."""
+        volts = BATTERY_V if battery_v is None else battery_v
         for _ in range(round(seconds / self.model.opt.timestep)):
             self.vehicle.drive(outputs, volts)
             mujoco.mj_step(self.model, self.data)
 
     def pace(self) -> float:
-        """Speed in whatever direction, m/s."""
-        return math.hypot(self.vehicle.speed(), self.vehicle.lateral_speed())
+        """Speed over ground, m/s."""
+        return math.hypot(self.vehicle.motion().speed, self.vehicle.motion().lateral_speed)
 
     def uprightness(self) -> float:
         """Cosine of the angle between the vehicle's upright axis and the world's."""
         return float(self.data.body("vehicle/chassis").xmat[8])
 
     def height(self) -> float:
-        """Of the origin above the ground, m."""
+        """Height of the origin above the ground, m."""
         return float(self.data.body("vehicle/chassis").xpos[2])
 
 
 def ground(name: str, *, wall_x: float | None = None, friction: float = 1.0) -> Ground:
-    """The vehicle at the origin, with a wall across the x axis if asked for."""
+    """Return a vehicle at the origin, with an optional wall across the x axis."""
     spec = mujoco.MjSpec()
     spec.worldbody.add_geom(
         name="world/ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[50.0, 50.0, 0.1],

@@ -1,4 +1,4 @@
-"""What all four vehicles promise: how they stand, go, turn, stop and bump."""
+"""Properties of all four vehicles."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 
 from shapechanger.bodies.vehicles import SIM_DT, VEHICLES
+from shapechanger.bodies.vehicles.parts import BATTERY_V
 from tests.bodies.vehicles.grounds import AHEAD, ALL, LAND, TO_THE_LEFT, ground, scaled
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_it_stands_still_at_rest(name: str) -> None:
-    """No creeping, no trembling: a tenth of a millimetre in ten seconds."""
+    """A vehicle at rest creeps by less than 0.1 mm in ten seconds."""
     here = ground(name)
     here.drive(1.0, {})
-    before = here.vehicle.pose()
+    before = here.vehicle.motion()
     here.drive(10.0, {})
-    after = here.vehicle.pose()
+    after = here.vehicle.motion()
     assert math.hypot(after.x - before.x, after.y - before.y) < 1e-4
     assert abs(after.heading - before.heading) < 1e-4
     assert abs(here.height()) < 1e-3
@@ -28,39 +29,39 @@ def test_it_stands_still_at_rest(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_top_speed_is_as_declared(name: str) -> None:
-    """Straight on, and the encoder or the log agrees with the way that it went."""
+    """The top speed is as declared, and the odometer agrees."""
     here = ground(name)
     here.drive(6.0, AHEAD[name])
-    assert here.vehicle.speed() == pytest.approx(here.kind.top_speed_mps, rel=0.1)
-    pose = here.vehicle.pose()
+    assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps, rel=0.1)
+    pose = here.vehicle.motion()
     assert abs(pose.y) < 0.02
     assert here.vehicle.travelled_m() == pytest.approx(pose.x, rel=0.03)
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_less_voltage_is_less_speed(name: str) -> None:
-    """A battery that runs low shows."""
+    """Speed falls with the voltage."""
     here = ground(name)
-    here.drive(5.0, AHEAD[name], battery_v=0.8 * here.kind.battery_v)
-    assert 0.6 < here.vehicle.speed() / here.kind.top_speed_mps < 0.9
+    here.drive(5.0, AHEAD[name], battery_v=0.8 * BATTERY_V)
+    assert 0.6 < here.vehicle.motion().speed / here.kind.top_speed_mps < 0.9
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_backwards_counts_down(name: str) -> None:
-    """Speed and distance have signs."""
+    """Speed and distance are negative backwards."""
     here = ground(name)
     here.drive(2.0, scaled(AHEAD[name], -0.5))
-    assert here.vehicle.speed() < -0.05
+    assert here.vehicle.motion().speed < -0.05
     assert here.vehicle.travelled_m() < -0.03
-    assert here.vehicle.pose().x < -0.03
+    assert here.vehicle.motion().x < -0.03
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_left_is_counter_clockwise(name: str) -> None:
-    """And the mirror image turns the other way just as fast."""
+    """Left turns are positive, and right turns mirror them."""
     here = ground(name)
     here.drive(3.0, TO_THE_LEFT[name])
-    left = here.vehicle.yaw_rate()
+    left = here.vehicle.motion().yaw_rate
     assert left > 0.1
     mirrored = dict(TO_THE_LEFT[name])
     for part in ("steering", "rudder"):
@@ -70,13 +71,13 @@ def test_left_is_counter_clockwise(name: str) -> None:
         mirrored = scaled(mirrored, -1.0)
     here.vehicle.place(0.0, 0.0, 0.0)
     here.drive(3.0, mirrored)
-    assert here.vehicle.yaw_rate() == pytest.approx(-left, rel=0.02)
+    assert here.vehicle.motion().yaw_rate == pytest.approx(-left, rel=0.02)
 
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("value", [0.03, -0.05])
 def test_a_small_value_moves_nothing(name: str, value: float) -> None:
-    """Friction in the gear holds it: less than a millimetre a second."""
+    """Outputs within the dead band do not move a vehicle."""
     here = ground(name)
     here.drive(2.0, scaled(AHEAD[name], value))
     assert here.pace() < 1e-3
@@ -86,15 +87,15 @@ def test_a_small_value_moves_nothing(name: str, value: float) -> None:
 
 @pytest.mark.parametrize("name", LAND)
 def test_zero_brakes_on_land(name: str) -> None:
-    """The shorted motor brakes; without a connection it coasts further."""
+    """A shorted motor brakes more than an open one."""
     here = ground(name)
     ways: list[float] = []
     for value in (0.0, None):
         here.vehicle.place(0.0, 0.0, 0.0)
         here.drive(3.0, AHEAD[name])
-        start = here.vehicle.pose().x
+        start = here.vehicle.motion().x
         here.drive(0.5, dict.fromkeys(AHEAD[name], value))
-        ways.append(here.vehicle.pose().x - start)
+        ways.append(here.vehicle.motion().x - start)
         assert here.vehicle.current_a() == 0.0
     braked, coasted = ways
     assert 0.0 < braked < 0.3 * here.kind.top_speed_mps
@@ -103,12 +104,12 @@ def test_zero_brakes_on_land(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_stalled_motor_draws_most(name: str) -> None:
-    """The current is that of the winding alone before it turns, and less at speed."""
+    """The stall current is that of the winding, and less flows at speed."""
     here = ground(name)
-    here.vehicle.drive(AHEAD[name], here.kind.battery_v)
+    here.vehicle.drive(AHEAD[name], BATTERY_V)
     stalled = here.vehicle.current_a()
     motors = 2 if name == "tank" else 1
-    assert stalled == pytest.approx(motors * here.kind.battery_v / 1.0, rel=0.01)  # 1 Ohm.
+    assert stalled == pytest.approx(motors * BATTERY_V / 1.0, rel=0.01)  # 1 Ohm.
     here.drive(3.0, AHEAD[name])
     assert 0.2 < here.vehicle.current_a() < 0.3 * stalled
 
@@ -116,16 +117,16 @@ def test_a_stalled_motor_draws_most(name: str) -> None:
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("heading", [0.0, 0.6])
 def test_a_wall_stops_it(name: str, heading: float) -> None:
-    """At top speed, head on and askew: it neither climbs, nor tips, nor passes."""
+    """A wall stops a vehicle, which neither climbs nor tips."""
     here = ground(name, wall_x=6.0)
     here.vehicle.place(0.0, 0.0, heading)
     most_height, least_upright, furthest = 0.0, 1.0, 0.0
     for _ in range(round(9.0 / SIM_DT)):
-        here.vehicle.drive(AHEAD[name], here.kind.battery_v)
+        here.vehicle.drive(AHEAD[name], BATTERY_V)
         mujoco.mj_step(here.model, here.data)
         most_height = max(most_height, abs(here.height()))
         least_upright = min(least_upright, here.uprightness())
-        furthest = max(furthest, here.vehicle.pose().x)
+        furthest = max(furthest, here.vehicle.motion().x)
     assert most_height < 0.05
     assert least_upright > math.cos(math.radians(20.0))
     assert 3.0 < furthest < 6.0
@@ -136,7 +137,7 @@ def test_a_wall_stops_it(name: str, heading: float) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_wild_outputs_break_nothing(name: str) -> None:
-    """A minute of random values, now and then without a connection, between walls."""
+    """Random outputs keep the simulation stable."""
     rng = np.random.default_rng(7)
     here = ground(name, wall_x=2.0)
     with np.errstate(all="raise"):
@@ -153,36 +154,36 @@ def test_wild_outputs_break_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_placing_forgets_everything(name: str) -> None:
-    """The same drive from the same place is the same, to the last bit."""
+    """`place` resets the whole state."""
     here = ground(name)
     ends: list[tuple[float, float, float, float]] = []
     for _ in range(2):
         here.vehicle.place(1.0, -2.0, 0.7)
-        pose = here.vehicle.pose()
+        pose = here.vehicle.motion()
         assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, -2.0, 0.7))
         assert here.vehicle.travelled_m() == 0.0
         assert here.pace() == 0.0
         here.drive(1.0, TO_THE_LEFT[name])
-        pose = here.vehicle.pose()
+        pose = here.vehicle.motion()
         ends.append((pose.x, pose.y, pose.heading, here.vehicle.travelled_m()))
     assert ends[0] == ends[1]
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_speed_is_along_the_heading(name: str) -> None:
-    """Wherever it points."""
+    """Speed is measured along the heading."""
     here = ground(name)
     here.vehicle.place(0.0, 0.0, 2.5)
     here.drive(2.0, AHEAD[name])
-    assert here.vehicle.speed() > 0.5
-    assert abs(here.vehicle.lateral_speed()) < 0.01
-    pose = here.vehicle.pose()
+    assert here.vehicle.motion().speed > 0.5
+    assert abs(here.vehicle.motion().lateral_speed) < 0.01
+    pose = here.vehicle.motion()
     assert math.atan2(pose.y, pose.x) == pytest.approx(2.5, abs=0.02)
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_names_and_collisions_are_the_vehicles_own(name: str) -> None:
-    """Hulls meet walls, wheels the ground too, what is only seen nothing."""
+    """Collision bits and names follow the conventions."""
     model = ground(name).model
     for i in range(model.ngeom):
         geom = model.geom(i)
@@ -202,7 +203,7 @@ def test_names_and_collisions_are_the_vehicles_own(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_its_size_is_as_declared(name: str) -> None:
-    """What collides ends where the numbers say, which the worlds rely on."""
+    """The extent of the collision geoms is as declared."""
     here = ground(name)
     hits: list[float] = []
     for geom in map(here.model.geom, range(here.model.ngeom)):
@@ -219,7 +220,7 @@ def test_its_size_is_as_declared(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_its_camera_looks_ahead(name: str) -> None:
-    """Along the heading, level with the horizon or a little below."""
+    """The camera looks along the heading, level or slightly down."""
     here = ground(name)
     here.vehicle.place(0.0, 0.0, 1.0)
     axes = here.data.camera("vehicle/camera").xmat.reshape(3, 3)

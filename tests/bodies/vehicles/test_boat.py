@@ -1,4 +1,4 @@
-"""The boat: no brakes, drift, currents, and two ways to steer."""
+"""The boat: gliding, drift, currents and twin propellers."""
 
 from __future__ import annotations
 
@@ -10,117 +10,117 @@ from tests.bodies.vehicles.grounds import AHEAD, TO_THE_LEFT, ground
 
 
 def test_it_has_no_brakes() -> None:
-    """A second after the motor stopped it still goes, whether shorted or not."""
+    """A boat glides on for more than a second without thrust."""
     here = ground("boat")
     here.drive(6.0, AHEAD["boat"])
-    fast = here.vehicle.speed()
+    fast = here.vehicle.motion().speed
     here.drive(1.0, {"propeller": 0.0, "rudder": 0.0})
-    assert 0.3 * fast < here.vehicle.speed() < 0.95 * fast
+    assert 0.3 * fast < here.vehicle.motion().speed < 0.95 * fast
     assert here.vehicle.current_a() == 0.0
 
 
 def test_astern_is_weak() -> None:
-    """It stops by reversing, slowly, and goes backwards slowly."""
+    """Reverse thrust is weak."""
     here = ground("boat")
     here.drive(6.0, AHEAD["boat"])
     here.drive(0.5, {"propeller": -1.0, "rudder": 0.0})
-    assert here.vehicle.speed() > 0.3
+    assert here.vehicle.motion().speed > 0.3
     here.drive(8.0, {"propeller": -1.0, "rudder": 0.0})
-    assert -0.95 * here.kind.top_speed_mps < here.vehicle.speed() < -0.3
+    assert -0.95 * here.kind.top_speed_mps < here.vehicle.motion().speed < -0.3
 
 
 def test_it_drifts_outwards_in_a_turn() -> None:
-    """In a turn to the left it slides to its right, on a circle some lengths wide."""
+    """In a left turn the boat drifts to the right."""
     here = ground("boat")
     here.drive(8.0, TO_THE_LEFT["boat"])
-    assert here.vehicle.lateral_speed() < -0.1 * here.vehicle.speed()
-    drift = math.atan2(-here.vehicle.lateral_speed(), here.vehicle.speed())
+    assert here.vehicle.motion().lateral_speed < -0.1 * here.vehicle.motion().speed
+    drift = math.atan2(-here.vehicle.motion().lateral_speed, here.vehicle.motion().speed)
     assert math.radians(8.0) < drift < math.radians(35.0)
-    radius = here.pace() / here.vehicle.yaw_rate()
+    radius = here.pace() / here.vehicle.motion().yaw_rate
     assert radius == pytest.approx(here.kind.turning_radius_m, rel=0.25)
 
 
 def test_it_slows_down_in_a_turn() -> None:
-    """As every ship does."""
+    """A turn reduces the speed."""
     here = ground("boat")
     here.drive(8.0, {"propeller": 0.7, "rudder": 0.0})
-    straight = here.vehicle.speed()
+    straight = here.vehicle.motion().speed
     here.drive(4.0, {"propeller": 0.7, "rudder": -1.0})
-    assert here.vehicle.speed() < 0.85 * straight
+    assert here.vehicle.motion().speed < 0.85 * straight
 
 
 def test_a_current_carries_it() -> None:
-    """Over ground; through the water it hardly moves, and turns a little as it is swept away."""
+    """A current moves the boat over ground, hardly through the water."""
     here = ground("boat")
     here.vehicle.set_current(0.0, 0.3)
     here.drive(60.0, {})
-    assert here.vehicle.pose().y > 10.0
-    assert here.vehicle.lateral_speed() == pytest.approx(0.3, rel=0.1)
-    assert abs(here.vehicle.travelled_m()) < 0.05 * here.vehicle.pose().y
+    assert here.vehicle.motion().y > 10.0
+    assert here.vehicle.motion().lateral_speed == pytest.approx(0.3, rel=0.1)
+    assert abs(here.vehicle.travelled_m()) < 0.05 * here.vehicle.motion().y
 
 
 def test_the_log_goes_by_the_water() -> None:
-    """Against a current the log runs ahead of the ground."""
+    """The log measures distance through the water."""
     here = ground("boat")
     here.vehicle.set_current(-0.3, 0.0)
     here.drive(10.0, AHEAD["boat"])
     # 10 s of 0.3 m/s, less what it takes until the flow has hold of the hull.
-    assert here.vehicle.travelled_m() - here.vehicle.pose().x == pytest.approx(3.0, abs=0.1)
-    assert here.vehicle.speed() == pytest.approx(here.kind.top_speed_mps - 0.3, rel=0.1)
+    assert here.vehicle.travelled_m() - here.vehicle.motion().x == pytest.approx(3.0, abs=0.1)
+    assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps - 0.3, rel=0.1)
 
 
 def test_physics_is_the_same_in_every_steady_current() -> None:
-    """A boat that goes with the flow from the start sees still water (Galilei)."""
+    """Motion relative to a uniform flow is that in still water."""
     still, flowing = ground("boat"), ground("boat")
     flowing.vehicle.set_current(0.2, -0.1)
     flowing.data.qvel[0:2] = (0.2, -0.1)
     for here in (still, flowing):
         here.drive(5.0, TO_THE_LEFT["boat"])
-    a, b = still.vehicle.pose(), flowing.vehicle.pose()
+    a, b = still.vehicle.motion(), flowing.vehicle.motion()
     assert (b.x - 1.0, b.y + 0.5, b.heading) == pytest.approx((a.x, a.y, a.heading), abs=1e-6)
     assert flowing.vehicle.travelled_m() == pytest.approx(still.vehicle.travelled_m(), abs=1e-6)
 
 
 def test_without_thrust_the_rudder_needs_way() -> None:
-    """It steers while it glides, and not at all at rest; the propeller's wash helps at once."""
+    """The rudder needs flow, from motion or from the propeller."""
     here = ground("boat")
     here.drive(2.0, {"propeller": 0.0, "rudder": -1.0})
-    assert abs(here.vehicle.yaw_rate()) < 1e-3
+    assert abs(here.vehicle.motion().yaw_rate) < 1e-3
     here.drive(0.7, {"propeller": 0.7, "rudder": -1.0})
-    assert here.vehicle.yaw_rate() > 0.05
+    assert here.vehicle.motion().yaw_rate > 0.05
     here.vehicle.place(0.0, 0.0, 0.0)
     here.drive(5.0, AHEAD["boat"])
     here.drive(1.0, {"propeller": 0.0, "rudder": -1.0})
-    assert here.vehicle.yaw_rate() > 0.1
+    assert here.vehicle.motion().yaw_rate > 0.1
 
 
 def test_it_keeps_its_course() -> None:
-    """A push aside dies out; it does not begin to circle by itself."""
+    """A disturbed heading rate decays."""
     here = ground("boat")
     here.drive(5.0, AHEAD["boat"])
     here.data.qvel[2] += 0.5
     here.drive(6.0, AHEAD["boat"])
-    assert abs(here.vehicle.yaw_rate()) < 0.05
+    assert abs(here.vehicle.motion().yaw_rate) < 0.05
 
 
 def test_two_propellers_steer() -> None:
-    """More on the right turns to the left; one ahead and one astern turns at a small way on."""
+    """Differential thrust turns the boat."""
     here = ground("boat")
     both = {"left propeller": 1.0, "right propeller": 1.0}
     here.drive(8.0, both)
-    assert here.vehicle.speed() == pytest.approx(here.kind.top_speed_mps, rel=0.1)
+    assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps, rel=0.1)
     here.drive(4.0, {"left propeller": 0.2, "right propeller": 0.8})
-    assert here.vehicle.yaw_rate() > 0.2
+    assert here.vehicle.motion().yaw_rate > 0.2
     here.vehicle.place(0.0, 0.0, 0.0)
     here.drive(8.0, {"left propeller": 0.8, "right propeller": -1.0})
-    assert here.vehicle.yaw_rate() < -0.3
+    assert here.vehicle.motion().yaw_rate < -0.3
     assert here.pace() < 0.5
 
 
 def test_two_propellers_share_fairly() -> None:
-    """Straight on for some lengths, and twice the current of one at a standstill."""
+    """Equal thrust drives straight and draws twice the current."""
     here = ground("boat")
     here.vehicle.drive({"left propeller": 1.0, "right propeller": 1.0}, 7.2)
     assert here.vehicle.current_a() == pytest.approx(14.4)
     here.drive(4.0, {"left propeller": 1.0, "right propeller": 1.0})
-    assert abs(here.vehicle.pose().y) < 0.05
+    assert abs(here.vehicle.motion().y) < 0.05

@@ -1,4 +1,4 @@
-"""The list of vehicles, and which robots fit them."""
+"""Vehicles by name, and the parts that fit them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from shapechanger.errors import ProfileError, UnknownName
 
 
 def test_each_is_listed_under_its_name() -> None:
-    """And none moves on both land and water."""
+    """Names are consistent, and only the boat floats."""
     assert {name: model.name for name, model in VEHICLES.items()} == {n: n for n in VEHICLES}
     assert set(VEHICLES) == {"car", "tank", "truck", "boat"}
     assert [name for name, model in VEHICLES.items() if model.floats] == ["boat"]
 
 
 def test_an_unknown_name_gets_a_hint() -> None:
-    """With the nearest spelling."""
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"Did you mean 'truck'\?"):
         vehicle_model("truk")
     with pytest.raises(UnknownName):
@@ -39,7 +39,7 @@ def test_an_unknown_name_gets_a_hint() -> None:
     ],
 )
 def test_robots_that_fit(name: str, parts: set[str]) -> None:
-    """Those of the shipped profiles."""
+    """The parts of the shipped profiles fit."""
     require_fit(name, parts)
 
 
@@ -55,7 +55,7 @@ def test_robots_that_fit(name: str, parts: set[str]) -> None:
     ],
 )
 def test_robots_that_do_not_fit(name: str, parts: set[str], message: str) -> None:
-    """The message says what it has and what would fit."""
+    """The error lists the parts of the robot and the vehicle."""
     with pytest.raises(ProfileError) as caught:
         require_fit(name, parts)
     assert message in str(caught.value)
@@ -63,7 +63,7 @@ def test_robots_that_do_not_fit(name: str, parts: set[str], message: str) -> Non
 
 @pytest.mark.parametrize("degrees", [True, False])
 def test_the_unit_of_angles_in_the_model_does_not_matter(degrees: bool) -> None:
-    """A world may be written in degrees or in radians."""
+    """Vehicles fit models in degrees and in radians."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = degrees
     add_vehicle(spec, "truck")
@@ -80,7 +80,7 @@ def test_the_motor_is_that_of_its_data_sheet() -> None:
 
 
 def test_a_gear_trades_speed_for_torque() -> None:
-    """Without losses, what comes out is what goes in."""
+    """A lossless gear keeps the power."""
     geared = HOBBY_MOTOR.geared(3.0)
     assert geared.amperes(6.0, 10.0) == pytest.approx(HOBBY_MOTOR.amperes(6.0, 30.0))
     assert geared.torque_per_current == pytest.approx(3.0 * HOBBY_MOTOR.torque_per_current)
@@ -89,13 +89,13 @@ def test_a_gear_trades_speed_for_torque() -> None:
 
 
 def test_a_motor_that_brakes_draws_nothing() -> None:
-    """Neither shorted nor overrun by the wheels, in both directions."""
+    """A braking motor draws no current."""
     assert HOBBY_MOTOR.amperes(0.0, 100.0) == 0.0
     assert HOBBY_MOTOR.amperes(1.0, 100.0) == 0.0
     assert HOBBY_MOTOR.amperes(-6.0, -100.0) == HOBBY_MOTOR.amperes(6.0, 100.0) > 0.0
 
 
 def test_a_servo_turns_at_its_rate_under_full_torque() -> None:
-    """Which is how its damping is made."""
+    """The damping follows from torque and speed."""
     servo = replace(HOBBY_SERVO, stall_torque=0.5, free_rate=5.0)
     assert servo.damping == pytest.approx(0.1)

@@ -1,4 +1,4 @@
-"""Car, truck and tank: how they turn, slip and pull."""
+"""Land vehicles: turning, slip and the trailer."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from tests.bodies.vehicles.grounds import AHEAD, Ground, ground
 @pytest.mark.parametrize("throttle", [0.25, 0.6])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_turning_circle_is_geometrys(name: str, throttle: float, side: float) -> None:
-    """At full lock, from the wheelbase and the angle of the wheels alone."""
+    """The turning radius follows from the geometry."""
     here = ground(name)
     here.drive(8.0, {"wheels": throttle, "steering": side})
-    radius = here.pace() / abs(here.vehicle.yaw_rate())
+    radius = here.pace() / abs(here.vehicle.motion().yaw_rate)
     assert radius == pytest.approx(here.kind.turning_radius_m, rel=0.15)
 
 
 def test_wheels_point_along_their_own_circles() -> None:
-    """The inner one turns further: lines through both axles meet in one point."""
+    """Wheel angles satisfy Ackermann's condition."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
     left, right = (
@@ -34,7 +34,7 @@ def test_wheels_point_along_their_own_circles() -> None:
 
 
 def test_the_servo_takes_its_time() -> None:
-    """From lock to lock not faster than 60 degrees in 0.19 s."""
+    """The servo's speed is limited to 60 degrees in 0.19 s."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
     joint = here.data.joint("vehicle/left steering")
@@ -47,7 +47,7 @@ def test_the_servo_takes_its_time() -> None:
 
 
 def test_a_servo_without_pulses_stays() -> None:
-    """Its gear holds it where it was sent."""
+    """Without pulses, the steering angle stays."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
     before = float(here.data.joint("vehicle/left steering").qpos[0])
@@ -56,18 +56,21 @@ def test_a_servo_without_pulses_stays() -> None:
 
 
 def test_the_car_slips_on_ice() -> None:
-    """The ground's friction counts: wheels spin at the start, and it slides out in a fast turn."""
+    """On low friction, wheels spin and the car slides."""
     dry, ice = ground("car"), ground("car", friction=0.3)
     for here in (dry, ice):
         here.drive(0.3, AHEAD["car"])
-    assert ice.vehicle.speed() < 0.7 * dry.vehicle.speed()
-    assert ice.vehicle.travelled_m() > 1.3 * ice.vehicle.pose().x
+    assert ice.vehicle.motion().speed < 0.7 * dry.vehicle.motion().speed
+    assert ice.vehicle.travelled_m() > 1.3 * ice.vehicle.motion().x
     slips: list[float] = []
     for here in (dry, ice):
         most = 0.0
         for _ in range(20):
             here.drive(0.1, {"wheels": 1.0, "steering": -1.0})
-            aside, ahead = abs(here.vehicle.lateral_speed()), abs(here.vehicle.speed())
+            aside, ahead = (
+                abs(here.vehicle.motion().lateral_speed),
+                abs(here.vehicle.motion().speed),
+            )
             most = max(most, math.atan2(aside, ahead))
         slips.append(most)
     assert slips[0] < math.radians(20.0)
@@ -76,7 +79,7 @@ def test_the_car_slips_on_ice() -> None:
 
 @pytest.mark.parametrize("name", ["car", "truck"])
 def test_no_wheel_sticks_out_at_full_lock(name: str) -> None:
-    """So that the smooth body meets a wall first, and no tyre climbs up."""
+    """At full lock, wheels stay inside the body's width."""
     here = ground(name)
     here.drive(1.0, {"steering": -1.0})
     for side in ("left", "right"):
@@ -88,7 +91,7 @@ def test_no_wheel_sticks_out_at_full_lock(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["car", "truck"])
 def test_it_scrapes_along_a_wall(name: str) -> None:
-    """Steered into it at full throttle: it keeps its wheels on the ground and gets on."""
+    """Steered into a wall, a vehicle stays upright and moves on."""
     here = ground(name, wall_x=1.0)
     here.vehicle.place(0.7, -4.0, math.radians(80.0))
     upright, height = 1.0, 0.0
@@ -98,45 +101,45 @@ def test_it_scrapes_along_a_wall(name: str) -> None:
         height = max(height, abs(here.height()))
     assert upright > 0.99
     assert height < 0.02
-    assert here.vehicle.pose().y > -2.5
+    assert here.vehicle.motion().y > -2.5
 
 
 def test_the_tank_turns_on_the_spot() -> None:
-    """Its middle stays where it was."""
+    """Opposite tracks turn the tank without moving it."""
     here = ground("tank")
     here.drive(3.0, {"left track": -0.5, "right track": 0.5})
-    pose = here.vehicle.pose()
+    pose = here.vehicle.motion()
     assert math.hypot(pose.x, pose.y) < 0.05
-    assert here.vehicle.yaw_rate() > 0.8
+    assert here.vehicle.motion().yaw_rate > 0.8
     assert abs(here.vehicle.travelled_m()) < 0.05
 
 
 def test_swapped_tracks_turn_the_other_way() -> None:
-    """What a robot wired wrongly does."""
+    """Swapped tracks reverse the turn."""
     here = ground("tank")
     rates: list[float] = []
     for left, right in ((0.8, 0.3), (0.3, 0.8)):
         here.vehicle.place(0.0, 0.0, 0.0)
         here.drive(3.0, {"left track": left, "right track": right})
-        rates.append(here.vehicle.yaw_rate())
-        assert here.vehicle.speed() > 0.1
+        rates.append(here.vehicle.motion().yaw_rate)
+        assert here.vehicle.motion().speed > 0.1
     assert rates[0] < -0.2
     assert rates[1] == pytest.approx(-rates[0], rel=0.02)
 
 
 def test_the_tank_steers_while_it_drives() -> None:
-    """A little difference is a wide turn, a larger one a tight turn."""
+    """A larger difference of the tracks gives a tighter turn."""
     here = ground("tank")
     radii: list[float] = []
     for inner in (0.6, 0.3):
         here.vehicle.place(0.0, 0.0, 0.0)
         here.drive(3.0, {"left track": inner, "right track": 0.8})
-        radii.append(here.vehicle.speed() / here.vehicle.yaw_rate())
+        radii.append(here.vehicle.motion().speed / here.vehicle.motion().yaw_rate)
     assert radii[0] > 1.5 * radii[1] > 0.1
 
 
 def test_a_track_turns_as_one() -> None:
-    """Its wheels keep together while it skids."""
+    """The wheels of a track turn together."""
     here = ground("tank")
     here.drive(2.0, {"left track": -1.0, "right track": 1.0})
     rates = [
@@ -151,7 +154,7 @@ def _hitch(here: Ground) -> float:
 
 
 def test_the_trailer_follows() -> None:
-    """In a turn it hangs back by the angle of geometry, and straightens out behind."""
+    """The trailer bends in turns and straightens afterwards."""
     here = ground("truck")
     here.drive(6.0, {"wheels": 0.4, "steering": -0.7})
     bent = _hitch(here)
@@ -161,7 +164,7 @@ def test_the_trailer_follows() -> None:
 
 
 def test_it_does_not_jack_knife_going_forward() -> None:
-    """A slalom from lock to lock at full throttle."""
+    """A slalom at full throttle keeps the trailer behind."""
     here = ground("truck")
     most = 0.0
     for turn in range(12):
@@ -173,7 +176,7 @@ def test_it_does_not_jack_knife_going_forward() -> None:
 
 
 def test_it_does_jack_knife_going_backward() -> None:
-    """As a trailer does when nobody steers against it."""
+    """Reversing without counter-steering folds the trailer."""
     here = ground("truck")
     here.drive(1.0, {"wheels": 0.4, "steering": -0.3})
     here.drive(8.0, {"wheels": -0.5, "steering": -0.3})
@@ -181,7 +184,7 @@ def test_it_does_jack_knife_going_backward() -> None:
 
 
 def test_gear_and_bed_do_nothing() -> None:
-    """A truck's robot may have them."""
+    """The optional parts have no effect."""
     here = ground("truck")
     here.drive(2.0, {**AHEAD["truck"], "gear": 1.0, "bed": -1.0})
-    assert here.vehicle.speed() > 1.3
+    assert here.vehicle.motion().speed > 1.3

@@ -1,4 +1,4 @@
-"""Which courses, starts and looks episodes have."""
+"""Sampling of courses, starts and looks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shapechanger.envs.vehicle.arguments import CourseSampler
+from shapechanger.envs.vehicle.base import CourseSampler
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds.course import HELD_OUT, TRAINING
 
@@ -19,14 +19,14 @@ def _courses(draw: CourseSampler, n: int = 500) -> list[int]:
 
 @pytest.mark.parametrize(("name", "seeds"), [("training", TRAINING), ("held-out", HELD_OUT)])
 def test_kinds_of_courses_keep_apart(name: Any, seeds: range) -> None:
-    """Nobody is judged on what was learned on, and nobody learns on what judges."""
+    """Training and held-out courses are disjoint."""
     drawn = _courses(CourseSampler(name, randomise=False))
     assert all(course in seeds for course in drawn)
     assert max(drawn) - min(drawn) > 0.9 * len(seeds)
 
 
 def test_holding_out_never_draws_what_vehicles_learn_on() -> None:
-    """Not even where somebody chose the courses."""
+    """After `hold_out`, only held-out courses are drawn, also with given courses."""
     for courses in ("training", "held-out", (3, 4)):
         draw = CourseSampler(courses, randomise=False)
         draw.hold_out()
@@ -35,14 +35,14 @@ def test_holding_out_never_draws_what_vehicles_learn_on() -> None:
 
 
 def test_chosen_courses_are_all_drawn_and_no_others() -> None:
-    """A handful of courses, to learn one's way with."""
+    """All given courses are drawn, and no others."""
     draw = CourseSampler((7, np.int64(9), 8), randomise=False)
     assert set(_courses(draw)) == {7, 8, 9}
     assert draw.first == 7
 
 
 def test_options_replace_what_is_drawn_and_nothing_else() -> None:
-    """The same generator draws the same rest, whatever was asked for."""
+    """Options do not change the other draws."""
     draw = CourseSampler("training", randomise=True)
     free = draw.draw(np.random.default_rng(5), "corridor", {})
     asked = draw.draw(np.random.default_rng(5), "corridor", {"course": 3})
@@ -52,7 +52,7 @@ def test_options_replace_what_is_drawn_and_nothing_else() -> None:
 
 
 def test_looks_are_drawn_only_where_they_are_to_be() -> None:
-    """Else every episode is in the usual light, with the camera in its place."""
+    """Looks are random only if requested."""
     plain = CourseSampler("training", randomise=False).draw(np.random.default_rng(5), "yard", {})
     assert (plain.look, plain.camera) == (None, None)
     draw, rng = CourseSampler("training", randomise=True), np.random.default_rng(5)
@@ -62,7 +62,7 @@ def test_looks_are_drawn_only_where_they_are_to_be() -> None:
 
 
 def test_what_is_no_course_is_refused() -> None:
-    """Each in a sentence that says what would be one."""
+    """Invalid courses raise errors that state what is valid."""
     with pytest.raises(UnknownName, match=r"No kind of courses matches 'hold-out'. Did you mean"):
         CourseSampler("hold-out", randomise=False)  # pyright: ignore[reportArgumentType]
     with pytest.raises(WorldError, match="no courses to draw from: give at least one seed"):
@@ -83,7 +83,7 @@ def test_what_is_no_course_is_refused() -> None:
     ],
 )
 def test_options_that_are_none_are_refused(options: dict[str, Any], sentence: str) -> None:
-    """Whoever asks for a course gets that one, or hears why not."""
+    """Unknown or invalid options raise errors."""
     draw = CourseSampler("training", randomise=False)
     with pytest.raises((UnknownName, WorldError), match=sentence):
         draw.draw(np.random.default_rng(5), "corridor", options)

@@ -1,4 +1,4 @@
-"""Whoever shows how to drive."""
+"""Demonstrators of the vehicle envs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapechanger.worlds.course import HOME
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_it_can_drive_what_it_shows(vehicle: str) -> None:
-    """Mistakes and all, it comes along the course and hits nothing."""
+    """The disturbed demonstrator makes progress without collisions."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         driver: TaskDemonstrator = env.demonstrator(3)
         env.reset(seed=2)
@@ -32,7 +32,7 @@ def test_it_can_drive_what_it_shows(vehicle: str) -> None:
 
 
 def test_its_mistakes_follow_from_its_seed() -> None:
-    """Another seed makes others, and another episode too."""
+    """Mistakes are a function of seed and episode."""
     shown: list[list[list[float]]] = []
     with closing(VehicleEnv("car", image=False)) as env:
         for seed in (1, 1, 2):
@@ -55,7 +55,7 @@ def test_its_mistakes_follow_from_its_seed() -> None:
 
 
 def test_it_begins_on_the_course_that_is_there() -> None:
-    """After a reset to another course it knows the way there."""
+    """`begin` takes the present course."""
     with closing(VehicleEnv("car", image=False)) as env:
         driver = env.demonstrator(1)
         for course in (3, 4):

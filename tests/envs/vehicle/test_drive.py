@@ -1,4 +1,4 @@
-"""Drives are counted as they were, and scores are what the numbers say."""
+"""Results and scores of drives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _STILL = np.zeros(2, np.float32)
 
 @pytest.fixture(scope="module")
 def car() -> Generator[VehicleEnv]:
-    """A car without a camera, that is put back after a collision."""
+    """A car without a camera that is put back after collisions."""
     with closing(VehicleEnv("car", image=False, put_back=True)) as env:
         yield env
 
@@ -41,18 +41,18 @@ def car() -> Generator[VehicleEnv]:
     ],
 )
 def test_the_interval_is_that_of_the_tables(count: int, low: float, high: float) -> None:
-    """To the digits that are printed there."""
+    """The interval agrees with published tables."""
     assert poisson_interval(count) == pytest.approx((low, high), abs=0.006)
 
 
 def test_more_confidence_is_a_wider_interval() -> None:
-    """And no confidence at all is narrower than either."""
+    """The interval grows with the confidence."""
     narrow, usual, wide = (poisson_interval(7, c) for c in (0.5, 0.95, 0.99))
     assert wide[0] < usual[0] < narrow[0] < 7 < narrow[1] < usual[1] < wide[1]
 
 
 def test_a_score_sums_before_it_divides() -> None:
-    """A long drive counts for more than a short one."""
+    """Scores are ratios of sums."""
     score = DriveScore.of(
         [DriveResult(1, 30.0, 20.0, 0, True), DriveResult(2, 10.0, 60.0, 2, False)]
     )
@@ -66,7 +66,7 @@ def test_a_score_sums_before_it_divides() -> None:
 
 
 def test_a_score_without_progress_has_no_bound() -> None:
-    """Whoever stood in a corner and ran into it is not told to be safe."""
+    """Without progress, the upper bound is infinite."""
     score = DriveScore.of([DriveResult(1, -0.5, 60.0, 3, False)])
     assert score.per_100_m == score.low == score.high == float("inf")
     still = DriveScore.of([DriveResult(1, 0.0, 60.0, 0, False)])
@@ -74,13 +74,13 @@ def test_a_score_without_progress_has_no_bound() -> None:
 
 
 def test_no_drives_are_no_score() -> None:
-    """An empty list is a mistake of the caller."""
+    """A score needs at least one drive."""
     with pytest.raises(WorldError, match="at least one"):
         DriveScore.of([])
 
 
 def test_the_expert_gets_there(car: VehicleEnv) -> None:
-    """It comes as far as it was to, and no farther than one step more."""
+    """The expert reaches the distance and stops there."""
     done = drive(car, ExpertDriver(car.world), course=HELD_OUT[0], metres=5.0)
     assert done.reached
     assert 5.0 <= done.metres < 5.2
@@ -91,7 +91,7 @@ def test_the_expert_gets_there(car: VehicleEnv) -> None:
 
 
 def test_a_collision_counts_once_and_the_drive_goes_on(car: VehicleEnv) -> None:
-    """Straight into a wall; then the expert takes over and still gets there."""
+    """A drive continues after a collision, which counts once."""
     pilot = ExpertDriver(car.world)
 
     def blind_at_first(observation: Any) -> NDArray[np.float32]:
@@ -103,7 +103,7 @@ def test_a_collision_counts_once_and_the_drive_goes_on(car: VehicleEnv) -> None:
 
 
 def test_time_is_up_for_who_stands_still(car: VehicleEnv) -> None:
-    """The limit is in the vehicle's time."""
+    """A drive ends at the time limit."""
     done = drive(car, lambda _: _STILL, course=HELD_OUT[0], limit_s=2.0)
     assert done.seconds == pytest.approx(2.0)
     assert not done.reached
@@ -111,7 +111,7 @@ def test_time_is_up_for_who_stands_still(car: VehicleEnv) -> None:
 
 
 def test_the_start_can_be_chosen(car: VehicleEnv) -> None:
-    """It is that of the course without another, and the same every time."""
+    """The default start has the course's seed; others can be given."""
     starts: list[tuple[float, ...]] = []
     for start in (None, HELD_OUT[0], 7, 7):
         drive(car, lambda _: _STILL, course=HELD_OUT[0], start=start, limit_s=0.05)
@@ -120,7 +120,7 @@ def test_the_start_can_be_chosen(car: VehicleEnv) -> None:
 
 
 def test_an_env_that_ends_at_a_collision_is_refused() -> None:
-    """In words that say what to do."""
+    """The error names the missing argument."""
     with (
         closing(VehicleEnv("car", image=False)) as env,
         pytest.raises(WorldError, match="put_back=True"),

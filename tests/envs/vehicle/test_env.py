@@ -1,4 +1,4 @@
-"""A vehicle's env: what an episode is, what it tells, and what it refuses."""
+"""The env of a whole simulated robot."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _car(**arguments: Any) -> VehicleEnv:
 
 
 def _played(env: VehicleEnv, seed: int, steps: int = 25) -> list[Any]:
-    """Observations, rewards and poses of an episode with actions of its own."""
+    """Return observations, rewards and poses of an episode."""
     rng = np.random.default_rng(seed)
     found: list[Any] = [env.reset(seed=seed)[0].tolist()]
     for _ in range(steps):
@@ -48,7 +48,7 @@ def _played(env: VehicleEnv, seed: int, steps: int = 25) -> list[Any]:
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_each_vehicle_drives_at_home(vehicle: str) -> None:
-    """Half throttle is progress, and what is told of it fits together."""
+    """Half throttle makes progress, and reward and info agree."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         seen, info = env.reset(seed=1)
         assert env.observation_space.contains(seen)
@@ -67,7 +67,7 @@ def test_each_vehicle_drives_at_home(vehicle: str) -> None:
 
 
 def test_no_episode_depends_on_those_before_it() -> None:
-    """A fresh env, one that has driven, and one that is asked for another course in between."""
+    """An episode does not depend on earlier ones."""
     with closing(_car()) as fresh, closing(_car()) as used:
         wanted = _played(fresh, 3)
         _played(used, 4)
@@ -79,14 +79,14 @@ def test_no_episode_depends_on_those_before_it() -> None:
 
 @pytest.mark.parametrize("vehicle", ["truck", "boat"])
 def test_a_trailer_and_a_current_remember_nothing(vehicle: str) -> None:
-    """What hangs on, and what flows, begins anew as well."""
+    """Trailer and current are reset as well."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         wanted = _played(env, 3)
         assert _played(env, 3) == wanted
 
 
 def test_the_seed_draws_the_course_and_the_start() -> None:
-    """Other seeds are other places; options name them."""
+    """Seeds and options give course and start."""
     with closing(_car()) as env:
         drawn = [env.reset(seed=seed)[1] for seed in (1, 2, 1)]
         assert drawn[0]["pose"] == drawn[2]["pose"]
@@ -99,7 +99,7 @@ def test_the_seed_draws_the_course_and_the_start() -> None:
 
 
 def _into_the_wall(env: VehicleEnv) -> tuple[float, dict[str, Any], bool]:
-    """Full lock and throttle from any start end at a wall."""
+    """Drive at full lock and throttle until a collision."""
     env.reset(seed=1)
     for _ in range(200):
         _, reward, terminated, _, info = env.step(np.array([-1.0, 0.6], np.float32))
@@ -109,7 +109,7 @@ def _into_the_wall(env: VehicleEnv) -> tuple[float, dict[str, Any], bool]:
 
 
 def test_a_collision_ends_the_episode() -> None:
-    """With the weight of the profile, or with that of whoever made the env."""
+    """A collision ends the episode with the weight of the profile or the argument."""
     for weight, arguments in ((-10.0, {}), (-3.0, {"reward": {"collision": -3.0}})):
         with closing(_car(**arguments)) as env:
             reward, info, terminated = _into_the_wall(env)
@@ -120,7 +120,7 @@ def test_a_collision_ends_the_episode() -> None:
 
 
 def test_who_is_put_back_drives_on() -> None:
-    """It stands free, and the next collision counts again."""
+    """With `put_back` the episode continues, and further collisions count."""
     with closing(_car(put_back=True)) as env:
         env.reset(seed=1)
         found = 0
@@ -136,7 +136,7 @@ def test_who_is_put_back_drives_on() -> None:
 
 
 def test_the_state_is_named_and_within_its_bounds() -> None:
-    """Its layout has the names that a served robot has."""
+    """The state's layout is that of a served robot, and values are in its bounds."""
     with closing(_car()) as env:
         assert env.observation_space.shape == (env.observation_layout.size,)
         assert "speed" in env.observation_layout.names
@@ -145,7 +145,7 @@ def test_the_state_is_named_and_within_its_bounds() -> None:
 
 
 def test_bang_steering_knows_three_angles() -> None:
-    """As the car of 2017."""
+    """Steering "bang" has three angles."""
     for steering, applied in (("bang", 1.0), ("proportional", 0.5)):
         with closing(_car(steering=steering)) as env:
             env.reset(seed=1)
@@ -154,14 +154,14 @@ def test_bang_steering_knows_three_angles() -> None:
 
 
 def test_holding_out_holds_out() -> None:
-    """From the next reset on, whatever the seed."""
+    """`hold_out` applies from the next reset on."""
     with closing(_car()) as env:
         env.hold_out()
         assert all(env.reset(seed=seed)[1]["course"] in HELD_OUT for seed in range(5))
 
 
 def test_a_pickled_env_is_made_with_the_same_arguments() -> None:
-    """Also those that were not given by name."""
+    """Pickling keeps all arguments."""
     with (
         closing(VehicleEnv("tank", world="yard", image=False, put_back=True)) as env,
         closing(pickle.loads(pickle.dumps(env))) as copy,
@@ -172,13 +172,13 @@ def test_a_pickled_env_is_made_with_the_same_arguments() -> None:
 
 
 def test_an_episode_is_cut_after_a_thousand_steps() -> None:
-    """The time limit is of the id, and no argument."""
+    """Episodes of the id are truncated after 1,000 steps."""
     for env_id in VEHICLE_ENVS:
         assert gym.spec(env_id).max_episode_steps == 1000
 
 
 def test_misuse_is_told_in_words() -> None:
-    """Before the first reset, and with what is no action."""
+    """Misuse raises errors that explain it."""
     with closing(_car()) as env:
         with pytest.raises(gym.error.ResetNeeded, match="reset"):
             env.step(_AHEAD)
@@ -190,7 +190,7 @@ def test_misuse_is_told_in_words() -> None:
 
 
 def test_a_vehicle_that_is_stuck_at_the_start_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An episode that begins with a collision would teach nothing."""
+    """A start in contact with an obstacle is refused."""
     with closing(_car()) as env:
         wall = env.world.course.walls[0]
         middle = (np.array(wall.start) + np.array(wall.end)) / 2.0
@@ -228,7 +228,7 @@ def test_a_vehicle_that_is_stuck_at_the_start_is_told_of(monkeypatch: pytest.Mon
 def test_what_cannot_be_made_is_refused_in_a_sentence(
     vehicle: str, arguments: Mapping[str, Any], kind: type[ShapechangerError], sentence: str
 ) -> None:
-    """And not by an error from somewhere below."""
+    """Invalid arguments raise the package's errors."""
     with pytest.raises(kind, match=sentence):
         VehicleEnv(vehicle, image=False, **arguments)
 
@@ -236,7 +236,7 @@ def test_what_cannot_be_made_is_refused_in_a_sentence(
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_pictures_come_with_the_state_where_both_are_asked_for() -> None:
-    """Alone, with the state, or not at all; of the size that was asked for."""
+    """`image`, `state` and `size` select the observation."""
     with closing(VehicleEnv("car", size=(48, 32))) as env:
         seen, _ = env.reset(seed=1)
         assert seen.shape == (32, 48, 3)
@@ -253,7 +253,7 @@ def test_pictures_come_with_the_state_where_both_are_asked_for() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_rendering_shows_what_the_camera_sees() -> None:
-    """Also where observations have no picture; and not before there is something to see."""
+    """`render` shows the camera's picture, after the first reset."""
     with closing(_car(size=(48, 32), render_mode="rgb_array")) as env:
         with pytest.raises(RenderError, match="before render"):
             env.render()
@@ -267,7 +267,7 @@ def test_rendering_shows_what_the_camera_sees() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_random_looks_follow_from_the_seed() -> None:
-    """Each episode has its own, and the same seed the same again."""
+    """Random looks are a function of the seed."""
     with closing(VehicleEnv("car", size=(48, 32), randomise=True)) as env:
         asked = {"course": 2, "start": 2}
         one, two, again = (env.reset(seed=seed, options=asked)[0] for seed in (1, 2, 1))
@@ -278,7 +278,7 @@ def test_random_looks_follow_from_the_seed() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_lenses_spoil_what_it_sees_and_not_where_it_is() -> None:
-    """The same drive, through a bad camera; one name may stand alone."""
+    """Lenses change pictures only; a single name is accepted."""
     with (
         closing(VehicleEnv("car", size=(48, 32))) as clear,
         closing(VehicleEnv("car", size=(48, 32), lenses="night")) as night,
@@ -290,7 +290,7 @@ def test_lenses_spoil_what_it_sees_and_not_where_it_is() -> None:
 
 
 def test_gpiozero_is_asked_for_where_it_is_missing() -> None:
-    """The pins of the robot are gpiozero's, also those that are simulated."""
+    """Without gpiozero, the error names the extra to install."""
     script = (
         "import sys, importlib.util\n"
         "found = importlib.util.find_spec\n"

@@ -1,4 +1,4 @@
-"""The fast env of a vehicle: it drives as the whole robot does, and sees distances."""
+"""The fast env with distances."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _STEPS = 60
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_it_drives_as_the_whole_robot_does(vehicle: str) -> None:
-    """Three seconds of the expert's actions, without looking, lead to nearly the same place."""
+    """The same actions lead to nearly the same place as with the whole robot."""
     with (
         closing(VehicleEnv(vehicle, image=False)) as robot,
         closing(RangesEnv(vehicle)) as fast,
@@ -46,7 +46,7 @@ def test_it_drives_as_the_whole_robot_does(vehicle: str) -> None:
 
 
 def test_distances_are_those_to_the_walls() -> None:
-    """The one ahead is the ultrasonic sensor's, and all change as the vehicle turns."""
+    """Distances agree with `distance_m`, and their sum across the lane with its width."""
     with closing(RangesEnv("car")) as env:
         seen, _ = env.reset(options=_COURSE)
         assert env.observation_space.contains(seen)
@@ -62,7 +62,7 @@ def test_distances_are_those_to_the_walls() -> None:
 
 
 def test_a_collision_costs_and_ends_the_episode() -> None:
-    """Full throttle into the wall; put back, the vehicle goes on and pays once for each."""
+    """Collisions cost and end the episode, unless `put_back`."""
     ahead = np.array([0.0, 1.0], np.float32)
     with closing(RangesEnv("car")) as env:
         env.reset(options=_COURSE)
@@ -85,7 +85,7 @@ def test_a_collision_costs_and_ends_the_episode() -> None:
 
 
 def test_after_a_collision_it_waits_as_the_whole_robot_does() -> None:
-    """The bumper's reflex holds it for 0.75 s, though it was put back on the free lane."""
+    """The bumper's reflex stops the vehicle for 0.75 s after `put_back`."""
     ahead = np.array([0.0, 0.8], np.float32)
     waits: list[int] = []
     for env in (
@@ -109,7 +109,7 @@ def test_after_a_collision_it_waits_as_the_whole_robot_does() -> None:
 
 
 def test_standing_costs() -> None:
-    """Who stops in front of a wall must not think that it is worth it."""
+    """Standing still has a negative reward."""
     with closing(RangesEnv("tank")) as env:
         env.reset(options=_COURSE)
         total = sum(env.step(np.zeros(2, np.float32))[1] for _ in range(20))
@@ -117,7 +117,7 @@ def test_standing_costs() -> None:
 
 
 def test_the_guard_shapes_the_outputs() -> None:
-    """Slew, caps, and the block after a bump, by the guard's own functions."""
+    """Outputs have the guard's caps, slew and bump block."""
     plan = GuardPlan(
         "test",
         (ActionPlan("throttle", high=0.5, slew_per_s=4.0, propels=True),),
@@ -138,7 +138,7 @@ def test_the_guard_shapes_the_outputs() -> None:
 
 
 def test_what_it_refuses() -> None:
-    """Each in a sentence."""
+    """Misuse raises errors that explain it."""
     with pytest.raises(UnknownName, match="No vehicle matches 'carr'"):
         RangesEnv("carr")
     with pytest.raises(UnknownName, match="No weight of the reward matches 'colision'"):

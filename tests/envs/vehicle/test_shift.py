@@ -1,4 +1,4 @@
-"""What changes from one vehicle to another: it is told, and nothing is no change."""
+"""Certificates of shifts between vehicles."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from shapechanger.errors import EmptyShift, MorphologyError
 
 @pytest.fixture
 def blind() -> dict[str, bool]:
-    """Arguments of vehicles that need not be drawn."""
+    """Arguments of vehicles without pictures."""
     return {"image": False, "put_back": True}
 
 
 def test_another_vehicle_is_told_in_sizes_and_answers(blind: dict[str, bool]) -> None:
-    """What it is, and what both do when they are told the same."""
+    """The certificate lists properties and rollouts."""
     with closing(VehicleEnv("car", **blind)) as car, closing(VehicleEnv("tank", **blind)) as tank:
         text = str(VehicleEnv.certify_shift(car, tank))
     assert "length: 0.4 m -> 0.32 m" in text
@@ -30,7 +30,7 @@ def test_another_vehicle_is_told_in_sizes_and_answers(blind: dict[str, bool]) ->
 
 
 def test_the_same_vehicle_is_no_shift(blind: dict[str, bool]) -> None:
-    """Unless that is what somebody wants to see."""
+    """An empty shift is refused unless allowed."""
     with closing(VehicleEnv("car", **blind)) as one, closing(VehicleEnv("car", **blind)) as two:
         with pytest.raises(EmptyShift, match="nothing to transfer"):
             VehicleEnv.certify_shift(one, two)
@@ -41,7 +41,7 @@ def test_the_same_vehicle_is_no_shift(blind: dict[str, bool]) -> None:
 
 @pytest.mark.gl
 def test_a_lens_changes_what_is_seen() -> None:
-    """And nothing else."""
+    """A lens changes observations only."""
     size = (40, 30)
     with (
         closing(VehicleEnv("car", size=size, put_back=True)) as clear,
@@ -54,7 +54,7 @@ def test_a_lens_changes_what_is_seen() -> None:
 
 
 def test_wrappers_count(blind: dict[str, bool]) -> None:
-    """The same vehicle that hears half of what it is told does something else."""
+    """Wrappers that change actions are a shift."""
     with (
         closing(VehicleEnv("car", **blind)) as car,
         closing(gym.wrappers.TransformAction(VehicleEnv("car", **blind), _halved, None)) as lame,
@@ -70,7 +70,7 @@ def _halved(action: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_vehicle_is_not_compared_with_an_ant(order: int, blind: dict[str, bool]) -> None:
-    """Whichever of them is asked says so."""
+    """Comparing with another kind of env is refused."""
     with (
         closing(VehicleEnv("car", **blind)) as car,
         closing(gym.make("shapechanger/InvertedPendulum-v1")) as pole,
@@ -83,7 +83,7 @@ def test_a_vehicle_is_not_compared_with_an_ant(order: int, blind: dict[str, bool
 @pytest.mark.gl
 @pytest.mark.parametrize("vehicle", ["car", "tank", "truck", "boat"])
 def test_a_vehicle_is_drawn_from_outside(vehicle: str) -> None:
-    """On its ground, in colours of its own, and smaller when more is in view."""
+    """`picture` shows the vehicle, smaller with a larger reach."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         near, far = env.picture(160, 120), env.picture(160, 120, reach=3.0 * env.reach)
     assert near.shape == (120, 160, 3)

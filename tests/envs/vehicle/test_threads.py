@@ -1,4 +1,4 @@
-"""Vehicles that threads step: each draws with what its own thread has made."""
+"""Rendering of vehicles in threads."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import shapechanger
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_the_pictures_of_two_threads_are_those_of_one() -> None:
-    """From all starts together, from those of some, and when somebody asks for them."""
+    """Pictures of threads equal those of single envs."""
 
     def pictures(threads: int) -> list[Any]:
         envs = shapechanger.make_vec(

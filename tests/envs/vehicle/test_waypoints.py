@@ -1,4 +1,4 @@
-"""Waypoints: one action for all vehicles, and each body measures what it needs for it."""
+"""The waypoint env, and measuring a steering response."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _COURSE = {"course": 2, "start": 2}
 
 
 def test_a_response_turns_a_bearing_into_steering() -> None:
-    """Left is left, the middle is the middle, and what the body cannot do is its full lock."""
+    """Steering has the bearing's sign and saturates."""
     car, tank = SteeringResponse(2.0, 0.0), SteeringResponse(0.0, 4.0)
     assert car.steering(0.0, 1.0) == 0.0
     assert car.steering(0.1, 1.0) == -car.steering(-0.1, 1.0) > 0.0
@@ -34,14 +34,14 @@ def test_a_response_turns_a_bearing_into_steering() -> None:
 
 @pytest.mark.parametrize("numbers", [(0.0, 0.0), (-1.0, 2.0), (math.nan, 1.0)])
 def test_a_body_that_does_not_turn_is_refused(numbers: tuple[float, float]) -> None:
-    """Such as one whose steering is not plugged in, or the wrong way round."""
+    """A response without a turn, or with the wrong sign, is refused."""
     with pytest.raises(StudyError, match="must turn to the right when it steers to the right"):
         SteeringResponse(*numbers)
 
 
 @pytest.mark.parametrize("vehicle", HOME)
 def test_profiles_look_as_the_simulated_cameras_do(vehicle: str) -> None:
-    """A profile says how its camera is mounted, and the body mounts it so."""
+    """The camera of each profile agrees with that of its body."""
     camera = load_profile(find_profile(f"lab-{vehicle}")).camera
     mount = vehicle_model(vehicle).camera
     assert camera is not None
@@ -50,7 +50,7 @@ def test_profiles_look_as_the_simulated_cameras_do(vehicle: str) -> None:
 
 
 def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
-    """With what is missing, and how to measure it."""
+    """The error names the missing settings and the command that measures them."""
     lines = find_profile("lab-car").read_text().splitlines()
     path = tmp_path / "car.toml"
     path.write_text("\n".join(line for line in lines if not line.startswith("pitch_deg")))
@@ -59,7 +59,7 @@ def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_car_measures_its_own_circle() -> None:
-    """Five seconds of its own motion give nearly what its drawing says."""
+    """The measured response of the car is close to its geometry."""
     with closing(RangesEnv("car", put_back=True)) as env:
         places = env.observation_layout.slices
         found = measure_response(env, places["speed"].start, places["yaw_rate"].start)
@@ -72,7 +72,7 @@ def test_a_car_measures_its_own_circle() -> None:
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize(("env_id", "vehicle"), [(i, v) for i, (v, _) in WAYPOINT_ENVS.items()])
 def test_who_follows_true_waypoints_hits_nothing(env_id: str, vehicle: str) -> None:
-    """The same law drives all vehicles; what is left to learn is to see the free way."""
+    """Following the expert's waypoints causes no collisions."""
     with closing(WaypointEnv(vehicle, put_back=True)) as env:
         seen, _ = env.reset(options=_COURSE)
         assert env.observation_space.contains(seen)
@@ -89,7 +89,7 @@ def test_who_follows_true_waypoints_hits_nothing(env_id: str, vehicle: str) -> N
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_the_whole_robot_follows_them_too() -> None:
-    """By what its own sensors measure."""
+    """The whole robot follows waypoints by its own sensors."""
     with closing(WaypointEnv("car", full_robot=True, put_back=True)) as env:
         env.reset(options=_COURSE)
         guide = env.demonstrator(0)
@@ -103,7 +103,7 @@ def test_the_whole_robot_follows_them_too() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 def test_what_is_no_waypoint_is_refused() -> None:
-    """Three numbers, or none."""
+    """Invalid waypoints are refused."""
     with closing(WaypointEnv("car")) as env:
         env.reset(options=_COURSE)
         for wrong in (np.zeros(3, np.float32), np.array([0.0, np.inf], np.float32)):

@@ -1,4 +1,4 @@
-"""Courses made by hand, for tests that need to know what stands where."""
+"""Hand-made courses with known walls and obstacles."""
 
 from __future__ import annotations
 

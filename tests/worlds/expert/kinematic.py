@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
-from shapechanger.worlds.expert.lattice import ClearanceField
+from shapechanger.worlds.expert.path import ClearanceField
 from shapechanger.worlds.world import Pose
 
 SIZES = {"car": (0.40, 0.20), "tank": (0.32, 0.24), "truck": (0.50, 0.20), "boat": (0.60, 0.20)}
@@ -17,7 +17,7 @@ TRAILER_M = 0.45
 
 
 class Kinematic:
-    """One vehicle in one course; where it touches something it stops.
+    """Kinematic vehicle on a course, which stops where it touches something.
 
     Attributes:
         touches: How often it began to touch something.
@@ -37,7 +37,7 @@ class Kinematic:
         self._trailer = pose.heading
 
     def advance(self, action: NDArray[np.float32], dt_s: float = 0.05) -> None:
-        """Let a control period go by."""
+        """Simulate one control period."""
         steering, throttle = float(action[0]), float(action[1])
         lag = 1.2 if self.name == "boat" else 0.15
         self.speed += (TOP[self.name] * throttle - self.speed) * dt_s / lag

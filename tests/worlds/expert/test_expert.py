@@ -1,9 +1,8 @@
-"""The expert drives every vehicle round without touching, and gets away where it touched."""
+"""The expert drives every vehicle without collisions and recovers when stuck."""
 
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from shapechanger.bodies.vehicles import VEHICLES
 from shapechanger.errors import UnknownName
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.expert import CourseExpert, CourseProgress, Disturbance
-from shapechanger.worlds.expert.driver import ThreeWay
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.world import Pose
@@ -29,7 +27,7 @@ def _drive(
     seconds: float,
     disturbance: Disturbance | None = None,
 ) -> float:
-    """Net progress after some time, m."""
+    """Return the net progress after some time, m."""
     progress = CourseProgress(course)
     progress.reset(vehicle.pose.x, vehicle.pose.y)
     for _ in range(round(seconds / 0.05)):
@@ -39,13 +37,13 @@ def _drive(
         assert np.abs(action).max() <= 1.0
         vehicle.advance(disturbance.applied(action) if disturbance else action)
         progress.update(vehicle.pose.x, vehicle.pose.y)
-    return progress.metres
+    return progress.update(vehicle.pose.x, vehicle.pose.y)
 
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", _HOMES)
 def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
-    """From a start on the middle of the lane, fast and without touching anything."""
+    """The expert is fast and touches nothing."""
     course = lay_out(_HOMES[name], seed)
     vehicle = Kinematic(name, course, start_pose(course, seed))
     metres = _drive(vehicle, CourseExpert(course, name), course, 30.0)
@@ -54,33 +52,20 @@ def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", _HOMES)
-def test_steering_with_three_levels_drives_round(name: str) -> None:
-    """Left, straight on and right are enough, each for its share of time."""
-    course = lay_out(_HOMES[name], 5)
-    vehicle = Kinematic(name, course, start_pose(course, 5))
-    expert = CourseExpert(course, name, levels="three")
-    steerings = {float(expert.act(vehicle.pose, 0.0)[0]) for _ in range(20)}
-    assert steerings <= {-1.0, 0.0, 1.0}
-    expert.reset(vehicle.pose)
-    assert _drive(vehicle, expert, course, 30.0) > 0.6 * 30.0 * TOP[name]
-    assert vehicle.touches == 0
-
-
-@pytest.mark.parametrize("name", _HOMES)
 def test_disturbances_are_put_right(name: str) -> None:
-    """What wanders and jerks comes back to its line, mostly without touching anything."""
+    """The expert corrects wandering and jerks with at most one collision."""
     course = lay_out(_HOMES[name], 6)
     vehicle = Kinematic(name, course, start_pose(course, 6))
     expert = CourseExpert(course, name)
     assert (
-        _drive(vehicle, expert, course, 40.0, Disturbance.of(name, "both", 1))
+        _drive(vehicle, expert, course, 40.0, Disturbance(1, TRAITS[name].sway))
         > 0.5 * 40.0 * TOP[name]
     )
     assert vehicle.touches <= 1
 
 
 def test_a_boat_holds_against_the_current() -> None:
-    """Water that moves at a fifth of its speed sets it off its line by little."""
+    """A current of a fifth of its speed displaces it by less than 0.35 m."""
     course = ring(2, half_width=2.5, radius=10.0, gap=1.8, current=(0.2, -0.1))
     x, y = course.route[0]
     ahead = course.route[1] - course.route[0]
@@ -98,7 +83,7 @@ def test_a_boat_holds_against_the_current() -> None:
 @pytest.mark.parametrize("name", _HOMES)
 @pytest.mark.parametrize("side", [1, -1])
 def test_it_gets_away_from_a_wall(name: str, side: int) -> None:
-    """With its nose at a wall it backs up, turns, and goes on."""
+    """A vehicle that faces a wall backs up, turns and drives on."""
     half_width = 1.2 if name in ("car", "tank") else 2.5
     course = ring(7, half_width=half_width, radius=10.0, obstacles=0)
     ahead = course.route[31] - course.route[30]
@@ -116,7 +101,7 @@ def pose_on(expert: CourseExpert, i: int) -> Pose:
 
 
 def test_it_backs_up_when_it_stands_still() -> None:
-    """After 0.7 s of throttle without motion, and forward again later."""
+    """Recovery starts after 0.7 s of throttle without motion and ends by driving forward."""
     course = ring(0)
     expert = CourseExpert(course, "car")
     pose = pose_on(expert, 0)
@@ -129,7 +114,7 @@ def test_it_backs_up_when_it_stands_still() -> None:
 
 
 def test_the_same_seed_does_the_same() -> None:
-    """Also while it gets away from walls."""
+    """Equal seeds give equal actions during recovery; other seeds give others."""
     course = ring(1)
 
     def track(seed: int) -> list[float]:
@@ -142,7 +127,7 @@ def test_the_same_seed_does_the_same() -> None:
 
 
 def test_a_reset_forgets_everything() -> None:
-    """The next episode begins as the first did, its randomness aside."""
+    """After `reset`, the first actions of an episode repeat."""
     course = ring(1)
     expert = CourseExpert(course, "boat")
     pose = pose_on(expert, 50)
@@ -155,38 +140,25 @@ def test_a_reset_forgets_everything() -> None:
 
 
 def test_an_unknown_vehicle_is_named() -> None:
-    """With the nearest spelling."""
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'truck'"):
         CourseExpert(ring(0), "trukc")
 
 
-@pytest.mark.parametrize("name", _HOMES)
-def test_what_the_expert_knows_is_so(name: str) -> None:
-    """Its numbers are those of the bodies."""
+@pytest.mark.parametrize("name", ["car", "truck"])
+def test_steering_is_that_of_the_body(name: str) -> None:
+    """The curvature at full lock agrees with the turning radius of the model."""
     model, traits = VEHICLES[name], TRAITS[name]
-    assert traits.half_width_m == pytest.approx(model.width_m / 2, abs=0.005)
-    assert traits.top_speed == pytest.approx(model.top_speed_mps, rel=0.1)
-    assert traits.nose_m == pytest.approx(model.nose_m, abs=0.005)
-    if traits.drive == "wheels":
-        assert 1 / traits.turn == pytest.approx(model.turning_radius_m, rel=0.1)
+    assert traits.body is model
+    assert 1 / traits.turn == pytest.approx(model.turning_radius_m, rel=0.1)
 
 
-@pytest.mark.parametrize("wanted", [-1.0, -0.61, -0.1, 0.0, 0.25, 0.5, 0.9])
-def test_three_levels_have_the_wanted_mean(wanted: float) -> None:
-    """And never owe more than one step."""
-    levels = ThreeWay()
-    given = [levels.step(wanted) for _ in range(200)]
-    assert set(given) <= {-1.0, 0.0, 1.0}
-    assert np.abs(np.cumsum(given) - wanted * np.arange(1, 201)).max() <= 1.0
-
-
-@pytest.mark.parametrize("kind", ["wander", "jerks", "both"])
-def test_disturbances_follow_from_their_seed(kind: Literal["wander", "jerks", "both"]) -> None:
-    """They leave the action alone that is recorded, and stay within what a vehicle takes."""
+def test_disturbances_are_reproducible_and_bounded() -> None:
+    """The given action is not changed, and the result stays within -1 to 1."""
     action = np.array((0.2, 0.8), np.float32)
 
     def run(seed: int) -> np.ndarray:
-        disturbance = Disturbance(kind, seed)
+        disturbance = Disturbance(seed, 0.25)
         return np.array([disturbance.applied(action) for _ in range(2000)])
 
     first = run(3)
@@ -196,5 +168,4 @@ def test_disturbances_follow_from_their_seed(kind: Literal["wander", "jerks", "b
     assert np.abs(first).max() <= 1.0
     assert first.dtype == np.float32
     assert first[:, 0].mean() == pytest.approx(0.2, abs=0.1)
-    assert first[:, 0].std() > 0.02
-    assert (first[:, 1] == np.float32(0.8)).all() == (kind == "jerks")
+    assert (first.std(axis=0) > 0.02).all()

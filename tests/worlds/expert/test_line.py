@@ -1,4 +1,4 @@
-"""Lines that know where on them a point is, and progress that is counted along them."""
+"""Closed lines: stations, nearest points and progress."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _RING = ClosedLine(ring(0).route)
 
 
 def test_a_square_knows_its_sides() -> None:
-    """Left of a line that goes round counter-clockwise is inside."""
+    """The left of a counter-clockwise line is its inside."""
     assert _SQUARE.length == 16.0
     assert _SQUARE.nearest(1.0, 0.5) == pytest.approx((1.0, 0.5))
     assert _SQUARE.nearest(1.0, -0.5) == pytest.approx((1.0, -0.5))
@@ -25,7 +25,7 @@ def test_a_square_knows_its_sides() -> None:
 
 @given(station=st.floats(-200.0, 200.0))
 def test_the_point_at_a_station_is_at_that_station(station: float) -> None:
-    """Stations go on round and round."""
+    """Stations wrap around."""
     x, y = _RING.at(station)
     spot = _RING.nearest(x, y)
     assert abs(_RING.ahead_by(station, spot.station)) < 1e-6
@@ -34,12 +34,12 @@ def test_the_point_at_a_station_is_at_that_station(station: float) -> None:
 
 @given(start=st.floats(0.0, 50.0), moved=st.floats(-20.0, 20.0))
 def test_the_shorter_way_undoes_a_move(start: float, moved: float) -> None:
-    """It is signed, and it knows where the line closes."""
+    """`ahead_by` is signed and wraps around."""
     assert _RING.ahead_by(start, start + moved) == pytest.approx(moved, abs=1e-9)
 
 
 def test_a_hint_keeps_to_its_leg() -> None:
-    """Of two legs 1 m apart, the one that is driven counts, however near the other is."""
+    """With a hint, a nearer parallel leg is ignored."""
     there = [(x, 0.0) for x in np.arange(0.0, 20.0, 0.1)]
     back = [(x, 1.0) for x in np.arange(20.0, 0.0, -0.1)]
     line = ClosedLine(np.array(there + back))
@@ -48,25 +48,26 @@ def test_a_hint_keeps_to_its_leg() -> None:
 
 
 def test_progress_counts_laps_and_counts_down() -> None:
-    """Three laps are three lengths, and the same way backward leaves nothing."""
+    """Progress counts whole laps, and backward motion subtracts."""
     course = ring(0)
     line = ClosedLine(course.route)
     progress = CourseProgress(course)
     progress.reset(*line.at(5.0))
+    metres = 0.0
     for station in np.arange(5.0, 5.0 + 3 * line.length, 0.1):
-        progress.update(*line.at(float(station)))
-    assert progress.metres == pytest.approx(3 * line.length, abs=0.2)
+        metres = progress.update(*line.at(float(station)))
+    assert metres == pytest.approx(3 * line.length, abs=0.2)
     for station in np.arange(5.0 + 3 * line.length, 4.0, -0.1):
-        progress.update(*line.at(float(station)))
-    assert progress.metres == pytest.approx(-1.0, abs=0.2)
+        metres = progress.update(*line.at(float(station)))
+    assert metres == pytest.approx(-1.0, abs=0.2)
 
 
 def test_standing_still_is_no_progress() -> None:
-    """Nor is swaying across the lane."""
+    """A vehicle at rest makes no progress."""
     course = ring(1)
     progress = CourseProgress(course)
     x, y = course.route[7]
     progress.reset(x, y)
     for _ in range(50):
         progress.update(x, y)
-    assert progress.metres == 0.0
+    assert progress.update(x, y) == 0.0

@@ -1,4 +1,4 @@
-"""Paths: closed, clear of everything, smooth; and refused in words where none exists."""
+"""Planned paths are closed, clear and smooth; impossible ones raise errors."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 from shapechanger.errors import WorldError
 from shapechanger.worlds.course import Course, Obstacle
 from shapechanger.worlds.expert import CoursePath, plan_path
-from shapechanger.worlds.expert.lattice import FAR_M, ClearanceField
 from shapechanger.worlds.expert.line import ClosedLine
+from shapechanger.worlds.expert.path import FAR_M, ClearanceField
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out
 from tests.worlds.expert.courses import ring
@@ -22,7 +22,7 @@ _CASES = list(itertools.product(_HOMES, range(3)))
 
 
 def _planned(vehicle: str, seed: int) -> tuple[Course, CoursePath, float]:
-    """A course where the vehicle is at home, its path, and the clearance it was asked for."""
+    """Return a course of the vehicle, its path, and the required clearance."""
     traits = TRAITS[vehicle]
     course = lay_out(_HOMES[vehicle], seed)
     path = plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
@@ -31,7 +31,7 @@ def _planned(vehicle: str, seed: int) -> tuple[Course, CoursePath, float]:
 
 @pytest.mark.parametrize(("vehicle", "seed"), _CASES)
 def test_a_path_keeps_its_laws(vehicle: str, seed: int) -> None:
-    """It is closed and even, goes on and on along the lane, and keeps clear."""
+    """A path is closed, evenly spaced, follows the lane once, and keeps its clearance."""
     course, path, least = _planned(vehicle, seed)
     steps = np.roll(path.points, -1, axis=0) - path.points
     sizes = np.hypot(steps[:, 0], steps[:, 1])
@@ -55,7 +55,7 @@ def test_a_path_keeps_its_laws(vehicle: str, seed: int) -> None:
 
 @pytest.mark.parametrize("vehicle", _HOMES)
 def test_a_path_can_be_driven(vehicle: str) -> None:
-    """It bends no tighter than the vehicle can, and is about as long as the lane."""
+    """The curvature is within the vehicle's limit, and the length close to the lane's."""
     for seed in range(3):
         course, path, _ = _planned(vehicle, seed)
         assert np.abs(path.curvature).max() < TRAITS[vehicle].turn
@@ -63,13 +63,13 @@ def test_a_path_can_be_driven(vehicle: str) -> None:
 
 
 def test_planning_twice_gives_the_same_path() -> None:
-    """There is no chance in it."""
+    """Planning is deterministic."""
     first, second = (plan_path(ring(3), 0.1, 0.12) for _ in range(2))
     np.testing.assert_array_equal(first.points, second.points)
 
 
 def test_where_a_path_begins_does_not_matter() -> None:
-    """The seam of the route leaves no kink: a rotated route is driven as fast as before."""
+    """The start of the route leaves no kink in the path."""
     course = ring(4)
     turned = dataclasses.replace(course, route=np.roll(course.route, 137, axis=0))
     first, second = plan_path(course, 0.1, 0.12), plan_path(turned, 0.1, 0.12)
@@ -78,7 +78,7 @@ def test_where_a_path_begins_does_not_matter() -> None:
 
 
 def _plug(course: Course, size: float) -> Course:
-    """The course with a box of a size across the middle of its lane."""
+    """Return the course with a box of this size in the middle of its lane."""
     x, y = course.route[100]
     ahead = course.route[101] - course.route[99]
     yaw = float(np.arctan2(ahead[1], ahead[0]))
@@ -87,13 +87,13 @@ def _plug(course: Course, size: float) -> Course:
 
 
 def test_a_blocked_lane_is_refused_in_words() -> None:
-    """With what could be done instead."""
+    """The message names the width, the place and alternatives."""
     with pytest.raises(WorldError, match=r"blocked for anything 0\.40 m wide .* another seed"):
         plan_path(_plug(ring(0, obstacles=0), 2.0), 0.1, 0.1)
 
 
 def test_a_gap_is_found_until_it_is_too_narrow() -> None:
-    """A box in the middle leaves 0.6 m at each side: 0.5 m go through, 0.7 m do not."""
+    """A passage of 0.6 m fits a width of 0.5 m, not one of 0.7 m."""
     course = _plug(ring(0, obstacles=0), 0.8)
     assert plan_path(course, 0.1, 0.15).clearance.min() >= 0.25
     with pytest.raises(WorldError):
@@ -101,16 +101,16 @@ def test_a_gap_is_found_until_it_is_too_narrow() -> None:
 
 
 def test_ahead_goes_round() -> None:
-    """A whole lap ahead is here."""
+    """Stations beyond the length wrap around."""
     path = plan_path(ring(5), 0.1, 0.12)
-    assert path.ahead(3.0, path.length) == pytest.approx(path.ahead(3.0, 0.0))
-    spot = path.nearest(*path.ahead(3.0, 1.0), hint=3.0)
+    assert path.at(3.0 + path.length) == pytest.approx(path.at(3.0))
+    spot = path.nearest(*path.at(4.0), hint=3.0)
     assert spot.station == pytest.approx(4.0)
-    assert path.way(path.length - 1.0, 1.0) == pytest.approx(2.0)
+    assert path.ahead_by(path.length - 1.0, 1.0) == pytest.approx(2.0)
 
 
 def test_distances_are_exact() -> None:
-    """Of walls, boxes that are turned, and round things; 0 inside."""
+    """Distances from walls, rotated boxes and cylinders are exact, and 0 inside."""
     box = Obstacle("box", 1.0, 1.0, np.pi / 4, 0.4, 0.2, 0.3)
     post = Obstacle("post", 3.0, 0.0, 0.0, 0.4, 0.4, 0.3)
     empty = ring(0, obstacles=0, radius=50.0)

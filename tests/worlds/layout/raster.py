@@ -1,4 +1,4 @@
-"""A course as a grid of cells that are free or blocked."""
+"""Occupancy grids of courses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Choices by chance."""
+"""Weighted random choice."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from shapechanger.worlds.layout.furniture import weighted_choice
 
 
 def test_each_is_picked_as_often_as_its_share() -> None:
-    """Shares need not sum to one, and a share of nothing is never picked."""
+    """Frequencies are proportional to the weights; weight 0 is never drawn."""
     rng = np.random.default_rng(0)
     counts = np.bincount([weighted_choice(rng, [3.0, 0.0, 1.0]) for _ in range(4000)], minlength=3)
     assert counts / 4000 == pytest.approx([0.75, 0.0, 0.25], abs=0.03)

@@ -1,4 +1,4 @@
-"""Courses by world and seed: what holds for each of them, also for those nobody learned on."""
+"""Properties of all courses, training and held-out."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _courses(world: str) -> list[Course]:
 
 
 def _bends(course: Course) -> np.ndarray:
-    """By how much the route turns left at each point, rad."""
+    """Return the left turn of the route at each point, rad."""
     steps = np.diff(course.route, axis=0, append=course.route[:1])
     headings = np.arctan2(steps[:, 1], steps[:, 0])
     return (np.diff(headings, prepend=headings[-1:]) + math.pi) % (2 * math.pi) - math.pi
@@ -56,7 +56,7 @@ def _same(one: Course, other: Course) -> bool:
 
 @each_world
 def test_a_seed_is_a_course(world: str) -> None:
-    """A result can be repeated: equal seeds give equal courses, different seeds different ones."""
+    """Equal seeds give equal courses, different seeds different ones."""
     for seed in _SEEDS[:5] + _SEEDS[-5:]:
         np.random.seed(seed % 7)  # noqa: NPY002 - What others do with chance must not matter.
         assert _same(lay_out(world, seed), _laid(world, seed))
@@ -67,7 +67,7 @@ def test_a_seed_is_a_course(world: str) -> None:
 
 @each_world
 def test_the_route_is_closed_even_and_of_the_promised_length(world: str) -> None:
-    """Whoever counts points counts metres, and the last point leads to the first."""
+    """Points are evenly spaced around the closed route, and its length is in range."""
     for course in _courses(world):
         steps = np.diff(course.route, axis=0, append=course.route[:1])
         chords = np.hypot(steps[:, 0], steps[:, 1])
@@ -79,7 +79,7 @@ def test_the_route_is_closed_even_and_of_the_promised_length(world: str) -> None
 
 @each_world
 def test_courses_turn_both_ways(world: str) -> None:
-    """Who learns to turn only left has learned nothing; loops run round both ways too."""
+    """Each course turns left and right, and loops run in both directions."""
     sums = set[int]()
     for course in _courses(world):
         bends = _bends(course)
@@ -91,7 +91,7 @@ def test_courses_turn_both_ways(world: str) -> None:
 
 @each_world
 def test_no_bend_is_tighter_than_promised(world: str) -> None:
-    """A vehicle with the turning circle of its world gets round every bend."""
+    """The curvature of the route stays within the limit of its world."""
     for course in _courses(world):
         # Over half a metre: the route is drawn by points, so single angles are rough.
         turned = np.abs(ndimage.uniform_filter1d(_bends(course), 5, mode="wrap"))
@@ -100,7 +100,7 @@ def test_no_bend_is_tighter_than_promised(world: str) -> None:
 
 @each_world
 def test_the_walls_are_closed_lines(world: str) -> None:
-    """No vehicle slips out between two walls: each ends where exactly one other begins."""
+    """Each wall ends where exactly one other begins."""
     for course in _courses(world):
         starts = [wall.start for wall in course.walls]
         ends = [wall.end for wall in course.walls]
@@ -113,7 +113,7 @@ def test_the_walls_are_closed_lines(world: str) -> None:
 
 @each_world
 def test_no_view_escapes_and_walls_face_it(world: str) -> None:
-    """From wherever on the route, a look in any direction ends at the left side of a wall."""
+    """From the route, every ray hits the front of a wall."""
     angles = np.linspace(0.0, 2 * math.pi, 90, endpoint=False) + 0.0123
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     for course in _courses(world)[::3]:
@@ -133,7 +133,7 @@ def test_no_view_escapes_and_walls_face_it(world: str) -> None:
 
 @each_world
 def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
-    """The middle is the middle: no wall is nearer than `half_width`, and one is that near."""
+    """`half_width` is the distance from the route to the nearest wall."""
     low, high = _WIDTHS[world]
     for course in _courses(world):
         nearest = distances_to_segments(course.route, wall_segments(course.walls)).min(axis=1)
@@ -145,7 +145,7 @@ def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
 
 @each_world
 def test_things_touch_at_most(world: str) -> None:
-    """Nothing stands in something else, neither in a wall nor outside."""
+    """Obstacles overlap neither walls nor each other."""
     for course in _courses(world):
         feet = wall_segments(course.walls)
         blocked, (x0, y0) = occupancy(_without(course), 0.05)
@@ -157,7 +157,7 @@ def test_things_touch_at_most(world: str) -> None:
 
 @each_world
 def test_the_start_is_free(world: str) -> None:
-    """Nothing stands within 1.5 m of the start along the route, nor within 2 m before it."""
+    """The route is free around its first point."""
     for course in _courses(world):
         n = len(course.route)
         behind, before = round(1.5 / course.spacing), round(2.0 / course.spacing)
@@ -170,7 +170,7 @@ def test_the_start_is_free(world: str) -> None:
 
 @each_world
 def test_there_is_a_way_round_as_wide_as_promised(world: str) -> None:
-    """A disc as wide as `gap_m` rolls once round, past every thing: measured on a fine grid."""
+    """A disc of diameter `gap_m` fits around the course on an occupancy grid."""
     cell = 0.04
     for course in _courses(world)[::2]:
         assert course.gap_m >= _GAPS[world]
@@ -193,7 +193,7 @@ def test_there_is_a_way_round_as_wide_as_promised(world: str) -> None:
 
 @each_world
 def test_lamps_hang_over_the_lane(world: str) -> None:
-    """Light falls where somebody drives, and only corridors have a ceiling to hang it from."""
+    """Lamps are in the lane, and only corridors have a ceiling."""
     for course in _courses(world):
         assert course.lamps
         assert course.ceiling_m == (2.5 if world == "corridor" else 0.0)
@@ -203,7 +203,7 @@ def test_lamps_hang_over_the_lane(world: str) -> None:
 
 
 def test_corridors_have_corners_and_doors() -> None:
-    """Six corners at least, and over all seeds every kind of wall and of furniture."""
+    """Corridors have at least six corners and, over all seeds, all kinds of wall and furniture."""
     surfaces, kinds = set[str](), set[str]()
     for course in _courses("corridor"):
         turned = np.abs(_bends(course)).sum() / (math.pi / 2.0)
@@ -217,7 +217,7 @@ def test_corridors_have_corners_and_doors() -> None:
 
 
 def test_yards_and_harbours_have_all_that_belongs_there() -> None:
-    """Over all seeds every surface and every obstacle occurs; quays are as high as they should."""
+    """Over all seeds every surface and obstacle occurs, and quays have their height."""
     yards, harbours = _courses("yard"), _courses("harbour")
     assert {w.surface for c in yards for w in c.walls} == {"hedge", "fence", "brick", "shed"}
     assert {t.kind for c in yards for t in c.obstacles} == {"cone", "crate", "bin", "post", "tree"}
@@ -228,7 +228,7 @@ def test_yards_and_harbours_have_all_that_belongs_there() -> None:
 
 
 def test_only_water_flows() -> None:
-    """A harbour has a current of up to 0.15 m/s, not always the same; land has none."""
+    """Harbours have varying currents of up to 0.15 m/s; land has none."""
     speeds = [math.hypot(*course.current_mps) for course in _courses("harbour")]
     assert 0.1 < max(speeds) <= 0.15
     assert min(speeds) < 0.05
@@ -236,7 +236,7 @@ def test_only_water_flows() -> None:
 
 
 def test_unknown_worlds_and_seeds_are_refused() -> None:
-    """The message says what exists, or what is wrong with the seed."""
+    """Errors list the worlds, or explain what is wrong with the seed."""
     with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
         lay_out("harbor", 0)
     with pytest.raises(WorldError, match="from 0, got -1"):
@@ -244,7 +244,7 @@ def test_unknown_worlds_and_seeds_are_refused() -> None:
 
 
 def test_a_world_that_never_fits_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Chance that makes no course ends in a sentence instead of an endless search."""
+    """The search for a layout gives up with an error."""
     from shapechanger.worlds.layout import courses
 
     def never(rng: np.random.Generator, seed: int) -> Course | None:

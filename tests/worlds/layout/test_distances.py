@@ -1,4 +1,4 @@
-"""Distances of things and walls, against many points of them."""
+"""Distances between obstacles and walls, compared with sampled points."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _random_thing(rng: np.random.Generator) -> Obstacle:
 
 
 def _samples(obstacle: Obstacle) -> np.ndarray:
-    """Points all over a thing."""
+    """Return sampled points of an obstacle."""
     a = np.linspace(-0.5, 0.5, 41)
     shares = np.stack(np.meshgrid(a, a), axis=-1).reshape(-1, 2)
     if obstacle.is_round:
@@ -43,7 +43,7 @@ def _nearest(one: np.ndarray, other: np.ndarray) -> float:
 
 @pytest.mark.parametrize("seed", range(25))
 def test_distances_are_those_of_the_nearest_points(seed: int) -> None:
-    """Things and walls are as far apart as their nearest points, and 0 or less where they meet."""
+    """Distances equal those of the nearest samples, and are 0 or less on overlap."""
     rng = np.random.default_rng(seed)
     one, other = _random_thing(rng), _random_thing(rng)
     measured = _nearest(_samples(one), _samples(other))
@@ -56,7 +56,7 @@ def test_distances_are_those_of_the_nearest_points(seed: int) -> None:
 
 
 def test_a_thing_inside_another_is_no_distance_away() -> None:
-    """A small box within a large one overlaps it, although no side of theirs crosses."""
+    """A box inside another overlaps it, although no sides cross."""
     large = Obstacle("box", 0.0, 0.0, 0.3, 2.0, 2.0, 1.0)
     small = Obstacle("box", 0.1, 0.0, 1.0, 0.2, 0.3, 1.0)
     assert obstacle_gap(large, small) == 0.0
@@ -65,7 +65,7 @@ def test_a_thing_inside_another_is_no_distance_away() -> None:
 
 
 def test_pieces_cross_only_in_their_middles() -> None:
-    """A chain whose pieces share ends does not cross itself; a bow tie does."""
+    """Shared ends do not count as a crossing."""
     chain = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     tie = chain[[0, 2, 1, 3]]
     assert not any_crossing(np.hstack([chain, np.roll(chain, -1, 0)]))

@@ -21,7 +21,7 @@ def _ellipse(a: float, b: float, n: int) -> np.ndarray:
 
 
 def test_resampled_points_are_evenly_apart() -> None:
-    """Also where the line bends much, and from points that were crowded there."""
+    """Points are evenly spaced in sharp bends and from uneven input."""
     line = resample(_ellipse(6.0, 2.0, 2000), 0.1)
     chords = np.hypot(*np.diff(line, axis=0, append=line[:1]).T)
     assert chords == pytest.approx(chords[0], rel=1e-3)
@@ -30,7 +30,7 @@ def test_resampled_points_are_evenly_apart() -> None:
 
 
 def test_normals_point_left_and_turns_sum_to_once_round() -> None:
-    """Counter-clockwise round a circle, left is inwards, and a round is 2 pi."""
+    """Normals of a counter-clockwise circle point inwards, and its turns sum to 2 pi."""
     circle = _ellipse(3.0, 3.0, 100)
     assert normals(circle) == pytest.approx(-circle / 3.0)
     assert turn_angles(circle).sum() == pytest.approx(2 * np.pi)
@@ -38,7 +38,7 @@ def test_normals_point_left_and_turns_sum_to_once_round() -> None:
 
 
 def test_tangent_radii_know_bends_and_necks() -> None:
-    """Round a circle they are its radius; between two long sides half the distance."""
+    """They equal a circle's radius, and half the distance between two long sides."""
     assert tangent_radii(_ellipse(3.0, 3.0, 64)) == pytest.approx(3.0)
     x = np.linspace(-10.0, 10.0, 201)
     sides = np.concatenate([np.stack([x, 0 * x - 1], 1), np.stack([x[::-1], 0 * x + 1], 1)])
@@ -46,7 +46,7 @@ def test_tangent_radii_know_bends_and_necks() -> None:
 
 
 def test_smoothing_keeps_the_middle_and_removes_wiggles() -> None:
-    """The mean stays, and a wiggle of two points is gone."""
+    """Smoothing keeps the mean and removes the highest frequency."""
     rng = np.random.default_rng(0)
     values = rng.normal(size=(100, 2))
     assert smooth(values, 4.0).mean(axis=0) == pytest.approx(values.mean(axis=0))

@@ -9,7 +9,7 @@ from shapechanger.worlds.layout.geometry import grow_cells, scale_grid, trace_ou
 
 
 def test_outlines_go_round_counter_clockwise() -> None:
-    """Three squares in the shape of an L have eight sides round them."""
+    """The outline of an L of three cells has eight sides."""
     loop = trace_outline(frozenset({(0, 0), (1, 0), (0, 1)}))
     assert loop is not None
     corners = [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2), (0, 1)]
@@ -26,13 +26,13 @@ def test_outlines_go_round_counter_clockwise() -> None:
     ids=["a corner touches", "a hole", "two pieces"],
 )
 def test_outlines_that_meet_themselves_are_refused(cells: frozenset[tuple[int, int]]) -> None:
-    """No lane can follow an outline of two pieces, or one that touches itself."""
+    """Outlines in several parts, or that touch themselves, return None."""
     assert trace_outline(cells) is None
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_grown_squares_hang_together(seed: int) -> None:
-    """Every outline that is accepted takes one step at a time and comes to no point twice."""
+    """Accepted outlines have unit steps and no repeated point."""
     rng = np.random.default_rng(seed)
     cells = grow_cells(rng, 6)
     assert len(cells) == 6

@@ -12,7 +12,7 @@ from tests.worlds.layout.raster import occupancy
 
 
 def _ring(*obstacles: Obstacle) -> Course:
-    """A square lane 2 m wide round a block of 2 m by 2 m."""
+    """Return a square lane, 2 m wide, around a block of 2 m by 2 m."""
 
     def walls(corners: list[tuple[float, float]]) -> list[Wall]:
         surface: Surface = "plaster"
@@ -28,7 +28,7 @@ def _ring(*obstacles: Obstacle) -> Course:
 
 
 def test_the_lane_is_free_and_the_rest_blocked() -> None:
-    """The area of the free cells is that of the lane, and cells are where the origin says."""
+    """The free cells cover the lane."""
     blocked, (x0, y0) = occupancy(_ring(), 0.1)
     rows, columns = np.nonzero(~blocked)
     assert len(rows) * 0.01 == pytest.approx(36.0 - 4.0, rel=0.04)
@@ -48,7 +48,7 @@ def test_the_lane_is_free_and_the_rest_blocked() -> None:
     ],
 )
 def test_things_are_blocked(obstacle: Obstacle, area: float) -> None:
-    """As many cells are blocked as the thing covers, round its middle."""
+    """The blocked cells cover the obstacle."""
     empty, (x0, y0) = occupancy(_ring(), 0.02)
     full, _ = occupancy(_ring(obstacle), 0.02)
     rows, columns = np.nonzero(full & ~empty)
@@ -60,7 +60,7 @@ def test_things_are_blocked(obstacle: Obstacle, area: float) -> None:
 
 @pytest.mark.parametrize("world", WORLDS)
 def test_the_route_is_free_of_walls(world: str) -> None:
-    """Cells near the route are free, cells behind a wall are not."""
+    """Cells near the route are free, cells behind walls are blocked."""
     course = lay_out(world, 5)
     blocked, (x0, y0) = occupancy(course, 0.05)
     rows, columns = np.nonzero(~blocked)

@@ -1,4 +1,4 @@
-"""Places to begin at."""
+"""Start poses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shapechanger.worlds.layout.geometry import distances_from_obstacle, wall_se
 @pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("seed", [0, 7, HELD_OUT[3]])
 def test_starts_are_on_the_route_and_free(world: str, seed: int) -> None:
-    """A vehicle with a trailer stands clear of everything, and looks along the lane."""
+    """A truck with its trailer fits at each start, facing along the lane."""
     course = lay_out(world, seed)
     poses = {start_pose(course, k) for k in range(30)}
     assert len(poses) > 10
@@ -42,13 +42,13 @@ def test_starts_are_on_the_route_and_free(world: str, seed: int) -> None:
 
 @pytest.mark.parametrize("world", WORLDS)
 def test_starts_follow_from_the_seed(world: str) -> None:
-    """An episode can be begun again from the same place."""
+    """Equal seeds give equal starts."""
     course = lay_out(world, 1)
     assert [start_pose(course, k) for k in range(5)] == [start_pose(course, k) for k in range(5)]
 
 
 def test_a_lane_that_is_full_begins_at_its_first_point() -> None:
-    """Where no place is free, the first point of the route is where to begin."""
+    """Without any free place, the start is the first point of the route."""
     course = lay_out("corridor", 0)
     full = replace(
         course,

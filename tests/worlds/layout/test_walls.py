@@ -1,4 +1,4 @@
-"""Walls of a course: how long ones are split into panels and pieces."""
+"""Long walls are split into panels and pieces."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def length(wall: Wall) -> float:
 
 
 def closed(walls: tuple[Wall, ...]) -> bool:
-    """Whether each wall begins where the one before it ends."""
+    """Return whether each wall begins where the previous one ends."""
     pairs = zip(walls, (*walls[1:], walls[0]), strict=True)
     return all(np.allclose(one.end, after.start, atol=1e-9) for one, after in pairs)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_long_walls_of_a_corridor_are_split_by_panels(seed: int) -> None:
-    """Plaster of 0.4 to 2.4 m between panels, each as wide as its kind, without gaps."""
+    """Panels have the width of their kind, with 0.4 to 2.4 m of plaster between them."""
     rng = np.random.default_rng(seed)
     walls = panel_walls(rng, _CORNERS, np.ones(4, np.int64), 2.5)
     assert closed(walls)
@@ -52,7 +52,7 @@ def test_long_walls_of_a_corridor_are_split_by_panels(seed: int) -> None:
 
 
 def test_banks_are_split_into_pieces_of_their_kind() -> None:
-    """Runs of straight walls, each as long as its kind's piece, closed around the lane."""
+    """Banks are closed runs of pieces with the length of their kind."""
     angle = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
     route = 10.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     kinds = (

@@ -1,4 +1,4 @@
-"""Textures as pictures."""
+"""Procedural textures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _TILED = ("floor", "asphalt", "water", "grass", "hedge", "ceiling", "brick", "fe
 
 @pytest.mark.parametrize("name", PAINTERS)
 def test_a_texture_is_a_picture_with_something_on_it(name: str) -> None:
-    """Small enough to be sent to the graphics card at once, and not of one colour."""
+    """Textures are small and not uniform."""
     picture = texture(name, 0)
     assert picture.dtype == np.uint8
     assert picture.shape[2] == 3
@@ -23,7 +23,7 @@ def test_a_texture_is_a_picture_with_something_on_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", PAINTERS)
 def test_it_follows_from_its_seed(name: str) -> None:
-    """A course that is drawn again looks as it did, in every process."""
+    """Equal seeds give equal textures in every process."""
     first = texture(name, 1).copy()
     texture.cache_clear()
     np.testing.assert_array_equal(texture(name, 1), first)
@@ -32,7 +32,7 @@ def test_it_follows_from_its_seed(name: str) -> None:
 
 @pytest.mark.parametrize("name", _TILED)
 def test_what_goes_on_and_on_has_no_seam(name: str) -> None:
-    """Across the seam, neighbours differ about as much as inside."""
+    """Repeating textures are continuous across their edges."""
     picture = texture(name, 3).astype(float)
     inside = np.abs(np.diff(picture, axis=1)).mean(axis=(0, 2))
     seam = np.abs(picture[:, 0] - picture[:, -1]).mean()
@@ -40,19 +40,19 @@ def test_what_goes_on_and_on_has_no_seam(name: str) -> None:
 
 
 def test_a_kept_texture_cannot_be_spoilt() -> None:
-    """All courses of a process share it."""
+    """Cached textures are read-only."""
     with pytest.raises(ValueError, match="read-only"):
         texture("door", 0)[0, 0, 0] = 1
 
 
 def test_an_unknown_texture_names_the_nearest() -> None:
-    """A misspelt surface is found at once."""
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'plaster'"):
         texture("plastre", 0)
 
 
 def test_clouds_have_mean_0_and_deviation_1() -> None:
-    """So that a share of them is a share of the colour."""
+    """Clouds have mean 0 and standard deviation 1."""
     field = clouds(np.random.default_rng(0), 64, 96, 4, 6)
     assert field.shape == (64, 96)
     assert field.mean() == pytest.approx(0.0, abs=1e-5)

@@ -1,4 +1,4 @@
-"""A small course made by hand, on which every number is known."""
+"""A small hand-made course."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _KINDS: dict[str, tuple[Surface, ...]] = {
 
 
 def square(world: str) -> Course:
-    """A loop round a block of 4 m: the lane is 2 m wide, x and y are from -1 to 7 m."""
+    """Return a loop around a block of 4 m; the lane is 2 m wide, x and y from -1 to 7 m."""
     side = np.arange(0.0, 6.0, 0.1)
     zero, six = np.zeros_like(side), np.full_like(side, 6.0)
     route = np.concatenate(
@@ -53,5 +53,5 @@ def square(world: str) -> Course:
 
 
 def with_walls(course: Course, *walls: Wall) -> Course:
-    """The course with other walls and nothing in its way."""
+    """Return the course with other walls and no obstacles."""
     return replace(course, walls=walls, obstacles=(), lamps=())

@@ -1,4 +1,4 @@
-"""What of a course a vehicle can touch."""
+"""Collision geoms of a course."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _touched(model: mujoco.MjModel, *place: float) -> set[str]:
 
 @pytest.mark.parametrize("world", _WORLDS)
 def test_every_name_says_that_it_is_of_the_world(world: str) -> None:
-    """A vehicle in the same model has its own names."""
+    """All elements of a course are named "world/..."."""
     model = _compiled(world)
     names = [
         *(model.geom(i).name for i in range(model.ngeom)),
@@ -50,7 +50,7 @@ def test_every_name_says_that_it_is_of_the_world(world: str) -> None:
 
 @pytest.mark.parametrize("world", _WORLDS)
 def test_what_is_touched_is_not_drawn_and_what_is_drawn_not_touched(world: str) -> None:
-    """Groups 0 to 2 are drawn; a mesh that is only seen must cost the physics nothing."""
+    """Collision geoms are hidden, and visual meshes do not collide."""
     model = _compiled(world)
     touchable = (model.geom_contype | model.geom_conaffinity) > 0
     assert (model.geom_group[touchable] == 3).all()
@@ -59,7 +59,7 @@ def test_what_is_touched_is_not_drawn_and_what_is_drawn_not_touched(world: str) 
 
 
 def test_walls_and_things_are_named_by_their_number() -> None:
-    """Whoever counts collisions finds the wall in the course."""
+    """Collision geoms are numbered like the walls and obstacles of the course."""
     model = _compiled("corridor")
     course = square("corridor")
     for number in range(len(course.walls)):
@@ -71,28 +71,28 @@ def test_walls_and_things_are_named_by_their_number() -> None:
 
 @pytest.mark.parametrize(("bits", "ground"), [(_HULL, False), (_WHEEL, True)])
 def test_a_wheel_touches_the_ground_and_a_hull_does_not(bits: dict[str, int], ground: bool) -> None:
-    """A hull that rubs on the floor would brake."""
+    """Wheels collide with the ground, hulls do not."""
     touched = _touched(_compiled("corridor", **bits), 0.0, 3.0, 0.05)
     assert touched == ({"world/ground"} if ground else set())
 
 
 @pytest.mark.parametrize("bits", [_HULL, _WHEEL])
 def test_both_touch_walls_and_things(bits: dict[str, int]) -> None:
-    """The first wall is at y = -1; the second thing is a round bin."""
+    """Hulls and wheels collide with walls and obstacles."""
     model = _compiled("corridor", **bits)
     assert _touched(model, 3.5, -0.95, 0.3) == {"world/wall/0"}
     assert _touched(model, 6.6, 2.8, 0.3) == {"world/thing/1"}
 
 
 def test_the_seen_side_of_a_wall_is_where_it_starts_to_push() -> None:
-    """What is seen and what is touched must be at the same place."""
+    """The visible side of a wall is the surface of its collision geom."""
     model = _compiled("corridor", **_HULL)
     assert _touched(model, 3.5, -0.89, 0.3) == set()
     assert _touched(model, 3.5, -0.91, 0.3) == {"world/wall/0"}
 
 
 def test_the_world_weighs_nothing_and_can_stand_with_a_vehicle() -> None:
-    """Nothing of it may move, or change what a vehicle weighs."""
+    """A course adds no joints and no mass."""
     model = _compiled("yard", **_HULL)
     assert model.body_mass[0] == 0.0
     assert model.nv == 6

@@ -1,4 +1,4 @@
-"""What a camera sees of a course."""
+"""Rendered pictures of courses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _WIDTH, _HEIGHT = 160, 120
 def _draw(
     course: Course, look: Look, place: tuple[float, float], angle: float
 ) -> NDArray[np.uint8]:
-    """What a camera 0.5 m above the ground sees at `place`, looking along `angle`, rad."""
+    """Render the view at `place`, 0.5 m above the ground, along `angle`, rad."""
     spec = mujoco.MjSpec()
     add_course(spec, course, look)
     cos, sin = float(np.cos(angle)), float(np.sin(angle))
@@ -47,7 +47,7 @@ def _draw(
 
 @pytest.fixture
 def quarters(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Windows that are green at the top left, red at the top right and blue below."""
+    """Texture that is green at the top left, red at the top right and blue below."""
 
     def painted(rng: np.random.Generator) -> NDArray[np.float32]:
         del rng
@@ -64,7 +64,7 @@ def quarters(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.mark.usefixtures("quarters")
 @pytest.mark.parametrize("angle", [0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi])
 def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
-    """Whichever way the wall stands, who looks at it can read what is written there."""
+    """Textures are upright and not mirrored on walls of any direction."""
     ahead = np.array([np.cos(angle), np.sin(angle)])
     right = np.array([ahead[1], -ahead[0]])
     # A wall 1.8 m wide 1 m ahead; its free side is at the left of who looks along it.
@@ -79,7 +79,7 @@ def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
 
 
 def test_nobody_sees_a_wall_from_behind() -> None:
-    """Its back belongs to a room that is not there."""
+    """Backs of walls are not rendered."""
     front = Wall((1.0, -1.0), (1.0, 1.0), 1.0, "brick")
     back = replace(front, start=front.end, end=front.start)
     course = with_walls(square("harbour"))
@@ -93,14 +93,14 @@ def test_nobody_sees_a_wall_from_behind() -> None:
 
 @pytest.mark.parametrize("world", ["corridor", "yard", "harbour"])
 def test_every_world_can_be_seen(world: str) -> None:
-    """Neither black, nor white, nor all of one colour."""
+    """Pictures of every world are neither uniform nor saturated."""
     picture = _draw(square(world), Look.of(world), (0.5, 0.0), 0.0)
     assert 20 < picture.mean() < 200
     assert picture.std() > 10
 
 
 def test_light_makes_it_bright_and_warmth_takes_the_blue() -> None:
-    """Both are what a learner is to see through."""
+    """More light is brighter, and warmth removes blue."""
     course, usual = square("corridor"), Look(light=0.6, warmth=0.2)
 
     def mean(look: Look) -> NDArray[np.float64]:
@@ -113,7 +113,7 @@ def test_light_makes_it_bright_and_warmth_takes_the_blue() -> None:
 
 
 def test_a_glossy_floor_shows_the_lamp_above_it() -> None:
-    """As the floors of the halls do that cars are driven in."""
+    """A glossy floor reflects lamps."""
     course = square("corridor")
     dull, glossy = (
         _draw(course, replace(Look.of("corridor"), gloss=gloss), (-0.5, 0.0), 0.0)
@@ -125,13 +125,13 @@ def test_a_glossy_floor_shows_the_lamp_above_it() -> None:
 
 
 def test_the_same_course_looks_the_same_twice() -> None:
-    """Pictures follow from the course and the look alone."""
+    """Rendering is deterministic."""
     one, other = (_draw(square("harbour"), Look.of("harbour"), (0.5, 0.0), 0.2) for _ in "ab")
     np.testing.assert_array_equal(one, other)
 
 
 def test_another_seed_has_other_textures() -> None:
-    """Else a policy learns stains by heart."""
+    """Another texture seed gives another picture."""
     usual = Look.of("yard")
     one, other = (
         _draw(square("yard"), replace(usual, texture_seed=seed), (0.5, 0.0), 0.0) for seed in (0, 1)

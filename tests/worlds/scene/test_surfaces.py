@@ -1,4 +1,4 @@
-"""Walls as patches: how long ones are split, and the light and texture on their pieces."""
+"""Patches of walls: splitting, light and texture."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pytest
 
 from shapechanger.worlds.course import Course, Lamp, Wall
 from shapechanger.worlds.look import Look
-from shapechanger.worlds.scene.surfaces import Light, wall_patches
+from shapechanger.worlds.surfaces import Surfaces
 from tests.worlds.scene.courses import square, with_walls
 
 
 def pieces(course: Course, surface: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners (n, 4, 3), texture coordinates (n, 4, 2) and lights (n, 4) of a surface."""
-    patches = wall_patches(course, Light(course, Look.of(course.world)))[surface]
+    patches = Surfaces(course, Look.of(course.world)).walls()[surface]
     points, places, lights, _ = patches.arrays(mirrored=False)
     return points.reshape(-1, 4, 3), places.reshape(-1, 4, 2), lights.reshape(-1, 4)
 
@@ -24,7 +24,7 @@ def pieces(course: Course, surface: str) -> tuple[np.ndarray, np.ndarray, np.nda
     ("length", "columns"), [(0.3, 1), (0.8, 1), (0.81, 2), (1.6, 2), (2.0, 3), (7.9, 10)]
 )
 def test_long_walls_are_split(length: float, columns: int) -> None:
-    """Into equal pieces of at most 0.8 m, in two rows, which cover the wall without gaps."""
+    """Walls are split into equal patches of at most 0.8 m in two rows."""
     wall = Wall((1.0, 2.0), (1.0 + length, 2.0), 2.0, "brick")
     corners, _, _ = pieces(with_walls(square("corridor"), wall), "brick")
     assert len(corners) == 2 * columns
@@ -40,7 +40,7 @@ def test_long_walls_are_split(length: float, columns: int) -> None:
 
 
 def test_the_texture_runs_on_from_piece_to_piece() -> None:
-    """One period of bricks, 1.2 m, from the far end of the wall on, and 1.8 m upwards."""
+    """Texture coordinates are continuous across the patches of a wall."""
     wall = Wall((0.0, 0.0), (6.0, 0.0), 0.9, "brick")
     corners, places, _ = pieces(with_walls(square("corridor"), wall), "brick")
     u = (6.0 - corners[..., 0]) / 1.2
@@ -50,7 +50,7 @@ def test_the_texture_runs_on_from_piece_to_piece() -> None:
 
 
 def test_light_varies_along_a_long_wall() -> None:
-    """It is brightest below a lamp in the middle, and equal at equal distances from it."""
+    """Light is brightest below a lamp and symmetric around it."""
     wall = Wall((0.0, 0.0), (8.0, 0.0), 2.0, "brick")
     course = with_walls(square("corridor"), wall)
     course = replace(course, lamps=(Lamp(4.0, 0.5, 0.0, 1.2, 0.3),))
@@ -64,7 +64,7 @@ def test_light_varies_along_a_long_wall() -> None:
 
 
 def test_a_door_is_one_texture_with_plaster_above() -> None:
-    """Stretched over the door, 2.1 m high, however many pieces it has."""
+    """A door's texture covers 2.1 m, with plaster above it."""
     door = Wall((0.0, 0.0), (1.02, 0.0), 2.5, "door")
     course = with_walls(square("corridor"), door)
     corners, places, _ = pieces(course, "door")
@@ -74,9 +74,3 @@ def test_a_door_is_one_texture_with_plaster_above() -> None:
     above, _, _ = pieces(course, "plaster")
     assert above[..., 2].min() == pytest.approx(2.1)
     assert above[..., 2].max() == pytest.approx(2.5)
-
-
-def test_walls_without_length_have_no_patches() -> None:
-    """Two corners at one place leave nothing to draw."""
-    course = with_walls(square("corridor"), Wall((1.0, 1.0), (1.0, 1.0), 2.0, "brick"))
-    assert not wall_patches(course, Light(course, Look.of("corridor")))["brick"]

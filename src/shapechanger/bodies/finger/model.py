@@ -83,17 +83,8 @@ def build_finger(
     spec.stat.center[:] = (0.02, 0.0, -0.02)
     spec.stat.extent = 0.15
     _add_bones(spec, parameters)
-    for i, name in enumerate(TENDONS):
-        path = _add_path(spec, name, parameters.moment_arms[i])
-        if parameters.tendon_stiffness is None:
-            path.armature = parameters.motor_kg
-            path.damping = [parameters.tendon_damping, 0.0, 0.0]
-            path.frictionloss = parameters.tendon_friction
-            _add_motor(spec, name, parameters, drive, i, mujoco.mjtTrn.mjTRN_TENDON, name, -1.0)
-        else:
-            joint = _add_spool(spec, name, parameters)
-            _add_cable(spec, name, parameters.moment_arms[i], joint, parameters)
-            _add_motor(spec, name, parameters, drive, i, mujoco.mjtTrn.mjTRN_JOINT, joint, 1.0)
+    for i in range(len(TENDONS)):
+        _add_tendon(spec, i, parameters, drive)
     mark = spec.worldbody.add_body(name=TARGET, mocap=True)
     mark.add_geom(
         name=TARGET, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_MARK_RADIUS_M, 0, 0], rgba=_MARK
@@ -159,54 +150,42 @@ def _add_path(
     return path
 
 
-def _add_spool(spec: mujoco.MjSpec, name: str, parameters: FingerParameters) -> str:
-    """Add the motor of a tendon as a sliding mass, and return the name of its joint."""
-    spool = spec.worldbody.add_body(
-        name=f"{name}/motor",
-        mass=parameters.motor_kg,
-        inertia=[1e-9] * 3,
-        gravcomp=1.0,
-        explicitinertial=True,
-    )
-    spool.add_joint(
-        name=f"{name}/motor",
-        type=mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=[1, 0, 0],
-        damping=[parameters.tendon_damping, 0.0, 0.0],
-        frictionloss=parameters.tendon_friction,
-    )
-    return f"{name}/motor"
-
-
-def _add_cable(
-    spec: mujoco.MjSpec,
-    name: str,
-    arms: tuple[float, float, float, float],
-    joint: str,
-    parameters: FingerParameters,
+def _add_tendon(
+    spec: mujoco.MjSpec, i: int, parameters: FingerParameters, drive: TendonDrive
 ) -> None:
-    """Add the spring between motor and finger, whose length is the stretch."""
-    stiffness = parameters.tendon_stiffness or 0.0
-    cable = _add_path(spec, f"{name}/stretch", arms)
-    cable.wrap_joint(joint, 1.0)
-    cable.stiffness = [stiffness, 0.0, 0.0]
-    # It only pulls; below the backlash it is slack.
-    cable.springlength = [-1e3, parameters.backlash]
-    critical = 2.0 * math.sqrt(stiffness * parameters.motor_kg)
-    cable.damping = [_CABLE_DAMPING_RATIO * critical, 0.0, 0.0]
-
-
-def _add_motor(
-    spec: mujoco.MjSpec,
-    name: str,
-    parameters: FingerParameters,
-    drive: TendonDrive,
-    i: int,
-    transmission: mujoco.mjtTrn,
-    target: str,
-    sign: float,
-) -> None:
-    """Add the actuator of a tendon; `sign` is that of a pulling force."""
+    """Add a tendon with its motor, which pulls it directly or, if it stretches, by a spring."""
+    name, arms = TENDONS[i], parameters.moment_arms[i]
+    path = _add_path(spec, name, arms)
+    if parameters.tendon_stiffness is None:
+        path.armature = parameters.motor_kg
+        path.damping = [parameters.tendon_damping, 0.0, 0.0]
+        path.frictionloss = parameters.tendon_friction
+        transmission, target, sign = mujoco.mjtTrn.mjTRN_TENDON, name, -1.0
+    else:
+        # The motor is a sliding mass.
+        transmission, target, sign = mujoco.mjtTrn.mjTRN_JOINT, f"{name}/motor", 1.0
+        spool = spec.worldbody.add_body(
+            name=target,
+            mass=parameters.motor_kg,
+            inertia=[1e-9] * 3,
+            gravcomp=1.0,
+            explicitinertial=True,
+        )
+        spool.add_joint(
+            name=target,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=[1, 0, 0],
+            damping=[parameters.tendon_damping, 0.0, 0.0],
+            frictionloss=parameters.tendon_friction,
+        )
+        # The spring between motor and finger, whose length is the stretch.
+        cable = _add_path(spec, f"{name}/stretch", arms)
+        cable.wrap_joint(target, 1.0)
+        cable.stiffness = [parameters.tendon_stiffness, 0.0, 0.0]
+        # It only pulls; below the backlash it is slack.
+        cable.springlength = [-1e3, parameters.backlash]
+        critical = 2.0 * math.sqrt(parameters.tendon_stiffness * parameters.motor_kg)
+        cable.damping = [_CABLE_DAMPING_RATIO * critical, 0.0, 0.0]
     motor = spec.add_actuator(
         name=name,
         trntype=transmission,
@@ -214,6 +193,7 @@ def _add_motor(
         ctrllimited=True,
         ctrlrange=[-1.0, 1.0],
         forcelimited=True,
+        # `sign` is that of a pulling force.
         forcerange=sorted((sign * parameters.least_tension, sign * parameters.most_tension[i])),
         dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,

@@ -9,21 +9,14 @@ from shapechanger.bodies.vehicles.fleet import (
     require_fit,
     vehicle_model,
 )
-from shapechanger.bodies.vehicles.model import (
-    BoundVehicle,
-    CameraMount,
-    Outputs,
-    PlanarPose,
-    VehicleModel,
-)
+from shapechanger.bodies.vehicles.model import BoundVehicle, Motion, Outputs, VehicleModel
 
 __all__ = [
     "SIM_DT",
     "VEHICLES",
     "BoundVehicle",
-    "CameraMount",
+    "Motion",
     "Outputs",
-    "PlanarPose",
     "VehicleModel",
     "add_vehicle",
     "require_fit",

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Final
 
 import mujoco
 
-from shapechanger.bodies.vehicles.model import CameraMount, VehicleModel
+from shapechanger.bodies.vehicles.model import VehicleModel
 from shapechanger.bodies.vehicles.parts import (
-    BATTERY_V,
     HOBBY_MOTOR,
-    PI_CAMERA_FOVY_DEG,
+    CameraMount,
     Paint,
     add_camera,
+    add_chassis,
     add_hull,
     add_look,
 )
@@ -36,19 +37,17 @@ _AXLES: Final = Axles(
 # Spur gear to the axle, chosen for 2 m/s; its efficiency is an estimate.
 _MOTOR: Final = HOBBY_MOTOR.geared(4.3, efficiency=0.9)
 
-_CAMERA: Final = CameraMount(x=0.055, y=0.0, z=0.118, pitch_rad=0.0, fovy_deg=PI_CAMERA_FOVY_DEG)
+_CAMERA: Final = CameraMount(x=0.055, y=0.0, z=0.118, pitch_rad=0.0)
 
 
 def _build(spec: mujoco.MjSpec) -> None:
     box, ellipsoid = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_ELLIPSOID
     paint = Paint(spec)
-    chassis = spec.worldbody.add_body(name="vehicle/chassis")
-    chassis.add_freejoint(name="vehicle/chassis")
+    chassis = add_chassis(spec)
     # The centre of mass is low. The hull is as wide as the wheels, so that it meets walls first.
     size = (_LENGTH / 2, _WIDTH / 2, 0.025)
     add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.045), size, _BODY_KG)
-    red, dark = paint("red", (0.62, 0.06, 0.05)), paint("dark", (0.07, 0.07, 0.08))
-    glass = paint("glass", (0.16, 0.20, 0.24))
+    red, dark, glass = paint("red"), paint("dark"), paint("glass")
     add_look(chassis, box, (0.0, 0.0, 0.036), (0.195, 0.062, 0.014), dark)
     add_look(chassis, box, (0.19, 0.0, 0.038), (0.01, 0.095, 0.014), dark)
     add_look(chassis, box, (-0.188, 0.0, 0.045), (0.012, 0.095, 0.018), red)
@@ -63,22 +62,15 @@ def _build(spec: mujoco.MjSpec) -> None:
     add_camera(chassis, _CAMERA)
 
 
-def _bind(model: mujoco.MjModel, data: mujoco.MjData) -> Steered:
-    return Steered(model, data, {"wheels": _MOTOR}, _AXLES)
-
-
 CAR: Final = VehicleModel(
     name="car",
     drives=(frozenset({"wheels", "steering"}),),
-    optional_parts=frozenset(),
     length_m=_LENGTH,
     width_m=_WIDTH,
     nose_m=_LENGTH / 2,
-    floats=False,
     camera=_CAMERA,
-    battery_v=BATTERY_V,
     top_speed_mps=2.0,
     turning_radius_m=_AXLES.turning_radius,
     build=_build,
-    bind=_bind,
+    bind=partial(Steered, motors={"wheels": _MOTOR}, axles=_AXLES),
 )

@@ -10,8 +10,6 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shapechanger.bodies.vehicles.model import CameraMount
-
 # Collision bits. MuJoCo lets two geoms collide if the contype of one shares a bit with the
 # conaffinity of the other. Walls have the type 1 and the affinity 2, the ground 4 and 8.
 _HULL_TYPE, _HULL_MEETS = 2, 1  # Collides with walls and obstacles, not with the ground.
@@ -23,9 +21,26 @@ HULL_FRICTION: Final = 0.2
 """Friction between a smooth plastic hull and a wall; an estimate, below that of rubber tyres."""
 
 _WHEEL_FRICTION: Final = 0.3  # The larger one of the wheel and the ground counts.
+_WHEEL_DAMPING: Final = 1e-4  # N·m·s/rad in the bearing; small, an estimate.
 
 PI_CAMERA_FOVY_DEG: Final = 48.8
 """Raspberry Pi camera module 2: https://www.raspberrypi.com/documentation/accessories/camera.html"""
+
+
+_COLOURS: Final = {
+    "blue": (0.08, 0.20, 0.45),
+    "brass": (0.55, 0.42, 0.15),
+    "dark": (0.07, 0.07, 0.08),
+    "glass": (0.16, 0.20, 0.24),
+    "green": (0.20, 0.27, 0.13),
+    "olive": (0.27, 0.33, 0.17),
+    "orange": (0.70, 0.28, 0.05),
+    "red": (0.62, 0.06, 0.05),
+    "rim": (0.55, 0.55, 0.58),
+    "track": (0.09, 0.09, 0.09),
+    "tyre": (0.05, 0.05, 0.05),
+    "white": (0.62, 0.62, 0.58),
+}
 
 
 class Paint:
@@ -39,20 +54,27 @@ class Paint:
         self._spec = spec
         self._made: set[str] = set()
 
-    def __call__(self, name: str, rgb: tuple[float, float, float]) -> str:
-        """Name of a material, which is added on the first call.
-
-        Args:
-            name: Name without the prefix "vehicle/".
-            rgb: Red, green and blue, 0 to 1.
-        """
-        material = f"vehicle/{name}"
+    def __call__(self, colour: str) -> str:
+        """Name of the material of a colour, which is added on the first call."""
+        material = f"vehicle/{colour}"
         if material not in self._made:
+            rgba = [*_COLOURS[colour], 1.0]
             self._spec.add_material(
-                name=material, rgba=[*rgb, 1.0], emission=0.6, specular=0.2, shininess=0.3
+                name=material, rgba=rgba, emission=0.6, specular=0.2, shininess=0.3
             )
             self._made.add(material)
         return material
+
+
+def add_chassis(spec: mujoco.MjSpec) -> mujoco.MjsBody:
+    """Add the body of a land vehicle, which moves freely.
+
+    Args:
+        spec: Model to extend.
+    """
+    chassis = spec.worldbody.add_body(name="vehicle/chassis")
+    chassis.add_freejoint(name="vehicle/chassis")
+    return chassis
 
 
 def add_look(
@@ -89,8 +111,6 @@ def add_hull(
     pos: ArrayLike,
     size: ArrayLike,
     mass: float,
-    *,
-    quat: ArrayLike = (1.0, 0.0, 0.0, 0.0),
 ) -> None:
     """Add a hidden collision geom with mass and slightly soft contacts.
 
@@ -101,10 +121,9 @@ def add_hull(
         pos: Position, m.
         size: MuJoCo sizes of the shape, m.
         mass: Mass, kg.
-        quat: Orientation.
     """
     body.add_geom(
-        name=name, type=kind, pos=pos, size=_three(size), quat=quat, mass=mass,
+        name=name, type=kind, pos=pos, size=_three(size), mass=mass,
         friction=[HULL_FRICTION, 0.005, 0.0001], priority=1, condim=3,
         solref=[0.02, 1.0], solimp=[0.8, 0.95, 0.005, 0.5, 2.0], group=_HIDDEN_GROUP,
         contype=_HULL_TYPE, conaffinity=_HULL_MEETS,
@@ -121,9 +140,8 @@ def add_wheel(
     paint: Paint,
     *,
     armature: float = 0.0,
-    damping: float = 1e-4,
     friction: float | None = None,
-    tyre: tuple[float, float, float] = (0.05, 0.05, 0.05),
+    tyre: str = "tyre",
 ) -> mujoco.MjsBody:
     """Add a wheel; rolling forward is positive.
 
@@ -138,14 +156,13 @@ def add_wheel(
         mass: Mass, kg.
         paint: Source of its materials.
         armature: Share of the motor's rotor inertia, kg·m2.
-        damping: Damping of its bearing, N·m·s/rad; small, an estimate.
         friction: Friction on any ground; None for that of the ground.
-        tyre: Red, green and blue of the tyre, 0 to 1.
+        tyre: Colour of the tyre.
     """
     wheel = body.add_body(name=name, pos=pos)
     wheel.add_joint(
         name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 1.0, 0.0],
-        armature=armature, damping=damping,
+        armature=armature, damping=_WHEEL_DAMPING,
     )  # fmt: skip
     wheel.add_geom(
         name=name, type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=[radius, width / 2, radius],
@@ -154,14 +171,32 @@ def add_wheel(
         contype=_WHEEL_TYPE, conaffinity=_WHEEL_MEETS,
     )  # fmt: skip
     cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
-    black = paint("tyre" if tyre == (0.05, 0.05, 0.05) else "track", tyre)
-    grey = paint("rim", (0.55, 0.55, 0.58))
+    black, grey = paint(tyre), paint("rim")
     aside = (90.0, 0.0, 0.0)
     add_look(wheel, cylinder, (0.0, 0.0, 0.0), (radius, width / 2), black, euler_deg=aside)
     add_look(wheel, cylinder, (0.0, 0.0, 0.0), (0.55 * radius, 0.52 * width), grey, euler_deg=aside)
     box = mujoco.mjtGeom.mjGEOM_BOX  # A spoke, so that its rotation is visible.
     add_look(wheel, box, (0.0, 0.0, 0.0), (0.5 * radius, 0.54 * width, 0.12 * radius), black)
     return wheel
+
+
+@dataclass(frozen=True, slots=True)
+class CameraMount:
+    """Pose and field of view of a vehicle's camera.
+
+    Attributes:
+        x: Position ahead of the vehicle's origin, m.
+        y: Position to the left of it, m.
+        z: Height above the ground, m.
+        pitch_rad: Angle of the optical axis below the horizon.
+        fovy_deg: Vertical field of view.
+    """
+
+    x: float
+    y: float
+    z: float
+    pitch_rad: float
+    fovy_deg: float = PI_CAMERA_FOVY_DEG
 
 
 def add_camera(body: mujoco.MjsBody, mount: CameraMount) -> None:
@@ -280,25 +315,6 @@ class DcMotor:
         return shaft
 
 
-def _from_data_sheet(
-    *,
-    volts: float,
-    free_rpm: float,
-    free_a: float,
-    stall_a: float,
-    stall_kgf_cm: float,
-    rotor_inertia: float,
-) -> DcMotor:
-    resistance = volts / stall_a
-    return DcMotor(
-        resistance=resistance,
-        volts_per_speed=(volts - free_a * resistance) / (free_rpm * _RPM),
-        torque_per_current=stall_kgf_cm * _KGF_CM / stall_a,
-        free_a=free_a,
-        rotor_inertia=rotor_inertia,
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class ServoMotor:
     """A hobby servo, which turns to an angle at a limited speed and holds it.
@@ -342,13 +358,13 @@ class ServoMotor:
         )
 
 
-HOBBY_MOTOR: Final = _from_data_sheet(
-    # Pololu item 4801, a motor of 25 mm with a gear of 4.4:1: https://www.pololu.com/product/4801
-    volts=6.0,
-    free_rpm=2200.0,
+# Pololu item 4801, a motor of 25 mm with a gear of 4.4:1: https://www.pololu.com/product/4801. At
+# 6 V it runs freely at 2200 rpm with 0.5 A, and stalls at 6 A with 1.2 kgf·cm.
+HOBBY_MOTOR: Final = DcMotor(
+    resistance=6.0 / 6.0,
+    volts_per_speed=(6.0 - 0.5 * 1.0) / (2200.0 * _RPM),
+    torque_per_current=1.2 * _KGF_CM / 6.0,
     free_a=0.5,
-    stall_a=6.0,
-    stall_kgf_cm=1.2,
     # An estimate: a rotor of 20 g and 8 mm radius, times the gear squared.
     rotor_inertia=0.5 * 0.020 * 0.008**2 * 4.4**2,
 )
@@ -359,79 +375,3 @@ HOBBY_SERVO: Final = ServoMotor(
     stall_torque=3.0 * _KGF_CM,
     free_rate=math.radians(60.0) / 0.19,
 )
-
-
-class MotorDrive:
-    """A motor in a running simulation, which turns the joints of a tendon.
-
-    Args:
-        model: Compiled model.
-        data: Its state.
-        name: Name of the actuator and the tendon.
-        motor: Properties of the motor.
-    """
-
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, name: str, motor: DcMotor
-    ) -> None:
-        self._motor = motor
-        self._actuator = int(model.actuator(name).id)
-        self._tendon = int(model.tendon(name).id)
-        self._ctrl = data.ctrl
-        self._velocity = data.ten_velocity
-        self._angle = data.ten_length
-        self._is_open = False
-
-    def set(self, value: float | None, battery_v: float) -> None:
-        """Set the voltage.
-
-        Args:
-            value: Share of the battery's voltage, -1 to 1; None for a disconnected motor.
-            battery_v: Voltage of the battery.
-        """
-        self._is_open = value is None
-        self._ctrl[self._actuator] = (
-            self._motor.volts_per_speed * self._velocity[self._tendon]
-            if value is None
-            else min(1.0, max(-1.0, value)) * battery_v
-        )
-
-    def current_a(self) -> float:
-        """Current from the battery, A."""
-        if self._is_open:
-            return 0.0
-        return self._motor.amperes(float(self._ctrl[self._actuator]), self.rate())
-
-    def turned(self) -> float:
-        """Angle of the shaft, rad."""
-        return float(self._angle[self._tendon])
-
-    def rate(self) -> float:
-        """Speed of the shaft, rad/s."""
-        return float(self._velocity[self._tendon])
-
-
-def joints_below_chassis(model: mujoco.MjModel) -> tuple[tuple[int, int], ...]:
-    """Addresses in qpos and qvel of the vehicle's joints, without those of its chassis."""
-    return tuple(
-        (int(joint.qposadr[0]), int(joint.dofadr[0]))
-        for joint in map(model.joint, range(model.njnt))
-        if joint.name.startswith("vehicle/") and not joint.name.startswith("vehicle/chassis")
-    )
-
-
-def settle(model: mujoco.MjModel, data: mujoco.MjData, joints: tuple[tuple[int, int], ...]) -> None:
-    """Set joints to 0 at rest, release all controls and forces, and run `mj_forward`.
-
-    Args:
-        model: Compiled model.
-        data: State to change.
-        joints: See `joints_below_chassis`.
-    """
-    for qpos, qvel in joints:
-        data.qpos[qpos] = 0.0
-        data.qvel[qvel] = 0.0
-    data.ctrl[:] = 0.0
-    data.qfrc_applied[:] = 0.0
-    data.qacc_warmstart[:] = 0.0
-    mujoco.mj_forward(model, data)

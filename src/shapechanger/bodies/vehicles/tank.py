@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Final
 
 import mujoco
 
-from shapechanger.bodies.vehicles.model import CameraMount, VehicleModel
+from shapechanger.bodies.vehicles.model import VehicleModel
 from shapechanger.bodies.vehicles.parts import (
-    BATTERY_V,
     HOBBY_MOTOR,
-    PI_CAMERA_FOVY_DEG,
+    CameraMount,
     Paint,
     add_camera,
+    add_chassis,
     add_hull,
     add_look,
     add_wheel,
@@ -37,21 +38,17 @@ _TRACK_FRICTION: Final = 0.5
 # Chosen for 1 m/s; the efficiency of gear and track is an estimate.
 _MOTOR: Final = HOBBY_MOTOR.geared(9.7, efficiency=0.8)
 
-_CAMERA: Final = CameraMount(
-    x=0.12, y=0.0, z=0.115, pitch_rad=math.radians(3.0), fovy_deg=PI_CAMERA_FOVY_DEG
-)
+_CAMERA: Final = CameraMount(x=0.12, y=0.0, z=0.115, pitch_rad=math.radians(3.0))
 _SIDES: Final = (("left", 1), ("right", -1))
 
 
 def _build(spec: mujoco.MjSpec) -> None:
     box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
     paint = Paint(spec)
-    chassis = spec.worldbody.add_body(name="vehicle/chassis")
-    chassis.add_freejoint(name="vehicle/chassis")
+    chassis = add_chassis(spec)
     size = (_LENGTH / 2, _WIDTH / 2, 0.025)
     add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.050), size, _BODY_KG)
-    green, olive = paint("green", (0.20, 0.27, 0.13)), paint("olive", (0.27, 0.33, 0.17))
-    dark = paint("dark", (0.07, 0.07, 0.08))
+    green, olive, dark = paint("green"), paint("olive"), paint("dark")
     add_look(chassis, box, (0.0, 0.0, 0.058), (0.150, 0.072, 0.022), green)
     add_look(chassis, box, (-0.02, 0.0, 0.086), (0.115, 0.118, 0.006), olive)
     add_look(chassis, cylinder, (-0.04, 0.0, 0.104), (0.055, 0.014), green)
@@ -77,7 +74,7 @@ def _add_track(
     for where, x in _WHEEL_XS.items():
         add_wheel(
             chassis, wheels[where], (x, y, _RADIUS), _RADIUS, _TRACK_WIDTH, _WHEEL_KG, paint,
-            armature=_MOTOR.rotor_inertia / 3, friction=_TRACK_FRICTION, tyre=(0.09, 0.09, 0.09),
+            armature=_MOTOR.rotor_inertia / 3, friction=_TRACK_FRICTION, tyre="track",
         )  # fmt: skip
         track.wrap_joint(wheels[where], 1 / 3)
     for where in ("front", "rear"):
@@ -91,22 +88,15 @@ def _add_track(
         )
 
 
-def _bind(model: mujoco.MjModel, data: mujoco.MjData) -> Rolling:
-    return Rolling(model, data, {f"{side} track": _MOTOR for side, _ in _SIDES}, _RADIUS)
-
-
 TANK: Final = VehicleModel(
     name="tank",
     drives=(frozenset({"left track", "right track"}),),
-    optional_parts=frozenset(),
     length_m=_LENGTH,
     width_m=_WIDTH,
     nose_m=_LENGTH / 2,
-    floats=False,
     camera=_CAMERA,
-    battery_v=BATTERY_V,
     top_speed_mps=1.0,
     turning_radius_m=0.0,
     build=_build,
-    bind=_bind,
+    bind=partial(Rolling, motors={f"{side} track": _MOTOR for side, _ in _SIDES}, radius=_RADIUS),
 )

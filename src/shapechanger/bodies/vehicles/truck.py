@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Final
 
 import mujoco
 
-from shapechanger.bodies.vehicles.model import CameraMount, VehicleModel
+from shapechanger.bodies.vehicles.model import VehicleModel
 from shapechanger.bodies.vehicles.parts import (
-    BATTERY_V,
     HOBBY_MOTOR,
-    PI_CAMERA_FOVY_DEG,
+    CameraMount,
     Paint,
     add_camera,
+    add_chassis,
     add_hull,
     add_look,
     add_wheel,
@@ -46,20 +47,16 @@ _MOST_PITCH: Final = math.radians(12.0)
 # Chosen for 1.5 m/s.
 _MOTOR: Final = HOBBY_MOTOR.geared(6.75, efficiency=0.9)
 
-_CAMERA: Final = CameraMount(
-    x=0.235, y=0.0, z=0.125, pitch_rad=math.radians(4.0), fovy_deg=PI_CAMERA_FOVY_DEG
-)
+_CAMERA: Final = CameraMount(x=0.235, y=0.0, z=0.125, pitch_rad=math.radians(4.0))
 
 
 def _build(spec: mujoco.MjSpec) -> None:
     box = mujoco.mjtGeom.mjGEOM_BOX
     paint = Paint(spec)
-    chassis = spec.worldbody.add_body(name="vehicle/chassis")
-    chassis.add_freejoint(name="vehicle/chassis")
+    chassis = add_chassis(spec)
     size = (_TRACTOR_LENGTH / 2, _WIDTH / 2, 0.025)
     add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.050), size, _TRACTOR_KG)
-    blue, dark = paint("blue", (0.08, 0.20, 0.45)), paint("dark", (0.07, 0.07, 0.08))
-    glass = paint("glass", (0.16, 0.20, 0.24))
+    blue, dark, glass = paint("blue"), paint("dark"), paint("glass")
     add_look(chassis, box, (0.0, 0.0, 0.055), (0.245, 0.055, 0.014), dark)
     add_look(chassis, box, (0.14, 0.0, 0.125), (0.075, 0.095, 0.050), blue)
     add_look(chassis, box, (0.14, 0.0, 0.200), (0.070, 0.092, 0.030), glass)
@@ -89,7 +86,7 @@ def _add_trailer(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> 
     add_hull(
         trailer, "vehicle/trailer", box, (x, 0.0, 0.025), (half, _WIDTH / 2, 0.02), _TRAILER_KG
     )
-    white, dark = paint("white", (0.62, 0.62, 0.58)), paint("dark", (0.07, 0.07, 0.08))
+    white, dark = paint("white"), paint("dark")
     add_look(trailer, box, (x, 0.0, 0.090), (half, 0.098, 0.075), white)
     add_look(trailer, box, (x, 0.0, 0.008), (half - 0.02, 0.05, 0.007), dark)
     add_look(trailer, box, (_TRAILER_AXLE_X, 0.0, -0.02), (0.03, 0.05, 0.025), dark)
@@ -99,10 +96,6 @@ def _add_trailer(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> 
         add_wheel(trailer, f"vehicle/trailer {side} wheel", place, *size, paint)
 
 
-def _bind(model: mujoco.MjModel, data: mujoco.MjData) -> Steered:
-    return Steered(model, data, {"wheels": _MOTOR}, _AXLES)
-
-
 TRUCK: Final = VehicleModel(
     name="truck",
     drives=(frozenset({"wheels", "steering"}),),
@@ -110,11 +103,9 @@ TRUCK: Final = VehicleModel(
     length_m=_TRACTOR_LENGTH / 2 - _HITCH_X + _TRAILER_LENGTH - _TRAILER_FRONT,
     width_m=_WIDTH,
     nose_m=_TRACTOR_LENGTH / 2,
-    floats=False,
     camera=_CAMERA,
-    battery_v=BATTERY_V,
     top_speed_mps=1.5,
     turning_radius_m=_AXLES.turning_radius,
     build=_build,
-    bind=_bind,
+    bind=partial(Steered, motors={"wheels": _MOTOR}, axles=_AXLES),
 )

@@ -8,25 +8,17 @@ from dataclasses import dataclass
 
 import mujoco
 
-from shapechanger.bodies.vehicles.model import Outputs, PlanarPose
-from shapechanger.bodies.vehicles.parts import (
-    HOBBY_SERVO,
-    DcMotor,
-    MotorDrive,
-    Paint,
-    add_wheel,
-    joints_below_chassis,
-    settle,
-)
+from shapechanger.bodies.vehicles.model import BoundVehicle, Motion, Outputs
+from shapechanger.bodies.vehicles.parts import HOBBY_SERVO, DcMotor, Paint, add_wheel
 
 
-class Rolling:
-    """A `BoundVehicle` on land, without steering.
+class Rolling(BoundVehicle):
+    """A vehicle on land, without steering.
 
     Args:
         model: Compiled model with the vehicle.
         data: Its state.
-        motors: Motor of each driving part; its actuator is named "vehicle/" plus the part.
+        motors: See `BoundVehicle`.
         radius: Radius of the driven wheels, m.
     """
 
@@ -37,71 +29,30 @@ class Rolling:
         motors: Mapping[str, DcMotor],
         radius: float,
     ) -> None:
-        self._model = model
-        self._data = data
+        super().__init__(model, data, motors)
         self._radius = radius
-        self._drives = tuple(
-            (part, MotorDrive(model, data, f"vehicle/{part}", motor))
-            for part, motor in motors.items()
-        )
         root = model.joint("vehicle/chassis")
-        self._qpos0 = int(root.qposadr[0])
-        self._qvel0 = int(root.dofadr[0])
-        self._qpos = data.qpos
-        self._qvel = data.qvel
-        self._joints = joints_below_chassis(model)
+        self._qpos0, self._qvel0 = int(root.qposadr[0]), int(root.dofadr[0])
 
-    def place(self, x: float, y: float, heading: float) -> None:
-        """Put the vehicle at a pose, at rest and with straight wheels."""
+    def _place_chassis(self, x: float, y: float, heading: float) -> None:
         p, v = self._qpos0, self._qvel0
         half = heading / 2
         self._qpos[p : p + 7] = (x, y, 0.0, math.cos(half), 0.0, 0.0, math.sin(half))
         self._qvel[v : v + 6] = 0.0
-        settle(self._model, self._data, self._joints)
 
-    def drive(self, outputs: Outputs, battery_v: float) -> None:
-        """Set the voltages of the motors."""
-        for part, drive in self._drives:
-            drive.set(outputs.get(part, 0.0), battery_v)
-
-    def pose(self) -> PlanarPose:
-        """Current pose."""
-        p = self._qpos0
-        x, y = self._qpos[p : p + 2].tolist()
-        return PlanarPose(x, y, self._heading())
-
-    def speed(self) -> float:
-        """Speed along the heading, m/s."""
-        heading = self._heading()
-        vx, vy = self._qvel[self._qvel0 : self._qvel0 + 2].tolist()
-        return vx * math.cos(heading) + vy * math.sin(heading)
-
-    def lateral_speed(self) -> float:
-        """Speed to the left, m/s."""
-        heading = self._heading()
-        vx, vy = self._qvel[self._qvel0 : self._qvel0 + 2].tolist()
-        return vy * math.cos(heading) - vx * math.sin(heading)
-
-    def yaw_rate(self) -> float:
-        """Rate of turn, rad/s, counter-clockwise seen from above."""
-        return float(self._qvel[self._qvel0 + 5])
+    def motion(self) -> Motion:
+        """Current pose and velocity."""
+        p, v = self._qpos0, self._qvel0
+        x, y, _, qw, qx, qy, qz = self._qpos[p : p + 7].tolist()
+        vx, vy, _, _, _, yaw_rate = self._qvel[v : v + 6].tolist()
+        heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        cosine, sine = math.cos(heading), math.sin(heading)
+        return Motion(x, y, heading, vx * cosine + vy * sine, vy * cosine - vx * sine, yaw_rate)
 
     def travelled_m(self) -> float:
         """Mean distance that the driven wheels rolled since `place`, m."""
-        turned = sum(drive.turned() for _, drive in self._drives)
+        turned = sum([drive.turned() for drive in self._drives.values()])
         return self._radius * turned / len(self._drives)
-
-    def current_a(self) -> float:
-        """Current of all motors, A."""
-        return sum(drive.current_a() for _, drive in self._drives)
-
-    def set_current(self, vx: float, vy: float) -> None:
-        """Ignored on land."""
-
-    def _heading(self) -> float:
-        p = self._qpos0 + 3
-        w, x, y, z = self._qpos[p : p + 4].tolist()
-        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 _SIDES = (("left", 1), ("right", -1))
@@ -191,7 +142,7 @@ def add_axles(
 
 
 class Steered(Rolling):
-    """A `BoundVehicle` with Ackermann steering.
+    """A vehicle on land with Ackermann steering.
 
     Args:
         model: Compiled model with the vehicle.
@@ -209,7 +160,6 @@ class Steered(Rolling):
     ) -> None:
         super().__init__(model, data, motors, axles.radius)
         self._axles = axles
-        self._ctrl = data.ctrl
         self._servos = tuple(model.actuator(f"vehicle/{side} steering").id for side, _ in _SIDES)
         self._steering = 0.0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.expert import CourseExpert, Disturbance
+from shapechanger.worlds.expert.traits import traits_of
 from shapechanger.worlds.simulation import MujocoWorld
 from shapechanger.worlds.world import Pose
 
@@ -37,37 +39,56 @@ Each was cloned from ten minutes of its expert's driving; `clones/README.md` is 
 """
 
 
-class VehicleDemonstrator:
-    """Expert that makes mistakes and recovers from them, for demonstrations.
+class Demonstrator(ABC):
+    """Driver that makes mistakes and recovers from them, for demonstrations.
 
     Args:
         world: The world of the vehicle.
         seed: Seed of the mistakes.
+        sway: Size of the mistakes, see `Disturbance`; None for what the expert can correct.
     """
 
-    def __init__(self, world: MujocoWorld, seed: int) -> None:
+    def __init__(self, world: MujocoWorld, seed: int, sway: float | None = None) -> None:
         self._world = world
+        self._sway = traits_of(world.vehicle.name).sway if sway is None else sway
         self._seeds = np.random.default_rng(seed)
         self.begin()
 
     def begin(self) -> None:
         """Begin an episode."""
-        self._course = self._world.course
-        self._expert = CourseExpert(self._course, self._world.vehicle.name, path=self._world.path())
-        self._expert.reset(self._world.pose)
-        self._disturbance = Disturbance.of(
-            self._world.vehicle.name, "both", int(self._seeds.integers(2**31))
-        )
+        self._disturbance = Disturbance(int(self._seeds.integers(2**31)), self._sway)
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the expert's action, to learn from, and the disturbed one, to take.
+        """Return the driver's action, to learn from, and the disturbed one, to take.
 
         Returns:
-            Each has shape (2,): steering and throttle.
+            Each has shape (2,).
         """
-        seen = self._world.inputs()
-        action = self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
+        action = self._action()
         return action, self._disturbance.applied(action)
+
+    @abstractmethod
+    def _action(self) -> NDArray[np.float32]:
+        """Return the driver's action, shape (2,)."""
+
+
+class VehicleDemonstrator(Demonstrator):
+    """Expert that knows the whole course; its actions are steering and throttle."""
+
+    def begin(self) -> None:
+        """Begin an episode."""
+        super().begin()
+        self._expert = course_expert(self._world)
+        self._expert.reset(self._world.pose)
+
+    def _action(self) -> NDArray[np.float32]:
+        seen = self._world.inputs()
+        return self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
+
+
+def course_expert(world: MujocoWorld) -> CourseExpert:
+    """Make the expert for the present course of a world."""
+    return CourseExpert(world.course, world.vehicle.name, path=world.path())
 
 
 def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
@@ -81,8 +102,8 @@ def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
     return np.array((*distances, seen.speed, seen.yaw_rate), np.float32)
 
 
-class TeacherDemonstrator:
-    """A policy that sees distances, as a demonstrator that makes mistakes; see `observe_ranges`.
+class TeacherDemonstrator(Demonstrator):
+    """A policy that sees distances, as a demonstrator; see `observe_ranges`.
 
     Args:
         world: The world of the vehicle.
@@ -93,21 +114,11 @@ class TeacherDemonstrator:
     def __init__(
         self, world: MujocoWorld, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int
     ) -> None:
-        self._world = world
-        self._act = act
-        self._seeds = np.random.default_rng(seed)
-        self.begin()
+        super().__init__(world, seed)
+        self._policy = act
 
-    def begin(self) -> None:
-        """Begin an episode."""
-        self._disturbance = Disturbance.of(
-            self._world.vehicle.name, "both", int(self._seeds.integers(2**31))
-        )
-
-    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the policy's action, to learn from, and the disturbed one, to take."""
-        action = self._act(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)
-        return action, self._disturbance.applied(action)
+    def _action(self) -> NDArray[np.float32]:
+        return self._policy(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)
 
 
 class ExpertDriver:
@@ -126,9 +137,7 @@ class ExpertDriver:
         seen = self._world.inputs()
         if self._world.course is not self._course:
             self._course = self._world.course
-            self._expert = CourseExpert(
-                self._course, self._world.vehicle.name, path=self._world.path()
-            )
+            self._expert = course_expert(self._world)
         elif self._was_moved(seen.pose):
             self._expert.reset(seen.pose)
         self._before = seen.pose

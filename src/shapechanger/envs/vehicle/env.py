@@ -14,18 +14,19 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.bodies.vehicles import add_vehicle, require_fit, vehicle_model
+from shapechanger.bodies.vehicles import add_vehicle
 from shapechanger.envs.renderer import body_reach, draw
-from shapechanger.envs.vehicle.arguments import (
+from shapechanger.envs.vehicle.base import (
     Courses,
     CourseSampler,
+    DrivingEnv,
     Steering,
     check_frame_size,
     resolve_profile,
 )
-from shapechanger.envs.vehicle.drivers import TeacherDemonstrator, VehicleDemonstrator
-from shapechanger.envs.vehicle.shift import VehicleShift, certify_vehicles
-from shapechanger.errors import MissingExtra, RenderError, UnknownName, WorldError
+from shapechanger.envs.vehicle.drivers import TeacherDemonstrator
+from shapechanger.envs.vehicle.shift import certify_vehicles
+from shapechanger.errors import MissingExtra, RenderError, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.inbox import Received
@@ -41,7 +42,7 @@ _WATER: Final = (0.24, 0.40, 0.46, 1.0)
 _MODES: Final = ("rgb_array",)
 
 
-class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
+class VehicleEnv(DrivingEnv):
     """Drive fast without collisions, with a camera that looks ahead.
 
     The robot is defined by a profile and runs its own guard and drivers on simulated pins: caps,
@@ -106,7 +107,7 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     record_clock: Final = "twin"
     """Clock of the nanoseconds in `info`."""
-    metadata: dict[str, Any] = {"render_modes": [*_MODES], "render_fps": 20}  # noqa: RUF012
+    certify_shift = staticmethod(certify_vehicles)
 
     def __init__(
         self,
@@ -129,13 +130,11 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         EzPickle.__init__(self, vehicle, **arguments)
         if find_spec("gpiozero") is None:  # The drivers import it when they open their pins.
             raise MissingExtra("gpiozero", "robot")
-        vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
         if render_mode is not None and render_mode not in _MODES:
             raise UnknownName("render mode", render_mode, _MODES)
         self.render_mode = render_mode
         wide, high = check_frame_size(size)
-        name = f"lab-{vehicle}" if robot is None else robot
-        profile = resolve_profile(name, steering, (wide, high))
+        profile = resolve_profile(vehicle, robot, (wide, high), steering)
         self._draw = CourseSampler(courses, randomise)
         self._world = MujocoWorld(
             vehicle,
@@ -145,7 +144,6 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )
         self.parts = frozenset(output.part for output in profile.outputs)
-        require_fit(vehicle, self.parts)
         self._robot = InProcessRobot(profile, self._world, pictures=image)
         welcome = self._robot.welcome
         self._senses = RobotSpaces(welcome, (wide, high), image, state)
@@ -157,11 +155,6 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self.action_space = self._senses.action_space
         self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
         self._last: Observation | None = None
-
-    @property
-    def world(self) -> MujocoWorld:
-        """The simulated world, with its ground truth."""
-        return self._world
 
     @property
     def action_layout(self) -> Layout:
@@ -194,16 +187,10 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
                 the start.
         """
         super().reset(seed=seed)
-        drawn = self._draw.draw(self.np_random, self._world.course.world, options or {})
-        if drawn.course != self._world.seed or drawn.look is not None:
-            self._world.lay_out(drawn.course, drawn.look, drawn.camera)
+        drawn = self._lay_out(options)
         self._world.zero_odometer()  # So that no episode depends on earlier ones.
         last = self._robot.start(lambda: self._world.place(drawn.start))
-        if self._world.touches:
-            raise WorldError(
-                f"The {self._world.vehicle.name} is stuck at start {drawn.start} of course "
-                f"{drawn.course}: choose another."
-            )
+        self._require_free(drawn)
         self._judge.start(last)
         self._last = last
         view = self._view(last)
@@ -231,18 +218,6 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             self._world.put_back()
         return view.observation, sum(terms.values()), terminated, False, info
 
-    def hold_out(self) -> None:
-        """Sample held-out courses from the next reset on."""
-        self._draw.hold_out()
-
-    def demonstrator(self, seed: int) -> VehicleDemonstrator:
-        """Return an expert that knows the whole course and recovers from its own mistakes.
-
-        Args:
-            seed: Seed of the mistakes.
-        """
-        return VehicleDemonstrator(self._world, seed)
-
     @property
     def teacher_env(self) -> str:
         """Id of the env in which a teacher for this vehicle learns; see `RangesEnv`."""
@@ -259,36 +234,15 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """
         return TeacherDemonstrator(self._world, act, seed)
 
-    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def render(self) -> NDArray[np.uint8] | None:
         """Return the camera's frame, shape (height, width, 3); None without a render mode.
 
         Raises:
             RenderError: If `reset` was never called.
         """
-        if self.render_mode is None:
-            return None
-        if self._last is None:
+        if self.render_mode and self._last is None:
             raise RenderError("Call reset() before render().")
-        return self._world.picture()
-
-    # Interface of transfer studies; see `shapechanger.transfer`.
-
-    @staticmethod
-    def certify_shift(
-        source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
-    ) -> VehicleShift:
-        """Compare two vehicles, wrappers included; both are reset.
-
-        Args:
-            source: The env in which a policy is trained.
-            target: The env that it is transferred to.
-            allow_empty: Whether to accept vehicles that do not differ.
-
-        Raises:
-            MorphologyError: If one of them is not a vehicle.
-            EmptyShift: If they do not differ and `allow_empty` is false.
-        """
-        return certify_vehicles(source, target, allow_empty=allow_empty)
+        return super().render()
 
     @property
     def reach(self) -> float:
@@ -315,7 +269,7 @@ class VehicleEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def close(self) -> None:
         """Release the pins and the renderer."""
         self._robot.close()
-        self._world.close()
+        super().close()
 
     def _view(self, seen: Observation) -> View:
         return self._senses.view(Received(seen, time.monotonic(), seen.frame))

@@ -11,15 +11,9 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.bodies.vehicles import require_fit, vehicle_model
-from shapechanger.envs.vehicle.arguments import Courses, CourseSampler, resolve_profile
-from shapechanger.envs.vehicle.drivers import (
-    BEARINGS_DEG,
-    FARTHEST_M,
-    VehicleDemonstrator,
-    observe_ranges,
-)
-from shapechanger.errors import SpaceMismatch, WorldError
+from shapechanger.envs.vehicle.base import Courses, CourseSampler, DrivingEnv, resolve_profile
+from shapechanger.envs.vehicle.drivers import BEARINGS_DEG, FARTHEST_M, observe_ranges
+from shapechanger.errors import SpaceMismatch
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.guard.plan import GuardPlan, output_values
 from shapechanger.robot.guard.rules import aimed, slewed
@@ -97,7 +91,7 @@ class OutputShaper:
         return {out.part: one / ticks for out, one in zip(outputs, total, strict=True)}
 
 
-class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
+class RangesEnv(DrivingEnv):
     """Drive fast without collisions, seeing distances all around the front.
 
     The task, the vehicle and the courses of `shapechanger/Car-v1`, on the true state of the world:
@@ -147,8 +141,6 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         WorldError: If the vehicle cannot drive in the world.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
-
     def __init__(
         self,
         vehicle: str,
@@ -163,10 +155,8 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
-        vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
-        profile = resolve_profile(f"lab-{vehicle}" if robot is None else robot, None, (160, 120))
+        profile = resolve_profile(vehicle, robot, (160, 120))
         self.parts = frozenset(output.part for output in profile.outputs)
-        require_fit(vehicle, self.parts)
         self._draw = CourseSampler(courses, randomise=False)
         self.render_mode = render_mode
         size = (160, 120) if camera is None and render_mode else camera
@@ -195,11 +185,6 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         self.metadata = {**self.metadata, "render_fps": profile.control_hz}
         self._needs_reset = True
 
-    @property
-    def world(self) -> MujocoWorld:
-        """The simulated world, with its ground truth."""
-        return self._world
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
@@ -211,16 +196,9 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
                 the start.
         """
         super().reset(seed=seed)
-        world = self._world
-        drawn = self._draw.draw(self.np_random, world.course.world, options or {})
-        if drawn.course != world.seed:
-            world.lay_out(drawn.course)
-        world.place(drawn.start)
-        if world.touches:
-            raise WorldError(
-                f"The {world.vehicle.name} is stuck at start {drawn.start} of course "
-                f"{drawn.course}: choose another."
-            )
+        drawn = self._lay_out(options)
+        self._world.place(drawn.start)
+        self._require_free(drawn)
         self._shaper.reset()
         self._bumped = False
         self._progress_m = 0.0
@@ -263,22 +241,6 @@ class RangesEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]], EzPickle):
         info = self._info() | terms
         info["reward_terms"] = terms
         return seen, sum(terms.values()), terminated, False, info
-
-    def hold_out(self) -> None:
-        """Sample held-out courses from the next reset on."""
-        self._draw.hold_out()
-
-    def demonstrator(self, seed: int) -> VehicleDemonstrator:
-        """Return an expert that knows the whole course; see `VehicleEnv.demonstrator`."""
-        return VehicleDemonstrator(self._world, seed)
-
-    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the camera's picture, shape (height, width, 3); None without a render mode."""
-        return self._world.picture() if self.render_mode else None
-
-    def close(self) -> None:
-        """Release the renderer, if there is one."""
-        self._world.close()
 
     def _observe(self) -> NDArray[np.float32]:
         space = cast("gym.spaces.Box", self.observation_space)

@@ -7,7 +7,7 @@ lens that distorts nothing, or a size that nothing uses.
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
 import msgspec
@@ -117,7 +117,7 @@ class _Driven(NamedTuple):
 
 def _drive(env: gym.Env[Any, Any], seed: int) -> _Driven:
     seen, info = env.reset(seed=seed)
-    first = _flat(seen)
+    first = _flat(env, seen)
     path, rewards = [info["pose"]], list[float]()
     for step in range(_STEPS):
         steering = 0.0 if step < _STEPS // 2 else _STEERING
@@ -132,7 +132,7 @@ def _drive(env: gym.Env[Any, Any], seed: int) -> _Driven:
     half = min(_STEPS // 2, len(way) - 1)
     turned = np.unwrap(way[half:, 2])
     return _Driven(
-        (first, _flat(seen)),
+        (first, _flat(env, seen)),
         way,
         np.array(rewards),
         float(np.linalg.norm(way[half, :2] - way[0, :2])),
@@ -189,9 +189,6 @@ def _name(env: gym.Env[Any, Any]) -> str:
     return name
 
 
-def _flat(seen: Any) -> NDArray[np.float64]:
-    """Return an observation as one vector; the parts of a dict in alphabetical order."""
-    if isinstance(seen, dict):
-        parts = cast("dict[str, Any]", seen)
-        return np.concatenate([_flat(parts[key]) for key in sorted(parts)])
-    return np.asarray(seen, np.float64).ravel()
+def _flat(env: gym.Env[Any, Any], seen: Any) -> NDArray[np.float64]:
+    """Return an observation as one vector."""
+    return np.asarray(gym.spaces.flatten(env.observation_space, seen), np.float64)

@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from shapechanger.bodies.vehicles import vehicle_model
-from shapechanger.envs.vehicle.arguments import Courses, resolve_profile
+from shapechanger.envs.vehicle.base import Courses, DrivingEnv, resolve_profile
+from shapechanger.envs.vehicle.drivers import Demonstrator, course_expert
 from shapechanger.envs.vehicle.env import VehicleEnv
 from shapechanger.envs.vehicle.ranges import RangesEnv
-from shapechanger.envs.vehicle.shift import VehicleShift, certify_vehicles
+from shapechanger.envs.vehicle.shift import certify_vehicles
 from shapechanger.errors import ProfileError, SpaceMismatch, StudyError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.worlds.expert import CourseExpert, Disturbance
+from shapechanger.robot.profile.profile import Profile
 from shapechanger.worlds.rectify import CANONICAL_SIZE, CameraGeometry, Rectifier
 from shapechanger.worlds.simulation import MujocoWorld
 
@@ -39,8 +40,8 @@ WIDEST_RAD: Final = 1.0
 _SIZE: Final = (160, 120)
 _SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
 _LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
-# Of the slow wandering and jerks of a demonstrator: as much as steering by 0.25 is in the car.
-_SWAY: Final = (0.18, 0.1)
+# Standard deviation of the bearing's disturbance: the effect of steering by 0.25 in the car.
+_SWAY: Final = 0.18
 
 # Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
 # is left out because the vehicle is still changing its motion.
@@ -120,13 +121,12 @@ def measure_response(
     return SteeringResponse(float(per_metre), float(per_second))
 
 
-def _geometry(robot: str | os.PathLike[str]) -> CameraGeometry:
+def _geometry(profile: Profile) -> CameraGeometry:
     """Return how the camera of a profile looks at the world.
 
     Raises:
         ProfileError: If the profile does not say it.
     """
-    profile = resolve_profile(robot, None, _SIZE)
     camera = profile.camera
     pitch, fovy = (None, None) if camera is None else (camera.pitch_deg, camera.fovy_deg)
     if pitch is None or fovy is None:
@@ -145,12 +145,8 @@ def _response_of(
     vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, full_robot: bool
 ) -> SteeringResponse:
     """Measure the response of a simulated vehicle, once in a process."""
-    if full_robot:
-        env: VehicleEnv | RangesEnv = VehicleEnv(
-            vehicle, world=world, robot=robot, image=False, put_back=True, courses=(0,)
-        )
-    else:
-        env = RangesEnv(vehicle, world=world, robot=robot, put_back=True, courses=(0,))
+    common: dict[str, Any] = {"world": world, "robot": robot, "courses": (0,), "put_back": True}
+    env = VehicleEnv(vehicle, image=False, **common) if full_robot else RangesEnv(vehicle, **common)
     try:
         places = env.observation_layout.slices
         return measure_response(env, places["speed"].start, places["yaw_rate"].start)
@@ -158,7 +154,7 @@ def _response_of(
         env.close()
 
 
-class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
+class WaypointEnv(DrivingEnv):
     """The driving task with a camera and an action that are the same for all vehicles.
 
     A policy that learned in one vehicle drives another one as it is: pictures are warped to one
@@ -197,7 +193,7 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         WorldError: If the vehicle cannot drive in the world.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+    certify_shift = staticmethod(certify_vehicles)
 
     def __init__(
         self,
@@ -214,17 +210,19 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         EzPickle.__init__(self, vehicle, **arguments)
         body = vehicle_model(vehicle)
         world = world or ("harbour" if body.floats else "corridor")
-        common: dict[str, Any] = {"world": world, "robot": robot, "courses": courses}
+        common: dict[str, Any] = {
+            "world": world, "robot": robot, "courses": courses, "put_back": put_back,
+        }  # fmt: skip
         self._env: VehicleEnv | RangesEnv = (
-            VehicleEnv(vehicle, size=_SIZE, state=True, put_back=put_back, **common)
+            VehicleEnv(vehicle, size=_SIZE, state=True, **common)
             if full_robot
-            else RangesEnv(vehicle, camera=_SIZE, put_back=put_back, **common)
+            else RangesEnv(vehicle, camera=_SIZE, **common)
         )
-        self.parts = self._env.parts
+        self.parts, self._world, self._draw = self._env.parts, self._env.world, self._env._draw
         self.response = _response_of(vehicle, world, robot, full_robot)
         self.render_mode = render_mode
         self._turns_on_the_spot = body.turning_radius_m == 0.0
-        self._rectifier = Rectifier(_geometry(f"lab-{vehicle}" if robot is None else robot), _SIZE)
+        self._rectifier = Rectifier(_geometry(resolve_profile(vehicle, robot, _SIZE)), _SIZE)
         columns, rows = CANONICAL_SIZE
         self.observation_space = gym.spaces.Box(0, 255, (rows, columns, 3), np.uint8)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -244,11 +242,6 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         self._speed_at = places["speed"].start
         if full_robot:
             self._speed_at -= places["camera/image"].stop
-
-    @property
-    def world(self) -> MujocoWorld:
-        """The simulated world, with its ground truth."""
-        return self._env.world
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -281,10 +274,6 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         seen, reward, terminated, truncated, info = self._env.step(command)
         return self._observe(seen), reward, terminated, truncated, info
 
-    def hold_out(self) -> None:
-        """Sample held-out courses from the next reset on."""
-        self._env.hold_out()
-
     def demonstrator(self, seed: int) -> WaypointDemonstrator:
         """Return an expert that knows the whole course and recovers from its own mistakes.
 
@@ -293,20 +282,9 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         """
         return WaypointDemonstrator(self.world, seed)
 
-    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the camera's picture, shape (120, 160, 3); None without a render mode."""
-        return self.world.picture() if self.render_mode else None
-
     def close(self) -> None:
         """Release the pins and the renderer."""
         self._env.close()
-
-    @staticmethod
-    def certify_shift(
-        source: gym.Env[Any, Any], target: gym.Env[Any, Any], *, allow_empty: bool = False
-    ) -> VehicleShift:
-        """Compare two vehicles; see `VehicleEnv.certify_shift`."""
-        return certify_vehicles(source, target, allow_empty=allow_empty)
 
     def _observe(self, seen: Any) -> NDArray[np.uint8]:
         if isinstance(self._env, RangesEnv):
@@ -316,8 +294,8 @@ class WaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]], EzPickle):
         return self._rectifier(seen["image"])
 
 
-class WaypointDemonstrator:
-    """Expert that points out the free way, makes mistakes and recovers from them.
+class WaypointDemonstrator(Demonstrator):
+    """Expert that points out the free way; its actions are waypoints, bearing and speed.
 
     Args:
         world: The world of the vehicle.
@@ -325,26 +303,17 @@ class WaypointDemonstrator:
     """
 
     def __init__(self, world: MujocoWorld, seed: int) -> None:
-        self._world = world
-        self._seeds = np.random.default_rng(seed)
-        self.begin()
+        super().__init__(world, seed, _SWAY)
 
     def begin(self) -> None:
         """Begin an episode."""
-        world = self._world
-        self._expert = CourseExpert(world.course, world.vehicle.name, path=world.path())
-        self._disturbance = Disturbance(seed=int(self._seeds.integers(2**31)), size=_SWAY)
+        super().begin()
+        self._expert = course_expert(self._world)
 
-    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the waypoint, to learn from, and the disturbed one, to drive to.
-
-        Returns:
-            Each has shape (2,): bearing and speed.
-        """
+    def _action(self) -> NDArray[np.float32]:
         pose, path = self._world.pose, self._expert.path
         station = path.nearest(pose.x, pose.y).station
-        x, y = path.ahead(station, AHEAD_M)
+        x, y = path.at(station + AHEAD_M)
         left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
         share = self._expert.speeds[path.index(station)] / self._world.vehicle.top_speed_mps
-        waypoint = np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)
-        return waypoint, self._disturbance.applied(waypoint)
+        return np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)

@@ -120,11 +120,6 @@ class CourseProgress:
         self._spot = Spot(0.0, 0.0)
         self._metres = 0.0
 
-    @property
-    def metres(self) -> float:
-        """Net distance since the last reset, m."""
-        return self._metres
-
     def reset(self, x: float, y: float) -> None:
         """Start at a point.
 

@@ -10,6 +10,7 @@ planning", Vehicle System Dynamics 58 (2020).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -18,9 +19,224 @@ from scipy.interpolate import CubicSpline
 
 from shapechanger.errors import WorldError
 from shapechanger.worlds.course import Course
-from shapechanger.worlds.expert.lattice import ClearanceField, Lattice, cheapest_way, lay_lattice
-from shapechanger.worlds.expert.line import ClosedLine, Spot
+from shapechanger.worlds.expert.line import ClosedLine
 from shapechanger.worlds.expert.traits import Traits
+from shapechanger.worlds.layout.geometry import arc_lengths, wall_segments
+
+FAR_M: Final = 2.5
+"""Largest distance that is computed, m; larger ones are reported as this."""
+
+_CHUNK: Final = 256
+
+
+class ClearanceField:
+    """Distances from the walls and obstacles of a course, seen from above.
+
+    Args:
+        course: The course.
+    """
+
+    def __init__(self, course: Course) -> None:
+        walls = wall_segments(course.walls)
+        self._start, self._end = walls[:, :2], walls[:, 2:]
+        self._obstacles = course.obstacles
+
+    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of each point from the nearest wall or obstacle, m, (N,).
+
+        It is at most `FAR_M`, and 0 inside an obstacle. It is fast if neighbours in the array are
+        close to each other.
+
+        Args:
+            points: Points, m, (N, 2).
+        """
+        parts = [self._near(points[i : i + _CHUNK]) for i in range(0, len(points), _CHUNK)]
+        return np.concatenate([np.empty(0), *parts])
+
+    def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances of points that are close together."""
+        low, high = points.min(axis=0) - FAR_M, points.max(axis=0) + FAR_M
+        start, end = self._start, self._end
+        near = (np.maximum(start, end) >= low) & (np.minimum(start, end) <= high)
+        start, end = start[near.all(axis=1)], end[near.all(axis=1)]
+        step = (end - start)[:, None]
+        away = points - start[:, None]  # (walls, points, 2)
+        share = np.einsum("wpj,wpj->wp", away, np.broadcast_to(step, away.shape))
+        squared = np.maximum(np.einsum("wpj,wpj->wp", step, step), 1e-12)
+        away -= np.clip(share / squared, 0.0, 1.0)[:, :, None] * step
+        squared = np.einsum("wpj,wpj->wp", away, away)
+        found = np.sqrt(squared.min(axis=0, initial=FAR_M**2))
+        for thing in self._obstacles:
+            reach = thing.length + thing.width
+            here = np.array((thing.x, thing.y))
+            if (here + reach < low).any() or (here - reach > high).any():
+                continue
+            dx, dy = (points - here).T
+            if thing.is_round:
+                off = np.hypot(dx, dy) - thing.length / 2
+            else:
+                cos, sin = np.cos(thing.yaw), np.sin(thing.yaw)
+                along = np.abs(cos * dx + sin * dy) - thing.length / 2
+                across = np.abs(cos * dy - sin * dx) - thing.width / 2
+                off = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
+            found = np.minimum(found, np.maximum(off, 0.0))
+        return found
+
+
+STATION_M: Final = 0.2
+OFFSET_M: Final = 0.1
+
+SLOPES: Final = np.arange(-2, 3)
+"""Changes of the offset from one station to the next, in steps of `OFFSET_M`."""
+
+BEND_COST: Final = 0.15
+"""Cost of changing the slope by one."""
+
+SLANT_COST: Final = 0.02
+"""Cost of a slope of one."""
+
+NARROW_COST: Final = 1.0
+"""Cost of a point with the smallest allowed clearance; it is quadratic in what is missing to the
+preferred clearance."""
+
+OVERLAP_M: Final = 12.0
+"""Length of the search beyond a whole lap, m. A way hardly depends on its offset that far back, so
+that a lap cut from the middle is closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Rows of points across the lane, at stations along it.
+
+    Attributes:
+        middle: Middle of the lane, m, (N, 2).
+        left: Unit vectors to the left, (N, 2).
+        offsets: Offsets from the middle, m, positive to the left, (K,).
+        clearance: Clearance of each point, m, (N, K); 0 outside the lane.
+    """
+
+    middle: NDArray[np.float64]
+    left: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+
+
+def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
+    """Lay a lattice over the lane of a course.
+
+    Args:
+        course: The course.
+        obstacles: Its clearances.
+    """
+    line = ClosedLine(course.route)
+    count = max(round(line.length / STATION_M), 8)
+    middle = np.array([line.at(line.length * i / count) for i in range(count)])
+    half_width = np.interp(
+        np.arange(count) * line.length / count,
+        line.stations,
+        course.half_width,
+        period=line.length,
+    )
+    step = line.length / count
+    # The direction over 0.8 m; rows would cross each other in tight corners with a shorter one.
+    ahead = np.roll(middle, -2, axis=0) - np.roll(middle, 2, axis=0)
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
+    side = int(np.floor(half_width.max() / OFFSET_M))
+    offsets = np.linspace(-side, side, 2 * side + 1) * OFFSET_M
+    points = middle[:, None] + offsets[None, :, None] * left[:, None]
+    clearance = obstacles.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
+    clearance[np.abs(offsets)[None, :] > half_width[:, None]] = 0.0
+    # Beyond the centre of a corner, rows run backward; such points are outside the lane.
+    gained = np.einsum("ikj,ij->ik", np.roll(points, -1, axis=0) - points, ahead)
+    backward = gained < 0.2 * step
+    clearance[backward | np.roll(backward, 1, axis=0)] = 0.0
+    return Lattice(middle, left, offsets, clearance)
+
+
+def cheapest_way(lattice: Lattice, least_m: float, comfort_m: float) -> NDArray[np.int64]:
+    """The closed way with the least cost of bends and narrow passages.
+
+    It is found by dynamic programming over stations, with offset and slope as the state.
+
+    Args:
+        lattice: The lattice.
+        least_m: Smallest clearance, m.
+        comfort_m: Clearance above which more is worth nothing, m.
+
+    Returns:
+        Index of the offset at each station, (N,).
+
+    Raises:
+        WorldError: If there is no such way.
+    """
+    missing = np.clip((comfort_m - lattice.clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
+    cost = np.where(lattice.clearance >= least_m, NARROW_COST * missing**2, np.inf)
+    count = len(cost)
+    overlap = min(round(OVERLAP_M / STATION_M), count)
+    way = _search(cost, np.arange(count + overlap) % count, None, least_m)
+    seam = overlap // 2
+    if way[seam] != way[seam + count]:
+        stations = (np.arange(count + 1) + seam) % count
+        closed = _search(cost, stations, int(way[seam + count]), least_m)
+        return np.roll(closed[:-1], seam)
+    return np.roll(way[seam : seam + count], seam)
+
+
+def _search(
+    cost: NDArray[np.float64], stations: NDArray[np.int64], seam: int | None, least_m: float
+) -> NDArray[np.int64]:
+    """The cheapest way along stations, as indices of offsets, (M,).
+
+    Args:
+        cost: Cost of each offset, (N, K).
+        stations: Stations to visit, in order, (M,).
+        seam: Offset to start and end with; None leaves both free.
+        least_m: Smallest clearance, m, for error messages.
+
+    Raises:
+        WorldError: If there is no way.
+    """
+    width = cost.shape[1]
+    bends = BEND_COST * (SLOPES[:, None] - SLOPES[None, :]) ** 2  # (from, to)
+    slants = SLANT_COST * SLOPES**2
+    total = np.full((width, len(SLOPES)), np.inf)
+    total[:] = cost[stations[0]][:, None]
+    if seam is not None:
+        total[np.arange(width) != seam] = np.inf
+    came_from = np.empty((len(stations), width, len(SLOPES)), np.int8)
+    for row, station in enumerate(stations[1:], start=1):
+        turned = total[:, :, None] + bends  # (offset, slope before, slope after)
+        chosen = turned.argmin(axis=1)
+        best = np.take_along_axis(turned, chosen[:, None, :], axis=1)[:, 0, :] + slants
+        total = np.full_like(total, np.inf)
+        for slope, gain in enumerate(SLOPES):
+            # From offset k to k + gain.
+            to = slice(max(gain, 0), width + min(gain, 0))
+            of = slice(max(-gain, 0), width + min(-gain, 0))
+            total[to, slope] = best[of, slope] + cost[station, to]
+            came_from[row, to, slope] = chosen[of, slope]
+        if not np.isfinite(total).any():
+            raise WorldError(
+                f"The course is blocked for anything {2 * least_m:.2f} m wide "
+                f"{station * STATION_M:.0f} m from its start. Use a narrower vehicle, a smaller "
+                "margin, or another seed."
+            )
+    if seam is not None:
+        total[np.arange(width) != seam] = np.inf
+        if not np.isfinite(total).any():
+            raise WorldError(
+                f"No way around this course with a width of {2 * least_m:.2f} m returns to its "
+                "start. Use a smaller margin, or another seed."
+            )
+    offset, slope = np.unravel_index(int(np.argmin(total)), total.shape)
+    way = np.empty(len(stations), np.int64)
+    for row in range(len(stations) - 1, -1, -1):
+        way[row] = offset
+        before = came_from[row, offset, slope] if row else 0
+        offset, slope = offset - SLOPES[slope], before
+    return way
+
 
 ROUNDS: Final = 150
 RELAXATION: Final = 1.6
@@ -90,7 +306,7 @@ ATTEMPTS: Final = 8
 """Number of attempts to push a line away from obstacles."""
 
 
-class CoursePath:
+class CoursePath(ClosedLine):
     """A closed path around a course.
 
     Args:
@@ -100,11 +316,9 @@ class CoursePath:
         clearance: Distance of each point from the nearest wall or obstacle, m, (N,).
 
     Attributes:
-        points: See above.
         heading: See above.
         curvature: See above.
         clearance: See above.
-        length: Length of the path, m.
     """
 
     def __init__(
@@ -114,49 +328,10 @@ class CoursePath:
         curvature: NDArray[np.float64],
         clearance: NDArray[np.float64],
     ) -> None:
-        self.points = points
+        super().__init__(points)
         self.heading = heading
         self.curvature = curvature
         self.clearance = clearance
-        self._line = ClosedLine(points)
-        self.length = self._line.length
-
-    @property
-    def stations(self) -> NDArray[np.float64]:
-        """Distance of each point along the path, m, (N,)."""
-        return self._line.stations
-
-    def nearest(self, x: float, y: float, hint: float | None = None) -> Spot:
-        """Nearest spot of the path to a point.
-
-        Args:
-            x: Position, m.
-            y: Position, m.
-            hint: Station to search around, m; None to search everywhere.
-        """
-        return self._line.nearest(x, y, hint)
-
-    def ahead(self, station: float, distance: float) -> tuple[float, float]:
-        """Return the point at a distance beyond a station.
-
-        Args:
-            station: Place along the path, m.
-            distance: Distance, m.
-        """
-        return self._line.at(station + distance)
-
-    def index(self, station: float) -> int:
-        """Index of the last point at or before a station, m."""
-        return self._line.index(station)
-
-    def way(self, start: float, end: float) -> float:
-        """Return the shorter way between two stations, m; backward is negative.
-
-        Args:
-            start: Place along the path, m.
-            end: Place along the path, m.
-        """
-        return self._line.ahead_by(start, end)
 
 
 def plan_path(
@@ -196,19 +371,6 @@ def plan_path(
         f"{margin_m:.2f} m on each side of a vehicle {2 * half_width_m:.2f} m wide. Use a smaller "
         "margin, or another seed."
     )
-
-
-def plan_path_for(course: Course, traits: Traits) -> CoursePath:
-    """Plan a path around a course for a vehicle.
-
-    Args:
-        course: The course.
-        traits: Driving properties of the vehicle.
-
-    Raises:
-        WorldError: If there is no path.
-    """
-    return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
 
 
 def _smoothed(
@@ -281,9 +443,8 @@ def _edge(lattice: Lattice, i: int, k: int, side: int, wanted: float) -> float:
 
 def _splined(knots: NDArray[np.float64], obstacles: ClearanceField) -> CoursePath:
     """An evenly spaced path through points, by a periodic cubic spline."""
-    closed = np.vstack((knots, knots[:1]))
-    chords = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))))
-    spline = CubicSpline(chords, closed, bc_type="periodic")
+    chords = arc_lengths(knots)
+    spline = CubicSpline(chords, np.vstack((knots, knots[:1])), bc_type="periodic")
     # Even steps of the parameter are only approximately even along the line.
     around = float(chords[-1])
     count = max(round(around / _SPACING_M), 8)

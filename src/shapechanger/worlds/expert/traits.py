@@ -8,24 +8,25 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, Literal
 
+from shapechanger.bodies.vehicles import VEHICLES, VehicleModel
 from shapechanger.errors import UnknownName
+
+PERIOD_S: Final = 0.05
+"""Control period of the experts, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Traits:
     """Driving properties of a vehicle.
 
-    Sizes and speeds are those of `shapechanger.bodies.vehicles`; the rest was tuned on training
-    courses.
+    All but the body was tuned on training courses.
 
     Attributes:
+        body: Model of the vehicle.
         drive: Kind of steering: front wheels, two tracks, or a rudder.
-        half_width_m: Half of its largest width.
-        nose_m: Distance from its origin to its front.
         margin_m: Smallest clearance on each side of its path: for the corners of its hull, a
             trailer that cuts corners, and errors.
         comfort_m: Preferred clearance.
-        top_speed: Speed at full throttle on level ground, m/s.
         cruise: Share of the top speed on free, straight lanes.
         lateral_limit: Largest lateral acceleration, m/s2.
         braking: Reliable deceleration, m/s2.
@@ -39,12 +40,10 @@ class Traits:
         least_throttle: Smallest throttle while driving forward; below 0 brakes with the motor.
     """
 
+    body: VehicleModel
     drive: Literal["wheels", "tracks", "rudder"]
-    half_width_m: float
-    nose_m: float
     margin_m: float
     comfort_m: float
-    top_speed: float
     cruise: float
     lateral_limit: float
     braking: float
@@ -55,16 +54,24 @@ class Traits:
     sway: float = 0.25
     least_throttle: float = 0.0
 
+    @property
+    def half_width_m(self) -> float:
+        """Half of the vehicle's largest width, m."""
+        return self.body.width_m / 2
+
+    @property
+    def top_speed(self) -> float:
+        """Speed at full throttle on level ground, m/s."""
+        return self.body.top_speed_mps
+
 
 TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
     {
         "car": Traits(
+            body=VEHICLES["car"],
             drive="wheels",
-            half_width_m=0.10,
-            nose_m=0.20,
             margin_m=0.13,
             comfort_m=0.40,
-            top_speed=2.0,
             cruise=0.9,
             lateral_limit=2.5,
             braking=1.5,
@@ -73,12 +80,10 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
             turn=math.tan(math.radians(28.0)) / 0.26,
         ),
         "tank": Traits(
+            body=VEHICLES["tank"],
             drive="tracks",
-            half_width_m=0.12,
-            nose_m=0.16,
             margin_m=0.12,
             comfort_m=0.40,
-            top_speed=1.0,
             cruise=0.9,
             lateral_limit=1.0,
             braking=1.0,
@@ -89,12 +94,10 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
             sway=0.12,
         ),
         "truck": Traits(
+            body=VEHICLES["truck"],
             drive="wheels",
-            half_width_m=0.10,
-            nose_m=0.25,
             margin_m=0.25,
             comfort_m=0.70,
-            top_speed=1.5,
             cruise=0.9,
             lateral_limit=1.2,
             braking=0.8,
@@ -103,12 +106,10 @@ TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
             turn=math.tan(math.radians(30.0)) / 0.32,
         ),
         "boat": Traits(
+            body=VEHICLES["boat"],
             drive="rudder",
-            half_width_m=0.10,
-            nose_m=0.30,
             margin_m=0.35,
             comfort_m=1.0,
-            top_speed=1.2,
             cruise=0.95,
             lateral_limit=0.5,
             braking=0.25,

@@ -217,7 +217,7 @@ _SPACING_M: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class _OpenWorld:
+class OpenWorld:
     """A kind of course in the open.
 
     Attributes:
@@ -241,7 +241,7 @@ class _OpenWorld:
     current_mps: float = 0.0
 
 
-_YARD: Final = _OpenWorld(
+YARD: Final = OpenWorld(
     name="yard",
     shape=ChannelShape(
         pitch=(5.5, 8.0),
@@ -269,8 +269,9 @@ _YARD: Final = _OpenWorld(
     per_m=(0.12, 0.4),
     gap_m=1.2,
 )
+"""Hedges, fences, sheds and brick walls."""
 
-_HARBOUR: Final = _OpenWorld(
+HARBOUR: Final = OpenWorld(
     name="harbour",
     shape=ChannelShape(
         pitch=(7.0, 10.5),
@@ -296,29 +297,20 @@ _HARBOUR: Final = _OpenWorld(
     gap_m=1.6,
     current_mps=0.15,
 )
+"""Quays, rocks and a current."""
 
 
-def yard(rng: np.random.Generator, seed: int) -> Course | None:
-    """Try to lay out a yard: hedges, fences, sheds and brick walls; None if it does not fit.
-
-    Args:
-        rng: Source of all that is drawn.
-        seed: Seed of the course.
-    """
-    return _lay_out(_YARD, rng, seed)
-
-
-def harbour(rng: np.random.Generator, seed: int) -> Course | None:
-    """Try to lay out a harbour: quays, rocks and a current; None if it does not fit.
+def open_course(world: OpenWorld, rng: np.random.Generator, seed: int) -> Course | None:
+    """Try to lay out a yard or a harbour.
 
     Args:
-        rng: Source of all that is drawn.
-        seed: Seed of the course.
+        world: Kind of course.
+        rng: Random generator.
+        seed: Seed to record in the course.
+
+    Returns:
+        The course, or None if the random layout does not fit.
     """
-    return _lay_out(_HARBOUR, rng, seed)
-
-
-def _lay_out(world: _OpenWorld, rng: np.random.Generator, seed: int) -> Course | None:
     channel = _dig_channel(rng, world.shape, _SPACING_M)
     if channel is None:
         return None

@@ -244,7 +244,7 @@ def _furnish(
             size = _FURNITURE[weighted_choice(rng, _FURNITURE_SHARES)]
             t = float(rng.uniform(1.2, length - 1.2))
             side = 1.0 if rng.random() < 0.5 else -1.0
-            obstacle = size.draw(rng, 0.0, 0.0, yaw)
+            obstacle = size.draw(rng, yaw)
             aside = widths[k] / 2.0 - obstacle.width / 2.0 - float(rng.uniform(0.005, 0.04))
             if obstacle.kind in ("box", "crate") and rng.random() < 0.4:
                 aside *= float(rng.uniform(0.4, 0.9))
@@ -265,7 +265,7 @@ def _plant(
     for corner, way, s in zip(corners, inward, along, strict=True):
         if rng.random() < 0.25:
             size = _FURNITURE[3] if rng.random() < 0.7 else _FURNITURE[1]
-            obstacle = size.draw(rng, 0.0, 0.0, 0.0)
+            obstacle = size.draw(rng, 0.0)
             # Free of both walls.
             x, y = corner - way + np.sign(way) * (obstacle.length / 2.0 + 0.02)
             obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(s))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -12,13 +13,19 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds.course import Course
-from shapechanger.worlds.layout.channel import harbour, yard
+from shapechanger.worlds.layout.channel import HARBOUR, YARD, open_course
 from shapechanger.worlds.layout.corridor import corridor
 from shapechanger.worlds.layout.geometry import distances_from_obstacle, turn_angles
 from shapechanger.worlds.world import Pose
 
 _MAKERS: Final[Mapping[str, Callable[[np.random.Generator, int], Course | None]]] = (
-    MappingProxyType({"corridor": corridor, "yard": yard, "harbour": harbour})
+    MappingProxyType(
+        {
+            "corridor": corridor,
+            "yard": partial(open_course, YARD),
+            "harbour": partial(open_course, HARBOUR),
+        }
+    )
 )
 
 WORLDS: Final = tuple(_MAKERS)

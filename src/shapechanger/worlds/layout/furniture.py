@@ -57,24 +57,18 @@ class Size:
     width: tuple[float, float]
     height: tuple[float, float]
 
-    def draw(self, rng: np.random.Generator, x: float, y: float, yaw: float) -> Obstacle:
-        """Draw an obstacle; a round one is as wide as it is long.
+    def draw(self, rng: np.random.Generator, yaw: float) -> Obstacle:
+        """Draw an obstacle at the origin; a round one is as wide as it is long.
 
         Args:
             rng: Random generator.
-            x: Position, m.
-            y: Position, m.
             yaw: Angle of its length, rad.
         """
         length, width, height = (
             float(rng.uniform(*bounds)) for bounds in (self.length, self.width, self.height)
         )
-        obstacle = Obstacle(self.kind, x, y, yaw, length, width, height)
-        return (
-            Obstacle(self.kind, x, y, 0.0, length, length, height)
-            if obstacle.is_round
-            else obstacle
-        )
+        obstacle = Obstacle(self.kind, 0.0, 0.0, yaw, length, width, height)
+        return replace(obstacle, yaw=0.0, width=length) if obstacle.is_round else obstacle
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +189,7 @@ def scatter_obstacles(
         kind = kinds[weighted_choice(rng, shares)]
         i = int(rng.integers(len(route)))
         heading = float(np.arctan2(-left[i, 0], left[i, 1]))
-        obstacle = kind.size.draw(rng, 0.0, 0.0, heading)
+        obstacle = kind.size.draw(rng, heading)
         if rng.random() < kind.moored:
             side = 1.0 if rng.random() < 0.5 else -1.0
             aside = side * (

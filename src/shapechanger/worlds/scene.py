@@ -1,4 +1,4 @@
-"""A course in a MuJoCo model: visual meshes and hidden collision geoms."""
+"""Courses in MuJoCo: visual meshes with precomputed light, and hidden collision geoms."""
 
 from __future__ import annotations
 
@@ -6,20 +6,12 @@ from typing import Final
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
-from shapechanger.worlds.look import Look
-from shapechanger.worlds.paint import CELLS, ROWS, texture
-from shapechanger.worlds.scene.patches import Patches, add_material, add_patches
-from shapechanger.worlds.scene.surfaces import (
-    Light,
-    ceiling_patches,
-    ground_patches,
-    lamp_patches,
-    obstacle_patches,
-    verge_patches,
-    wall_patches,
-)
+from shapechanger.worlds.look import Colour, Look
+from shapechanger.worlds.paint import texture
+from shapechanger.worlds.surfaces import Patches, Surfaces
 
 # Two geoms collide if the contype of one shares a bit with the conaffinity of the other.
 _SOLID_TYPE: Final = 1
@@ -55,8 +47,6 @@ def _add_collision(spec: mujoco.MjSpec, course: Course) -> None:
     for number, wall in enumerate(course.walls):
         start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
         length = float(np.hypot(*(end - start)))
-        if length <= 0.0:
-            continue
         along = (end - start) / length
         behind = np.array([along[1], -along[0]])
         x, y = 0.5 * (start + end) + 0.5 * _THICKNESS * behind
@@ -126,29 +116,37 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     """
     _set_camera(spec)
     _add_collision(spec, course)
-    light = Light(course, look)
+    surfaces = Surfaces(course, look)
     mirrored = look.gloss > 0.0
     walls, plain = look.tone(look.wall), look.tone()
 
-    def show(name: str, patches: Patches, colour: tuple[float, float, float]) -> None:
+    def show(name: str, patches: Patches, colour: Colour) -> None:
         """Add patches with the texture of that name."""
         if patches:
-            add_material(spec, f"world/{name}", texture(name, look.texture_seed), colour)
-            add_patches(spec, f"world/{name}", patches, f"world/{name}", mirrored)
+            picture = texture(name, look.texture_seed)
+            _add_surface(spec, f"world/{name}", patches, picture, colour, mirrored=mirrored)
 
-    for surface, patches in wall_patches(course, light).items():
+    for surface, patches in surfaces.walls().items():
         show(surface, patches, walls)
-    obstacles = obstacle_patches(course, light)
     if course.ceiling_m > 0.0:
-        show("ceiling", ceiling_patches(course, light), plain)
+        show("ceiling", surfaces.ceiling(), plain)
     else:
-        _add_sky(spec, look)
+        # The tone is in the texture, because MuJoCo does not light skyboxes.
+        sky = (texture("sky", look.texture_seed) * np.array(plain)).astype(np.uint8)
+        _add_texture(spec, "world/sky", sky, mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     if course.world == "yard":
-        show("grass", verge_patches(course, light), plain)
-    show("things", obstacles, plain)
+        show("grass", surfaces.verges(), plain)
+    show("things", surfaces.obstacles(), plain)
     if course.lamps and course.ceiling_m > 0.0:
-        _add_lamps(spec, course, look, mirrored)
-    _add_ground(spec, course, look, light)
+        # They stay bright in dim light, as they do for a camera.
+        red, green, blue = (c ** (1.0 / 4.0) for c in plain)
+        picture = texture("things", look.texture_seed)
+        lamps = surfaces.lamps()
+        _add_surface(spec, "world/lamps", lamps, picture, (red, green, blue), mirrored=mirrored)
+    # The ground is last, because it is blended over the mirrored course.
+    picture = texture(_GROUND.get(course.world, _DEFAULT_GROUND), look.texture_seed)
+    ground, colour = surfaces.ground(), look.tone(look.ground)
+    _add_surface(spec, "world/floor", ground, picture, colour, opacity=1.0 - look.gloss)
 
 
 def _set_camera(spec: mujoco.MjSpec) -> None:
@@ -171,34 +169,56 @@ def _set_camera(spec: mujoco.MjSpec) -> None:
     )
 
 
-def _add_ground(spec: mujoco.MjSpec, course: Course, look: Look, light: Light) -> None:
-    """Add the visible ground; last, because it is blended over the mirrored course."""
-    name = _GROUND.get(course.world, _DEFAULT_GROUND)
-    material = add_material(
-        spec, "world/floor", texture(name, look.texture_seed), look.tone(look.ground)
-    )
-    material.rgba[3] = 1.0 - look.gloss
-    add_patches(spec, "world/floor", ground_patches(course, light), "world/floor")
-
-
-def _add_lamps(spec: mujoco.MjSpec, course: Course, look: Look, mirrored: bool) -> None:
-    """Add the lamps, which stay bright in dim light, as they do for a camera."""
-    row, column = divmod(CELLS["lamp"], ROWS)
-    place = (np.array([column, row]) + 0.5) / ROWS
-    colour = tuple(c ** (1.0 / 4.0) for c in look.tone())
-    add_material(spec, "world/lamps", texture("things", look.texture_seed), colour)
-    add_patches(spec, "world/lamps", lamp_patches(course, place), "world/lamps", mirrored)
-
-
-def _add_sky(spec: mujoco.MjSpec, look: Look) -> None:
-    """Add the sky, with its tone in the texture, because MuJoCo does not light skyboxes."""
-    picture = texture("sky", look.texture_seed) * np.array(look.tone())
+def _add_texture(
+    spec: mujoco.MjSpec, name: str, picture: NDArray[np.uint8], kind: mujoco.mjtTexture
+) -> None:
     height, width, channels = picture.shape
-    sky = spec.add_texture(
-        name="world/sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        height=height,
-        width=width,
-        nchannel=channels,
+    texture = spec.add_texture(name=name, type=kind, height=height, width=width, nchannel=channels)
+    texture.data = picture.tobytes()
+
+
+def _add_surface(
+    spec: mujoco.MjSpec,
+    name: str,
+    patches: Patches,
+    picture: NDArray[np.uint8],
+    colour: Colour,
+    *,
+    mirrored: bool = False,
+    opacity: float = 1.0,
+) -> None:
+    """Add patches as a visual mesh, without mass and collisions, lit by their own light only.
+
+    MuJoCo has no brightness per vertex, but a normal. The only light shines straight up, so the
+    normals are chosen for the brightness that they give, whatever the orientation of the patch.
+
+    Args:
+        spec: Model to extend.
+        name: Name of the texture, the material, the mesh and the geom.
+        patches: The patches.
+        picture: The texture, (H, W, 3).
+        colour: Factors on red, green and blue.
+        mirrored: Whether to add a copy mirrored below the ground.
+        opacity: 0 for invisible to 1 for opaque.
+    """
+    _add_texture(spec, name, picture, mujoco.mjtTexture.mjTEXTURE_2D)
+    material = spec.add_material(
+        name=name, rgba=[*colour, opacity], emission=0.0, specular=0.0, shininess=0.0,
+        reflectance=0.0,
+    )  # fmt: skip
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+    points, places, lights, triangles = patches.arrays(mirrored)
+    lean = np.clip(lights, 0.0, 1.0)
+    normals = np.stack([np.sqrt(1.0 - lean * lean), np.zeros_like(lean), -lean], axis=1)
+    spec.add_mesh(
+        name=name,
+        uservert=points.ravel(),
+        usernormal=normals.ravel(),
+        usertexcoord=places.ravel(),
+        userface=triangles.ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
     )
-    sky.data = picture.astype(np.uint8).tobytes()
+    spec.worldbody.add_geom(
+        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, material=name, contype=0,
+        conaffinity=0, group=0, mass=0.0,
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Arguments of `VehicleEnv`: the robot's profile, the frame size, courses and reset options."""
+"""What the vehicle envs share: their arguments, and the sampling of courses, starts and looks."""
 
 from __future__ import annotations
 
@@ -9,14 +9,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, cast
 
+import gymnasium as gym
 import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
 
+from shapechanger.bodies.vehicles import require_fit, vehicle_model
+from shapechanger.envs.vehicle.drivers import Demonstrator, VehicleDemonstrator
 from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.worlds.camera import CameraJitter
 from shapechanger.worlds.course import HELD_OUT, TRAINING
 from shapechanger.worlds.look import Look
+from shapechanger.worlds.simulation import MujocoWorld
 
 Steering = Literal["proportional", "bang"]
 """Steering angles: any, or only full left, straight and full right, as in 2017."""
@@ -63,20 +69,25 @@ def check_seed(what: str, seed: Any) -> int:
 
 
 def resolve_profile(
-    robot: str | os.PathLike[str], steering: Steering | None, size: tuple[int, int]
+    vehicle: str,
+    robot: str | os.PathLike[str] | None,
+    size: tuple[int, int],
+    steering: Steering | None = None,
 ) -> Profile:
-    """Load a profile, and set its steering and its camera's frame size.
+    """Load the profile of a vehicle, and set its steering and its camera's frame size.
 
     Args:
-        robot: Path or name of the profile.
-        steering: Replaces the profile's steering; None to keep it.
+        vehicle: Name of the vehicle.
+        robot: Path or name of the profile; None for `lab-` followed by the vehicle.
         size: Width and height of frames, pixels.
+        steering: Replaces the profile's steering; None to keep it.
 
     Raises:
-        UnknownName: If there is no such profile or steering.
-        ProfileError: If it is not the profile of a vehicle with a camera.
+        UnknownName: If there is no such vehicle, profile or steering.
+        ProfileError: If it is not the profile of this vehicle with a camera.
     """
-    profile = load_profile(find_profile(robot))
+    vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
+    profile = load_profile(find_profile(f"lab-{vehicle}" if robot is None else robot))
     if profile.camera is None:
         raise ProfileError(f"{profile.path}: the robot has no camera, and this task needs one.")
     actions = profile.actions
@@ -89,6 +100,7 @@ def resolve_profile(
         if steering not in _LEVELS:
             raise UnknownName("steering", steering, _LEVELS)
         actions = (dataclasses.replace(actions[0], levels=_LEVELS[steering]), *actions[1:])
+    require_fit(vehicle, {output.part for output in profile.outputs})
     camera = dataclasses.replace(profile.camera, size=size, flip=False)
     return dataclasses.replace(profile, actions=actions, camera=camera)
 
@@ -179,3 +191,60 @@ class CourseSampler:
             look,
             camera,
         )
+
+
+class DrivingEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
+    """Base of the vehicle envs: a world, and the courses that its episodes are on.
+
+    Attributes:
+        parts: The parts that the robot's outputs move, such as "wheels" and "steering".
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+    parts: frozenset[str]
+    _world: MujocoWorld
+    _draw: CourseSampler
+
+    @property
+    def world(self) -> MujocoWorld:
+        """The simulated world, with its ground truth."""
+        return self._world
+
+    def hold_out(self) -> None:
+        """Sample held-out courses from the next reset on."""
+        self._draw.hold_out()
+
+    def demonstrator(self, seed: int) -> Demonstrator:
+        """Return an expert that knows the whole course and recovers from its own mistakes.
+
+        Args:
+            seed: Seed of the mistakes.
+        """
+        return VehicleDemonstrator(self._world, seed)
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the camera's picture, shape (height, width, 3); None without a render mode."""
+        return self._world.picture() if self.render_mode else None
+
+    def close(self) -> None:
+        """Release the renderer, if there is one."""
+        self._world.close()
+
+    def _lay_out(self, options: Mapping[str, Any] | None) -> EpisodeSetup:
+        """Sample the next episode, and lay out its course."""
+        drawn = self._draw.draw(self.np_random, self._world.course.world, options or {})
+        if drawn.course != self._world.seed or drawn.look is not None:
+            self._world.lay_out(drawn.course, drawn.look, drawn.camera)
+        return drawn
+
+    def _require_free(self, drawn: EpisodeSetup) -> None:
+        """Check that the vehicle touches nothing at the start.
+
+        Raises:
+            WorldError: If it does.
+        """
+        if self._world.touches:
+            raise WorldError(
+                f"The {self._world.vehicle.name} is stuck at start {drawn.start} of course "
+                f"{drawn.course}: choose another."
+            )
