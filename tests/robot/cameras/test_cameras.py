@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError
 from shapechanger.robot.cameras import v4l2 as api
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
 from shapechanger.robot.cameras.pattern import read_barcode
@@ -55,12 +55,6 @@ def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
     assert not thread.is_alive()
     camera.close()  # Twice is once.
     return words[0]
-
-
-def test_unknown_driver_is_named() -> None:
-    """With the ones there are."""
-    with pytest.raises(UnknownName, match="picamera2, v4l2, file, pipe, pattern"):
-        open_camera(_plan("webcam"))
 
 
 def test_pattern_moves_and_carries_its_time() -> None:

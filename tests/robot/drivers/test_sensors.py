@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError
 from shapechanger.robot.drivers import hcsr04
 from tests.robot.drivers.fakes import MS, FakeHardware
 
@@ -95,8 +95,6 @@ def test_switch_to_three_volts() -> None:
     assert bumper.read(0, 0.0) == {"bump": 0.0}
     hardware.factory.drive(6, 1, 0.1)
     assert bumper.read(0, 0.0) == {"bump": 1.0}
-    with pytest.raises(UnknownName, match="up, down"):
-        hardware.sensor("switch", pins=[7], pull="sideways")
 
 
 def _echo(hardware: FakeHardware, seconds: float) -> None:

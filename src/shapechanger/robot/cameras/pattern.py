@@ -77,7 +77,7 @@ def read_barcode(image: NDArray[np.uint8]) -> int | None:
 
 
 class Pattern:
-    """Camera with drifting colours; see `Camera`."""
+    """Camera with drifting colours; see `Camera`. It has no settings and ignores `flip`."""
 
     def __init__(self, plan: CameraPlan) -> None:
         self._width, self._height = plan.size
@@ -110,8 +110,3 @@ class Pattern:
         image[..., 1] = down * 2 % 256
         image[..., 2] = (across + down) % 256
         return image
-
-
-def open_driver(plan: CameraPlan) -> Pattern:
-    """Open the test pattern, which has no settings and ignores `flip`."""
-    return Pattern(plan)

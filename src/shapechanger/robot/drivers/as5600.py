@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words, texts, whole, wholes
+from shapechanger.robot.drivers.settings import in_words
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
 
@@ -163,9 +163,9 @@ def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
     Raises:
         RobotError: If there is no such bus.
     """
-    bus, mux = whole(plan.settings, "bus"), whole(plan.settings, "mux")
-    columns = (wholes(plan.settings, key) for key in ("channels", "zeros", "directions"))
-    rows = zip(texts(plan.settings, "joints"), *columns, strict=True)
+    bus, mux = plan.settings["bus"], plan.settings["mux"]
+    columns = (plan.settings[key] for key in ("joints", "channels", "zeros", "directions"))
+    rows = zip(*columns, strict=True)
     encoders = tuple(JointEncoder(*row) for row in rows)
     words = f"The multiplexer of sensor {plan.name!r} at 0x{mux:02x} on I2C bus {bus}"
     with in_words(words):

@@ -11,16 +11,15 @@ import struct
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words, whole
+from shapechanger.robot.drivers.settings import in_words
 from shapechanger.robot.guard.plan import SensorPlan
-from shapechanger.robot.hardware import Hardware, I2cBus
+from shapechanger.robot.hardware import Hardware
 
 _CONFIG: Final = 0x1A
 _GYRO_CONFIG: Final = 0x1B
 _ACCEL_CONFIG: Final = 0x1C
-_ACCEL_XOUT_H: Final = (
-    0x3B  # Seven big-endian numbers: acceleration x y z, temperature, rate x y z.
-)
+# Seven big-endian numbers follow: acceleration x y z, temperature, rate x y z.
+_ACCEL_XOUT_H: Final = 0x3B
 _PWR_MGMT_1: Final = 0x6B
 _WHO_AM_I: Final = 0x75
 
@@ -40,24 +39,24 @@ _ZERO_SHARE: Final = 0.02
 
 
 class Mpu6050:
-    """Inertial sensor; see `SensorDriver`."""
+    """Inertial sensor; see `SensorDriver`. Its settings are `bus` and `address`."""
 
-    def __init__(self, bus: I2cBus, address: int, name: str) -> None:
-        self._bus = bus
-        self._address = address
-        self._name = name
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        number, self._address = plan.settings["bus"], plan.settings["address"]
+        self._name = f"Sensor {plan.name!r} at 0x{self._address:02x} on I2C bus {number}"
         self._zero_rad_per_s: float | None = None
-        with in_words(name):
-            identity = bus.read_byte_data(address, _WHO_AM_I)
+        with in_words(self._name):
+            self._bus = bus = hardware.i2c(number)
+            identity = bus.read_byte_data(self._address, _WHO_AM_I)
             if identity != _IDENTITY:
                 raise RobotError(
-                    f"{name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
+                    f"{self._name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
                     f"not 0x{_IDENTITY:02x}."
                 )
-            bus.write_byte_data(address, _PWR_MGMT_1, _AWAKE)
-            bus.write_byte_data(address, _CONFIG, _LOW_PASS_44_HZ)
-            bus.write_byte_data(address, _GYRO_CONFIG, _RANGE_500_DEG_PER_S)
-            bus.write_byte_data(address, _ACCEL_CONFIG, _RANGE_4_G)
+            bus.write_byte_data(self._address, _PWR_MGMT_1, _AWAKE)
+            bus.write_byte_data(self._address, _CONFIG, _LOW_PASS_44_HZ)
+            bus.write_byte_data(self._address, _GYRO_CONFIG, _RANGE_500_DEG_PER_S)
+            bus.write_byte_data(self._address, _ACCEL_CONFIG, _RANGE_4_G)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return acceleration forward and left in m/s², and yaw rate to the left in rad/s.
@@ -85,11 +84,3 @@ class Mpu6050:
     def close(self) -> None:
         """Close the bus."""
         self._bus.close()
-
-
-def open_driver(plan: SensorPlan, hardware: Hardware) -> Mpu6050:
-    """Open the sensor; the settings are `bus` and `address`."""
-    bus, address = whole(plan.settings, "bus"), whole(plan.settings, "address")
-    name = f"Sensor {plan.name!r} at 0x{address:02x} on I2C bus {bus}"
-    with in_words(name):
-        return Mpu6050(hardware.i2c(bus), address, name)

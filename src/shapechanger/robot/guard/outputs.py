@@ -17,7 +17,7 @@ from shapechanger.robot.drivers.output import (
     open_output,
 )
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, output_values
-from shapechanger.robot.hardware import REAL, Hardware
+from shapechanger.robot.hardware import REAL, Hardware, load
 
 
 def enable_device(pin: int, hardware: Hardware) -> Any:
@@ -330,16 +330,12 @@ def preload(plan: GuardPlan, source: str) -> None:
         plan: The robot.
         source: Where its hardware comes from.
     """
-    modules = [source.partition(":")[0]]
-    modules += [
-        OUTPUT_DRIVERS[output.driver]
-        for output in plan.outputs
-        if output.driver not in _STOPS_ITSELF
-    ]
+    load(source)
+    for output in plan.outputs:
+        if output.driver not in _STOPS_ITSELF:
+            load(OUTPUT_DRIVERS[output.driver])
     if plan.enable_pin is not None:
-        modules.append("gpiozero")
-    for module in modules:
-        importlib.import_module(module)
+        importlib.import_module("gpiozero")
     if source != REAL:
         return
     for library in ("shapechanger.robot.drivers.lgpio_pins", "gpiozero.pins.lgpio", "smbus2"):
