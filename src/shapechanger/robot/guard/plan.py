@@ -171,7 +171,7 @@ class GuardPlan:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> GuardPlan:
-        """Read the output of `dataclasses.asdict`. It is trusted and not validated."""
+        """Read the output of `dataclasses.asdict`, which is trusted and not validated."""
         parts: dict[str, Any] = {
             "actions": tuple(ActionPlan(**action) for action in data["actions"]),
             "outputs": tuple(OutputPlan(**output) for output in data["outputs"]),

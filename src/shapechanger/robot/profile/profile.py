@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
@@ -222,25 +221,7 @@ def _check(source: Source, outputs: list[OutputPlan], bus: Mapping[str, Any]) ->
 _SI: Final = {"deg": ("rad", math.pi / 180.0)}
 
 
-@dataclass(frozen=True, slots=True)
-class RewardPlan:
-    """Weights of the task.
-
-    Attributes:
-        velocity: Reward per metre forward, 1/m.
-        collision: Reward per collision, at most 0.
-        stall: Reward per second of stall, 1/s, at most 0.
-        collision_ends_episode: Whether a collision ends the task.
-    """
-
-    velocity: float = 1.0
-    collision: float = -10.0
-    stall: float = -1.0
-    collision_ends_episode: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class ResetStep:
+class ResetStep(NamedTuple):
     """One step of the reset routine.
 
     Attributes:
@@ -252,82 +233,37 @@ class ResetStep:
     seconds: float
 
 
-@dataclass(frozen=True, slots=True)
-class EnablePlan:
-    """One-shot that enables the motors while the guard toggles a pin.
-
-    Attributes:
-        pin: BCM pin that is toggled.
-        hold_ms: Time for which it holds the line after the last toggle, ms.
-    """
-
-    pin: int
-    hold_ms: int
-
-
-@dataclass(frozen=True, slots=True)
-class Profile:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile(GuardPlan):
     """A robot: what it moves and senses, its caps, and when it stops.
 
     Attributes:
         path: The file that it was read from.
-        name: Name of the robot.
         body: Kind of robot, such as "car".
         control_hz: Expected rate of commands, Hz.
         calibrated: Date of calibration; None if it never was.
-        actions: The numbers of a command, in order.
-        outputs: What they move.
-        sensors: What the guard reads.
         camera: Its camera; None without one.
-        limits: When it stops by itself.
         max_observation_age_ms: Largest age of the observation that a command answers, ms.
         arming: Who may arm it.
-        stop: How it stops.
-        reward: Weights of the task.
+        reward: Weights of the task, as in `Welcome.reward`: "velocity" per metre forward,
+            "collision" per collision, "stall" per second of stall, and "collision_ends_episode",
+            1 or 0.
         reset: The reset routine; empty for none.
-        enable: The one-shot of the enable line; None without one.
-        stop_pin: BCM pin of the emergency stop button; None without one.
     """
 
     path: Path
-    name: str
     body: str
     control_hz: float
     calibrated: datetime.date | None
-    actions: tuple[ActionPlan, ...]
-    outputs: tuple[OutputPlan, ...]
-    sensors: tuple[SensorPlan, ...]
     camera: CameraPlan | None
-    limits: LimitPlan
     max_observation_age_ms: int
     arming: Literal["person", "anyone"]
-    stop: StopPlan
-    reward: RewardPlan
+    reward: dict[str, float]
     reset: tuple[ResetStep, ...]
-    enable: EnablePlan | None
-    stop_pin: int | None
-
-    @property
-    def image_size(self) -> tuple[int, int] | None:
-        """Width and height of frames, pixels; None without a camera."""
-        return self.camera.size if self.camera else None
 
     def guard_plan(self) -> GuardPlan:
-        """Return the guard's plan."""
-        plan = GuardPlan(
-            name=self.name,
-            actions=self.actions,
-            outputs=self.outputs,
-            sensors=self.sensors,
-            limits=self.limits,
-            stop=self.stop,
-            stop_pin=self.stop_pin,
-        )
-        if self.enable is None:
-            return plan
-        return dataclasses.replace(
-            plan, enable_pin=self.enable.pin, enable_hold_ms=self.enable.hold_ms
-        )
+        """Return only what the guard needs."""
+        return GuardPlan(**{field.name: getattr(self, field.name) for field in fields(GuardPlan)})
 
     def action_layout(self) -> Layout:
         """Return the layout of commands.
@@ -354,14 +290,6 @@ class Profile:
             for action in self.actions
         )
         return Layout((*_state_features(self.sensors, self.actions, self.limits), *applied))
-
-    def reward_weights(self) -> dict[str, float]:
-        """Return the reward weights by name, as in `Welcome.reward`; booleans are 1 or 0."""
-        return {name: float(weight) for name, weight in dataclasses.asdict(self.reward).items()}
-
-    def reset_routine(self) -> tuple[tuple[tuple[float, ...], float], ...]:
-        """Return the values and the duration, s, of each reset step, as in `Welcome.reset`."""
-        return tuple((step.values, step.seconds) for step in self.reset)
 
 
 def _action_feature(action: ActionPlan, span_n: float | None) -> Feature:

@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.errors import ProfileError
 from shapechanger.robot.guard.plan import ActionPlan, LimitPlan, StopPlan
 from shapechanger.robot.profile.mistakes import Source, choice
-from shapechanger.robot.profile.profile import (
-    EnablePlan,
-    Profile,
-    ResetStep,
-    RewardPlan,
-    with_servo_bus,
-)
+from shapechanger.robot.profile.profile import Profile, ResetStep, with_servo_bus
 from shapechanger.robot.profile.schema import (
     EMERGENCY_BUTTON_KEYS,
     ENABLE_KEYS,
@@ -28,7 +21,6 @@ from shapechanger.robot.profile.schema import (
     SERVO_BUS_KEYS,
     STOP_KEYS,
     TABLES,
-    ProfileKey,
 )
 from shapechanger.robot.profile.sections import (
     Section,
@@ -63,97 +55,80 @@ def read_profile(text: str, path: Path) -> Profile:
         if name not in TABLES:
             words = f"a profile has no table or key {choice(name, TABLES)}"
             raise source.mistake((name,), words)
-    return _Reader(source, data).profile()
+    root = Section(source, (), data)
+    wiring = PinAllocation(source)
+    robot = root.section("robot").read(ROBOT_KEYS)
+    actions = {name: read_action(name, table) for name, table in _named(root, "action").items()}
+    if not actions:
+        raise root.mistake("a robot needs an action, such as [action.throttle]", "action")
+    outputs = tuple(read_output(name, table) for name, table in _named(root, "output").items())
+    check_mix(source, actions, outputs)
+    outputs = wiring.take_outputs(outputs)
+    sensors = tuple(read_sensor(name, table) for name, table in _named(root, "sensor").items())
+    for sensor in sensors:
+        wiring.take_sensor(sensor)
+    camera = read_camera(root.section("camera")) if "camera" in root else None
+    stop = StopPlan(**root.section("stop").read(STOP_KEYS))
+    check_stop(source, stop, actions, outputs)
+    bus = root.section("servo_bus").read(SERVO_BUS_KEYS) if "servo_bus" in root else None
+    outputs, sensors = with_servo_bus(source, bus, outputs, sensors, stop)
+    limits = read_limits(root.section("limits"), robot["control_hz"], camera, sensors)
+    pins: dict[str, Any] = {}
+    if "enable" in root:
+        enable = root.section("enable").read(ENABLE_KEYS)
+        wiring.take_pin(enable["pin"], ("enable", "pin"))
+        pins = {"enable_pin": enable["pin"], "enable_hold_ms": enable["hold_ms"]}
+    if "emergency_button" in root:
+        pins["stop_pin"] = root.section("emergency_button").read(EMERGENCY_BUTTON_KEYS)["pin"]
+        wiring.take_pin(pins["stop_pin"], ("emergency_button", "pin"))
+    reward = root.section("reward").read(REWARD_KEYS)
+    return Profile(
+        path=path,
+        **robot,
+        actions=tuple(actions.values()),
+        outputs=outputs,
+        sensors=sensors,
+        camera=camera,
+        max_observation_age_ms=limits.pop("max_observation_age_ms"),
+        arming=limits.pop("arming"),
+        limits=LimitPlan(**limits),
+        stop=stop,
+        reward={name: float(weight) for name, weight in reward.items()},
+        reset=_reset(root, actions),
+        **pins,
+    )
 
 
-class _Reader:
-    """Reader of one profile, table by table."""
-
-    def __init__(self, source: Source, data: Mapping[str, Any]) -> None:
-        self._source = source
-        self._root = Section(source, (), data)
-        self._wiring = PinAllocation(source)
-
-    def profile(self) -> Profile:
-        """Read the whole profile."""
-        root = self._root
-        robot = root.section("robot").read(ROBOT_KEYS)
-        named = {name: read_action(name, table) for name, table in self._named("action").items()}
-        if not named:
-            words = "a robot needs an action, such as [action.throttle]"
-            raise root.mistake(words, "action")
-        outputs = tuple(read_output(name, table) for name, table in self._named("output").items())
-        check_mix(self._source, named, outputs)
-        outputs = self._wiring.take_outputs(outputs)
-        sensors = tuple(read_sensor(name, table) for name, table in self._named("sensor").items())
-        for sensor in sensors:
-            self._wiring.take_sensor(sensor)
-        camera = read_camera(root.section("camera")) if "camera" in root else None
-        stop = StopPlan(**root.section("stop").read(STOP_KEYS))
-        check_stop(self._source, stop, named, outputs)
-        bus = root.section("servo_bus").read(SERVO_BUS_KEYS) if "servo_bus" in root else None
-        outputs, sensors = with_servo_bus(self._source, bus, outputs, sensors, stop)
-        limits = read_limits(root.section("limits"), robot["control_hz"], camera, sensors)
-        enable = self._with_pin("enable", ENABLE_KEYS)
-        button = self._with_pin("emergency_button", EMERGENCY_BUTTON_KEYS)
-        actions = tuple(named.values())
-        return Profile(
-            path=self._source.path,
-            **robot,
-            actions=actions,
-            outputs=outputs,
-            sensors=sensors,
-            camera=camera,
-            limits=LimitPlan(**{field.name: limits[field.name] for field in fields(LimitPlan)}),
-            max_observation_age_ms=limits["max_observation_age_ms"],
-            arming=limits["arming"],
-            stop=stop,
-            reward=RewardPlan(**root.section("reward").read(REWARD_KEYS)),
-            reset=self._reset(actions),
-            enable=EnablePlan(**enable) if enable else None,
-            stop_pin=button["pin"] if button else None,
-        )
-
-    def _reset(self, actions: Sequence[ActionPlan]) -> tuple[ResetStep, ...]:
-        steps = self._root.table.get("reset", [])
-        if not isinstance(steps, list):
-            words = "the steps of the reset routine are written [[reset]], with two brackets"
-            raise self._root.mistake(words, "reset")
-        tables = enumerate(cast("list[Any]", steps))
-        return tuple(_step(Section(self._source, ("reset", i), t), actions) for i, t in tables)
-
-    def _with_pin(self, name: str, keys: Sequence[ProfileKey]) -> dict[str, Any] | None:
-        """Read a table with a pin, and allocate the pin; None if it is missing."""
-        if name not in self._root:
-            return None
-        values = self._root.section(name).read(keys)
-        self._wiring.take_pin(values["pin"], (name, "pin"))
-        return values
-
-    def _named(self, kind: str) -> dict[str, Section]:
-        """Return the tables of one kind by name, in the order of the file."""
-        tables = self._root.section(kind).named()
-        if len(tables) > _MOST_NAMED:
-            words = f"a robot has at most {_MOST_NAMED} {kind}s, not {len(tables)}"
-            raise self._root.mistake(words, kind)
-        return tables
+def _named(root: Section, kind: str) -> dict[str, Section]:
+    """Return the tables of one kind by name, in the order of the file."""
+    tables = root.section(kind).named()
+    if len(tables) > _MOST_NAMED:
+        raise root.mistake(f"a robot has at most {_MOST_NAMED} {kind}s, not {len(tables)}", kind)
+    return tables
 
 
-def _step(section: Section, actions: Sequence[ActionPlan]) -> ResetStep:
-    """Read one step of the reset routine; actions without a value are at rest."""
-    step = section.read(RESET_KEYS)
-    values: dict[str, float] = step["values"]
-    known = {action.name: action for action in actions}
-    for name, value in values.items():
-        if name not in known:
-            words = f"values of {section} name no action: {choice(name, known)}"
-            raise section.mistake(words, "values", name)
-        low, high = known[name].low, known[name].high
-        if not low <= value <= high:
-            words = f"{name} of {section} must be {low:g} to {high:g}, its own caps"
-            raise section.mistake(words, "values", name)
-    filled = tuple(values.get(action.name, action.rest) for action in actions)
-    return ResetStep(filled, step["seconds"])
+def _reset(root: Section, actions: Mapping[str, ActionPlan]) -> tuple[ResetStep, ...]:
+    """Read the reset routine; in each step, actions without a value are at rest."""
+    tables = root.table.get("reset", [])
+    if not isinstance(tables, list):
+        words = "the steps of the reset routine are written [[reset]], with two brackets"
+        raise root.mistake(words, "reset")
+    steps: list[ResetStep] = []
+    for i, table in enumerate(cast("list[Any]", tables)):
+        section = Section(root.source, ("reset", i), table)
+        step = section.read(RESET_KEYS)
+        values: dict[str, float] = step["values"]
+        for name, value in values.items():
+            if name not in actions:
+                words = f"values of {section} name no action: {choice(name, actions)}"
+                raise section.mistake(words, "values", name)
+            low, high = actions[name].low, actions[name].high
+            if not low <= value <= high:
+                words = f"{name} of {section} must be {low:g} to {high:g}, its own caps"
+                raise section.mistake(words, "values", name)
+        filled = tuple(values.get(action.name, action.rest) for action in actions.values())
+        steps.append(ResetStep(filled, step["seconds"]))
+    return tuple(steps)
 
 
 def _toml(text: str, path: Path) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any, Final, cast
 
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.drivers.pulse import PULSE_KEYS
 from shapechanger.robot.guard.plan import ActionPlan, OutputPlan, SensorPlan, StopPlan
 from shapechanger.robot.profile.mistakes import Place, Source, called, choice, shown
 from shapechanger.robot.profile.schema import (
@@ -31,6 +32,7 @@ from shapechanger.robot.profile.schema import (
     with_unit,
 )
 
+_Owners = Mapping[str, Mapping[str, Iterable[ProfileKey]]]
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 
 
@@ -74,14 +76,12 @@ class Section:
                 raise self.mistake(f"the name {name!r} {words}", name)
         return {name: self.section(name) for name in self.table}
 
-    def read(
-        self, keys: Iterable[ProfileKey], elsewhere: Mapping[str, str] | None = None
-    ) -> dict[str, Any]:
+    def read(self, keys: Iterable[ProfileKey], owners: _Owners | None = None) -> dict[str, Any]:
         """Return the value of each key, with defaults, and refuse unknown keys.
 
         Args:
             keys: The permitted keys.
-            elsewhere: For keys of other tables, where they belong.
+            owners: Keys of other drivers, by what these are called and by driver.
         """
         known = {key.name: key for key in keys}
         for name in self.table:
@@ -90,11 +90,11 @@ class Section:
             if (meant := with_unit(name, known)) is not None:
                 words = f"{name!r} of {self} lacks its unit or has another one: write {meant!r}"
                 raise self.mistake(f"{words} ({unit_of(meant)})", name)
-            if elsewhere and name in elsewhere:
-                words = f"{name!r} belongs to {elsewhere[name]}, not to {self}"
-            else:
-                words = f"{self} has no key {choice(name, known)}"
-            raise self.mistake(words, name)
+            for kind, drivers in (owners or {}).items():
+                if having := [d for d, ks in drivers.items() if name in (k.name for k in ks)]:
+                    words = f"{name!r} belongs to {kind} {' and '.join(having)}, not to {self}"
+                    raise self.mistake(words, name)
+            raise self.mistake(f"{self} has no key {choice(name, known)}", name)
         return {name: self.value(key) for name, key in known.items()}
 
     def value(self, key: ProfileKey) -> Any:
@@ -143,32 +143,30 @@ _NOT_GPIOZERO: Final = (
 _DRIVER, _OVER = OUTPUT_KEYS[0], next(key for key in OUTPUT_SETTINGS["servo"] if key.name == "over")
 
 
-def _owners(kind: str, tables: Mapping[str, Iterable[ProfileKey]]) -> dict[str, str]:
-    """Return, for each key, the drivers that have it."""
-    owners: dict[str, list[str]] = {}
-    for driver, keys in tables.items():
-        for key in keys:
-            owners.setdefault(key.name, []).append(driver)
-    return {name: f"{kind} {' and '.join(drivers)}" for name, drivers in owners.items()}
-
-
-_ELSEWHERE: Final = {
-    **_owners("what goes over", OVER_SETTINGS),
-    **_owners("the driver", OUTPUT_SETTINGS),
-}
-_SENSORS_ELSEWHERE: Final = _owners("the driver", SENSOR_SETTINGS)
-_CAMERAS_ELSEWHERE: Final = _owners("the driver", CAMERA_SETTINGS)
-
-
-def _split(
-    values: dict[str, Any], common: Iterable[ProfileKey]
+def _read_device(
+    section: Section,
+    common: tuple[ProfileKey, ...],
+    drivers: Mapping[str, tuple[ProfileKey, ...]],
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Separate the values of common keys from those of the driver."""
-    names = {key.name for key in common}
-    return (
-        {name: value for name, value in values.items() if name in names},
-        {name: value for name, value in values.items() if name not in names},
-    )
+    """Read an output, a sensor or a camera.
+
+    Args:
+        section: Its table.
+        common: Keys that do not depend on the driver; the first is the driver.
+        drivers: Keys of each driver.
+
+    Returns:
+        The values of the common keys, and the settings of the driver.
+    """
+    keys = drivers[section.value(common[0])]
+    owners = {"the driver": drivers}
+    if drivers is OUTPUT_SETTINGS:
+        owners["what goes over"] = OVER_SETTINGS
+    if _OVER in keys:
+        keys += OVER_SETTINGS[section.value(_OVER)]
+    values = section.read((*common, *keys), owners)
+    settings = {key.name: values.pop(key.name) for key in keys}
+    return values, settings
 
 
 def read_output(name: str, section: Section) -> OutputPlan:
@@ -183,11 +181,7 @@ def read_output(name: str, section: Section) -> OutputPlan:
         if isinstance(written, str) and "gpiozero" in written.lower():
             words = f"{key.name} of {section} cannot be {written!r}: {_NOT_GPIOZERO}"
             raise section.mistake(words, key.name)
-    keys: tuple[ProfileKey, ...] = OUTPUT_SETTINGS[section.value(_DRIVER)]
-    if _OVER in keys:
-        keys += OVER_SETTINGS[section.value(_OVER)]
-    values = section.read((*OUTPUT_KEYS, *keys), _ELSEWHERE)
-    common, settings = _split(values, OUTPUT_KEYS)
+    common, settings = _read_device(section, OUTPUT_KEYS, OUTPUT_SETTINGS)
     output = OutputPlan(name=name, **common, settings=settings)
     _check_pulses(section, output)
     return output
@@ -200,18 +194,15 @@ def read_sensor(name: str, section: Section) -> SensorPlan:
         name: Name of the sensor.
         section: Its table.
     """
-    driver: str = section.value(SENSOR_KEYS[0])
-    is_joint = {
-        name: driver == "as5600" and isinstance(v, dict) for name, v in section.table.items()
-    }
-    table = {name: value for name, value in section.table.items() if not is_joint[name]}
-    joints = {name: value for name, value in section.table.items() if is_joint[name]}
-    keys = (*SENSOR_KEYS, *SENSOR_SETTINGS[driver])
-    values = Section(section.source, section.place, table).read(keys, _SENSORS_ELSEWHERE)
-    settings = _split(values, SENSOR_KEYS)[1]
-    if driver == "as5600":
-        settings |= _joints(Section(section.source, section.place, joints))
-    return SensorPlan(name=name, driver=driver, measures=MEASURES[driver], settings=settings)
+    is_encoder = section.table.get("driver") == "as5600"
+    joints = {k for k, v in section.table.items() if is_encoder and isinstance(v, dict)}
+    table = {k: v for k, v in section.table.items() if k not in joints}
+    own = Section(section.source, section.place, table)
+    common, settings = _read_device(own, SENSOR_KEYS, SENSOR_SETTINGS)
+    if is_encoder:
+        by_joint = {k: section.table[k] for k in section.table if k in joints}
+        settings |= _joints(Section(section.source, section.place, by_joint))
+    return SensorPlan(name, **common, measures=MEASURES[common["driver"]], settings=settings)
 
 
 def _joints(sensor: Section) -> dict[str, Any]:
@@ -238,9 +229,7 @@ def _joints(sensor: Section) -> dict[str, Any]:
 
 def read_camera(section: Section) -> CameraPlan:
     """Read the camera."""
-    settings_keys = CAMERA_SETTINGS[section.value(CAMERA_KEYS[0])]
-    values = section.read((*CAMERA_KEYS, *settings_keys), _CAMERAS_ELSEWHERE)
-    common, settings = _split(values, CAMERA_KEYS)
+    common, settings = _read_device(section, CAMERA_KEYS, CAMERA_SETTINGS)
     return CameraPlan(**common, settings=settings)
 
 
@@ -307,23 +296,19 @@ def _camera_stale_ms(section: Section, stale_ms: int | None, camera: CameraPlan 
 
 
 _NEARLY_ZERO: Final = 1e-9
-_PULSES: Final = {
-    "servo": ("left_us", "centre_us", "right_us"),
-    "esc": ("backward_us", "neutral_us", "forward_us"),
-}
 # 1 s in µs; a pulse must end before the next one begins.
 _SECOND_US: Final = 1_000_000
 
 
 def _check_pulses(section: Section, output: OutputPlan) -> None:
     """Refuse a range of duties or pulses that is empty, or a pulse longer than its period."""
-    settings: dict[str, Any] = {**output.settings}
+    settings = output.settings
     if "full" in settings and not settings["start"] < settings["full"]:
         words = f"start of {section} must be below full, which is {settings['full']:g}"
         raise section.mistake(words, "start")
-    if output.driver not in _PULSES:
+    if output.driver not in PULSE_KEYS:
         return
-    names = _PULSES[output.driver]
+    names = PULSE_KEYS[output.driver]
     first, middle, last = (settings[name] for name in names)
     low, high = sorted((first, last))
     if not low < middle < high:
@@ -352,7 +337,8 @@ def check_mix(
         place: Place = ("output", output.name)
         mix: Place = (*place, "mix")
         if not output.mix:
-            words = f"mix of {called(place)} is empty, so nothing moves it; {_there_are(actions)}"
+            words = f"mix of {called(place)} is empty, so nothing moves it; there are: "
+            words += ", ".join(actions)
             raise source.mistake(mix, words)
         for name, weight in output.mix.items():
             if name not in actions:
@@ -427,7 +413,3 @@ def _drives(actions: Mapping[str, ActionPlan], output: OutputPlan) -> bool:
         or output.part in DRIVING_PARTS
         or any(actions[name].propels for name in output.mix)
     )
-
-
-def _there_are(actions: Iterable[str]) -> str:
-    return f"there are: {', '.join(actions)}"
