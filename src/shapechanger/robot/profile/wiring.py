@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
 from shapechanger.robot.profile.mistakes import Place, Source, called
+from shapechanger.robot.profile.pins import I2C_PINS
 from shapechanger.robot.profile.schema import (
-    I2C_PINS,
     NO_PIN,
     OUTPUT_SETTINGS,
     OVER_SETTINGS,
