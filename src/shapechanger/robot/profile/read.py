@@ -171,11 +171,8 @@ def _read_action(name: str, section: Section) -> ActionPlan:
 
 _NOT_GPIOZERO: Final = (
     "gpiozero makes the pulses of a servo in steps of 200 µs, and 1.4 ms out of a neutral of "
-    f"1.5 ms (gpiozero#1209); use the driver servo or esc, over one of {', '.join(schema.OVER)}"
-)
-_DRIVER, _OVER = (
-    schema.OUTPUT_KEYS[0],
-    next(key for key in schema.OUTPUT_SETTINGS["servo"] if key.name == "over"),
+    "1.5 ms (gpiozero#1209); use the driver servo or esc, over one of "
+    f"{', '.join(schema.OVER_KEY.names)}"
 )
 
 
@@ -198,8 +195,8 @@ def _read_device(
     owners = {"the driver": drivers}
     if drivers is schema.OUTPUT_SETTINGS:
         owners["what goes over"] = schema.OVER_SETTINGS
-    if _OVER in keys:
-        keys += schema.OVER_SETTINGS[section.value(_OVER)]
+    if schema.OVER_KEY in keys:
+        keys += schema.OVER_SETTINGS[section.value(schema.OVER_KEY)]
     values = section.read((*common, *keys), owners)
     settings = {key.name: values.pop(key.name) for key in keys}
     return values, settings
@@ -212,11 +209,11 @@ def _read_output(name: str, section: Section) -> OutputPlan:
         name: Name of the output.
         section: Its table.
     """
-    for key in (_DRIVER, _OVER):
-        written = section.table.get(key.name)
+    for key in ("driver", "over"):
+        written = section.table.get(key)
         if isinstance(written, str) and "gpiozero" in written.lower():
-            words = f"{key.name} of {section} cannot be {written!r}: {_NOT_GPIOZERO}"
-            raise section.mistake(words, key.name)
+            words = f"{key} of {section} cannot be {written!r}: {_NOT_GPIOZERO}"
+            raise section.mistake(words, key)
     common, settings = _read_device(section, schema.OUTPUT_KEYS, schema.OUTPUT_SETTINGS)
     output = OutputPlan(name=name, **common, settings=settings)
     _check_pulses(section, output)

@@ -247,8 +247,8 @@ DRIVING_PARTS: Final = (
 PARTS: Final = (*DRIVING_PARTS, "steering", "rudder", "gear", "bed", "joint", "tendon")
 """Parts that an output may move."""
 
-OVER: Final = ("pca9685", "lgpio", "sysfs")
-"""Sources of the pulses of a servo or a controller."""
+OVER_KEY: Final = ProfileKey("over", "choice", names=("pca9685", "lgpio", "sysfs"))
+"""Source of the pulses of a servo or a controller."""
 
 MEASURES: Final = {
     "encoder": "speed",
@@ -290,10 +290,7 @@ OUTPUT_KEYS: Final = (
 )
 
 _BUS: Final = ProfileKey("bus", "whole", 1, low=0, high=99)
-_PULSES: Final = (
-    ProfileKey("over", "choice", names=OVER),
-    ProfileKey("hz", "whole", 50, low=40, high=400),
-)
+_PULSES: Final = (OVER_KEY, ProfileKey("hz", "whole", 50, low=40, high=400))
 _DUTY: Final = (
     # gpiozero's software PWM takes up to 10 kHz.
     ProfileKey("pwm_hz", "whole", 50, low=1, high=10_000),
