@@ -14,7 +14,7 @@ from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
-# The larger, the more cautious. The most cautious reading wins: of two speeds the smaller, so that a
+# Larger is more cautious, and the most cautious reading wins: of two speeds the smaller, so that a
 # turning track does not hide a stalled one. Of other quantities the last reading wins.
 _CAUTION: Final[dict[str, Callable[[float], float]]] = {
     "bump": operator.pos,
