@@ -21,9 +21,9 @@ from shapechanger.robot.guard.plan import (
 )
 from shapechanger.robot.profile import schema
 from shapechanger.robot.profile.mistakes import Place, Source, called, choice
-from shapechanger.robot.profile.profile import Profile, ResetStep, with_servo_bus
+from shapechanger.robot.profile.profile import Profile, ResetStep
 from shapechanger.robot.profile.schema import ProfileKey, Section
-from shapechanger.robot.profile.wiring import PinAllocation
+from shapechanger.robot.profile.wiring import PinAllocation, with_servo_bus
 
 _MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.link.messages`.
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
