@@ -275,7 +275,7 @@ def test_motion_sensor_that_sleeps_is_noticed() -> None:
     hardware = FakeHardware({0x68: _motion(0, 0, 8192, 0)})
     imu = hardware.sensor("mpu6050", bus=1, address=0x68)
     hardware.bus.chips[0x68] |= _motion(0, 0, 0, 0)
-    with pytest.raises(RobotError, match="lost its power"):
+    with pytest.raises(RobotError, match="lost power"):
         imu.read(0, 0.0)
 
 
@@ -299,7 +299,7 @@ def test_temperature_is_in_degrees(tmp_path: Path) -> None:
     assert sensor.read(0, 0.0) == {"temperature": 48.312}
     file.write_text("hot")
     assert sensor.read(999 * MS, 0.0) == {"temperature": 48.312}
-    with pytest.raises(RobotError, match="says 'hot'"):
+    with pytest.raises(RobotError, match=r"'hot' at .* is no temp"):
         sensor.read(1000 * MS, 0.0)
     with pytest.raises(RobotError, match="does not answer"):
         FakeHardware().sensor("cpu_temperature", path=str(tmp_path / "none"))

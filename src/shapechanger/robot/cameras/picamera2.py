@@ -73,7 +73,7 @@ class PiCamera:
                 request = self._camera.capture_request(wait=_SILENT_S)
             except (TimeoutError, RuntimeError) as error:
                 raise RobotError(
-                    f"The Pi's camera has given nothing for {_SILENT_S:g} s; is its cable in?"
+                    f"The Pi's camera has sent no frame for {_SILENT_S:g} s: check its cable."
                 ) from error
             try:
                 image = np.ascontiguousarray(request.make_array("main"))
@@ -84,8 +84,8 @@ class PiCamera:
         width, height = self._plan.size
         if image.shape != (height, width, 3):
             raise RobotError(
-                f"The Pi's camera gave a picture of {image.shape[1]} by {image.shape[0]} pixels; "
-                f"the profile says {width} by {height}."
+                f"The Pi's camera returned a frame of {image.shape[1]} by {image.shape[0]} pixels; "
+                f"the profile sets {width} by {height}."
             )
         quality = self._plan.jpeg_quality
         jpeg = simplejpeg.encode_jpeg(image, quality, colorsubsampling="420")

@@ -145,7 +145,7 @@ class V4l2:
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`."""
         if not self._interruption.wait(self._fd, _SILENT_S):
-            raise RobotError(f"The camera {self._device} has given nothing for {_SILENT_S:g} s.")
+            raise RobotError(f"The camera {self._device} has sent no frame for {_SILENT_S:g} s.")
         try:
             jpeg, captured_ns = self._newest()
         except OSError as error:
@@ -169,8 +169,8 @@ class V4l2:
         width, height, kind = image_size(wanted)
         if (width, height, kind) != (*self._plan.size, MJPEG):
             raise RobotError(
-                f"The camera {self._device} has no JPEG pictures of {self._plan.size[0]} by "
-                f"{self._plan.size[1]} pixels; `v4l2-ctl --list-formats-ext` lists what it has."
+                f"The camera {self._device} offers no JPEG frames of {self._plan.size[0]} by "
+                f"{self._plan.size[1]} pixels; `v4l2-ctl --list-formats-ext` lists what it offers."
             )
         self._ioctl(self._fd, SET_PARAMETERS, frame_rate(self._plan.fps))
         self._ioctl(self._fd, REQUEST_BUFFERS, request(_BUFFERS))

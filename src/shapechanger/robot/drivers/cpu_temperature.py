@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -33,10 +33,11 @@ class CpuTemperature:
         """Do nothing: no file stays open."""
 
     def _measure(self) -> float:
-        with in_words(self._name):
+        with device_errors(self._name):
             written = self._path.read_text()
         try:
             # Millidegrees: Documentation/driver-api/thermal/sysfs-api.rst of the kernel.
             return int(written) / 1000.0
         except ValueError as error:
-            raise RobotError(f"{self._name} says {written!r} at {self._path}.") from error
+            words = f"{self._name} read {written!r} at {self._path}, which is no temperature."
+            raise RobotError(words) from error

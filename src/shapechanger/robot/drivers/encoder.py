@@ -8,7 +8,7 @@ from collections import deque
 from typing import Final
 
 from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -57,7 +57,7 @@ class Encoder:
         self._last_edge_ns = 0
         self._speed = 0.0
         self._sign = 1.0
-        with in_words(f"Sensor {plan.name!r}"):
+        with device_errors(f"Sensor {plan.name!r}"):
             factory = hardware.pin_factory()
             self._inputs = [EdgeInput(settings["a"], "up", factory, self._a_changed)]
             if self._two_channels:

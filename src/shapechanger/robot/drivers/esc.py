@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.pulse import PulseRange, open_pulse_channel
-from shapechanger.robot.drivers.settings import in_words
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -32,7 +32,7 @@ class Esc:
         self._neutral_since_ns: int | None = None
         self._backward_since_ns: int | None = None
         self._reverses = False
-        with in_words(self._name), ExitStack() as undo:
+        with device_errors(self._name), ExitStack() as undo:
             self._channel = open_pulse_channel(settings, hardware)
             undo.callback(self._channel.close)
             self._send(0.0)
@@ -55,12 +55,12 @@ class Esc:
         """Stop the pulses; the controller then has to see neutral again."""
         self._neutral_since_ns = self._backward_since_ns = None
         self._reverses = False
-        with in_words(self._name):
+        with device_errors(self._name):
             self._channel.release()
 
     def close(self) -> None:
         """Stop the pulses and close the channel."""
-        with in_words(self._name):
+        with device_errors(self._name):
             self._channel.close()
 
     def _backward(self, value: float, now_ns: int) -> float:
@@ -80,7 +80,7 @@ class Esc:
         return self._send(value)
 
     def _send(self, value: float) -> float:
-        with in_words(self._name):
+        with device_errors(self._name):
             width_us = self._channel.write_us(self._pulses.width_us(value))
         # Neutral reads as 0, even if the pulse steps do not hit it exactly.
         return self._pulses.value(width_us) if value else 0.0

@@ -14,7 +14,7 @@ from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, RealClock
 
@@ -44,7 +44,7 @@ class Hcsr04:
         self._distance_m: float | None = None
         self._pinged_ns: int | None = None
         self._unanswered = 0  # Pings since the line changed.
-        with in_words(self._name):
+        with device_errors(self._name):
             factory = hardware.pin_factory()
             self._ticks_diff = factory.ticks_diff
             self._trigger = DigitalOutputDevice(settings["trigger"], pin_factory=factory)
@@ -69,7 +69,7 @@ class Hcsr04:
             self._ping()
         if self._unanswered > _MOST_MISSED:
             self._distance_m = None
-            raise RobotError(f"{self._name} gives no echo: is it wired, and does it have 5 V?")
+            raise RobotError(f"{self._name} receives no echo: check its wires and its 5 V supply.")
         return {} if self._distance_m is None else {"distance": self._distance_m}
 
     def close(self) -> None:
@@ -78,7 +78,7 @@ class Hcsr04:
         self._echo.close()
 
     def _ping(self) -> None:
-        with in_words(self._name):
+        with device_errors(self._name):
             self._trigger.on()
             # Spin: the shortest sleep takes several times as long, and the guard waits for it.
             if self._trigger_ns:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -27,14 +27,14 @@ class Ina219:
         self._name = f"Sensor {plan.name!r} at 0x{self._address:02x} on I2C bus {bus}"
         self._read_ns: int | None = None
         self._volts = 0.0
-        with in_words(self._name):
+        with device_errors(self._name):
             self._bus = hardware.i2c(bus)
             self._bus.write_i2c_block_data(self._address, _CONFIGURATION, _CONTINUOUS_32_V)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the voltage of the "battery" in V, updated ten times a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
-            with in_words(self._name):
+            with device_errors(self._name):
                 high, low = self._bus.read_i2c_block_data(self._address, _BUS_VOLTAGE, 2)
             self._volts = ((high << 8 | low) >> _STATUS_BITS) * _V_PER_STEP
             self._read_ns = now_ns

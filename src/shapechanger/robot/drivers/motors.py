@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from gpiozero import DigitalOutputDevice, Motor, PhaseEnableMotor
 
 from shapechanger.robot.drivers.duty import Duty
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -37,7 +37,7 @@ class _DutyMotor:
         if drive != self._written:
             # A failed write may still have taken effect.
             written, self._written = self._written, None
-            with in_words(self._name):
+            with device_errors(self._name):
                 self._drive(drive, written)
             self._written = drive
         return math.copysign(self._duty.size_at(abs(drive)), drive) if drive else 0.0
@@ -45,14 +45,14 @@ class _DutyMotor:
     def release(self) -> None:
         """Set the speed to zero, and disable a bridge that can be disabled."""
         self._written = None
-        with in_words(self._name):
+        with device_errors(self._name):
             self._stop()
 
     def close(self) -> None:
         """Set all inputs low; see `LowAtOncePin.close` for the pins afterwards."""
         if not self._is_closed:
             self._is_closed = True
-            with in_words(self._name), self._opened:
+            with device_errors(self._name), self._opened:
                 self.release()
 
     def _drive(self, drive: float, written: float | None) -> None:
@@ -76,7 +76,7 @@ class HBridge(_DutyMotor):
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         super().__init__(plan, ("forward", "backward"))
         settings = plan.settings
-        with in_words(self._name), ExitStack() as undo:
+        with device_errors(self._name), ExitStack() as undo:
             factory = hardware.pin_factory()
             self._enable: DigitalOutputDevice | None = None
             if settings["enable"] >= 0:
@@ -125,7 +125,7 @@ class PhaseEnable(_DutyMotor):
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
         super().__init__(plan, ("phase", "enable"))
         pins = plan.settings["phase"], plan.settings["enable"]
-        with in_words(self._name), ExitStack() as undo:
+        with device_errors(self._name), ExitStack() as undo:
             self._motor = PhaseEnableMotor(*pins, pin_factory=hardware.pin_factory())
             undo.callback(self._motor.close)
             # A plain output would keep its level.

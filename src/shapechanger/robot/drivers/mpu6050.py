@@ -11,7 +11,7 @@ import struct
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -45,7 +45,7 @@ class Mpu6050:
         number, self._address = plan.settings["bus"], plan.settings["address"]
         self._name = f"Sensor {plan.name!r} at 0x{self._address:02x} on I2C bus {number}"
         self._zero_rad_per_s: float | None = None
-        with in_words(self._name):
+        with device_errors(self._name):
             self._bus = bus = hardware.i2c(number)
             identity = bus.read_byte_data(self._address, _WHO_AM_I)
             if identity != _IDENTITY:
@@ -66,11 +66,11 @@ class Mpu6050:
         Raises:
             RobotError: If it does not respond, or sleeps, as after a loss of power.
         """
-        with in_words(self._name):
+        with device_errors(self._name):
             data = self._bus.read_i2c_block_data(self._address, _ACCEL_XOUT_H, 14)
         x, y, z, _, _, _, yaw = struct.unpack(">7h", bytes(data))
         if x == y == z == 0:  # Not even gravity is measured.
-            raise RobotError(f"{self._name} sleeps: it has lost its power for a moment.")
+            raise RobotError(f"{self._name} is asleep: it lost power for a moment.")
         rate = yaw * _RAD_PER_S
         if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:
             zero = rate if self._zero_rad_per_s is None else self._zero_rad_per_s

@@ -14,7 +14,7 @@ from typing import Any, Final
 from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.hardware import Hardware
 
 _MODE1: Final = 0x00
@@ -64,7 +64,7 @@ class Pca9685:
         self._must_start = False
         self._unchanged = 0
         self._enable: DigitalOutputDevice | None = None
-        with in_words(self.name), ExitStack() as undo:
+        with device_errors(self.name), ExitStack() as undo:
             if output_enable >= 0:
                 # OE is active low, and a resistor pulls it up until we drive it.
                 self._enable = DigitalOutputDevice(
@@ -139,7 +139,7 @@ class Pca9685:
         """
         with self._doubt_on_failure():
             if self._bus.read_byte_data(self._address, _MODE1) & _SLEEP:
-                raise RobotError(f"{self.name} sleeps: it has lost its power for a moment.")
+                raise RobotError(f"{self.name} is asleep: it lost power for a moment.")
 
     def _write(self, channel: int, steps: int) -> None:
         with self._doubt_on_failure():
@@ -155,13 +155,13 @@ class Pca9685:
 
     def _switch(self, on: bool) -> None:
         if self._enable is not None:
-            with in_words(self.name):
+            with device_errors(self.name):
                 self._enable.value = on
 
     @contextmanager
     def _doubt_on_failure(self) -> Generator[None]:
         try:
-            with in_words(self.name):
+            with device_errors(self.name):
                 yield
         except Exception:
             self._steps.clear()

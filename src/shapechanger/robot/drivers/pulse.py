@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -158,7 +158,7 @@ class SysfsPwm(_WholeMicroseconds):
         super().__init__()
         self._name = f"Channel {channel} of {root}/pwmchip{chip}"
         self._folder = root / f"pwmchip{chip}" / f"pwm{channel}"
-        with in_words(self._name):
+        with device_errors(self._name):
             if not self._folder.exists():
                 (self._folder.parent / "export").write_text(f"{channel}\n")
             self._write_when_allowed("period", 1_000_000_000 // hz)
@@ -167,14 +167,14 @@ class SysfsPwm(_WholeMicroseconds):
 
     def close(self) -> None:
         """Stop the pulses and disable the channel."""
-        with in_words(self._name):
+        with device_errors(self._name):
             try:
                 self._send(0)
             finally:
                 self._write("enable", 0)
 
     def _pulse(self, width_us: int) -> None:
-        with in_words(self._name):
+        with device_errors(self._name):
             self._write("duty_cycle", width_us * 1000)
 
     def _write(self, file: str, number: int) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.pulse import PulseRange, open_pulse_channel
-from shapechanger.robot.drivers.settings import in_words
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -27,7 +27,7 @@ class ServoDriver:
         self._speed_per_s: float = plan.settings["travel_deg_per_s"] / _DEG_PER_VALUE
         self._value: float | None = None
         self._written_ns = 0
-        with in_words(self._name):
+        with device_errors(self._name):
             self._channel = open_pulse_channel(plan.settings, hardware)
 
     def write(self, value: float, now_ns: int) -> float:
@@ -36,7 +36,7 @@ class ServoDriver:
         if self._value is not None and math.isfinite(self._speed_per_s):
             most = self._speed_per_s * (now_ns - self._written_ns) / 1e9
             value = min(max(value, self._value - most), self._value + most)
-        with in_words(self._name):
+        with device_errors(self._name):
             width_us = self._channel.write_us(self._pulses.width_us(value))
         self._value, self._written_ns = value, now_ns
         return self._pulses.value(width_us)
@@ -44,10 +44,10 @@ class ServoDriver:
     def release(self) -> None:
         """Stop the pulses, which releases most servos."""
         self._value = None
-        with in_words(self._name):
+        with device_errors(self._name):
             self._channel.release()
 
     def close(self) -> None:
         """Stop the pulses and close the channel."""
-        with in_words(self._name):
+        with device_errors(self._name):
             self._channel.close()

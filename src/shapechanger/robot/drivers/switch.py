@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.settings import in_words
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -20,7 +20,7 @@ class Switch:
         self._name = f"Sensor {plan.name!r}"
         self._pressed_level = 0 if pull == "up" else 1
         self._was_pressed = False
-        with in_words(self._name):
+        with device_errors(self._name):
             factory = hardware.pin_factory()
             self._inputs = [
                 EdgeInput(pin, pull, factory, self._changed) for pin in plan.settings["pins"]
@@ -30,7 +30,7 @@ class Switch:
         """Return "bump", 1 if any switch is or was pressed since the last read, else 0."""
         # Cleared before the levels are read, so that a push in between counts.
         was_pressed, self._was_pressed = self._was_pressed, False
-        with in_words(self._name):
+        with device_errors(self._name):
             pressed = any(one.level == self._pressed_level for one in self._inputs)
         return {"bump": float(pressed or was_pressed)}
 

@@ -164,7 +164,7 @@ class Guard:
         for name in sensing.failures.keys() - self._failures.keys():
             self._log.warning("Sensor %s fails: %s", name, sensing.failures[name])
         for name in self._failures.keys() - sensing.failures.keys():
-            self._log.info("Sensor %s answers again.", name)
+            self._log.info("Sensor %s responds again.", name)
         self._failures = dict(sensing.failures)
 
     def _apply(self, now_ns: int) -> OutputDecision:

@@ -157,8 +157,8 @@ def _read_action(name: str, section: Section) -> ActionPlan:
     if low < lowest:
         raise section.mistake(f"low of {section} must be 0 to 1, because it is one-sided", "low")
     if not low < action.high:
-        words = f"{section} may only move from low = {low:g} to high = {action.high:g}"
-        raise section.mistake(f"{words}, which is nowhere", "high")
+        words = f"high of {section} must be above low, which is {low:g}, not {action.high:g}"
+        raise section.mistake(words, "high")
     if not low <= action.rest <= action.high:
         words = f"rest of {section} must lie between low and high, {low:g} to {action.high:g}"
         raise section.mistake(words, "rest")
@@ -194,7 +194,7 @@ def _read_device(
     keys = drivers[section.value(common[0])]
     owners = {"the driver": drivers}
     if drivers is schema.OUTPUT_SETTINGS:
-        owners["what goes over"] = schema.OVER_SETTINGS
+        owners["the pulse source"] = schema.OVER_SETTINGS
     if schema.OVER_KEY in keys:
         keys += schema.OVER_SETTINGS[section.value(schema.OVER_KEY)]
     values = section.read((*common, *keys), owners)
@@ -378,7 +378,7 @@ def _check_mix(
                 words = f"mix of {called(place)} names no action: {choice(name, actions)}"
                 raise source.mistake((*mix, name), words)
             if weight == 0.0:
-                words = f"mix of {called(place)} takes nothing of {name!r}: leave it out"
+                words = f"the weight of {name!r} in mix of {called(place)} is 0: leave it out"
                 raise source.mistake((*mix, name), words)
         _check_rest(source, actions, output)
         moved |= output.mix.keys()
@@ -434,7 +434,8 @@ def _check_rest(source: Source, actions: Mapping[str, ActionPlan], output: Outpu
     )
     if _drives(actions, output) and abs(at_rest) > _NEARLY_ZERO:
         words = (
-            f"{called(place)} would be at {at_rest:g} at rest, and must be at 0 because it drives"
+            f"{called(place)} is at {at_rest:g} when its actions rest, and must be at 0 then, "
+            "because it propels the robot"
         )
         raise source.mistake((*place, "offset"), words)
 

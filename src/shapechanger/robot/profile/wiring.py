@@ -205,7 +205,7 @@ def with_servo_bus(
     if len(sensing) != 1:
         words = (
             f"servos need one sensor with the driver {_DYNAMIXEL}, such as [sensor.tendons], which "
-            "hears when one of them fails"
+            "reports their failures"
         )
         raise source.mistake(("sensor",) if not sensing else ("sensor", sensing[1].name), words)
     if stop.then != "release":
