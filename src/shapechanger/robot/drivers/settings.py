@@ -53,17 +53,6 @@ def wholes(settings: Mapping[str, object], key: str) -> tuple[int, ...]:
     return tuple(whole({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 
 
-def numbers(settings: Mapping[str, object], key: str) -> tuple[float, ...]:
-    """Return a tuple of numbers, such as tensions.
-
-    Args:
-        settings: Settings of the plan.
-        key: Name of the setting.
-    """
-    values = cast("list[object]", _of_type(settings, key, list, "a list of numbers"))
-    return tuple(number({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
-
-
 def texts(settings: Mapping[str, object], key: str) -> tuple[str, ...]:
     """Return a tuple of strings, such as names of tendons.
 
