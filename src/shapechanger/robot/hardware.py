@@ -56,54 +56,30 @@ class Clock(Protocol):
 
 
 class I2cBus(Protocol):
-    """Methods of `smbus2.SMBus` that the drivers use."""
+    """Methods of `smbus2.SMBus` that the drivers use.
+
+    In all of them, `i2c_addr` is the address of the chip and `register` the number of its (first)
+    register; a `value` is one byte, and a `length` a number of bytes.
+    """
 
     def write_byte(self, i2c_addr: int, value: int) -> None:
-        """Send one byte to a chip without registers.
-
-        Args:
-            i2c_addr: Address of the chip.
-            value: The byte.
-        """
+        """Send one byte to a chip without registers."""
         ...
 
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        """Read one register.
-
-        Args:
-            i2c_addr: Address of the chip.
-            register: Number of the register.
-        """
+        """Read one register."""
         ...
 
     def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
-        """Write one register.
-
-        Args:
-            i2c_addr: Address of the chip.
-            register: Number of the register.
-            value: The byte.
-        """
+        """Write one register."""
         ...
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
-        """Read consecutive registers.
-
-        Args:
-            i2c_addr: Address of the chip.
-            register: Number of the first register.
-            length: Number of bytes.
-        """
+        """Read consecutive registers."""
         ...
 
     def write_i2c_block_data(self, i2c_addr: int, register: int, data: Sequence[int]) -> None:
-        """Write consecutive registers.
-
-        Args:
-            i2c_addr: Address of the chip.
-            register: Number of the first register.
-            data: The bytes.
-        """
+        """Write consecutive registers, one byte each."""
         ...
 
     def close(self) -> None:
@@ -134,7 +110,7 @@ class Hardware(Protocol):
 
     @property
     def clock(self) -> Clock:
-        """The clock."""
+        """Clock of this process."""
         ...
 
     def pin_factory(self) -> Any:
@@ -185,13 +161,9 @@ class RealHardware:
     """Pins and buses of a Raspberry Pi; each library is imported when it is needed."""
 
     def __init__(self) -> None:
-        self._clock = RealClock()
-        self._pin_factory: Any = None
-
-    @property
-    def clock(self) -> RealClock:
+        self.clock = RealClock()
         """The machine's clock."""
-        return self._clock
+        self._pin_factory: Any = None
 
     def pin_factory(self) -> Any:
         """Return gpiozero's factory for lgpio, independent of the environment variables.
@@ -243,6 +215,12 @@ def real(_: str = "") -> RealHardware:
     return RealHardware()
 
 
+def load(place: str) -> Any:
+    """Import what is at MODULE:NAME."""
+    module, _, name = place.partition(":")
+    return getattr(importlib.import_module(module), name)
+
+
 def connect(source: str, argument: str) -> Hardware:
     """Return the hardware of a source.
 
@@ -250,5 +228,4 @@ def connect(source: str, argument: str) -> Hardware:
         source: MODULE:FUNCTION.
         argument: Argument of the function.
     """
-    module, _, function = source.partition(":")
-    return getattr(importlib.import_module(module), function)(argument)
+    return load(source)(argument)

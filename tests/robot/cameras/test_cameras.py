@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError
 from shapechanger.robot.cameras import v4l2 as api
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, Frame, open_camera
 from shapechanger.robot.cameras.pattern import read_barcode
@@ -57,12 +57,6 @@ def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
     return words[0]
 
 
-def test_unknown_driver_is_named() -> None:
-    """With the ones there are."""
-    with pytest.raises(UnknownName, match="picamera2, v4l2, file, pipe, pattern"):
-        open_camera(_plan("webcam"))
-
-
 def test_pattern_moves_and_carries_its_time() -> None:
     """So that the age of a frame can be measured anywhere."""
     camera = open_camera(CameraPlan("pattern", fps=100.0))
@@ -79,7 +73,7 @@ def test_pattern_moves_and_carries_its_time() -> None:
 
 def test_pattern_too_small_for_its_barcode_is_refused() -> None:
     """In words, when it is opened."""
-    with pytest.raises(RobotError, match="no room"):
+    with pytest.raises(RobotError, match="too small"):
         open_camera(_plan("pattern"))
 
 
@@ -421,7 +415,7 @@ def test_pi_camera_that_hangs_or_changes_its_size_says_so(picamera2: type[_Picam
         camera.read()
     assert picamera2.made[0].requests[0].released
     picamera2.made[0].image = np.zeros((0, 0, 3), np.uint8)
-    with pytest.raises(RobotError, match="given nothing for 2 s"):
+    with pytest.raises(RobotError, match="sent no frame for 2 s"):
         camera.read()
 
 

@@ -77,7 +77,7 @@ def test_barcode_that_does_not_fit_is_refused() -> None:
 def test_picture_of_the_wrong_size_is_named() -> None:
     """The client has made room for another one."""
     check_jpeg(_jpeg(), (32, 24))
-    with pytest.raises(RobotError, match="32 by 24 pixels; the profile says 160 by 120"):
+    with pytest.raises(RobotError, match="32 by 24 pixels; the profile sets 160 by 120"):
         check_jpeg(_jpeg(), (160, 120))
 
 

@@ -117,12 +117,6 @@ def test_pin_in_use_is_refused_in_words() -> None:
     motor.close()
 
 
-def test_setting_of_a_wrong_type_is_refused_in_words() -> None:
-    """The guard reads plans that somebody may have written by hand."""
-    with pytest.raises(RobotError, match="'forward' must be a whole number, not 'x'"):
-        FakeHardware().output("hbridge", **_HBRIDGE | {"forward": "x"})
-
-
 def test_speed_is_zero_while_the_direction_changes() -> None:
     """And it does not stutter where the direction stays."""
     hardware = FakeHardware()

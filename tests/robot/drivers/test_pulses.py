@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.pca9685 import prescale_for
 from shapechanger.robot.drivers.pulse import PulseRange, SysfsPwm
 from tests.robot.drivers.fakes import MS, FakeHardware
@@ -53,14 +53,6 @@ def test_middle_outside_of_the_ends_is_refused() -> None:
     """Both sides of such a servo would be the same."""
     with pytest.raises(RobotError, match="must lie between"):
         PulseRange(1000.0, 900.0, 2000.0)
-
-
-def test_gpiozero_is_refused_with_its_reason() -> None:
-    """It cannot say 1.5 ms."""
-    with pytest.raises(RobotError, match=r"gpiozero#1209.*pca9685"):
-        FakeHardware().output("servo", **_SERVO, over="gpiozero")
-    with pytest.raises(UnknownName, match="pca9685, lgpio, sysfs"):
-        FakeHardware().output("servo", **_SERVO, over="pca")
 
 
 def test_servo_gets_no_pulse_before_it_is_told() -> None:
@@ -132,17 +124,9 @@ def test_controller_brakes_before_it_reverses() -> None:
     assert esc.write(0.5, 1050 * MS) == 0.5  # A wish to go forward waits for nothing.
 
 
-def test_unknown_reverse_is_refused() -> None:
-    """With the ones there are."""
-    with pytest.raises(UnknownName, match="direct, double, none"):
-        _armed("sideways")
-
-
 def test_prescaler_of_50_hz() -> None:
     """The data sheet's formula; its own example is 200 Hz, 30."""
     assert (prescale_for(50), prescale_for(200)) == (121, 30)
-    with pytest.raises(RobotError, match="24 to 1526 Hz"):
-        prescale_for(10)
 
 
 def test_chip_is_set_up_asleep_and_woken() -> None:
@@ -273,16 +257,6 @@ def test_chip_that_lost_its_power_is_started_again() -> None:
     assert _width_us(hardware, 1) == pytest.approx(1750, abs=5)
 
 
-def test_channel_that_does_not_exist_leaves_nothing_open() -> None:
-    """The next one opens the chip as if nothing had been."""
-    hardware = FakeHardware({0x40: _asleep()})
-    on_chip = _ON_CHIP | {"output_enable": 26}
-    with pytest.raises(RobotError, match="channels 0 to 15, not 16"):
-        hardware.output("servo", **_SERVO | on_chip, channel=16)
-    hardware.output("servo", **_SERVO | on_chip, channel=15).close()
-    assert hardware.bus.closed == 2
-
-
 def test_chip_that_is_not_there_is_named() -> None:
     """With its address, because that is what one looks for with i2cdetect."""
     with pytest.raises(RobotError, match="PCA9685 at 0x40 on I2C bus 1 does not answer"):
@@ -300,7 +274,7 @@ def test_chip_that_lost_its_power_is_noticed() -> None:
         for _ in range(100):
             servo.write(0.0, 0)
 
-    with pytest.raises(RobotError, match="lost its power"):
+    with pytest.raises(RobotError, match="lost power"):
         write_for_a_second()
 
 

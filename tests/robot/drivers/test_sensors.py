@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError
 from shapechanger.robot.drivers import hcsr04
 from tests.robot.drivers.fakes import MS, FakeHardware
 
@@ -95,8 +95,6 @@ def test_switch_to_three_volts() -> None:
     assert bumper.read(0, 0.0) == {"bump": 0.0}
     hardware.factory.drive(6, 1, 0.1)
     assert bumper.read(0, 0.0) == {"bump": 1.0}
-    with pytest.raises(UnknownName, match="up, down"):
-        hardware.sensor("switch", pins=[7], pull="sideways")
 
 
 def _echo(hardware: FakeHardware, seconds: float) -> None:
@@ -277,7 +275,7 @@ def test_motion_sensor_that_sleeps_is_noticed() -> None:
     hardware = FakeHardware({0x68: _motion(0, 0, 8192, 0)})
     imu = hardware.sensor("mpu6050", bus=1, address=0x68)
     hardware.bus.chips[0x68] |= _motion(0, 0, 0, 0)
-    with pytest.raises(RobotError, match="lost its power"):
+    with pytest.raises(RobotError, match="lost power"):
         imu.read(0, 0.0)
 
 
@@ -301,7 +299,7 @@ def test_temperature_is_in_degrees(tmp_path: Path) -> None:
     assert sensor.read(0, 0.0) == {"temperature": 48.312}
     file.write_text("hot")
     assert sensor.read(999 * MS, 0.0) == {"temperature": 48.312}
-    with pytest.raises(RobotError, match="says 'hot'"):
+    with pytest.raises(RobotError, match=r"'hot' at .* is no temp"):
         sensor.read(1000 * MS, 0.0)
     with pytest.raises(RobotError, match="does not answer"):
         FakeHardware().sensor("cpu_temperature", path=str(tmp_path / "none"))

@@ -328,7 +328,7 @@ def test_a_controller_that_does_not_obey_yet_is_told_of(
     state = bench.run(70)
     waiting = [s for s in bench.states if s.applied_seq == 1 and s.at_ns < _T0 + 50 * MS]
     assert {s.applied for s in waiting} == {(0.5, 0.0)}
-    assert {s.stop_reason for s in waiting} == {"Output drive: it does something else."}
+    assert {s.stop_reason for s in waiting} == {"Output drive: it does not follow."}
     assert (state.applied, state.stop_reason) == ((0.5, 0.5), "")
 
 

@@ -145,8 +145,9 @@ for module in ("process", "supervisor"):
     importlib.import_module(f"shapechanger.robot.guard.{module}")
 from shapechanger.robot.drivers.output import OUTPUT_DRIVERS
 from shapechanger.robot.drivers.sensor import SENSOR_DRIVERS
-for module in (*OUTPUT_DRIVERS.values(), *SENSOR_DRIVERS.values()):
-    importlib.import_module(module)
+from shapechanger.robot.hardware import load
+for place in (*OUTPUT_DRIVERS.values(), *SENSOR_DRIVERS.values()):
+    load(place)
 print(*sys.modules)
 """
 

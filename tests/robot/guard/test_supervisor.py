@@ -230,7 +230,7 @@ class _Daemon(_Stuck):
 
     name = "daemon"
 
-    def tell(self) -> None:
+    def terminate(self) -> None:
         self.code = 0
 
     def end(self, at_most_s: float, reap_s: float) -> None:
@@ -242,7 +242,7 @@ def _supervisor(told: str) -> Iterator[Supervisor]:
     """One without processes."""
     log = logging.getLogger("test")
     one = Supervisor(ServePlan(quick_car(), {}), -1, ProcessCommands((), ()), log)
-    one._told = told
+    one._end_reason = told
     with one._woken, one._waker:
         yield one
 

@@ -50,7 +50,7 @@ MISTAKES = [
         "enable = 26",
         "channel = 3",
         "channel = 3",
-        "belongs to what goes over pca9685 and sysfs, not to",
+        "belongs to the pulse source pca9685 and sysfs, not to",
     ),
     ("trigger = 23", "a = 5\ntrigger = 23", "a = 5", "'a' belongs to the driver encoder, not to"),
     (
@@ -351,7 +351,7 @@ MISTAKES = [
         "low = -0.5",
         "low = 0.5\nhigh = 0.5",
         "high = 0.5",
-        "may only move from low = 0.5 to high = 0.5, which",
+        "of [action.throttle] must be above low, which is 0.5, not 0.5",
     ),
     (
         "low = -0.5",
@@ -437,7 +437,7 @@ MISTAKES = [
         "mix = { arm = 1.0 }",
         "mix = { arm = 0.0 }",
         "mix = { arm = 0.0 }",
-        "takes nothing of 'arm': leave it out",
+        "the weight of 'arm' in mix of [output.",
     ),
     (
         "[output.drive]",
@@ -456,19 +456,19 @@ MISTAKES = [
         "enable = 26",
         "offset = 0.1",
         "offset = 0.1",
-        "would be at 0.1 at rest, and must be at 0 because it driv",
+        "is at 0.1 when its actions rest, and must be at 0 then",
     ),
     (
         "mix = { throttle = 1 }",
         "mix = { throttle = 1, arm = 1 }",
         "[output.drive]",
-        "would be at 0.25 at rest",
+        "is at 0.25 when its actions rest",
     ),
     (
         "mix.throttle = 0.5",
         "mix.arm = 0.5",
         "[output.pump]",
-        "[output.pump] would be at 0.125 at rest",
+        "[output.pump] is at 0.125 when its actions rest",
     ),
     (
         "right_us = 1000",

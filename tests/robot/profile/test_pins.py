@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gpiozero.pins.data import PLUS_J8
 
-from shapechanger.robot.profile.schema import BCM_OF_BOARD, bcm
+from shapechanger.robot.profile.pins import BCM_OF_BOARD, bcm
 
 
 def test_header_is_the_one_of_gpiozero() -> None:

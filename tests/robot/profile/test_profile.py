@@ -27,7 +27,6 @@ def test_everything_is_read() -> None:
     assert profile.camera == CameraPlan(
         "v4l2", (128, 128), flip=True, settings={"device": "/dev/video0"}
     )
-    assert profile.image_size == (128, 128)
     assert profile.limits == LimitPlan(
         deadline_ms=200,
         camera_stale_ms=500,
@@ -37,14 +36,14 @@ def test_everything_is_read() -> None:
     )
     assert (profile.max_observation_age_ms, profile.arming) == (400, "anyone")
     assert profile.stop == StopPlan(then="release")
-    assert profile.reward_weights() == {
+    assert profile.reward == {
         "velocity": 2.0,
         "collision": -10.0,
         "stall": -1.0,
         "collision_ends_episode": 0.0,
     }
     # What a step does not name is at rest.
-    assert profile.reset_routine() == (((0.0, -0.4, 0.25), 1.0), ((0.0, 0.0, 0.5), 0.5))
+    assert profile.reset == (((0.0, -0.4, 0.25), 1.0), ((0.0, 0.0, 0.5), 0.5))
 
 
 def test_drivers_find_all_their_settings() -> None:
@@ -135,11 +134,11 @@ def test_a_robot_may_have_next_to_nothing() -> None:
         text + '[action.turn]\n[output.turn]\ndriver = "hbridge"\nforward = 4\nbackward = 5\n'
         "mix = { turn = 1.0 }\n"
     )
-    assert profile.camera is profile.image_size is profile.enable is profile.stop_pin is None
+    assert profile.camera is profile.enable_pin is profile.stop_pin is None
     assert profile.limits == LimitPlan()
     assert profile.arming == "person"
     assert profile.guard_plan().enable_pin is None
-    assert profile.reset_routine() == ()
+    assert profile.reset == ()
 
 
 def test_a_pin_may_be_left_unconnected_in_so_many_words() -> None:

@@ -46,12 +46,6 @@ def test_a_middle_outside_the_ends_is_refused() -> None:
         pulse_changes(_SERVO, JogResult(0.2, 0.2, 0.2))
 
 
-def test_a_motor_has_no_pulses() -> None:
-    """Only servos and motor controllers have pulse widths."""
-    with pytest.raises(RobotError, match="sends no pulses"):
-        with_widest_pulses(_MOTOR)
-
-
 def test_a_motor_that_turned_backward_gets_a_negative_mix() -> None:
     """The pins stay as they are wired."""
     assert motor_changes(_MOTOR, "forward", 0.214) == {"output.drive.start": 0.21}

@@ -11,7 +11,8 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.setup.doctor import Finding, examine_robot, unit_name
+from shapechanger.robot.setup.doctor import Finding, examine_robot
+from shapechanger.robot.setup.systemd import unit_name
 
 _CAMERA = CameraPlan("pattern")
 _MOTOR = OutputPlan("drive", "hbridge", "wheels", {"throttle": 1.0}, settings={"forward": 22})

@@ -21,11 +21,11 @@ from rich.text import Text
 from shapechanger.cli.console import plain_console
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
+from shapechanger.robot.drivers.pulse import PULSE_KEYS
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.calibration import (
-    PULSES,
     JogResult,
     motor_changes,
     pulse_changes,
@@ -287,17 +287,17 @@ class Calibration:
         for output in self._profile.outputs:
             if not output.mix:
                 continue
-            if output.driver in PULSES:
+            if output.driver in PULSE_KEYS:
                 self.found |= self._pulses(output)
             elif output.driver in _MOTORS:
                 self.found |= self._motor(output)
         for sensor in self._profile.sensors:
             if sensor.driver == "encoder":
-                self.found |= self._wheel(sensor.name, float(_number(sensor.settings["wheel_m"])))
+                self.found |= self._wheel(sensor.name, sensor.settings["wheel_m"])
 
     def _pulses(self, output: OutputPlan) -> dict[str, Any]:
         wide = with_widest_pulses(output)
-        low_key, _, high_key = PULSES[output.driver]
+        low_key, _, high_key = PULSE_KEYS[output.driver]
         settings = {
             f"output.{output.name}.{key}": wide.settings[key] for key in (low_key, high_key)
         }
@@ -332,7 +332,7 @@ class Calibration:
             return {}
         self._console.print("  … did it go forward, or right? Y or N")
         went = self._answer()
-        return motor_changes(output, went, abs(value) * _number(output.settings["full"]))
+        return motor_changes(output, went, abs(value) * output.settings["full"])
 
     def _wheel(self, name: str, wheel_m: float) -> dict[str, Any]:
         self._console.print(f"\n{name}: push the robot 1 m forward by hand, then Enter …")
@@ -388,12 +388,6 @@ class Calibration:
                 _end_if_asked(key)  # Nothing is served here, so everything is at rest.
                 if key in {"y", "n"}:
                     return "forward" if key == "y" else "backward"
-
-
-def _number(value: object) -> float:
-    if isinstance(value, int | float):
-        return float(value)
-    raise RobotError(f"Expected a number, got {value!r}.")
 
 
 def ask_for_wheels_up() -> None:

@@ -377,7 +377,6 @@ def _pins(plan: GuardPlan) -> dict[int, str]:
             pin = device.settings.get(key)
             if isinstance(pin, int) and pin >= 0:
                 used[pin] = device.name
-        pins = device.settings.get("pins")
-        if isinstance(pins, list):
-            used |= {int(pin): device.name for pin in pins}
+        pins: list[int] = device.settings.get("pins", [])
+        used |= dict.fromkeys(pins, device.name)
     return used

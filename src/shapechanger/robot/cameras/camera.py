@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import select
 import threading
 import time
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError
+from shapechanger.robot.hardware import load
 
 CAMERA_DRIVERS: Final = {
-    "picamera2": "shapechanger.robot.cameras.picamera2",
-    "v4l2": "shapechanger.robot.cameras.v4l2",
-    "file": "shapechanger.robot.cameras.file",
-    "pipe": "shapechanger.robot.cameras.pipe",
-    "pattern": "shapechanger.robot.cameras.pattern",
+    "picamera2": "shapechanger.robot.cameras.picamera2:PiCamera",
+    "v4l2": "shapechanger.robot.cameras.v4l2:V4l2",
+    "file": "shapechanger.robot.cameras.file:Folder",
+    "pipe": "shapechanger.robot.cameras.pipe:Pipe",
+    "pattern": "shapechanger.robot.cameras.pattern:Pattern",
 }
-"""Module of each camera driver, by its name in a profile; each has `open_driver(plan)`."""
+"""MODULE:NAME of each camera driver, by its name in a profile; called with the plan."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class CameraPlan:
     flip: bool = False
     pitch_deg: float | None = None
     fovy_deg: float | None = None
-    settings: dict[str, int | str] = field(default_factory=dict[str, int | str])
+    settings: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 class Camera(Protocol):
@@ -83,12 +83,9 @@ def open_camera(plan: CameraPlan) -> Camera:
     """Open a camera.
 
     Raises:
-        UnknownName: If there is no such driver.
         RobotError: If the camera does not respond.
     """
-    if plan.driver not in CAMERA_DRIVERS:
-        raise UnknownName("camera driver", plan.driver, CAMERA_DRIVERS)
-    return importlib.import_module(CAMERA_DRIVERS[plan.driver]).open_driver(plan)
+    return load(CAMERA_DRIVERS[plan.driver])(plan)
 
 
 class Interruption:

@@ -13,10 +13,13 @@ _SUFFIXES: Final = (".jpg", ".jpeg")
 
 
 class Folder:
-    """Camera that replays the files of a folder in the order of their names; see `Camera`."""
+    """Camera that replays the files of a folder in the order of their names; see `Camera`.
+
+    Its setting is the folder, `path`.
+    """
 
     def __init__(self, plan: CameraPlan) -> None:
-        folder = Path(str(plan.settings["path"])).expanduser()
+        folder = Path(plan.settings["path"]).expanduser()
         try:
             self._files = sorted(
                 file for file in folder.iterdir() if file.suffix.lower() in _SUFFIXES
@@ -42,8 +45,3 @@ class Folder:
     def close(self) -> None:
         """Interrupt a waiting `read`."""
         self._pace.close()
-
-
-def open_driver(plan: CameraPlan) -> Folder:
-    """Open the folder `path`."""
-    return Folder(plan)

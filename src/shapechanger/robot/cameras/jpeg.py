@@ -26,7 +26,7 @@ def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
         RobotError: If it is not.
     """
     if len(jpeg) > _MAX_JPEG:
-        raise RobotError(f"The camera gave {len(jpeg)} bytes; a picture has {_MAX_JPEG} at most.")
+        raise RobotError(f"The camera returned {len(jpeg)} bytes; a frame has at most {_MAX_JPEG}.")
     if not simplejpeg.is_jpeg(jpeg):
         raise RobotError("The camera returned an incomplete JPEG.")
     try:
@@ -35,8 +35,8 @@ def check_jpeg(jpeg: bytes, size: tuple[int, int]) -> None:
         raise RobotError(f"The camera returned invalid JPEG data: {error}.") from error
     if (int(width), int(height)) != size:
         raise RobotError(
-            f"The camera gave a picture of {width} by {height} pixels; "
-            f"the profile says {size[0]} by {size[1]}."
+            f"The camera returned a frame of {width} by {height} pixels; "
+            f"the profile sets {size[0]} by {size[1]}."
         )
 
 
@@ -114,12 +114,12 @@ class JpegSplitter:
         """
         garbage = self._skip_to_start()
         if garbage:
-            raise RobotError(f"The stream has {garbage} bytes that belong to no JPEG.")
+            raise RobotError(f"The stream has {garbage} bytes that are not part of a JPEG.")
         try:
             end = self._find_end()
         except ValueError as error:
             self._drop(len(_START))
-            raise RobotError(f"The stream has a broken JPEG: {error}.") from error
+            raise RobotError(f"The stream has an invalid JPEG: {error}.") from error
         if end is None:
             if len(self._data) > _MAX_JPEG:
                 self._drop(len(self._data))

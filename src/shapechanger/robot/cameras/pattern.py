@@ -44,7 +44,7 @@ def draw_barcode(image: NDArray[np.uint8], number: int) -> None:
     rows = barcode_rows(width)
     if width < _LEAST_WIDTH or height < rows or number < 0:
         raise ValueError(
-            f"A barcode needs a number of at least 0, not {number}, and a picture of at least "
+            f"A barcode needs a number of at least 0, not {number}, and an image of at least "
             f"{_LEAST_WIDTH} by {rows} pixels, not {width} by {height}."
         )
     data = (number % 2**_BARCODE_BITS).to_bytes(_BYTES, "big")
@@ -77,14 +77,14 @@ def read_barcode(image: NDArray[np.uint8]) -> int | None:
 
 
 class Pattern:
-    """Camera with drifting colours; see `Camera`."""
+    """Camera with drifting colours; see `Camera`. It has no settings and ignores `flip`."""
 
     def __init__(self, plan: CameraPlan) -> None:
         self._width, self._height = plan.size
         if self._width < _LEAST_WIDTH or self._height < barcode_rows(self._width):
             raise RobotError(
-                f"A test pattern of {self._width} by {self._height} pixels has no room for its "
-                "barcode: it needs a width of 96 at least."
+                f"A test pattern of {self._width} by {self._height} pixels is too small for its "
+                "barcode, which needs a width of at least 96."
             )
         self._quality = plan.jpeg_quality
         self._pace = Pace(plan.fps)
@@ -110,8 +110,3 @@ class Pattern:
         image[..., 1] = down * 2 % 256
         image[..., 2] = (across + down) % 256
         return image
-
-
-def open_driver(plan: CameraPlan) -> Pattern:
-    """Open the test pattern, which has no settings and ignores `flip`."""
-    return Pattern(plan)

@@ -22,27 +22,46 @@ _FORMAT: Final = "BGR888"
 
 
 class PiCamera:
-    """Camera on the Pi's own connector; see `Camera`."""
+    """Camera on the Pi's own connector; see `Camera`. Its setting is its `number`, from 0.
 
-    def __init__(self, plan: CameraPlan, camera: Any, transform: Any) -> None:
+    Raises:
+        RobotError: If picamera2 is not installed, or there is no such camera.
+    """
+
+    def __init__(self, plan: CameraPlan) -> None:
+        try:
+            from libcamera import Transform  # pyright: ignore[reportMissingModuleSource]
+            from picamera2 import Picamera2  # pyright: ignore[reportMissingModuleSource]
+        except ImportError as error:
+            raise RobotError(
+                "The Pi's camera needs picamera2: `sudo apt install python3-picamera2`, and a "
+                "virtual environment made with `python3 -m venv --system-site-packages` by the "
+                "system's Python."
+            ) from error
         self._plan = plan
-        self._camera = camera
         self._lock = threading.Lock()  # `close` waits for a `read` in progress.
         self._closed = False
+        try:
+            self._camera: Any = Picamera2(plan.settings["number"])
+        except (RuntimeError, IndexError) as error:
+            raise RobotError(
+                f"There is no camera {plan.settings['number']}: {error}. "
+                "`rpicam-hello --list-cameras` lists what the system sees."
+            ) from error
         period_us = round(1e6 / plan.fps)
         try:
-            camera.configure(
-                camera.create_video_configuration(
+            self._camera.configure(
+                self._camera.create_video_configuration(
                     main={"size": plan.size, "format": _FORMAT},
-                    transform=transform,
+                    transform=Transform(hflip=int(plan.flip), vflip=int(plan.flip)),
                     # Never a frame from before the call (picamera2#787).
                     queue=False,
                     controls={"FrameDurationLimits": (period_us, period_us)},
                 )
             )
-            camera.start()
+            self._camera.start()
         except RuntimeError as error:
-            camera.close()
+            self._camera.close()
             raise RobotError(f"The Pi's camera does not start: {error}.") from error
 
     def read(self) -> Frame:
@@ -54,7 +73,7 @@ class PiCamera:
                 request = self._camera.capture_request(wait=_SILENT_S)
             except (TimeoutError, RuntimeError) as error:
                 raise RobotError(
-                    f"The Pi's camera has given nothing for {_SILENT_S:g} s; is its cable in?"
+                    f"The Pi's camera has sent no frame for {_SILENT_S:g} s: check its cable."
                 ) from error
             try:
                 image = np.ascontiguousarray(request.make_array("main"))
@@ -65,8 +84,8 @@ class PiCamera:
         width, height = self._plan.size
         if image.shape != (height, width, 3):
             raise RobotError(
-                f"The Pi's camera gave a picture of {image.shape[1]} by {image.shape[0]} pixels; "
-                f"the profile says {width} by {height}."
+                f"The Pi's camera returned a frame of {image.shape[1]} by {image.shape[0]} pixels; "
+                f"the profile sets {width} by {height}."
             )
         quality = self._plan.jpeg_quality
         jpeg = simplejpeg.encode_jpeg(image, quality, colorsubsampling="420")
@@ -79,28 +98,3 @@ class PiCamera:
                 self._closed = True
                 self._camera.stop()
                 self._camera.close()
-
-
-def open_driver(plan: CameraPlan) -> PiCamera:
-    """Open camera `number`, counted from 0.
-
-    Raises:
-        RobotError: If picamera2 is not installed, or there is no such camera.
-    """
-    try:
-        from libcamera import Transform  # pyright: ignore[reportMissingModuleSource]
-        from picamera2 import Picamera2  # pyright: ignore[reportMissingModuleSource]
-    except ImportError as error:
-        raise RobotError(
-            "The Pi's camera needs picamera2: `sudo apt install python3-picamera2`, and a virtual "
-            "environment made with `python3 -m venv --system-site-packages` by the system's Python."
-        ) from error
-    turn = int(plan.flip)
-    try:
-        camera = Picamera2(int(plan.settings["number"]))
-    except (RuntimeError, IndexError) as error:
-        raise RobotError(
-            f"There is no camera {plan.settings['number']}: {error}. `rpicam-hello --list-cameras` "
-            "lists what the system sees."
-        ) from error
-    return PiCamera(plan, camera, Transform(hflip=turn, vflip=turn))

@@ -27,11 +27,13 @@ class Pipe:
     """Camera at the other end of a pipe; see `Camera`.
 
     Of several buffered frames the newest is returned, except from a file.
+
+    Its setting is `path`: a pipe, a file, or a program with arguments after `|`.
     """
 
     def __init__(self, plan: CameraPlan) -> None:
         self._plan = plan
-        self._path = str(plan.settings["path"])
+        self._path: str = plan.settings["path"]
         self._program: subprocess.Popen[bytes] | None = None
         self._splitter = JpegSplitter()
         self._interruption = Interruption()
@@ -126,8 +128,3 @@ class Pipe:
         if self._program is None and self._live and self._fd is not None:
             os.close(self._fd)
             self._fd = None
-
-
-def open_driver(plan: CameraPlan) -> Pipe:
-    """Open the stream at `path`: a pipe, a file, or a program with arguments after `|`."""
-    return Pipe(plan)

@@ -120,14 +120,19 @@ Ioctl = Callable[[int, int, Any], int]
 
 
 class V4l2:
-    """Webcam; see `Camera`. Of several ready frames the newest is returned."""
+    """Webcam; see `Camera`. Of several ready frames the newest is returned.
+
+    Args:
+        plan: The camera; its setting is the `device`, such as /dev/video0.
+        ioctl: Calls the kernel.
+    """
 
     def __init__(self, plan: CameraPlan, ioctl: Ioctl = fcntl.ioctl) -> None:
         if struct.calcsize("P") != 8:
             raise RobotError("The v4l2 camera needs a 64-bit system; take `pipe` with ffmpeg.")
         self._plan = plan
         self._ioctl = ioctl
-        self._device = str(plan.settings["device"])
+        self._device: str = plan.settings["device"]
         self._interruption = Interruption()
         self._buffers: list[mmap.mmap] = []
         self._fd = -1
@@ -140,7 +145,7 @@ class V4l2:
     def read(self) -> Frame:
         """Wait for the next frame; see `Camera.read`."""
         if not self._interruption.wait(self._fd, _SILENT_S):
-            raise RobotError(f"The camera {self._device} has given nothing for {_SILENT_S:g} s.")
+            raise RobotError(f"The camera {self._device} has sent no frame for {_SILENT_S:g} s.")
         try:
             jpeg, captured_ns = self._newest()
         except OSError as error:
@@ -164,8 +169,8 @@ class V4l2:
         width, height, kind = image_size(wanted)
         if (width, height, kind) != (*self._plan.size, MJPEG):
             raise RobotError(
-                f"The camera {self._device} has no JPEG pictures of {self._plan.size[0]} by "
-                f"{self._plan.size[1]} pixels; `v4l2-ctl --list-formats-ext` lists what it has."
+                f"The camera {self._device} offers no JPEG frames of {self._plan.size[0]} by "
+                f"{self._plan.size[1]} pixels; `v4l2-ctl --list-formats-ext` lists what it offers."
             )
         self._ioctl(self._fd, SET_PARAMETERS, frame_rate(self._plan.fps))
         self._ioctl(self._fd, REQUEST_BUFFERS, request(_BUFFERS))
@@ -202,8 +207,3 @@ class V4l2:
                 jpeg = self._buffers[buffer.index][: buffer.used].rstrip(b"\0")
                 newest = jpeg, buffer.at_ns if monotonic else time.monotonic_ns()
             self._ioctl(self._fd, QUEUE, data)
-
-
-def open_driver(plan: CameraPlan) -> V4l2:
-    """Open the webcam at `device`, such as /dev/video0."""
-    return V4l2(plan)

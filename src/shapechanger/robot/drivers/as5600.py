@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words, texts, whole, wholes
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
 
@@ -99,9 +99,9 @@ class As5600:
         Raises:
             RobotError: If it or the multiplexer does not respond.
         """
-        with in_words(self._words):
+        with device_errors(self._words):
             self._bus.write_byte(self._mux, 1 << encoder.channel)
-        with in_words(f"The encoder of {encoder.joint}, on channel {encoder.channel},"):
+        with device_errors(f"The encoder of {encoder.joint}, on channel {encoder.channel},"):
             status, high, low = self._bus.read_i2c_block_data(ADDRESS, _STATUS, 3)
         return Measured(
             counts=(high << 8 | low) % COUNTS_PER_TURN,
@@ -163,12 +163,12 @@ def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
     Raises:
         RobotError: If there is no such bus.
     """
-    bus, mux = whole(plan.settings, "bus"), whole(plan.settings, "mux")
-    columns = (wholes(plan.settings, key) for key in ("channels", "zeros", "directions"))
-    rows = zip(texts(plan.settings, "joints"), *columns, strict=True)
+    bus, mux = plan.settings["bus"], plan.settings["mux"]
+    columns = (plan.settings[key] for key in ("joints", "channels", "zeros", "directions"))
+    rows = zip(*columns, strict=True)
     encoders = tuple(JointEncoder(*row) for row in rows)
     words = f"The multiplexer of sensor {plan.name!r} at 0x{mux:02x} on I2C bus {bus}"
-    with in_words(words):
+    with device_errors(words):
         return As5600(hardware.i2c(bus), mux, encoders, words)
 
 

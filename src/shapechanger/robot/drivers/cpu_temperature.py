@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words, text
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -14,11 +14,11 @@ _PERIOD_NS: Final = 1_000_000_000
 
 
 class CpuTemperature:
-    """Temperature in a kernel file; see `SensorDriver`."""
+    """Temperature in a kernel file; see `SensorDriver`. Its setting is the file, `path`."""
 
-    def __init__(self, path: Path, name: str) -> None:
-        self._path = path
-        self._name = name
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        self._path = Path(plan.settings["path"])
+        self._name = f"Sensor {plan.name!r}"
         self._read_ns: int | None = None
         self._celsius = self._measure()
 
@@ -33,15 +33,11 @@ class CpuTemperature:
         """Do nothing: no file stays open."""
 
     def _measure(self) -> float:
-        with in_words(self._name):
+        with device_errors(self._name):
             written = self._path.read_text()
         try:
             # Millidegrees: Documentation/driver-api/thermal/sysfs-api.rst of the kernel.
             return int(written) / 1000.0
         except ValueError as error:
-            raise RobotError(f"{self._name} says {written!r} at {self._path}.") from error
-
-
-def open_driver(plan: SensorPlan, hardware: Hardware) -> CpuTemperature:
-    """Open the file at `path`, the only setting."""
-    return CpuTemperature(Path(text(plan.settings, "path")), f"Sensor {plan.name!r}")
+            words = f"{self._name} read {written!r} at {self._path}, which is no temperature."
+            raise RobotError(words) from error

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from typing import Any, Final
+from typing import Final
 
 from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.settings import in_words, number, whole
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -37,11 +37,15 @@ class Encoder:
 
     With two channels (quadrature) it measures the direction, and each edge is a quarter of a count.
     With one, each rising edge is a count, and the direction is that of the propulsion.
+
+    The settings are the BCM pins `a` and `b` (-1 for none), `counts_per_turn` (rising edges of one
+    channel for a turn of the wheel) and `wheel_m` (circumference).
     """
 
-    def __init__(self, a: int, b: int | None, count_m: float, factory: Any, name: str) -> None:
-        self._name = name
-        self._two_channels = b is not None
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        settings = plan.settings
+        count_m: float = settings["wheel_m"] / settings["counts_per_turn"]
+        self._two_channels: bool = settings["b"] >= 0
         self._edge_m = count_m / _EDGES_PER_COUNT if self._two_channels else count_m
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._state = 0
@@ -53,12 +57,14 @@ class Encoder:
         self._last_edge_ns = 0
         self._speed = 0.0
         self._sign = 1.0
-        self._inputs = [EdgeInput(a, "up", factory, self._a_changed)]
-        if b is not None:
-            self._inputs.append(EdgeInput(b, "up", factory, self._b_changed))
-        with self._lock:
-            levels = [one.level for one in self._inputs]
-            self._state = levels[0] << 1 | levels[-1] if self._two_channels else levels[0]
+        with device_errors(f"Sensor {plan.name!r}"):
+            factory = hardware.pin_factory()
+            self._inputs = [EdgeInput(settings["a"], "up", factory, self._a_changed)]
+            if self._two_channels:
+                self._inputs.append(EdgeInput(settings["b"], "up", factory, self._b_changed))
+            with self._lock:
+                levels = [one.level for one in self._inputs]
+                self._state = levels[0] << 1 | levels[-1] if self._two_channels else levels[0]
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the "speed" in m/s, positive forward."""
@@ -116,18 +122,3 @@ class Encoder:
                 self._edges.clear()
         self._edges.append((at_s, step))
         self._count += 1
-
-
-def open_driver(plan: SensorPlan, hardware: Hardware) -> Encoder:
-    """Open the encoder.
-
-    The settings are the BCM pins `a` and `b` (-1 for none), `counts_per_turn` (rising edges of one
-    channel for a turn of the wheel) and `wheel_m` (circumference).
-    """
-    settings = plan.settings
-    b = whole(settings, "b")
-    count_m = number(settings, "wheel_m") / number(settings, "counts_per_turn")
-    name = f"Sensor {plan.name!r}"
-    with in_words(name):
-        factory = hardware.pin_factory()
-        return Encoder(whole(settings, "a"), None if b < 0 else b, count_m, factory, name)

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from typing import Final, Literal
 
-from shapechanger.errors import UnknownName
-from shapechanger.robot.drivers.pulse import PulseChannel, PulseRange, open_pulse_channel
-from shapechanger.robot.drivers.settings import in_words, number, text
+from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.pulse import PulseRange, open_pulse_channel
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
-
-_REVERSES: Final = ("direct", "double", "none")
 
 
 class Esc:
@@ -20,27 +16,27 @@ class Esc:
     It arms after some time at neutral, until which only neutral is sent. A car's controller brakes
     at the first pulse below neutral and reverses at the second: `reverse` "double" sends brake,
     neutral and reverse in sequence. Pulses at neutral or above are sent at once.
+
+    The settings are those of `open_pulse_channel`, `backward_us`, `neutral_us` and `forward_us` (at
+    -1, 0 and 1), `arm_s` (time at neutral before it obeys), `reverse` ("direct", "double" or
+    "none") and `brake_ms` (how long "double" brakes, and then waits at neutral).
     """
 
-    def __init__(
-        self,
-        channel: PulseChannel,
-        pulses: PulseRange,
-        reverse: Literal["direct", "double", "none"],
-        arm_s: float,
-        brake_s: float,
-        name: str,
-    ) -> None:
-        self._channel = channel
-        self._pulses = pulses
-        self._reverse = reverse
-        self._arm_ns = round(arm_s * 1e9)
-        self._brake_ns = round(brake_s * 1e9)
-        self._name = name
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        settings = plan.settings
+        self._name = f"Output {plan.name!r}"
+        self._pulses = PulseRange.of(plan)
+        self._reverse: str = settings["reverse"]
+        self._arm_ns = round(settings["arm_s"] * 1e9)
+        self._brake_ns = round(settings["brake_ms"] / 1e3 * 1e9)
         self._neutral_since_ns: int | None = None
         self._backward_since_ns: int | None = None
         self._reverses = False
-        self._send(0.0)
+        with device_errors(self._name), ExitStack() as undo:
+            self._channel = open_pulse_channel(settings, hardware)
+            undo.callback(self._channel.close)
+            self._send(0.0)
+            undo.pop_all()
 
     def write(self, value: float, now_ns: int) -> float:
         """Write a throttle and return the applied one; see `OutputDriver.write`."""
@@ -59,12 +55,12 @@ class Esc:
         """Stop the pulses; the controller then has to see neutral again."""
         self._neutral_since_ns = self._backward_since_ns = None
         self._reverses = False
-        with in_words(self._name):
+        with device_errors(self._name):
             self._channel.release()
 
     def close(self) -> None:
         """Stop the pulses and close the channel."""
-        with in_words(self._name):
+        with device_errors(self._name):
             self._channel.close()
 
     def _backward(self, value: float, now_ns: int) -> float:
@@ -84,33 +80,7 @@ class Esc:
         return self._send(value)
 
     def _send(self, value: float) -> float:
-        with in_words(self._name):
+        with device_errors(self._name):
             width_us = self._channel.write_us(self._pulses.width_us(value))
         # Neutral reads as 0, even if the pulse steps do not hit it exactly.
         return self._pulses.value(width_us) if value else 0.0
-
-
-def open_driver(plan: OutputPlan, hardware: Hardware) -> Esc:
-    """Open the controller at neutral.
-
-    The settings are those of `open_pulse_channel`, `backward_us`, `neutral_us` and `forward_us` (at
-    -1, 0 and 1), `arm_s` (neutral before it obeys), `reverse` ("direct", "double" or "none") and
-    `brake_ms` (how long "double" brakes, and then waits at neutral).
-
-    Raises:
-        UnknownName: If there is no such kind of reverse.
-    """
-    settings = plan.settings
-    name = f"Output {plan.name!r}"
-    reverse = text(settings, "reverse")
-    if reverse not in _REVERSES:
-        raise UnknownName("kind of reverse", reverse, _REVERSES)
-    keys = ("backward_us", "neutral_us", "forward_us")
-    pulses = PulseRange(*(number(settings, key) for key in keys))
-    arm_s, brake_s = number(settings, "arm_s"), number(settings, "brake_ms") / 1e3
-    with in_words(name), ExitStack() as undo:
-        channel = open_pulse_channel(settings, hardware)
-        undo.callback(channel.close)
-        controller = Esc(channel, pulses, reverse, arm_s, brake_s, name)
-        undo.pop_all()
-    return controller

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Any, Final
+from typing import Final
 
 from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.edges import EdgeInput
-from shapechanger.robot.drivers.settings import in_words, number, whole
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, RealClock
 
@@ -25,15 +25,18 @@ _SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for
 
 
 class Hcsr04:
-    """Distance sensor; see `SensorDriver`. It does not wait for the echo: the next read has it."""
+    """Distance sensor; see `SensorDriver`. It does not wait for the echo: the next read has it.
 
-    def __init__(
-        self, trigger: int, echo: int, max_m: float, factory: Any, name: str, trigger_ns: int
-    ) -> None:
-        self._name = name
-        self._max_m = max_m
-        self._trigger_ns = trigger_ns
-        self._ticks_diff = factory.ticks_diff
+    The settings are the BCM pins `trigger` and `echo`, and `max_m`, the distance without an
+    obstacle.
+    """
+
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        settings = plan.settings
+        self._name = f"Sensor {plan.name!r}"
+        self._max_m: float = settings["max_m"]
+        # Simulated pins need no pulse width.
+        self._trigger_ns = _TRIGGER_NS if isinstance(hardware.clock, RealClock) else 0
         self._lock = threading.Lock()  # lgpio calls back from its own thread.
         self._rise: float | None = None
         self._echo_s: float | None = None
@@ -41,8 +44,11 @@ class Hcsr04:
         self._distance_m: float | None = None
         self._pinged_ns: int | None = None
         self._unanswered = 0  # Pings since the line changed.
-        self._trigger = DigitalOutputDevice(trigger, pin_factory=factory)
-        self._echo = EdgeInput(echo, "down", factory, self._changed)
+        with device_errors(self._name):
+            factory = hardware.pin_factory()
+            self._ticks_diff = factory.ticks_diff
+            self._trigger = DigitalOutputDevice(settings["trigger"], pin_factory=factory)
+            self._echo = EdgeInput(settings["echo"], "down", factory, self._changed)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the "distance" in m, at most `max_m`; empty before the first echo.
@@ -63,7 +69,7 @@ class Hcsr04:
             self._ping()
         if self._unanswered > _MOST_MISSED:
             self._distance_m = None
-            raise RobotError(f"{self._name} gives no echo: is it wired, and does it have 5 V?")
+            raise RobotError(f"{self._name} receives no echo: check its wires and its 5 V supply.")
         return {} if self._distance_m is None else {"distance": self._distance_m}
 
     def close(self) -> None:
@@ -72,10 +78,9 @@ class Hcsr04:
         self._echo.close()
 
     def _ping(self) -> None:
-        with in_words(self._name):
+        with device_errors(self._name):
             self._trigger.on()
             # Spin: the shortest sleep takes several times as long, and the guard waits for it.
-            # Simulated pins need no pulse width.
             if self._trigger_ns:
                 end_ns = time.perf_counter_ns() + self._trigger_ns
                 while time.perf_counter_ns() < end_ns:
@@ -90,22 +95,3 @@ class Hcsr04:
             elif self._rise is not None:
                 self._echo_s = self._ticks_diff(at_s, self._rise)
                 self._rise = None
-
-
-def open_driver(plan: SensorPlan, hardware: Hardware) -> Hcsr04:
-    """Open the sensor.
-
-    The settings are the BCM pins `trigger` and `echo`, and `max_m`, the distance without an
-    obstacle.
-    """
-    settings = plan.settings
-    name = f"Sensor {plan.name!r}"
-    with in_words(name):
-        return Hcsr04(
-            whole(settings, "trigger"),
-            whole(settings, "echo"),
-            number(settings, "max_m"),
-            hardware.pin_factory(),
-            name,
-            trigger_ns=_TRIGGER_NS if isinstance(hardware.clock, RealClock) else 0,
-        )

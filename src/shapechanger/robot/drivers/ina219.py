@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from shapechanger.robot.drivers.settings import in_words, whole
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
-from shapechanger.robot.hardware import Hardware, I2cBus
+from shapechanger.robot.hardware import Hardware
 
 _CONFIGURATION: Final = 0x00
 _BUS_VOLTAGE: Final = 0x02
@@ -20,21 +20,21 @@ _PERIOD_NS: Final = 100_000_000  # A battery changes slowly, and the bus is shar
 
 
 class Ina219:
-    """Voltage sensor; see `SensorDriver`."""
+    """Voltage sensor; see `SensorDriver`. Its settings are `bus` and `address`."""
 
-    def __init__(self, bus: I2cBus, address: int, name: str) -> None:
-        self._bus = bus
-        self._address = address
-        self._name = name
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        bus, self._address = plan.settings["bus"], plan.settings["address"]
+        self._name = f"Sensor {plan.name!r} at 0x{self._address:02x} on I2C bus {bus}"
         self._read_ns: int | None = None
         self._volts = 0.0
-        with in_words(name):
-            bus.write_i2c_block_data(address, _CONFIGURATION, _CONTINUOUS_32_V)
+        with device_errors(self._name):
+            self._bus = hardware.i2c(bus)
+            self._bus.write_i2c_block_data(self._address, _CONFIGURATION, _CONTINUOUS_32_V)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return the voltage of the "battery" in V, updated ten times a second."""
         if self._read_ns is None or now_ns - self._read_ns >= _PERIOD_NS:
-            with in_words(self._name):
+            with device_errors(self._name):
                 high, low = self._bus.read_i2c_block_data(self._address, _BUS_VOLTAGE, 2)
             self._volts = ((high << 8 | low) >> _STATUS_BITS) * _V_PER_STEP
             self._read_ns = now_ns
@@ -43,11 +43,3 @@ class Ina219:
     def close(self) -> None:
         """Close the bus."""
         self._bus.close()
-
-
-def open_driver(plan: SensorPlan, hardware: Hardware) -> Ina219:
-    """Open the sensor; the settings are `bus` and `address`."""
-    bus, address = whole(plan.settings, "bus"), whole(plan.settings, "address")
-    name = f"Sensor {plan.name!r} at 0x{address:02x} on I2C bus {bus}"
-    with in_words(name):
-        return Ina219(hardware.i2c(bus), address, name)

@@ -11,16 +11,15 @@ import struct
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words, whole
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.guard.plan import SensorPlan
-from shapechanger.robot.hardware import Hardware, I2cBus
+from shapechanger.robot.hardware import Hardware
 
 _CONFIG: Final = 0x1A
 _GYRO_CONFIG: Final = 0x1B
 _ACCEL_CONFIG: Final = 0x1C
-_ACCEL_XOUT_H: Final = (
-    0x3B  # Seven big-endian numbers: acceleration x y z, temperature, rate x y z.
-)
+# Seven big-endian numbers follow: acceleration x y z, temperature, rate x y z.
+_ACCEL_XOUT_H: Final = 0x3B
 _PWR_MGMT_1: Final = 0x6B
 _WHO_AM_I: Final = 0x75
 
@@ -40,24 +39,24 @@ _ZERO_SHARE: Final = 0.02
 
 
 class Mpu6050:
-    """Inertial sensor; see `SensorDriver`."""
+    """Inertial sensor; see `SensorDriver`. Its settings are `bus` and `address`."""
 
-    def __init__(self, bus: I2cBus, address: int, name: str) -> None:
-        self._bus = bus
-        self._address = address
-        self._name = name
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        number, self._address = plan.settings["bus"], plan.settings["address"]
+        self._name = f"Sensor {plan.name!r} at 0x{self._address:02x} on I2C bus {number}"
         self._zero_rad_per_s: float | None = None
-        with in_words(name):
-            identity = bus.read_byte_data(address, _WHO_AM_I)
+        with device_errors(self._name):
+            self._bus = bus = hardware.i2c(number)
+            identity = bus.read_byte_data(self._address, _WHO_AM_I)
             if identity != _IDENTITY:
                 raise RobotError(
-                    f"{name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
+                    f"{self._name} is not an MPU-6050: it identifies itself as 0x{identity:02x}, "
                     f"not 0x{_IDENTITY:02x}."
                 )
-            bus.write_byte_data(address, _PWR_MGMT_1, _AWAKE)
-            bus.write_byte_data(address, _CONFIG, _LOW_PASS_44_HZ)
-            bus.write_byte_data(address, _GYRO_CONFIG, _RANGE_500_DEG_PER_S)
-            bus.write_byte_data(address, _ACCEL_CONFIG, _RANGE_4_G)
+            bus.write_byte_data(self._address, _PWR_MGMT_1, _AWAKE)
+            bus.write_byte_data(self._address, _CONFIG, _LOW_PASS_44_HZ)
+            bus.write_byte_data(self._address, _GYRO_CONFIG, _RANGE_500_DEG_PER_S)
+            bus.write_byte_data(self._address, _ACCEL_CONFIG, _RANGE_4_G)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Return acceleration forward and left in m/s², and yaw rate to the left in rad/s.
@@ -67,11 +66,11 @@ class Mpu6050:
         Raises:
             RobotError: If it does not respond, or sleeps, as after a loss of power.
         """
-        with in_words(self._name):
+        with device_errors(self._name):
             data = self._bus.read_i2c_block_data(self._address, _ACCEL_XOUT_H, 14)
         x, y, z, _, _, _, yaw = struct.unpack(">7h", bytes(data))
         if x == y == z == 0:  # Not even gravity is measured.
-            raise RobotError(f"{self._name} sleeps: it has lost its power for a moment.")
+            raise RobotError(f"{self._name} is asleep: it lost power for a moment.")
         rate = yaw * _RAD_PER_S
         if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:
             zero = rate if self._zero_rad_per_s is None else self._zero_rad_per_s
@@ -85,11 +84,3 @@ class Mpu6050:
     def close(self) -> None:
         """Close the bus."""
         self._bus.close()
-
-
-def open_driver(plan: SensorPlan, hardware: Hardware) -> Mpu6050:
-    """Open the sensor; the settings are `bus` and `address`."""
-    bus, address = whole(plan.settings, "bus"), whole(plan.settings, "address")
-    name = f"Sensor {plan.name!r} at 0x{address:02x} on I2C bus {bus}"
-    with in_words(name):
-        return Mpu6050(hardware.i2c(bus), address, name)

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Final, Protocol
 
-from shapechanger.errors import UnknownName
 from shapechanger.robot.guard.plan import OutputPlan
-from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.hardware import Hardware, load
 
-# Each module has `open_driver(plan, hardware)` and is loaded on demand, so that the guard loads
-# only its own drivers.
+# Loaded on demand, so that the guard loads only its own drivers.
 OUTPUT_DRIVERS: Final = {
-    "hbridge": "shapechanger.robot.drivers.hbridge",
-    "phase_enable": "shapechanger.robot.drivers.phase_enable",
-    "servo": "shapechanger.robot.drivers.servo",
-    "esc": "shapechanger.robot.drivers.esc",
-    "dynamixel": "shapechanger.robot.drivers.dynamixel.output",
+    "hbridge": "shapechanger.robot.drivers.motors:HBridge",
+    "phase_enable": "shapechanger.robot.drivers.motors:PhaseEnable",
+    "servo": "shapechanger.robot.drivers.servo:ServoDriver",
+    "esc": "shapechanger.robot.drivers.esc:Esc",
+    "dynamixel": "shapechanger.robot.drivers.dynamixel.output:open_driver",
 }
-"""Module of each output driver, by its name in a profile."""
+"""MODULE:NAME of each output driver, by its name in a profile; called with plan and hardware."""
 
 
 class OutputDriver(Protocol):
@@ -87,9 +84,6 @@ def open_output(plan: OutputPlan, hardware: Hardware) -> OutputDriver:
         hardware: The pins and buses of this robot.
 
     Raises:
-        UnknownName: If there is no such driver.
         RobotError: If the device does not respond.
     """
-    if plan.driver not in OUTPUT_DRIVERS:
-        raise UnknownName("output driver", plan.driver, OUTPUT_DRIVERS)
-    return importlib.import_module(OUTPUT_DRIVERS[plan.driver]).open_driver(plan, hardware)
+    return load(OUTPUT_DRIVERS[plan.driver])(plan, hardware)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager
-from typing import Final
+from typing import Any, Final
 
 from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.settings import in_words, whole
+from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.hardware import Hardware
 
 _MODE1: Final = 0x00
@@ -31,7 +31,6 @@ _OSCILLATOR_MHZ: Final = 25.0  # Internal oscillator; boards deviate, so calibra
 _STEPS: Final = 4096
 _NO_PULSE: Final = 0x1000  # Bit 4 of OFF_H: no pulses.
 _WAKE_UP_S: Final = 0.0005  # 500 us at most until the oscillator is up (section 7.3.1.1).
-_PRESCALE_RANGE: Final = (3, 255)
 
 # Unchanged pulses are not rewritten; the chip is polled now and then, because it sleeps after a
 # short loss of power.
@@ -40,11 +39,7 @@ _UNCHANGED_PER_CHECK: Final = 50
 
 def prescale_for(hz: float) -> int:
     """Return the prescaler for a frequency: round(25 MHz / (4096 hz)) - 1, section 7.3.5."""
-    prescale = round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1
-    low, high = _PRESCALE_RANGE
-    if not low <= prescale <= high:
-        raise RobotError(f"A PCA9685 sends pulses at 24 to 1526 Hz, not at {hz} Hz.")
-    return prescale
+    return round(_OSCILLATOR_MHZ * 1e6 / (_STEPS * hz)) - 1
 
 
 class Pca9685:
@@ -69,7 +64,7 @@ class Pca9685:
         self._must_start = False
         self._unchanged = 0
         self._enable: DigitalOutputDevice | None = None
-        with in_words(self.name), ExitStack() as undo:
+        with device_errors(self.name), ExitStack() as undo:
             if output_enable >= 0:
                 # OE is active low, and a resistor pulls it up until we drive it.
                 self._enable = DigitalOutputDevice(
@@ -144,7 +139,7 @@ class Pca9685:
         """
         with self._doubt_on_failure():
             if self._bus.read_byte_data(self._address, _MODE1) & _SLEEP:
-                raise RobotError(f"{self.name} sleeps: it has lost its power for a moment.")
+                raise RobotError(f"{self.name} is asleep: it lost power for a moment.")
 
     def _write(self, channel: int, steps: int) -> None:
         with self._doubt_on_failure():
@@ -160,13 +155,13 @@ class Pca9685:
 
     def _switch(self, on: bool) -> None:
         if self._enable is not None:
-            with in_words(self.name):
+            with device_errors(self.name):
                 self._enable.value = on
 
     @contextmanager
     def _doubt_on_failure(self) -> Generator[None]:
         try:
-            with in_words(self.name):
+            with device_errors(self.name):
                 yield
         except Exception:
             self._steps.clear()
@@ -179,10 +174,6 @@ class Pca9685Channel:
     """One channel; see `PulseChannel`."""
 
     def __init__(self, chip: Pca9685, channel: int) -> None:
-        if not 0 <= channel < 16:
-            raise RobotError(f"{chip.name} has channels 0 to 15, not {channel}.")
-        if channel in chip.channels:
-            raise RobotError(f"Channel {channel} of {chip.name} is used twice.")
         chip.channels.add(channel)
         self._chip: Pca9685 | None = chip
         self._channel = channel
@@ -217,7 +208,7 @@ class Pca9685Channel:
 _OPEN: Final[dict[tuple[int, int, int], tuple[Hardware, Pca9685]]] = {}
 
 
-def open_channel(settings: Mapping[str, object], hardware: Hardware) -> Pca9685Channel:
+def open_channel(settings: Mapping[str, Any], hardware: Hardware) -> Pca9685Channel:
     """Open a channel without pulses.
 
     Args:
@@ -228,8 +219,8 @@ def open_channel(settings: Mapping[str, object], hardware: Hardware) -> Pca9685C
         RobotError: If the chip does not respond, the channel is used twice, or another channel of
             the chip has another frequency or enable pin.
     """
-    bus, address = whole(settings, "bus"), whole(settings, "address")
-    hz, output_enable = whole(settings, "hz"), whole(settings, "output_enable")
+    bus, address, number = settings["bus"], settings["address"], settings["channel"]
+    hz, output_enable = settings["hz"], settings["output_enable"]
     key = (id(hardware), bus, address)
     _, chip = _OPEN.get(key, (hardware, None))
     if chip is None or not chip.channels:
@@ -240,15 +231,12 @@ def open_channel(settings: Mapping[str, object], hardware: Hardware) -> Pca9685C
             f"{chip.name} has one frequency and one output_enable for all of its channels, not "
             f"{chip.hz} and {hz} Hz, GPIO{chip.output_enable} and GPIO{output_enable}."
         )
-    try:
-        channel = Pca9685Channel(chip, whole(settings, "channel"))
-    except RobotError:
-        if not chip.channels:
-            chip.leave(-1)
-        raise
+    if number in chip.channels:
+        raise RobotError(f"Channel {number} of {chip.name} is used twice.")
+    channel = Pca9685Channel(chip, number)
     try:
         channel.release()
     except Exception:
-        chip.leave(whole(settings, "channel"))  # A retry finds the channel free.
+        chip.leave(number)  # A retry finds the channel free.
         raise
     return channel

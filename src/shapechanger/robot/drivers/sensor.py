@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Final, Protocol
 
-from shapechanger.errors import UnknownName
 from shapechanger.robot.guard.plan import SensorPlan
-from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.hardware import Hardware, load
 
 SENSOR_DRIVERS: Final = {
-    "encoder": "shapechanger.robot.drivers.encoder",
-    "switch": "shapechanger.robot.drivers.switch",
-    "hcsr04": "shapechanger.robot.drivers.hcsr04",
-    "mpu6050": "shapechanger.robot.drivers.mpu6050",
-    "ina219": "shapechanger.robot.drivers.ina219",
-    "as5600": "shapechanger.robot.drivers.as5600",
-    "cpu_temperature": "shapechanger.robot.drivers.cpu_temperature",
-    "dynamixel": "shapechanger.robot.drivers.dynamixel.sensor",
+    "encoder": "shapechanger.robot.drivers.encoder:Encoder",
+    "switch": "shapechanger.robot.drivers.switch:Switch",
+    "hcsr04": "shapechanger.robot.drivers.hcsr04:Hcsr04",
+    "mpu6050": "shapechanger.robot.drivers.mpu6050:Mpu6050",
+    "ina219": "shapechanger.robot.drivers.ina219:Ina219",
+    "as5600": "shapechanger.robot.drivers.as5600:open_driver",
+    "cpu_temperature": "shapechanger.robot.drivers.cpu_temperature:CpuTemperature",
+    "dynamixel": "shapechanger.robot.drivers.dynamixel.sensor:open_driver",
 }
-"""Module of each sensor driver, by name; each has `open_driver(plan, hardware)`."""
+"""MODULE:NAME of each sensor driver, by its name in a profile; called with plan and hardware."""
 
 
 class SensorDriver(Protocol):
@@ -29,7 +27,7 @@ class SensorDriver(Protocol):
         """Return the measurements by name, in SI units, as in `GuardState.quantities`.
 
         Args:
-            now_ns: The time.
+            now_ns: Monotonic time, ns.
             direction: Sign of the propulsion, for a sensor that cannot tell forward from backward.
 
         Raises:
@@ -50,9 +48,6 @@ def open_sensor(plan: SensorPlan, hardware: Hardware) -> SensorDriver:
         hardware: The pins and buses of this robot.
 
     Raises:
-        UnknownName: If there is no such driver.
         RobotError: If the device does not respond.
     """
-    if plan.driver not in SENSOR_DRIVERS:
-        raise UnknownName("sensor driver", plan.driver, SENSOR_DRIVERS)
-    return importlib.import_module(SENSOR_DRIVERS[plan.driver]).open_driver(plan, hardware)
+    return load(SENSOR_DRIVERS[plan.driver])(plan, hardware)

@@ -1,10 +1,8 @@
-"""Typed access to the settings of a driver, and translation of device errors."""
+"""Typed access to the settings of a driver."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import TypeVar, cast
 
 from shapechanger.errors import RobotError
@@ -55,17 +53,6 @@ def wholes(settings: Mapping[str, object], key: str) -> tuple[int, ...]:
     return tuple(whole({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
 
 
-def numbers(settings: Mapping[str, object], key: str) -> tuple[float, ...]:
-    """Return a tuple of numbers, such as tensions.
-
-    Args:
-        settings: Settings of the plan.
-        key: Name of the setting.
-    """
-    values = cast("list[object]", _of_type(settings, key, list, "a list of numbers"))
-    return tuple(number({f"{key}[{i}]": value}, f"{key}[{i}]") for i, value in enumerate(values))
-
-
 def texts(settings: Mapping[str, object], key: str) -> tuple[str, ...]:
     """Return a tuple of strings, such as names of tendons.
 
@@ -82,31 +69,3 @@ def _of_type(settings: Mapping[str, object], key: str, kind: type[_T], words: st
     if not isinstance(value, kind) or isinstance(value, bool):
         raise RobotError(f"The setting {key!r} must be {words}, not {value!r}.")
     return value
-
-
-@contextmanager
-def in_words(device: str) -> Generator[None]:
-    """Turn the errors of gpiozero, lgpio and the kernel into a `RobotError`.
-
-    Args:
-        device: Description of the device, such as "The motor on GPIO22 and GPIO27".
-
-    Raises:
-        RobotError: If the device does not respond.
-    """
-    try:
-        yield
-    except _device_errors() as error:
-        raise RobotError(f"{device} does not answer: {str(error).rstrip('.')}.") from error
-
-
-def _device_errors() -> tuple[type[BaseException], ...]:
-    """Return what gpiozero, lgpio and the kernel raise.
-
-    Profiles read settings where neither library is installed, and a library that was never loaded
-    raises nothing.
-    """
-    names = (("gpiozero", "GPIOZeroError"), ("lgpio", "error"))
-    loaded = [(sys.modules.get(module), name) for module, name in names]
-    own = tuple(getattr(module, name) for module, name in loaded if module is not None)
-    return (OSError, ImportError, *own)

@@ -17,7 +17,7 @@ from shapechanger.robot.drivers.output import (
     open_output,
 )
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, output_values
-from shapechanger.robot.hardware import REAL, Hardware
+from shapechanger.robot.hardware import REAL, Hardware, load
 
 
 def enable_device(pin: int, hardware: Hardware) -> Any:
@@ -81,12 +81,12 @@ _STEP: Final = 0.06
 
 _WHY: Final = {
     "esc": "its controller waits, brakes or changes direction",
-    "dynamixel": "its bus has a fault, and lets go",
+    "dynamixel": "its bus has a fault and released it",
     "servo": "it turns no faster than its profile allows",
 }
 
 
-class Done(NamedTuple):
+class Applied(NamedTuple):
     """Applied outputs.
 
     Attributes:
@@ -98,12 +98,8 @@ class Done(NamedTuple):
     reason: str
 
 
-class Truth:
-    """Reconstruct the applied actions from the values of the outputs.
-
-    Args:
-        plan: The robot.
-    """
+class ActionEstimator:
+    """Estimate the applied actions of a robot from the values of its outputs."""
 
     def __init__(self, plan: GuardPlan) -> None:
         self._plan = plan
@@ -114,9 +110,9 @@ class Truth:
             for action in plan.actions
         ]
 
-    def done(
+    def estimate(
         self, actions: Sequence[float], requested: Sequence[float], has: Sequence[float]
-    ) -> Done:
+    ) -> Applied:
         """Return the applied outputs.
 
         Args:
@@ -124,23 +120,23 @@ class Truth:
             requested: Requested value of each output.
             has: Actual value of each output.
         """
-        others = {
+        deviating = {
             i for i, (a, b) in enumerate(zip(requested, has, strict=True)) if abs(a - b) > _STEP
         }
-        if not others:
-            return Done(tuple(actions), "")
+        if not deviating:
+            return Applied(tuple(actions), "")
         outputs = self._plan.outputs
         reasons = [
-            f"Output {outputs[i].name}: {_WHY.get(outputs[i].driver, 'it does something else')}."
-            for i in sorted(others)
+            f"Output {outputs[i].name}: {_WHY.get(outputs[i].driver, 'it does not follow')}."
+            for i in sorted(deviating)
         ]
-        done = tuple(self._action(i, value, others, has) for i, value in enumerate(actions))
-        return Done(done, " ".join(reasons))
+        applied = tuple(self._action(i, value, deviating, has) for i, value in enumerate(actions))
+        return Applied(applied, " ".join(reasons))
 
-    def _action(self, index: int, value: float, others: set[int], has: Sequence[float]) -> float:
+    def _action(self, index: int, value: float, deviating: set[int], has: Sequence[float]) -> float:
         """Return one action: the value farthest from rest among the outputs of it alone."""
         moved = self._moved[index]
-        if others.isdisjoint(moved):
+        if deviating.isdisjoint(moved):
             return value
         action = self._plan.actions[index]
         if all(abs(has[i] - self._rest[i]) <= _STEP for i in moved):
@@ -153,7 +149,7 @@ class Truth:
         return max(found, key=lambda v: abs(v - action.rest), default=value)
 
 
-def _drives_first(plan: GuardPlan) -> GuardPlan:
+def _propelling_first(plan: GuardPlan) -> GuardPlan:
     """Return the plan with propelling outputs first: a slow servo must not delay them."""
     propelling = {action.name for action in plan.actions if action.propels}
     outputs = sorted(plan.outputs, key=lambda output: propelling.isdisjoint(output.mix))
@@ -176,9 +172,9 @@ class OutputBank:
     """
 
     def __init__(self, plan: GuardPlan, hardware: Hardware) -> None:
-        self._plan = plan = _drives_first(plan)
+        self._plan = plan = _propelling_first(plan)
         self._rest = tuple(action.rest for action in plan.actions)
-        self._truth = Truth(plan)
+        self._estimator = ActionEstimator(plan)
         self._drivers: list[tuple[OutputPlan, OutputDriver]] = []
         self.released = False
         self.values = {output.name: 0.0 for output in plan.outputs}
@@ -192,7 +188,7 @@ class OutputBank:
                 device.begin()
             undo.pop_all()
 
-    def write(self, actions: Sequence[float], now_ns: int) -> Done:
+    def write(self, actions: Sequence[float], now_ns: int) -> Applied:
         """Write all outputs, including unchanged ones: some controllers need several writes.
 
         Args:
@@ -208,7 +204,7 @@ class OutputBank:
         for device in self._devices:
             device.flush(grip=True)
         self.released = False
-        return self._truth.done(actions, values, tuple(self.values.values()))
+        return self._estimator.estimate(actions, values, tuple(self.values.values()))
 
     def ready(self) -> str:
         """Reset outputs that had a fault.
@@ -241,10 +237,10 @@ class OutputBank:
         failures: list[str] = []
         values = output_values(self._plan, self._rest)
         for (output, driver), value in zip(self._drivers, values, strict=True):
-            with noted(failures, f"Output {output.name}"):
+            with errors_noted(failures, f"Output {output.name}"):
                 self.values[output.name] = driver.write(value, now_ns)
         for device in self._devices:
-            with noted(failures):
+            with errors_noted(failures):
                 device.flush(grip=False)
         self.released = False
         return failures
@@ -258,7 +254,7 @@ class OutputBank:
         # A released output must not be energised again.
         failures = [] if self.released else self.rest(now_ns)
         for output, driver in self._drivers:
-            with noted(failures, f"Output {output.name}"):
+            with errors_noted(failures, f"Output {output.name}"):
                 driver.close()
         self._drivers.clear()
         return failures
@@ -275,8 +271,8 @@ def _devices(drivers: Iterable[OutputDriver]) -> list[SharedDevice]:
 
 
 @contextlib.contextmanager
-def noted(failures: list[str], what: str = "") -> Generator[None]:
-    """Note an error in place of raising it: whatever it is, the next output must rest too.
+def errors_noted(failures: list[str], what: str = "") -> Generator[None]:
+    """Note an error instead of raising it: whatever it is, the next output must rest too.
 
     Args:
         failures: The list to add it to.
@@ -295,7 +291,7 @@ _STOPS_ITSELF: Final = ("dynamixel",)
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
-    """Put every output to rest by opening and closing it, independently of the others.
+    """Put every output to rest by opening and closing it, independently of the deviating.
 
     No other process may have the outputs open.
 
@@ -308,17 +304,17 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     """
     failures: list[str] = []
     opened: list[tuple[str, OutputDriver]] = []
-    for output in _drives_first(plan).outputs:
+    for output in _propelling_first(plan).outputs:
         if output.driver in _STOPS_ITSELF:
             continue
-        with noted(failures, f"Output {output.name}"):
+        with errors_noted(failures, f"Output {output.name}"):
             opened.append((output.name, open_output(output, hardware)))
     # Closed only when all are at rest: lgpio takes 100 ms for each handle that it closes.
     for name, driver in opened:
-        with noted(failures, f"Output {name}"):
+        with errors_noted(failures, f"Output {name}"):
             driver.close()
     if plan.enable_pin is not None:
-        with noted(failures, f"Enable pin {plan.enable_pin}"):
+        with errors_noted(failures, f"Enable pin {plan.enable_pin}"):
             enable_device(plan.enable_pin, hardware).close()
     return failures
 
@@ -330,16 +326,12 @@ def preload(plan: GuardPlan, source: str) -> None:
         plan: The robot.
         source: Where its hardware comes from.
     """
-    modules = [source.partition(":")[0]]
-    modules += [
-        OUTPUT_DRIVERS[output.driver]
-        for output in plan.outputs
-        if output.driver not in _STOPS_ITSELF
-    ]
+    load(source)
+    for output in plan.outputs:
+        if output.driver not in _STOPS_ITSELF:
+            load(OUTPUT_DRIVERS[output.driver])
     if plan.enable_pin is not None:
-        modules.append("gpiozero")
-    for module in modules:
-        importlib.import_module(module)
+        importlib.import_module("gpiozero")
     if source != REAL:
         return
     for library in ("shapechanger.robot.drivers.lgpio_pins", "gpiozero.pins.lgpio", "smbus2"):

@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-Setting = bool | int | float | str | list[int] | list[float] | list[str]
-
 
 @dataclass(frozen=True, slots=True)
 class ActionPlan:
@@ -68,7 +66,7 @@ class OutputPlan:
     part: str = ""
     mix: dict[str, float] = field(default_factory=dict[str, float])
     offset: float = 0.0
-    settings: dict[str, Setting] = field(default_factory=dict[str, Setting])
+    settings: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +84,7 @@ class SensorPlan:
     name: str
     driver: str
     measures: str
-    settings: dict[str, Setting] = field(default_factory=dict[str, Setting])
+    settings: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +171,7 @@ class GuardPlan:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> GuardPlan:
-        """Read the output of `dataclasses.asdict`. It is trusted and not validated."""
+        """Read the output of `dataclasses.asdict`, which is trusted and not validated."""
         parts: dict[str, Any] = {
             "actions": tuple(ActionPlan(**action) for action in data["actions"]),
             "outputs": tuple(OutputPlan(**output) for output in data["outputs"]),

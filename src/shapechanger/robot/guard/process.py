@@ -21,7 +21,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.guard.channel import DaemonChannel, GuardChannel, Heartbeat
 from shapechanger.robot.guard.log import log_to_stderr, shortened
 from shapechanger.robot.guard.messages import GuardState
-from shapechanger.robot.guard.outputs import Done, OutputBank, Switches
+from shapechanger.robot.guard.outputs import Applied, OutputBank, Switches
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import GUARD, run_promptly
 from shapechanger.robot.guard.rules import OutputDecision, Rules
@@ -85,18 +85,14 @@ class Guard:
         self._applied: tuple[int, int | None] = (0, None)
         self._applied_ns: int | None = None
         self._sent: GuardState | None = None
-        self._said = ""
+        self._logged = ""
         self.is_safe = True
         """Return whether all outputs obeyed on closing."""
         self.ended = ""
         """Reason for ending; empty while it runs."""
 
     def run(self, heartbeat: Heartbeat) -> None:
-        """Run until asked to end.
-
-        Args:
-            heartbeat: Sign of life to the supervisor.
-        """
+        """Run until asked to end, with a heartbeat to the supervisor."""
         until_ns = self._clock.now_ns()
         while not self.ended:
             fds = [heartbeat.fileno()]
@@ -124,7 +120,7 @@ class Guard:
 
     def round(self, now_ns: int) -> int:
         """Run one round and return the time of the next."""
-        self._obey()
+        self._process_orders()
         if is_tick := now_ns >= self._next_tick_ns:
             self._next_tick_ns = max(self._next_tick_ns, now_ns - self._period_ns)
             self._next_tick_ns += self._period_ns
@@ -138,7 +134,7 @@ class Guard:
         self._report(decision, now_ns)
         return min(self._next_tick_ns, self._rules.next_wake_ns(now_ns))
 
-    def _obey(self) -> None:
+    def _process_orders(self) -> None:
         orders, malformed = self._daemon.orders()
         for order in orders:
             if order.kind == "arm" and (why := self._outputs.ready()):
@@ -164,7 +160,7 @@ class Guard:
         for name in sensing.failures.keys() - self._failures.keys():
             self._log.warning("Sensor %s fails: %s", name, sensing.failures[name])
         for name in self._failures.keys() - sensing.failures.keys():
-            self._log.info("Sensor %s answers again.", name)
+            self._log.info("Sensor %s responds again.", name)
         self._failures = dict(sensing.failures)
 
     def _apply(self, now_ns: int) -> OutputDecision:
@@ -175,7 +171,9 @@ class Guard:
             if decision.release:
                 self._outputs.release()
             else:
-                decision = self._truly(decision, self._outputs.write(decision.actions, now_ns))
+                decision = self._with_applied(
+                    decision, self._outputs.write(decision.actions, now_ns)
+                )
         except Exception as error:  # Whatever a driver raises, the other outputs must rest.
             self._healthy = False
             self._rules.fail(str(error) or type(error).__name__, now_ns)
@@ -185,13 +183,13 @@ class Guard:
             self._applied_ns = None if decision.seq is None else self._clock.now_ns()
         return decision
 
-    def _truly(self, decision: OutputDecision, done: Done) -> OutputDecision:
+    def _with_applied(self, decision: OutputDecision, outputs: Applied) -> OutputDecision:
         """Return the decision as the outputs applied it."""
-        self._rules.learn(done.actions)
+        self._rules.learn(outputs.actions)
         reason = decision.stop_reason
         if decision.seq is not None:  # A robot at rest obeys, if slightly later.
-            reason = f"{reason} {done.reason}".strip()
-        return replace(decision, actions=done.actions, stop_reason=reason)
+            reason = f"{reason} {outputs.reason}".strip()
+        return replace(decision, actions=outputs.actions, stop_reason=reason)
 
     def _recover(self, decision: OutputDecision, now_ns: int) -> OutputDecision:
         """Put all outputs to rest, retrying until each of them obeys."""
@@ -228,7 +226,7 @@ class Guard:
             sources=senses.sources,
             bumps=self._rules.bumps,
         )
-        self._say(arming.reason or "Armed.")
+        self._log_change(arming.reason or "Armed.")
         sent = self._sent
         # The next tick would be too late for some of them.
         if sent is not None and now_ns + self._period_ns - sent.at_ns <= _STATE_EVERY_NS:
@@ -239,10 +237,10 @@ class Guard:
             self._sent = replace(state, refused="", refused_seq=None)
             self._refused = ("", None)
 
-    def _say(self, fact: str) -> None:
-        if fact != self._said:
+    def _log_change(self, fact: str) -> None:
+        if fact != self._logged:
             self._log.info("%s", fact)
-            self._said = fact
+            self._logged = fact
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -9,11 +9,7 @@ from shapechanger.robot.guard.sensors import Sensing
 
 
 class Persistence:
-    """Condition that counts once it has held without interruption.
-
-    Args:
-        for_s: Time for which it must hold, s.
-    """
+    """Condition that counts once it has held for `for_s` seconds without interruption."""
 
     def __init__(self, for_s: float) -> None:
         self._for_ns = round(for_s * 1e9)
@@ -43,13 +39,11 @@ _BELIEVED_AFTER_S = 0.5
 
 
 class Bump:
-    """Block forward motion during a contact and for some time after it.
+    """Block forward motion during a contact and for `hold_ms` after it.
 
     Attributes:
         count: Number of bumps.
-
-    Args:
-        hold_ms: Time after the contact, ms.
+        until_ns: When the robot may go forward again; None if it never bumped.
     """
 
     def __init__(self, hold_ms: int) -> None:
@@ -57,7 +51,6 @@ class Bump:
         self._touches = False
         self.count = 0
         self.until_ns: int | None = None
-        """When the robot may go forward again; None if it never bumped."""
 
     def sense(self, quantities: Mapping[str, float], now_ns: int) -> None:
         """Update with a new sensing.
@@ -125,9 +118,6 @@ class RobotHealth:
 
     A battery recovers as soon as the load is gone, so a low battery latches until the robot is
     armed again.
-
-    Args:
-        plan: The robot.
     """
 
     def __init__(self, plan: GuardPlan) -> None:
@@ -197,9 +187,6 @@ class Propulsion:
 
     Attributes:
         forward: Which actions push the robot forward or backward, by index.
-
-    Args:
-        actions: The actions of the robot.
     """
 
     def __init__(self, actions: Sequence[ActionPlan]) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -12,29 +14,16 @@ from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
-
-def _larger(new: float, old: float) -> bool:
-    return new > old
-
-
-def _smaller(new: float, old: float) -> bool:
-    return new < old
-
-
-def _slower(new: float, old: float) -> bool:
-    return abs(new) < abs(old)
-
-
-# The more cautious reading wins: of two speeds the smaller, so that a turning track does not hide a
-# stalled one. Of other quantities the last one wins.
-_COUNTS_MORE: Final[dict[str, Callable[[float, float], bool]]] = {
-    "bump": _larger,
-    "collision": _larger,
-    "stall": _larger,
-    "temperature": _larger,
-    "distance": _smaller,
-    "battery": _smaller,
-    "speed": _slower,
+# Larger is more cautious, and the most cautious reading wins: of two speeds the smaller, so that a
+# turning track does not hide a stalled one. Of other quantities the last reading wins.
+_CAUTION: Final[dict[str, Callable[[float], float]]] = {
+    "bump": operator.pos,
+    "collision": operator.pos,
+    "stall": operator.pos,
+    "temperature": operator.pos,
+    "distance": operator.neg,
+    "battery": operator.neg,
+    "speed": lambda m_per_s: -abs(m_per_s),
 }
 
 
@@ -53,9 +42,8 @@ def merge(
         sensor: Its name.
     """
     for name, value in measured.items():
-        counts_more = _COUNTS_MORE.get(name)
-        is_first = name not in quantities
-        if is_first or counts_more is None or counts_more(value, quantities[name]):
+        caution = _CAUTION.get(name)
+        if name not in quantities or not caution or caution(value) > caution(quantities[name]):
             quantities[name], sources[name] = value, sensor
 
 
@@ -145,12 +133,11 @@ class Sensors:
         self._clock = hardware.clock
         self._ranging = {s.name for s in plan.sensors if s.measures == "distance"}
         self._drivers: list[tuple[str, SensorDriver]] = []
-        try:
+        with contextlib.ExitStack() as undo:
+            undo.callback(self.close)
             for sensor in plan.sensors:
                 self._drivers.append((sensor.name, open_sensor(sensor, hardware)))
-        except BaseException:
-            self.close()
-            raise
+            undo.pop_all()
 
     def read(self, now_ns: int, direction: float) -> Sensing:
         """Read all sensors.

@@ -28,7 +28,7 @@ from typing import Final
 
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.log import log_to_stderr
-from shapechanger.robot.guard.outputs import make_safe, noted, preload
+from shapechanger.robot.guard.outputs import errors_noted, make_safe, preload
 from shapechanger.robot.guard.priority import SUPERVISOR, run_promptly
 from shapechanger.robot.guard.serve_plan import AFTER_FAILURE, ServePlan, descriptors, read_plan_fd
 from shapechanger.robot.hardware import connect
@@ -115,7 +115,7 @@ class Child:
         self._process.kill()
         self._wait(at_most_s)
 
-    def tell(self) -> None:
+    def terminate(self) -> None:
         """Send SIGTERM."""
         if not self.has_ended():
             self._process.terminate()
@@ -127,7 +127,7 @@ class Child:
             at_most_s: Time to exit after SIGTERM, s.
             reap_s: Time to disappear after SIGKILL, s.
         """
-        self.tell()
+        self.terminate()
         if not self._wait(at_most_s):
             self.kill(reap_s)
 
@@ -189,7 +189,7 @@ _END_S: Final = 1.0  # For a process to exit after SIGTERM.
 _REAP_S: Final = 0.05  # For a killed process to disappear; the pins wait no longer.
 _AGAIN_S: Final = 0.1  # Between attempts to put the outputs to rest.
 _UNSAFE_S: Final = 5.0  # For such attempts when there is nothing else to wait for.
-_LOOK_S: Final = 0.02  # Between checks of the heartbeats.
+_CHECK_S: Final = 0.02  # Between checks of the heartbeats.
 # A longer gap between checks means that the supervisor itself did not run.
 _PAUSE_NS: Final = 100_000_000
 
@@ -234,7 +234,7 @@ class Supervisor:
         self._commands = commands
         self._log = log
         self._restarts = Restarts()
-        self._told = ""
+        self._end_reason = ""
         self._is_safe = True
         self._has_guarded = False
         self._failures: list[str] = []
@@ -263,8 +263,8 @@ class Supervisor:
                 why = self._supervise(guard, daemon)
             finally:
                 self._stop(guard, daemon)
-            if self._told:
-                self._log.info("ends: %s.", self._told)
+            if self._end_reason:
+                self._log.info("ends: %s.", self._end_reason)
                 return _ENDED if self._is_safe else _NOT_SAFE
             if not self._is_safe:
                 self._log.critical("gives up: %s, and not all outputs are at rest.", why)
@@ -274,18 +274,18 @@ class Supervisor:
                 return _FAILED_TOO_OFTEN
             self._log.warning("%s; both start afresh, and the robot is not armed.", why)
             self._pause(self._restarts.pause_s)
-            if self._told:
-                self._log.info("ends: %s.", self._told)
+            if self._end_reason:
+                self._log.info("ends: %s.", self._end_reason)
                 return _ENDED
             after_failure = (AFTER_FAILURE,)
 
     def _end(self, number: int, _: object) -> None:
-        self._told = self._told or f"ended by {signal.Signals(number).name}"
+        self._end_reason = self._end_reason or f"ended by {signal.Signals(number).name}"
 
     def _pause(self, seconds: float) -> None:
         """Wait; the first signal ends the wait early."""
         poll = select.poll()
-        if not self._told:
+        if not self._end_reason:
             poll.register(self._woken.fileno(), select.POLLIN)
         poll.poll(seconds * 1e3)
 
@@ -317,15 +317,15 @@ class Supervisor:
             guard: self._plan.guard_silence_ms * 1_000_000,
             daemon: round(_DAEMON_SILENCE_S * 1e9),
         }
-        looked_ns = time.monotonic_ns()
-        while not self._told:
-            poll.poll(_LOOK_S * 1e3)
+        checked_ns = time.monotonic_ns()
+        while not self._end_reason:
+            poll.poll(_CHECK_S * 1e3)
             now_ns = time.monotonic_ns()
             # Silence does not count while the supervisor itself was stopped.
-            deaf_ns = now_ns - looked_ns if now_ns - looked_ns > _PAUSE_NS else 0
-            looked_ns = now_ns
+            paused_ns = now_ns - checked_ns if now_ns - checked_ns > _PAUSE_NS else 0
+            checked_ns = now_ns
             for child, limit_ns in silence_ns.items():
-                child.beaten_ns += deaf_ns
+                child.beaten_ns += paused_ns
                 if child.is_gone(now_ns):
                     return f"the {child.name} is gone"
                 if not child.has_beaten:
@@ -333,26 +333,26 @@ class Supervisor:
                 if now_ns - child.beaten_ns >= limit_ns:
                     child.kill(_REAP_S)
                     return f"the {child.name} was silent, and was killed"
-        return self._told
+        return self._end_reason
 
     def _stop(self, guard: Child, daemon: Child) -> None:
         """End both children, the guard first, and leave the outputs at rest."""
         if not guard.killed and guard.is_gone(time.monotonic_ns()):
             guard.kill(_REAP_S)
             if guard.code == 0:
-                self._told = self._told or "the guard was ended"
+                self._end_reason = self._end_reason or "the guard was ended"
         elif not guard.killed:
             # A guard that does not exit may hold the outputs anywhere, so the time is short.
             guard.end(self._plan.guard_silence_ms / 1e3, _REAP_S)
         self._has_guarded = self._has_guarded or guard.has_beaten
-        daemon.tell()
+        daemon.terminate()
         if guard.code == 0:
             self._is_safe = True
         else:
             self._secure(guard)
         daemon.end(_END_S, _END_S)
         for child in (guard, daemon):
-            self._log.info("%s %s.", child.name, _words(child.code))
+            self._log.info("%s %s.", child.name, _exit_words(child.code))
             child.close()
 
     def _secure(self, guard: Child) -> None:
@@ -377,8 +377,8 @@ class Supervisor:
                 return
             if self._is_safe:
                 self._is_safe = False
-                self._say_unsafe(["The guard does not end, and may still write."])
-            if self._told or not self._has_guarded:
+                self._log_unsafe(["The guard does not end, and may still write."])
+            if self._end_reason or not self._has_guarded:
                 until_ns = until_ns or now_ns + round(_UNSAFE_S * 1e9)
                 if now_ns >= until_ns:
                     return
@@ -386,16 +386,17 @@ class Supervisor:
 
     def _make_safe(self) -> None:
         failures: list[str] = []
-        with noted(failures, "The hardware"):  # The children must be ended whatever happens to it.
+        # The children must be ended whatever happens to the hardware.
+        with errors_noted(failures, "The hardware"):
             hardware = connect(*self._plan.hardware)
             try:
                 failures += make_safe(self._plan.guard, hardware)
             finally:
                 hardware.close()
         self._is_safe = not failures
-        self._say_unsafe(failures)
+        self._log_unsafe(failures)
 
-    def _say_unsafe(self, failures: list[str]) -> None:
+    def _log_unsafe(self, failures: list[str]) -> None:
         """Log the outputs that do not obey, whenever the list changes."""
         if failures and failures != self._failures:
             self._failures = failures
@@ -403,7 +404,7 @@ class Supervisor:
                 self._log.error("NOT SAFE: %s", failure)
 
 
-def _words(code: int | None) -> str:
+def _exit_words(code: int | None) -> str:
     if code is None:
         return "does not end"
     return f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"

@@ -8,14 +8,12 @@ from shapechanger.robot.profile.load import (
     shipped_profiles,
     write_profile,
 )
-from shapechanger.robot.profile.profile import EnablePlan, Profile, ResetStep, RewardPlan
+from shapechanger.robot.profile.profile import Profile, ResetStep
 from shapechanger.robot.profile.read import read_profile
 
 __all__ = [
-    "EnablePlan",
     "Profile",
     "ResetStep",
-    "RewardPlan",
     "find_profile",
     "load_profile",
     "read_profile",

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -13,6 +11,7 @@ import tomlkit
 from tomlkit.items import Item
 
 from shapechanger.errors import OutputError, UnknownName
+from shapechanger.robot.new_file import rewrite_file
 from shapechanger.robot.profile.load import profile_text
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.profile.read import read_profile
@@ -48,7 +47,10 @@ def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile
         table[key] = _item(value, table, key)
     text: str = tomlkit.dumps(document)
     profile = read_profile(text, target)
-    _replace(target, text)
+    try:
+        rewrite_file(target, text.encode())
+    except OSError as error:
+        raise OutputError(f"Cannot write {target}: {error.strerror or error}.") from error
     return profile
 
 
@@ -63,27 +65,3 @@ def _item(value: Any, table: Any, key: str) -> Any:
         inline.trivia.comment_ws = before.trivia.comment_ws
         inline.trivia.comment = before.trivia.comment
     return inline
-
-
-def _replace(target: Path, text: str) -> None:
-    """Replace a file atomically, safe against a power failure."""
-    written: Path | None = None
-    try:
-        with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", dir=target.parent, prefix=f".{target.name}.", delete=False
-        ) as file:
-            written = Path(file.name)
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        shutil.copymode(target, written)
-        written.replace(target)
-        folder = os.open(target.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except OSError as error:
-        if written is not None:
-            written.unlink(missing_ok=True)
-        raise OutputError(f"Cannot write {target}: {error.strerror or error}.") from error

@@ -2,245 +2,102 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
-from shapechanger.errors import RobotError, UnknownName
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.drivers.dynamixel.settings import (
-    ServoSettings,
-    bus_settings,
-    servo_settings,
-)
-from shapechanger.robot.drivers.settings import number, numbers, texts
 from shapechanger.robot.guard.plan import (
     ActionPlan,
     GuardPlan,
-    LimitPlan,
     OutputPlan,
     SensorPlan,
-    StopPlan,
 )
-from shapechanger.robot.profile.mistakes import Source, called
 
-_APPLIED: Final = "applied"
-"""Suffix of the features with the applied value of an action: `steering/applied`."""
-
-_STALL: Final = "stall"
-"""Stall, concluded by the guard from a measured speed: pushing without moving."""
-
-TENDONS: Final = "tendons"
-"""Measurements of a servo bus: `FDP/length`, `FDP/speed` and `FDP/tension`."""
-
-JOINTS: Final = "joints"
-"""Measurement of joint encoders: `MCP_flexion/angle`."""
-
-_COLLISION: Final = "collision"
-"""Collision, concluded by the guard from a bumper or a stall."""
-
-
-class Quantity(NamedTuple):
-    """One number measured by a sensor.
-
-    Attributes:
-        measures: Kind of the sensors that give it, as in `SensorPlan.measures`, or a conclusion.
-        unit: Its SI unit.
-        low: Smallest value.
-        high: Largest value.
-    """
-
-    measures: str
-    unit: str
-    low: float = -math.inf
-    high: float = math.inf
-
-
+_INF: Final = math.inf
+# Unit, smallest and largest value of each quantity in `GuardState.quantities`, in the order of the
+# state, and the kind of sensor that measures it (see `SensorPlan.measures`). The guard concludes
+# stalls from a measured speed, and collisions from a bumper or a stall.
 _QUANTITIES: Final = {
-    "speed": Quantity("speed", "m/s"),
-    "distance": Quantity("distance", "m", low=0.0),
-    "bump": Quantity("bump", "1", 0.0, 1.0),
-    "stall": Quantity(_STALL, "1", 0.0, 1.0),
-    "collision": Quantity(_COLLISION, "1", 0.0, 1.0),
-    "yaw_rate": Quantity("imu", "rad/s"),
-    "acceleration_x": Quantity("imu", "m/s²"),
-    "acceleration_y": Quantity("imu", "m/s²"),
-    "battery": Quantity("battery", "V", low=0.0),
-    "temperature": Quantity("temperature", "°C"),
+    "speed": ("m/s", -_INF, _INF, "speed"),
+    "distance": ("m", 0.0, _INF, "distance"),
+    "bump": ("1", 0.0, 1.0, "bump"),
+    "stall": ("1", 0.0, 1.0, "stall"),
+    "collision": ("1", 0.0, 1.0, "collision"),
+    "yaw_rate": ("rad/s", -_INF, _INF, "imu"),
+    "acceleration_x": ("m/s²", -_INF, _INF, "imu"),
+    "acceleration_y": ("m/s²", -_INF, _INF, "imu"),
+    "battery": ("V", 0.0, _INF, "battery"),
+    "temperature": ("°C", -_INF, _INF, "temperature"),
 }
-"""Quantities by their names in `GuardState.quantities`, in the order of the state."""
 
 
-def _state_features(
-    sensors: Iterable[SensorPlan], actions: Iterable[ActionPlan], limits: LimitPlan
-) -> list[Feature]:
+def _state_features(plan: GuardPlan) -> list[Feature]:
     """Return a feature for each quantity that a robot senses.
 
     Without a speed sensor, the guard estimates the speed from a propelling action whose profile
-    gives its gain in m/s. Stalls and collisions are the guard's conclusions.
+    gives its gain in m/s.
     """
-    sensors = tuple(sensors)
     sources: dict[str, Element] = {}
-    for sensor in sensors:
+    for sensor in plan.sensors:
         sources.setdefault(sensor.measures, Element("sensor", sensor.name))
-    if "speed" in sources and limits.stall_s > 0.0:
-        sources[_STALL] = sources["speed"]
-    if bumped := sources.get("bump", sources.get(_STALL)):
-        sources[_COLLISION] = bumped
-    for action in actions:
-        if action.propels and action.unit == _QUANTITIES["speed"].unit:
+    if "speed" in sources and plan.limits.stall_s > 0.0:
+        sources["stall"] = sources["speed"]
+    if bumped := sources.get("bump", sources.get("stall")):
+        sources["collision"] = bumped
+    for action in plan.actions:
+        if action.propels and action.unit == "m/s":
             sources.setdefault("speed", Element("actuator", action.name))
     known = [
-        Feature(name, q.unit, q.low, q.high, sources[q.measures])
-        for name, q in _QUANTITIES.items()
-        if q.measures in sources
+        Feature(name, unit, low, high, sources[measures])
+        for name, (unit, low, high, measures) in _QUANTITIES.items()
+        if measures in sources
     ]
-    known += [f for s in sensors if s.measures == TENDONS for f in _tendon_features(s)]
-    return known + [f for s in sensors if s.measures == JOINTS for f in _joint_features(s)]
+    known += [f for s in plan.sensors if s.measures == "tendons" for f in _tendon_features(s)]
+    return known + [f for s in plan.sensors if s.measures == "joints" for f in _joint_features(s)]
 
 
 def _tendon_features(sensor: SensorPlan) -> list[Feature]:
     """Return length, speed and tension of each tendon on a servo bus."""
-    names = texts(sensor.settings, "tendons")
-    most = numbers(sensor.settings, "most_tensions_n")
-    parts = [(name, n, Element("tendon", name)) for name, n in zip(names, most, strict=True)]
+    most = dict(zip(sensor.settings["tendons"], sensor.settings["most_tensions_n"], strict=True))
+    parts = {name: Element("tendon", name) for name in most}
     return [
-        *(Feature(f"{name}/length", "m", element=part) for name, _, part in parts),
-        *(Feature(f"{name}/speed", "m/s", element=part) for name, _, part in parts),
-        *(Feature(f"{name}/tension", "N", 0.0, n, part) for name, n, part in parts),
+        *(Feature(f"{name}/length", "m", element=part) for name, part in parts.items()),
+        *(Feature(f"{name}/speed", "m/s", element=part) for name, part in parts.items()),
+        *(Feature(f"{name}/tension", "N", 0.0, most[name], part) for name, part in parts.items()),
     ]
 
 
 def _joint_features(sensor: SensorPlan) -> list[Feature]:
     """Return the angle of each joint, within half a turn of its zero."""
-    names = texts(sensor.settings, "joints")
+    names: list[str] = sensor.settings["joints"]
     return [
         Feature(f"{name}/angle", "rad", -math.pi, math.pi, Element("joint", name)) for name in names
     ]
 
 
-_DRIVER: Final = "dynamixel"
-
-
-def with_servo_bus(
-    source: Source,
-    bus: Mapping[str, Any] | None,
-    outputs: tuple[OutputPlan, ...],
-    sensors: tuple[SensorPlan, ...],
-    stop: StopPlan,
-) -> tuple[tuple[OutputPlan, ...], tuple[SensorPlan, ...]]:
-    """Add the settings of the servo bus to its outputs and sensors.
-
-    Args:
-        source: Where the profile was read.
-        bus: The table of the bus; None without one.
-        outputs: All outputs.
-        sensors: All sensors.
-        stop: How the robot stops.
-
-    Raises:
-        ProfileError: If outputs lack a bus, or a bus lacks outputs or a sensor; if two servos share
-            an id, a servo cannot do what it is set to, or a stop would not release it.
-    """
-    on_bus = [output for output in outputs if output.driver == _DRIVER]
-    sensing = [sensor for sensor in sensors if sensor.driver == _DRIVER]
-    if not on_bus:
-        if bus is not None:
-            words = f"[servo_bus] needs an output with the driver {_DRIVER}"
-            raise source.mistake(("servo_bus",), words)
-        if sensing:
-            words = f"{called(('sensor', sensing[0].name))} needs outputs with the driver {_DRIVER}"
-            raise source.mistake(("sensor", sensing[0].name), words)
-        return outputs, sensors
-    first = ("output", on_bus[0].name)
-    if bus is None:
-        raise source.mistake(first, f"{called(first)} is on a bus: add [servo_bus]")
-    if len(sensing) != 1:
-        words = (
-            f"servos need one sensor with the driver {_DRIVER}, such as [sensor.tendons], which "
-            "hears when one of them fails"
-        )
-        raise source.mistake(("sensor",) if not sensing else ("sensor", sensing[1].name), words)
-    if stop.then != "release":
-        words = 'then of [stop] must be "release", so that no servo pulls while nobody commands'
-        raise source.mistake(("stop", "then"), words)
-    whole = [replace(output, settings={**output.settings, **bus}) for output in on_bus]
-    _check(source, whole, bus)
-    tendons: dict[str, Any] = {
-        "device": bus["device"],
-        "tendons": [output.name for output in on_bus],
-        "most_tensions_n": [number(output.settings, "most_tension_n") for output in on_bus],
-    }
-    by_name = {output.name: output for output in whole}
-    return (
-        tuple(by_name.get(output.name, output) for output in outputs),
-        tuple(
-            replace(sensor, settings={**sensor.settings, **tendons})
-            if sensor in sensing
-            else sensor
-            for sensor in sensors
-        ),
-    )
-
-
-def _tension_spans(outputs: Iterable[OutputPlan]) -> dict[str, float]:
+def _tension_spans(outputs: Sequence[OutputPlan]) -> dict[str, float]:
     """Return the tension span, N, of each action that alone pulls one tendon."""
-    outputs = tuple(outputs)
     moved = [name for output in outputs for name in output.mix]
     spans: dict[str, float] = {}
     for output in outputs:
-        if output.driver != _DRIVER or output.offset or len(output.mix) != 1:
+        if output.driver != "dynamixel" or output.offset or len(output.mix) != 1:
             continue
         ((name, weight),) = output.mix.items()
         if weight == 1.0 and moved.count(name) == 1:
-            settings = output.settings
-            spans[name] = number(settings, "most_tension_n") - number(settings, "pretension_n")
+            spans[name] = output.settings["most_tension_n"] - output.settings["pretension_n"]
     return {name: span for name, span in spans.items() if span > 0.0}
-
-
-def _check(source: Source, outputs: list[OutputPlan], bus: Mapping[str, Any]) -> None:
-    """Report, with its line, what the driver would refuse."""
-    servos: list[ServoSettings] = []
-    for output in outputs:
-        try:
-            servos.append(servo_settings(output))
-        except (RobotError, UnknownName) as error:
-            words = str(error).rstrip(".")
-            raise source.mistake(("output", output.name), words) from error
-    try:
-        bus_settings({**outputs[0].settings, **bus}, tuple(servos))
-    except RobotError as error:
-        raise source.mistake(("servo_bus",), str(error).rstrip(".")) from error
 
 
 # Layouts are in SI units; profiles may use degrees.
 _SI: Final = {"deg": ("rad", math.pi / 180.0)}
 
 
-@dataclass(frozen=True, slots=True)
-class RewardPlan:
-    """Weights of the task.
-
-    Attributes:
-        velocity: Reward per metre forward, 1/m.
-        collision: Reward per collision, at most 0.
-        stall: Reward per second of stall, 1/s, at most 0.
-        collision_ends_episode: Whether a collision ends the task.
-    """
-
-    velocity: float = 1.0
-    collision: float = -10.0
-    stall: float = -1.0
-    collision_ends_episode: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class ResetStep:
+class ResetStep(NamedTuple):
     """One step of the reset routine.
 
     Attributes:
@@ -252,82 +109,37 @@ class ResetStep:
     seconds: float
 
 
-@dataclass(frozen=True, slots=True)
-class EnablePlan:
-    """One-shot that enables the motors while the guard toggles a pin.
-
-    Attributes:
-        pin: BCM pin that is toggled.
-        hold_ms: Time for which it holds the line after the last toggle, ms.
-    """
-
-    pin: int
-    hold_ms: int
-
-
-@dataclass(frozen=True, slots=True)
-class Profile:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile(GuardPlan):
     """A robot: what it moves and senses, its caps, and when it stops.
 
     Attributes:
         path: The file that it was read from.
-        name: Name of the robot.
         body: Kind of robot, such as "car".
         control_hz: Expected rate of commands, Hz.
         calibrated: Date of calibration; None if it never was.
-        actions: The numbers of a command, in order.
-        outputs: What they move.
-        sensors: What the guard reads.
         camera: Its camera; None without one.
-        limits: When it stops by itself.
         max_observation_age_ms: Largest age of the observation that a command answers, ms.
         arming: Who may arm it.
-        stop: How it stops.
-        reward: Weights of the task.
+        reward: Weights of the task, as in `Welcome.reward`: "velocity" per metre forward,
+            "collision" per collision, "stall" per second of stall, and "collision_ends_episode",
+            1 or 0.
         reset: The reset routine; empty for none.
-        enable: The one-shot of the enable line; None without one.
-        stop_pin: BCM pin of the emergency stop button; None without one.
     """
 
     path: Path
-    name: str
     body: str
     control_hz: float
     calibrated: datetime.date | None
-    actions: tuple[ActionPlan, ...]
-    outputs: tuple[OutputPlan, ...]
-    sensors: tuple[SensorPlan, ...]
     camera: CameraPlan | None
-    limits: LimitPlan
     max_observation_age_ms: int
     arming: Literal["person", "anyone"]
-    stop: StopPlan
-    reward: RewardPlan
+    reward: dict[str, float]
     reset: tuple[ResetStep, ...]
-    enable: EnablePlan | None
-    stop_pin: int | None
-
-    @property
-    def image_size(self) -> tuple[int, int] | None:
-        """Width and height of frames, pixels; None without a camera."""
-        return self.camera.size if self.camera else None
 
     def guard_plan(self) -> GuardPlan:
-        """Return the guard's plan."""
-        plan = GuardPlan(
-            name=self.name,
-            actions=self.actions,
-            outputs=self.outputs,
-            sensors=self.sensors,
-            limits=self.limits,
-            stop=self.stop,
-            stop_pin=self.stop_pin,
-        )
-        if self.enable is None:
-            return plan
-        return dataclasses.replace(
-            plan, enable_pin=self.enable.pin, enable_hold_ms=self.enable.hold_ms
-        )
+        """Return only what the guard needs."""
+        return GuardPlan(**{field.name: getattr(self, field.name) for field in fields(GuardPlan)})
 
     def action_layout(self) -> Layout:
         """Return the layout of commands.
@@ -345,7 +157,7 @@ class Profile:
         """Return the layout of states: sensed quantities, then applied actions."""
         applied = tuple(
             Feature(
-                f"{action.name}/{_APPLIED}",
+                f"{action.name}/applied",
                 "1",
                 0.0 if action.one_sided else -1.0,
                 1.0,
@@ -353,15 +165,7 @@ class Profile:
             )
             for action in self.actions
         )
-        return Layout((*_state_features(self.sensors, self.actions, self.limits), *applied))
-
-    def reward_weights(self) -> dict[str, float]:
-        """Return the reward weights by name, as in `Welcome.reward`; booleans are 1 or 0."""
-        return {name: float(weight) for name, weight in dataclasses.asdict(self.reward).items()}
-
-    def reset_routine(self) -> tuple[tuple[tuple[float, ...], float], ...]:
-        """Return the values and the duration, s, of each reset step, as in `Welcome.reset`."""
-        return tuple((step.values, step.seconds) for step in self.reset)
+        return Layout((*_state_features(self), *applied))
 
 
 def _action_feature(action: ActionPlan, span_n: float | None) -> Feature:

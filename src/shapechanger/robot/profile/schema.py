@@ -1,63 +1,21 @@
-"""Schema of profiles: every table, its keys, units and bounds."""
+"""Schema of profiles: every table, its keys, units and bounds, and how a table is read."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any, Final, Literal, cast
 
+from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CAMERA_DRIVERS
 from shapechanger.robot.drivers.dynamixel.settings import MODELS
 from shapechanger.robot.drivers.output import OUTPUT_DRIVERS
 from shapechanger.robot.drivers.sensor import SENSOR_DRIVERS
-from shapechanger.robot.profile.mistakes import nearest, shown
-
-_HIGHEST_BCM: Final = 27
-"""Largest BCM number on the header; the smallest is 0."""
-
-BCM_OF_BOARD: Final = {
-    3: 2, 5: 3, 7: 4, 8: 14, 10: 15, 11: 17, 12: 18, 13: 27, 15: 22, 16: 23,
-    18: 24, 19: 10, 21: 9, 22: 25, 23: 11, 24: 8, 26: 7, 27: 0, 28: 1, 29: 5,
-    31: 6, 32: 12, 33: 13, 35: 19, 36: 16, 37: 26, 38: 20, 40: 21,
-}  # fmt: skip
-"""BCM number of each header position that has one."""
-
-I2C_PINS: Final = {0: (0, 1), 1: (2, 3)}
-"""BCM pins of SDA and SCL of the I2C buses with fixed pins."""
-
-_POWER_OF_BOARD: Final = (
-    dict.fromkeys((1, 17), "3.3 V")
-    | dict.fromkeys((2, 4), "5 V")
-    | dict.fromkeys((6, 9, 14, 20, 25, 30, 34, 39), "ground")
-)
-_WRITTEN: Final = re.compile(r"(GPIO|BOARD)([0-9]{1,3})")
-
-
-def bcm(written: object) -> int:
-    """Parse a pin into its BCM number.
-
-    Raises:
-        ValueError: If there is no such pin; the message is a reason after a comma, or empty.
-    """
-    if type(written) is int:
-        number = written
-    elif isinstance(written, str) and (match := _WRITTEN.fullmatch(written)):
-        number = int(match[2])
-        if match[1] == "BOARD":
-            if number in _POWER_OF_BOARD:
-                raise ValueError(f"and {written} is {_POWER_OF_BOARD[number]}")
-            if number not in BCM_OF_BOARD:
-                raise ValueError("and the header has the places 1 to 40")
-            number = BCM_OF_BOARD[number]
-    else:
-        raise ValueError
-    if not 0 <= number <= _HIGHEST_BCM:
-        raise ValueError
-    return number
-
+from shapechanger.robot.profile.mistakes import Place, Source, called, choice, nearest, shown
+from shapechanger.robot.profile.pins import HIGHEST_BCM, bcm
 
 _UNITS: Final = {
     "_deg_per_s": "degrees a second",
@@ -110,7 +68,7 @@ NO_PIN: Final = -1
 
 _LONGEST_TEXT: Final = 64  # As in the messages, see `shapechanger.link.messages`.
 _NOT_PRINTABLE: Final = re.compile(r"[^\x20-\x7e\xa0-\U0010ffff]")
-_A_PIN: Final = f'a BCM pin from 0 to {_HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
+_A_PIN: Final = f'a BCM pin from 0 to {HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,8 +247,8 @@ DRIVING_PARTS: Final = (
 PARTS: Final = (*DRIVING_PARTS, "steering", "rudder", "gear", "bed", "joint", "tendon")
 """Parts that an output may move."""
 
-OVER: Final = ("pca9685", "lgpio", "sysfs")
-"""Sources of the pulses of a servo or a controller."""
+OVER_KEY: Final = ProfileKey("over", "choice", names=("pca9685", "lgpio", "sysfs"))
+"""Source of the pulses of a servo or a controller."""
 
 MEASURES: Final = {
     "encoder": "speed",
@@ -332,10 +290,7 @@ OUTPUT_KEYS: Final = (
 )
 
 _BUS: Final = ProfileKey("bus", "whole", 1, low=0, high=99)
-_PULSES: Final = (
-    ProfileKey("over", "choice", names=OVER),
-    ProfileKey("hz", "whole", 50, low=40, high=400),
-)
+_PULSES: Final = (OVER_KEY, ProfileKey("hz", "whole", 50, low=40, high=400))
 _DUTY: Final = (
     # gpiozero's software PWM takes up to 10 kHz.
     ProfileKey("pwm_hz", "whole", 50, low=1, high=10_000),
@@ -506,3 +461,80 @@ SERVO_BUS_KEYS: Final = (
 """Keys of the bus of the outputs with the driver dynamixel."""
 
 EMERGENCY_BUTTON_KEYS: Final = (ProfileKey("pin", "pin"),)
+
+_Owners = Mapping[str, Mapping[str, Iterable[ProfileKey]]]
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
+
+
+class Section:
+    """One table of a profile and its path, so that a mistake in it can be located.
+
+    Every method raises a `ProfileError` with one sentence and the line.
+
+    Args:
+        source: Where the profile was read.
+        place: Path of the table.
+        table: Its keys and nested tables; anything else is refused.
+    """
+
+    def __init__(self, source: Source, place: Place, table: Any) -> None:
+        self.source = source
+        self.place = place
+        if not isinstance(table, dict):
+            raise self.mistake(f"{self} must be a table, not {shown(table)}")
+        self.table = cast("dict[str, Any]", table)
+
+    def __str__(self) -> str:
+        return called(self.place)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.table
+
+    def mistake(self, words: str, *at: str | int) -> ProfileError:
+        """Return the error for a mistake in this table, or in one of its keys."""
+        return self.source.mistake((*self.place, *at), words)
+
+    def section(self, name: str) -> Section:
+        """Return a nested table, which is empty if it is missing."""
+        return Section(self.source, (*self.place, name), self.table.get(name, {}))
+
+    def named(self) -> dict[str, Section]:
+        """Return the nested tables by name; refuse names that are not allowed for a part."""
+        for name in self.table:
+            if _NAME.fullmatch(name) is None:
+                words = "must begin with a letter and have at most 32 letters, digits, '_' and '-'"
+                raise self.mistake(f"the name {name!r} {words}", name)
+        return {name: self.section(name) for name in self.table}
+
+    def read(self, keys: Iterable[ProfileKey], owners: _Owners | None = None) -> dict[str, Any]:
+        """Return the value of each key, with defaults, and refuse unknown keys.
+
+        Args:
+            keys: The permitted keys.
+            owners: Keys of other drivers, by what these are called and by driver.
+        """
+        known = {key.name: key for key in keys}
+        for name in self.table:
+            if name in known:
+                continue
+            if (meant := with_unit(name, known)) is not None:
+                words = f"{name!r} of {self} lacks its unit or has another one: write {meant!r}"
+                raise self.mistake(f"{words} ({unit_of(meant)})", name)
+            for kind, drivers in (owners or {}).items():
+                if having := [d for d, ks in drivers.items() if name in (k.name for k in ks)]:
+                    words = f"{name!r} belongs to {kind} {' and '.join(having)}, not to {self}"
+                    raise self.mistake(words, name)
+            raise self.mistake(f"{self} has no key {choice(name, known)}", name)
+        return {name: self.value(key) for name, key in known.items()}
+
+    def value(self, key: ProfileKey) -> Any:
+        """Return the value of one key, or its default."""
+        if key.name not in self.table:
+            if key.default is REQUIRED:
+                raise self.mistake(f"{self} lacks the key {key.name!r}, {key.wanted}")
+            return key.default
+        try:
+            return key.value_of(self.table[key.name])
+        except ValueError as error:
+            words = f"{key.name} of {self} must be {key.wanted}, {error}"
+            raise self.mistake(words, key.name) from None

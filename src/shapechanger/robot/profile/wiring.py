@@ -1,4 +1,4 @@
-"""Allocation of pins, channels and addresses; none may be used twice."""
+"""Pins, channels, addresses and the servo bus: nothing may be used twice or be missing."""
 
 from __future__ import annotations
 
@@ -6,10 +6,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.dynamixel.settings import (
+    ServoSettings,
+    bus_settings,
+    servo_settings,
+)
+from shapechanger.robot.guard.plan import OutputPlan, SensorPlan, StopPlan
 from shapechanger.robot.profile.mistakes import Place, Source, called
+from shapechanger.robot.profile.pins import I2C_PINS
 from shapechanger.robot.profile.schema import (
-    I2C_PINS,
     NO_PIN,
     OUTPUT_SETTINGS,
     OVER_SETTINGS,
@@ -156,3 +162,84 @@ def _chip_of(settings: _Settings) -> str:
     if settings.get("over") != "pca9685":
         return ""
     return f"the PCA9685 at {settings['address']:#x} of I2C bus {settings['bus']}"
+
+
+_DYNAMIXEL: Final = "dynamixel"
+
+
+def with_servo_bus(
+    source: Source,
+    bus: Mapping[str, Any] | None,
+    outputs: tuple[OutputPlan, ...],
+    sensors: tuple[SensorPlan, ...],
+    stop: StopPlan,
+) -> tuple[tuple[OutputPlan, ...], tuple[SensorPlan, ...]]:
+    """Add the settings of the servo bus to its outputs and sensors.
+
+    Args:
+        source: Where the profile was read.
+        bus: The table of the bus; None without one.
+        outputs: All outputs.
+        sensors: All sensors.
+        stop: How the robot stops.
+
+    Raises:
+        ProfileError: If outputs lack a bus, or a bus lacks outputs or a sensor; if two servos share
+            an id, a servo cannot do what it is set to, or a stop would not release it.
+    """
+    on_bus = [output for output in outputs if output.driver == _DYNAMIXEL]
+    sensing = [sensor for sensor in sensors if sensor.driver == _DYNAMIXEL]
+    if not on_bus:
+        if bus is not None:
+            words = f"[servo_bus] needs an output with the driver {_DYNAMIXEL}"
+            raise source.mistake(("servo_bus",), words)
+        if sensing:
+            words = (
+                f"{called(('sensor', sensing[0].name))} needs outputs with the driver {_DYNAMIXEL}"
+            )
+            raise source.mistake(("sensor", sensing[0].name), words)
+        return outputs, sensors
+    first = ("output", on_bus[0].name)
+    if bus is None:
+        raise source.mistake(first, f"{called(first)} is on a bus: add [servo_bus]")
+    if len(sensing) != 1:
+        words = (
+            f"servos need one sensor with the driver {_DYNAMIXEL}, such as [sensor.tendons], which "
+            "reports their failures"
+        )
+        raise source.mistake(("sensor",) if not sensing else ("sensor", sensing[1].name), words)
+    if stop.then != "release":
+        words = 'then of [stop] must be "release", so that no servo pulls while nobody commands'
+        raise source.mistake(("stop", "then"), words)
+    whole = [replace(output, settings={**output.settings, **bus}) for output in on_bus]
+    _check_servos(source, whole, bus)
+    tendons: dict[str, Any] = {
+        "device": bus["device"],
+        "tendons": [output.name for output in on_bus],
+        "most_tensions_n": [output.settings["most_tension_n"] for output in on_bus],
+    }
+    by_name = {output.name: output for output in whole}
+    return (
+        tuple(by_name.get(output.name, output) for output in outputs),
+        tuple(
+            replace(sensor, settings={**sensor.settings, **tendons})
+            if sensor in sensing
+            else sensor
+            for sensor in sensors
+        ),
+    )
+
+
+def _check_servos(source: Source, outputs: list[OutputPlan], bus: Mapping[str, Any]) -> None:
+    """Report, with its line, what the driver would refuse."""
+    servos: list[ServoSettings] = []
+    for output in outputs:
+        try:
+            servos.append(servo_settings(output))
+        except (RobotError, UnknownName) as error:
+            words = str(error).rstrip(".")
+            raise source.mistake(("output", output.name), words) from error
+    try:
+        bus_settings({**outputs[0].settings, **bus}, tuple(servos))
+    except RobotError as error:
+        raise source.mistake(("servo_bus",), str(error).rstrip(".")) from error

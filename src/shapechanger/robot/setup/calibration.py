@@ -7,14 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.pulse import PulseRange
+from shapechanger.robot.drivers.pulse import PULSE_KEYS, PulseRange
 from shapechanger.robot.guard.plan import OutputPlan
-
-PULSES: Final = {
-    "servo": ("left_us", "centre_us", "right_us"),
-    "esc": ("backward_us", "neutral_us", "forward_us"),
-}
-"""Settings of each driver that are pulse widths, at -1, 0 and 1."""
 
 # A servo must not be driven against its stop while it is jogged. Makers state 500 to 2500 us as the
 # full range of standard servos, and 900 to 2100 us as what most of them reach.
@@ -38,13 +32,9 @@ class JogResult:
 
 
 def with_widest_pulses(output: OutputPlan) -> OutputPlan:
-    """Return the output with the widest pulse range, for jogging; its middle stays.
-
-    Raises:
-        RobotError: If the output sends no pulses.
-    """
-    low, _, high = _keys(output)
-    turned = _number(output, low) > _number(output, high)
+    """Return a servo or controller with the widest pulse range, for jogging; its middle stays."""
+    low, _, high = PULSE_KEYS[output.driver]
+    turned = output.settings[low] > output.settings[high]
     ends = (_WIDEST_US, _NARROWEST_US) if turned else (_NARROWEST_US, _WIDEST_US)
     settings = {**output.settings, low: ends[0], high: ends[1]}
     return dataclasses.replace(output, settings=settings)
@@ -57,10 +47,9 @@ def reading(output: OutputPlan, value: float) -> str:
         output: A servo, a motor controller or a motor.
         value: -1 to 1.
     """
-    if output.driver in PULSES:
-        pulses = PulseRange(*(_number(output, key) for key in _keys(output)))
-        return f"{pulses.width_us(value):.0f} µs"
-    return f"duty {abs(value) * _number(output, 'full'):.2f}"
+    if output.driver in PULSE_KEYS:
+        return f"{PulseRange.of(output).width_us(value):.0f} µs"
+    return f"duty {abs(value) * output.settings['full']:.2f}"
 
 
 def pulse_changes(output: OutputPlan, found: JogResult) -> dict[str, int]:
@@ -73,8 +62,7 @@ def pulse_changes(output: OutputPlan, found: JogResult) -> dict[str, int]:
     Raises:
         RobotError: If the middle does not lie between the ends.
     """
-    keys = _keys(output)
-    jogged = PulseRange(*(_number(output, key) for key in keys))
+    keys, jogged = PULSE_KEYS[output.driver], PulseRange.of(output)
     widths = [round(jogged.width_us(v)) for v in (found.low, found.middle, found.high)]
     PulseRange(*map(float, widths))  # Checks the order.
     return {f"output.{output.name}.{key}": us for key, us in zip(keys, widths, strict=True)}
@@ -93,7 +81,7 @@ def motor_changes(
     Raises:
         RobotError: If the duty is out of range.
     """
-    full = _number(output, "full")
+    full: float = output.settings["full"]
     if not 0.0 <= starts_at < full:
         raise RobotError(
             f"{output.name} must start at a duty from 0 to below its full duty of {full:g}, got "
@@ -126,16 +114,3 @@ def wheel_changes(
             "swap its pins `a` and `b` if it counts backward."
         )
     return {f"sensor.{sensor}.wheel_m": round(wheel_m * pushed_m / measured_m, 4)}
-
-
-def _keys(output: OutputPlan) -> tuple[str, str, str]:
-    if output.driver not in PULSES:
-        raise RobotError(f"The driver of {output.name}, {output.driver}, sends no pulses.")
-    return PULSES[output.driver]
-
-
-def _number(output: OutputPlan, key: str) -> float:
-    value = output.settings[key]
-    if isinstance(value, int | float):
-        return float(value)
-    raise RobotError(f"{key} of {output.name} must be a number, got {value!r}.")

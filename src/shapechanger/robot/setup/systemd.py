@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -10,9 +11,14 @@ from typing import Final
 
 from shapechanger.errors import OutputError
 from shapechanger.robot.new_file import write_new
-from shapechanger.robot.setup.doctor import unit_name
 
 _TEMPLATE: Final = Path(__file__).parent / "robot.service"
+_NOT_IN_UNITS: Final = re.compile(r"[^A-Za-z0-9_.-]")
+
+
+def unit_name(robot: str) -> str:
+    """Return the name of a robot's systemd unit; one computer may serve several robots."""
+    return f"shapechanger-{_NOT_IN_UNITS.sub('-', robot)}.service"
 
 
 def unit_text(

@@ -78,7 +78,7 @@ def has(profile: Profile, needs: str) -> bool:
         "camera": profile.camera is not None,
         "bumper": any(sensor.measures == "bump" for sensor in profile.sensors),
         "button": profile.stop_pin is not None,
-        "one-shot": profile.enable is not None,
+        "one-shot": profile.enable_pin is not None,
     }[needs]
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from shapechanger.robot.guard.outputs import Truth
+from shapechanger.robot.guard.outputs import ActionEstimator
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
 
 _CAR = GuardPlan(
@@ -40,18 +40,18 @@ def test_an_action_is_what_its_output_does(
     has: tuple[float, float], actions: tuple[float, float], reason: str
 ) -> None:
     """Steps of a pulse are no difference; a controller at neutral is rest."""
-    done = Truth(_CAR).done((0.5, -0.4), (-0.4, -0.05), has)
+    done = ActionEstimator(_CAR).estimate((0.5, -0.4), (-0.4, -0.05), has)
     assert done.actions == pytest.approx(actions)
     assert done.reason == reason
 
 
 def test_outputs_of_several_actions_tell_of_rest_only() -> None:
     """Two tracks at rest are a tank at rest; one of them alone tells of no action."""
-    truth = Truth(_TANK)
-    assert truth.done((0.2, 0.5), (0.7, 0.3), (0.0, 0.0)).actions == (0.0, 0.0)
-    one = truth.done((0.2, 0.5), (0.7, 0.3), (0.0, 0.3))
+    estimator = ActionEstimator(_TANK)
+    assert estimator.estimate((0.2, 0.5), (0.7, 0.3), (0.0, 0.0)).actions == (0.0, 0.0)
+    one = estimator.estimate((0.2, 0.5), (0.7, 0.3), (0.0, 0.3))
     assert one.actions == (0.2, 0.5)
-    assert one.reason == "Output left: it does something else."
+    assert one.reason == "Output left: it does not follow."
 
 
 def test_an_action_with_two_outputs_goes_as_long_as_one_of_them_does() -> None:
@@ -61,6 +61,6 @@ def test_an_action_with_two_outputs_goes_as_long_as_one_of_them_does() -> None:
         (ActionPlan("throttle", propels=True),),
         tuple(OutputPlan(name, "esc", mix={"throttle": 1.0}) for name in ("left", "right")),
     )
-    done = Truth(boat).done((0.5,), (0.5, 0.5), (0.5, 0.0))
+    done = ActionEstimator(boat).estimate((0.5,), (0.5, 0.5), (0.5, 0.0))
     assert done.actions == (0.5,)
     assert done.reason.startswith("Output right: its controller waits")

@@ -1,0 +1,49 @@
+"""Pins of a Raspberry Pi's header."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+HIGHEST_BCM: Final = 27
+"""Largest BCM number on the header; the smallest is 0."""
+
+BCM_OF_BOARD: Final = {
+    3: 2, 5: 3, 7: 4, 8: 14, 10: 15, 11: 17, 12: 18, 13: 27, 15: 22, 16: 23,
+    18: 24, 19: 10, 21: 9, 22: 25, 23: 11, 24: 8, 26: 7, 27: 0, 28: 1, 29: 5,
+    31: 6, 32: 12, 33: 13, 35: 19, 36: 16, 37: 26, 38: 20, 40: 21,
+}  # fmt: skip
+"""BCM number of each header position that has one."""
+
+I2C_PINS: Final = {0: (0, 1), 1: (2, 3)}
+"""BCM pins of SDA and SCL of the I2C buses with fixed pins."""
+
+_POWER_OF_BOARD: Final = (
+    dict.fromkeys((1, 17), "3.3 V")
+    | dict.fromkeys((2, 4), "5 V")
+    | dict.fromkeys((6, 9, 14, 20, 25, 30, 34, 39), "ground")
+)
+_WRITTEN: Final = re.compile(r"(GPIO|BOARD)([0-9]{1,3})")
+
+
+def bcm(written: object) -> int:
+    """Parse a pin into its BCM number.
+
+    Raises:
+        ValueError: If there is no such pin; the message is a reason after a comma, or empty.
+    """
+    if type(written) is int:
+        number = written
+    elif isinstance(written, str) and (match := _WRITTEN.fullmatch(written)):
+        number = int(match[2])
+        if match[1] == "BOARD":
+            if number in _POWER_OF_BOARD:
+                raise ValueError(f"and {written} is {_POWER_OF_BOARD[number]}")
+            if number not in BCM_OF_BOARD:
+                raise ValueError("and the header has the places 1 to 40")
+            number = BCM_OF_BOARD[number]
+    else:
+        raise ValueError
+    if not 0 <= number <= HIGHEST_BCM:
+        raise ValueError
+    return number
