@@ -7,9 +7,10 @@ import tomllib
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
 
 import gymnasium as gym
+import tyro
 
 from shapechanger.envs.catalogue import (
     CATALOGUE,
@@ -21,13 +22,30 @@ from shapechanger.envs.catalogue import (
     find,
     find_task,
 )
-from shapechanger.errors import MorphologyError, StudyError, UnknownName
+from shapechanger.errors import MorphologyError, OutputError, StudyError, UnknownName
 from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
     from shapechanger.transfer.executor import Executor
 
+EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+"""Argument: the id of an env."""
+Body = Annotated[str, tyro.conf.arg(help="Another body of the family: its name, or edits as JSON.")]
+"""Option: the body of an env."""
+ExecutorKind = Annotated[
+    Literal["processes", "ray"],
+    tyro.conf.arg(help="Where runs run: in processes of this machine, or on a Ray cluster."),
+]
+"""Option: what runs the jobs of a study."""
+ClusterAddress = Annotated[
+    str | None,
+    tyro.conf.arg(
+        help="Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not "
+        "given."
+    ),
+]
+"""Option: the Ray cluster of a study."""
 _REFERENCE: Final = "reference"
 # The largest seed that both PyTorch and NumPy accept.
 _LARGEST_SEED: Final = 2**32 - 1
@@ -97,6 +115,11 @@ def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
     return EnvRef(env.id, {**env.kwargs, **more})
 
 
+def name_of(env: gym.Env[Any, Any]) -> str:
+    """Return the id of an env, or the name of its class."""
+    return env.spec.id if env.spec else type(env.unwrapped).__name__
+
+
 def asked(env: gym.Env[Any, Any], ability: str) -> Any:
     """Return a method that an env offers beyond Gymnasium's, such as "picture".
 
@@ -105,8 +128,9 @@ def asked(env: gym.Env[Any, Any], ability: str) -> Any:
     """
     offered = getattr(env.unwrapped, ability, None)
     if offered is None:
-        name = env.spec.id if env.spec else type(env.unwrapped).__name__
-        raise MorphologyError(f"{name} offers no {ability}; these envs do: {', '.join(CATALOGUE)}.")
+        raise MorphologyError(
+            f"{name_of(env)} offers no {ability}; these envs do: {', '.join(CATALOGUE)}."
+        )
     return offered
 
 
@@ -212,6 +236,22 @@ def settings_of(given: Sequence[str]) -> dict[str, Any]:
             raise StudyError(f"--set names {name} more than once.")
         settings[name] = parsed["value"]
     return settings
+
+
+def require_file(path: Path) -> None:
+    """Make the folder of a file that is to be written.
+
+    Args:
+        path: The file.
+
+    Raises:
+        OutputError: If it is a folder, or its folder cannot be made or written to.
+    """
+    from shapechanger.transfer.files import make_folder
+
+    if path.is_dir():
+        raise OutputError(f"Cannot write {path}: it is a folder.")
+    make_folder(path.parent)
 
 
 def require_seed(seed: int) -> None:

@@ -7,7 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Final, NoReturn
+from typing import Annotated, Any, Final, NoReturn
 
 from shapechanger.errors import MissingExtra, ShapechangerError
 
@@ -73,7 +73,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             args=arguments,
             config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
         )
-        command.run()
+        leaf: Any = getattr(command, "command", command)  # A group holds its subcommand.
+        leaf.run()
         sys.stdout.flush()
     except ShapechangerError as error:
         _stop(f"error: {error}", _WRONG_USAGE)

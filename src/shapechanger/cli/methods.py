@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import print_table
 
 
 @dataclass(frozen=True)
@@ -22,4 +22,4 @@ class Methods:
             method = load_method(name)
             about = (type(method).__doc__ or "").strip().partition("\n")[0]
             table.add_row(name, about, method.paper)
-        plain_console().print(table)
+        print_table(table)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import json
 import re
-import shlex
 import sys
 import time
 import tomllib
@@ -13,16 +12,24 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import msgspec
 import tyro
-from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
+from shapechanger.cli.console import (
+    Interrupted,
+    StudyProgress,
+    command_line,
+    plain_console,
+    print_table,
+    say,
+)
 from shapechanger.cli.env_arguments import (
+    ClusterAddress,
+    ExecutorKind,
     default_learner,
     driven,
     env_ref,
@@ -217,10 +224,8 @@ class RunSuite:
     """The suite's folder; results/NAME if not given."""
     seed: int | None = None
     """Number that the seeds of all runs are drawn from; the suite's own if not given."""
-    executor: Literal["processes", "ray"] = "processes"
-    """Where runs run: in processes of this machine, or on a Ray cluster."""
-    address: str | None = None
-    """Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not given."""
+    executor: ExecutorKind = "processes"
+    address: ClusterAddress = None
     workers: int | None = None
     """Runs at a time; one for each core if not given."""
 
@@ -236,9 +241,6 @@ class RunSuite:
             if name not in tasks:
                 raise UnknownName("study", name, tasks)
         out = self.out or Path("results", Path(self.name).stem)
-        command = shlex.join(["shapechanger", *sys.argv[1:]])
-        # Files have no width; do not wrap tables in them.
-        console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = executor_of(self.executor, self.workers, self.address)
         failed: list[str] = []
         page = _Page(suite, Path(self.name).stem, out, tasks)
@@ -254,18 +256,16 @@ class RunSuite:
                         name,
                         executor=executor,
                         on_progress=progress,
-                        command=command,
+                        command=command_line(),
                         traits=traits,
                     )
             except FailedRuns as error:
                 failed.append(f"{name}: {error}")
                 continue
             except KeyboardInterrupt:
-                raise Interrupted(f"Stopped. Go on with: {command}") from None
-            write_study_report(study, folder)
+                raise Interrupted(f"Stopped. Go on with: {command_line()}") from None
             page.add(name, study)
-            console.print(f"wrote {folder / 'report.html'} and {page.path}", soft_wrap=True)
-        _print_outcomes(page.outcomes(), console)
+        _print_outcomes(page.outcomes())
         if failed:
             raise FailedRuns(" ".join(failed))
 
@@ -306,7 +306,7 @@ class WatchSuite:
             raise StudyError(f"--every is a number of seconds above 0, got {self.every:g}.")
         table, complete = _progress_table(self.folder)
         if not sys.stdout.isatty():
-            plain_console(width=_FILE_WIDTH).print(table)
+            print_table(table, _FILE_WIDTH)
             return
         with Live(table, console=plain_console(), auto_refresh=False) as live:
             while not complete:
@@ -340,8 +340,6 @@ class MergeSuites:
         for folder in self.folders:
             if not any((folder / name / PLAN_FILE).exists() for name in tasks):
                 raise StudyError(f"{folder} holds no study of the suite {self.name}.")
-        console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
-        command = shlex.join(["shapechanger", *sys.argv[1:]])
         page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in tasks:
             parts = [one / name for one in self.folders if (one / name / PLAN_FILE).exists()]
@@ -349,13 +347,10 @@ class MergeSuites:
                 continue
             plan = merge_study(parts, out / name)
             if missing := unfinished_runs(plan, out / name):
-                console.print(f"{name} lacks {', '.join(run.name for run in missing)}.")
+                say(f"{name} lacks {', '.join(run.name for run in missing)}.")
                 continue
-            study = run_study(plan, out / name, executor=Serial(), command=command)
-            write_study_report(study, out / name)
-            page.add(name, study)
-            console.print(f"wrote {out / name / 'report.html'} and {page.path}", soft_wrap=True)
-        _print_outcomes(page.outcomes(), console)
+            page.add(name, run_study(plan, out / name, executor=Serial(), command=command_line()))
+        _print_outcomes(page.outcomes())
 
 
 @dataclass(frozen=True)
@@ -369,7 +364,7 @@ class ListSuites:
             suite = load_suite(name)
             studies = str(len(suite_tasks(suite)))
             table.add_row(name, studies, str(suite.seeds), ", ".join(suite.arms) or "the default")
-        plain_console().print(table)
+        print_table(table)
 
 
 @dataclass(frozen=True)
@@ -383,17 +378,9 @@ class Suite:
         | Annotated[ListSuites, tyro.conf.subcommand("list")]
     )
 
-    def run(self) -> None:
-        """Run the subcommand."""
-        self.command.run()
-
 
 def _progress_table(out: Path) -> tuple[Table, bool]:
-    """A row for each study in a suite's folder, and whether all are complete.
-
-    Raises:
-        StudyError: If there is none.
-    """
+    """A row for each study in a suite's folder, and whether all are complete."""
     from shapechanger.transfer.files import read_json
     from shapechanger.transfer.plan import SOURCE, Plan
     from shapechanger.transfer.runs import last_evaluation, load_result
@@ -422,15 +409,14 @@ def _progress_table(out: Path) -> tuple[Table, bool]:
     return table, complete
 
 
-def _print_outcomes(found: list[StudyOutcome], console: Console) -> None:
-    console.print(_table(found))
+def _print_outcomes(found: list[StudyOutcome]) -> None:
+    print_table(_table(found), _FILE_WIDTH)
     halves = sum(outcome.halves for outcome in found)
-    console.print(
+    say(
         "Gains are of fine-tuning over scratch, in scores (0: what takes no skill, 1: the "
         "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
         f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
-        "half of scratch's steps.",
-        soft_wrap=True,
+        "half of scratch's steps."
     )
 
 
@@ -457,11 +443,12 @@ class _Page:
         }
 
     def add(self, name: str, study: Study) -> None:
-        """Add a study that has ended, or replace it, and write the page."""
+        """Add a study that has ended, or replace it; write its report and the page."""
         from shapechanger.cli.films import film_study
         from shapechanger.reports.suite import Sweep, write_suite_report
         from shapechanger.transfer.files import write_json
 
+        write_study_report(study, self._out / name)
         self._studies[name] = study
         for one in self._studies:
             if one not in self._strips or one == name:
@@ -470,7 +457,7 @@ class _Page:
                     self._strips[one] = film_study(
                         self._studies[one], self._out / one, self._out / one / _FILM
                     )
-        ordered = {one: self._studies[one] for one in self._tasks if one in self._studies}
+        ordered = self._ordered()
         swept = self._suite.sweep
         write_suite_report(
             self._name,
@@ -491,14 +478,16 @@ class _Page:
             else None,
         )
         write_json(self._out / _SUMMARY, self.outcomes())
+        say(f"wrote {self._out / name / 'report.html'} and {self.path}")
 
     def outcomes(self) -> list[StudyOutcome]:
         """Return the outcome of each study, in the order of the suite."""
         from shapechanger.transfer.suite import study_outcomes
 
-        return study_outcomes(
-            {one: self._studies[one] for one in self._tasks if one in self._studies}
-        )
+        return study_outcomes(self._ordered())
+
+    def _ordered(self) -> dict[str, Study]:
+        return {one: self._studies[one] for one in self._tasks if one in self._studies}
 
 
 def _table(found: list[StudyOutcome]) -> Table:

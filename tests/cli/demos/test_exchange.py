@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.demos.exchange import Export, Import
+from shapechanger.cli.demos.recordings import Export, Import
 from shapechanger.demos.episodes import drop
 from shapechanger.errors import UnknownName
 from tests.demos.exchange.small import drive, keys_folder

@@ -11,8 +11,8 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from shapechanger.cli.console import plain_console
-from shapechanger.cli.demos.edit import episode_at
+from shapechanger.cli.console import say
+from shapechanger.cli.demos.recordings import episode_at
 from shapechanger.cli.env_arguments import env_ref, opened
 from shapechanger.demos.dataset import decode_picture
 from shapechanger.demos.episodes import Episode
@@ -65,10 +65,6 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
 
     The applied actions are replayed where they are known, because the frames follow from them; the
     expert's intended actions may differ.
-
-    Raises:
-        DemosError: If the env has other actions.
-        UnknownName: If the env is unknown.
     """
     from shapechanger.demos.recording import Sight
 
@@ -102,12 +98,11 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
             if terminated or truncated:
                 ended = "; there it was over" if played < len(kept) else ""
                 break
-    console = plain_console()
-    console.print(f"played {played} of {len(kept)} steps in {env_id}{ended}", soft_wrap=True)
+    say(f"played {played} of {len(kept)} steps in {env_id}{ended}")
     for line in _caveats(episode):
-        console.print(line, soft_wrap=True)
+        say(line)
     for line in apart.lines(states if compares else None):
-        console.print(line, soft_wrap=True)
+        say(line)
 
 
 def _ref(episode: Episode, env_id: str) -> EnvRef:
@@ -214,10 +209,7 @@ def film(episode: Episode, path: Path) -> None:
     write_film(frames, path, episode.header.control_hz)
     left = len(episode.kept) - len(frames)
     rest = f"; {left} pictures of another size are left out" if left else ""
-    plain_console().print(
-        f"wrote {path}: {len(frames)} steps, {len(frames) / episode.header.control_hz:.1f} s{rest}",
-        soft_wrap=True,
-    )
+    say(f"wrote {path}: {len(frames)} steps, {len(frames) / episode.header.control_hz:.1f} s{rest}")
 
 
 _SAME_RATE: Final = 0.01
@@ -228,31 +220,24 @@ def _play_on_robot(episode: Episode, name: str) -> None:
     """Replay an episode on a robot after a person at this terminal has armed it.
 
     The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.
-
-    Raises:
-        DemosError: If the robot has other actions or another rate.
-        LinkError: If it cannot be reached, or is lost.
-        NoTerminal: If there is no terminal to stop it from.
     """
     from shapechanger.remote.client import RobotClient
     from shapechanger.remote.known_robots import recall
     from shapechanger.teleop import Terminal
 
     known = recall(name)
-    console = plain_console()
     with (
         Terminal() as terminal,
         RobotClient.connect(known, role="person", frames=False) as robot,
     ):
         _require_fit(episode, robot.welcome)
-        console.print(
+        say(
             f"{episode.seconds:.1f} s of {episode.path.name}, replayed without looking: "
             f"{robot.welcome.robot} starts from where it stands now.\n"
-            "E arms it and starts · any other key cancels; during the replay, any key stops it.",
-            soft_wrap=True,
+            "E arms it and starts · any other key cancels; during the replay, any key stops it."
         )
         if not _agreed(robot, terminal):
-            console.print("left; nothing was played")
+            say("left; nothing was played")
             return
         try:
             robot.take()
@@ -262,15 +247,11 @@ def _play_on_robot(episode: Episode, name: str) -> None:
             if robot.alive:
                 robot.disarm()
                 robot.release()
-        console.print(ended, soft_wrap=True)
+        say(ended)
 
 
 def _require_fit(episode: Episode, welcome: Welcome) -> None:
-    """Refuse a robot that does not fit the recording.
-
-    Raises:
-        DemosError: If its actions, units, ranges or rate differ.
-    """
+    """Refuse a robot that does not fit the recording."""
     recorded = Layout.from_json(episode.header.action_layout)
     moved = Layout.from_json(welcome.action_layout)
     if [_range(f) for f in recorded] != [_range(f) for f in moved]:

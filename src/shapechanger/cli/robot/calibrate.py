@@ -7,18 +7,19 @@ import math
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import tyro
 from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import plain_console, say
+from shapechanger.cli.robot.setup import change_profile, own_profile
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.guard.plan import OutputPlan
@@ -33,6 +34,7 @@ from shapechanger.robot.setup.calibration import (
     wheel_changes,
     with_widest_pulses,
 )
+from shapechanger.teleop import Terminal
 
 if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
@@ -54,17 +56,9 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate interactively and write the result, or the partial result after an error."""
-        from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
-        from shapechanger.teleop import Terminal
-
         if not 0.0 < self.cap <= 1.0:
             raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
-        path = find_profile(self.profile)
-        if path in shipped_profiles().values():
-            raise RobotError(
-                f"{path.stem} comes with Shapechanger and is not changed: "
-                f"`shapechanger robot init {path.stem}` writes one of your own."
-            )
+        path = own_profile(self.profile)
         profile = load_profile(path)
         if not (self.twin or self.wheels_up):
             ask_for_wheels_up()
@@ -77,24 +71,13 @@ class Calibrate:
                 # Keep the results so far if the last wire was loose. The date is
                 # left out: it is not calibrated.
                 if calibration.found:
-                    console.print("\nIt did not come to its end. What was found before:")
-                    _write(path, calibration.found)
+                    say("\nIt did not come to its end. What was found before:")
+                    change_profile(path, calibration.found)
                 raise
         if not changes:
-            console.print("Nothing was found, and nothing was written.")
+            say("Nothing was found, and nothing was written.")
             return
-        _write(path, {**changes, "robot.calibrated": datetime.date.today()})
-
-
-def _write(path: Path, changes: dict[str, Any]) -> None:
-    """Write the changes to the profile and print them."""
-    from shapechanger.robot.profile.edit import rewrite
-
-    rewrite(path, changes)
-    console = plain_console()
-    for name, value in changes.items():
-        console.print(f"{name} = {value}")
-    console.print(f"wrote {path}")
+        change_profile(path, {**changes, "robot.calibrated": datetime.date.today()})
 
 
 _STEP: Final = 0.02
@@ -104,15 +87,7 @@ _SETTLES_S: Final = 4.0
 _STOP_LOOKS: Final = 50  # Observations within which an emergency stop must be visible.
 
 
-class Keys(Protocol):
-    """Source of key presses, such as a terminal."""
-
-    def keys(self, wait_s: float) -> list[str]:
-        """Return pressed keys, waiting up to `wait_s` seconds for the first."""
-        ...
-
-
-class Ended(Exception):
+class _Ended(Exception):
     """The person quits."""
 
 
@@ -133,7 +108,7 @@ class Jogger:
         robot: RobotClient,
         profile: Profile,
         output: OutputPlan,
-        keys: Keys,
+        keys: Terminal,
         console: Console,
         step: float = _STEP,
     ) -> None:
@@ -150,12 +125,12 @@ class Jogger:
         self._action = profile.actions[self._place]
         self._way = math.copysign(1.0, output.mix[name])
 
-    def find(self, cap: float, ask_beyond: Callable[[float], None] | None = None) -> float | None:
+    def find(self, cap: float, *, goes_beyond: bool = False) -> float | None:
         """Jog until Enter.
 
         Args:
             cap: Largest commanded value.
-            ask_beyond: Question at the cap, on which Y goes beyond it; None to forbid that.
+            goes_beyond: Whether to ask at the cap, where Y goes beyond it.
 
         Returns:
             The applied value of the output, or None if skipped.
@@ -163,13 +138,6 @@ class Jogger:
         Raises:
             RobotError: If the robot stopped.
         """
-        with _live_line(self._console) as live:
-            return self._jogged(cap, ask_beyond, live)
-
-    def _jogged(
-        self, cap: float, ask_beyond: Callable[[float], None] | None, live: Live
-    ) -> float | None:
-        """Run `find` with a live display."""
         value = self._action.rest
         self._robot.acknowledge()
         newest = self._robot.newest
@@ -178,37 +146,40 @@ class Jogger:
         accepted_s = 0.0
         asked = False
         before: tuple[float, ...] = ()
-        while True:
-            seen = self._robot.observation(seq).message
-            seq = seen.seq
-            if not seen.armed:
-                raise RobotError(f"The robot stopped: {seen.stop_reason}")
-            live.update(Text(f"  {reading(self._output, self._is_at(seen.action_applied))}"))
-            values = list(self._rests)
-            values[self._place] = value
-            sent = self._robot.command(values, answers=seq)
-            if accepted is None:
-                for key in self._keys.keys(0.0):
-                    if key == "enter":
-                        accepted, accepted_s = sent + 1, time.monotonic()
-                        break
-                    _end_if_asked(key, self._robot)
-                    if key == "n":
-                        return None
-                    if key == "y" and asked:
-                        cap = 1.0
-                    step = self._way * {"d": self._step, "a": -self._step}.get(key, 0.0)
-                    if abs(value + step) > cap and ask_beyond is not None and not asked and cap < 1:
-                        ask_beyond(cap)
-                        asked = True
-                    value = min(max(value + step, -cap), cap)
-                    value = min(max(value, self._action.low), self._action.high)
-            # It may still be moving: a slew, or a controller that is not armed yet.
-            elif (seen.applied_seq or 0) >= accepted and seen.action_applied == before:
-                is_there = abs(seen.action_applied[self._place] - value) < _THERE
-                if is_there or time.monotonic() > accepted_s + _SETTLES_S:
-                    return self._is_at(before)
-            before = seen.action_applied
+        with _live_line(self._console) as live:
+            while True:
+                seen = self._robot.observation(seq).message
+                seq = seen.seq
+                if not seen.armed:
+                    raise RobotError(f"The robot stopped: {seen.stop_reason}")
+                live.update(Text(f"  {reading(self._output, self._is_at(seen.action_applied))}"))
+                values = list(self._rests)
+                values[self._place] = value
+                sent = self._robot.command(values, answers=seq)
+                if accepted is None:
+                    for key in self._keys.keys(0.0):
+                        if key == "enter":
+                            accepted, accepted_s = sent + 1, time.monotonic()
+                            break
+                        _end_if_asked(key, self._robot)
+                        if key == "n":
+                            return None
+                        if key == "y" and asked:
+                            cap = 1.0
+                        step = self._way * {"d": self._step, "a": -self._step}.get(key, 0.0)
+                        if goes_beyond and not asked and abs(value + step) > cap and cap < 1:
+                            self._console.print(
+                                f"  That is the cap of {cap:g}. Go beyond it? Y does."
+                            )
+                            asked = True
+                        value = min(max(value + step, -cap), cap)
+                        value = min(max(value, self._action.low), self._action.high)
+                # It may still be moving: a slew, or a controller that is not armed yet.
+                elif (seen.applied_seq or 0) >= accepted and seen.action_applied == before:
+                    is_there = abs(seen.action_applied[self._place] - value) < _THERE
+                    if is_there or time.monotonic() > accepted_s + _SETTLES_S:
+                        return self._is_at(before)
+                before = seen.action_applied
 
     def _is_at(self, applied: tuple[float, ...]) -> float:
         """Return the value of the output for the applied actions."""
@@ -232,7 +203,7 @@ def _end_if_asked(key: str, robot: RobotClient | None = None) -> None:
             if not robot.observation(newest.message.seq if newest else 0).message.armed:
                 break
     if key in {"q", "space"}:
-        raise Ended
+        raise _Ended
 
 
 _START_STEP: Final = 0.05
@@ -254,7 +225,7 @@ class Calibration:
     """
 
     def __init__(
-        self, profile: Profile, keys: Keys, console: Console, cap: float, *, twin: bool
+        self, profile: Profile, keys: Terminal, console: Console, cap: float, *, twin: bool
     ) -> None:
         self._profile = profile
         self._keys = keys
@@ -279,7 +250,7 @@ class Calibration:
         )
         try:
             self._everything()
-        except Ended:
+        except _Ended:
             self.found = {}
         return self.found
 
@@ -312,14 +283,11 @@ class Calibration:
             found: list[float] = []
             for name in names:
                 self._console.print(f"  … {name}")
-                value = jogger.find(cap, self._ask_beyond)
+                value = jogger.find(cap, goes_beyond=True)
                 if value is None:
                     return {}
                 found.append(value)
         return dict(pulse_changes(wide, JogResult(*found)))
-
-    def _ask_beyond(self, cap: float) -> None:
-        self._console.print(f"  That is the cap of {cap:g}. Go beyond it? Y does.")
 
     def _motor(self, output: OutputPlan) -> dict[str, Any]:
         self._console.print(f"\n{output.name}: D raises its duty; Enter when it begins to move …")

@@ -13,7 +13,7 @@ import tyro
 from rich.live import Live
 from rich.text import Text
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import plain_console, say
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.remote.known_robots import KnownRobot
@@ -49,61 +49,44 @@ class Drive:
 
     def run(self) -> None:
         """Drive until Q, or until Ctrl-C if the console is used."""
-        from shapechanger.cli.robot.key import can_open
+        from shapechanger.cli.robot.fetch import recorded
+        from shapechanger.cli.robot.key import can_open, open_console
+        from shapechanger.remote.client import RobotClient
         from shapechanger.remote.known_robots import recall
 
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
         known = recall(self.robot)
         pilot = None if self.policy is None else _load_pilot(self.policy, known)
-        if self.terminal or not can_open():
-            self._drive_here(known, pilot)
-        else:
-            self._drive_there(known, pilot)
-
-    def _drive_here(self, known: KnownRobot, pilot: PolicyDriver | None) -> None:
-        """Drive with the keys of this terminal."""
-        from contextlib import nullcontext
-
-        from shapechanger.cli.robot.fetch import recorded
-        from shapechanger.remote.client import RobotClient
-        from shapechanger.teleop import Terminal
-
-        with (
-            Terminal() as terminal,
-            RobotClient.connect(known, role="person", frames=False) as robot,
-        ):
-            driving = Driving(robot, terminal, self.cap, pilot)
-            robot.take()
-            with recorded(robot, known.name, self.record), pilot or nullcontext():
+        uses_keys = self.terminal or not can_open()
+        with contextlib.ExitStack() as stack:
+            terminal = stack.enter_context(Terminal()) if uses_keys else None
+            robot = stack.enter_context(RobotClient.connect(known, role="person", frames=False))
+            driving = None
+            if terminal is not None:
+                driving = Driving(robot, terminal, self.cap, pilot)
+                robot.take()
+            else:
+                address = open_console(known)
+                say(
+                    f"The console of {known.name} is at {address}, and opens in your browser, "
+                    "which warns of its certificate once. --terminal drives with the keys of this "
+                    "terminal."
+                )
+                if pilot is None and self.record is None:
+                    return
+            stack.enter_context(recorded(robot, known.name, self.record))
+            if pilot is not None:
+                stack.enter_context(pilot)
+            if driving is not None:
                 driving.run()
-
-    def _drive_there(self, known: KnownRobot, pilot: PolicyDriver | None) -> None:
-        """Drive in the console; this process stays only for a policy."""
-        from contextlib import nullcontext
-
-        from shapechanger.cli.robot.fetch import recorded
-        from shapechanger.cli.robot.key import open_console
-        from shapechanger.remote.client import RobotClient
-
-        with RobotClient.connect(known, role="person", frames=False) as robot:
-            console = plain_console()
-            address = open_console(known)
-            console.print(
-                f"The console of {known.name} is at {address}, and opens in your browser, which "
-                "warns of its certificate once. --terminal drives with the keys of this terminal.",
-                soft_wrap=True,
-            )
-            if pilot is None and self.record is None:
-                return
-            with recorded(robot, known.name, self.record), pilot or nullcontext():
-                console.print("Ctrl-C ends this.")
+            else:
+                say("Ctrl-C ends this.")
                 _stay(robot, pilot)
 
 
 def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:
     """Print the policy's state until Ctrl-C or until it fails."""
-    console = plain_console()
     said = ""
     try:
         while robot.alive:
@@ -112,10 +95,10 @@ def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:
                 pilot.require_well()
                 if pilot.note != said:
                     said = pilot.note
-                    console.print(said, soft_wrap=True)
+                    say(said)
             time.sleep(_LOOK_EVERY_S)
     except KeyboardInterrupt:
-        console.print("Ended.")
+        say("Ended.")
 
 
 _HELP: Final = (
@@ -204,11 +187,7 @@ class Driving:
         return True
 
     def _act(self, key: str, seen: Observation) -> None:
-        """Handle one key press.
-
-        Raises:
-            RobotRefused: If the robot refuses.
-        """
+        """Handle one key press."""
         if key in DIRECTIONS:
             # A driving key takes the robot from a policy immediately.
             if not seen.mine and seen.holder_role == "program":
@@ -233,29 +212,16 @@ class Driving:
         elif key == "p":
             self._keys.let_go()
             self._note = self._hand_over()
-        elif key in {"r", "m", "u"}:
-            self._record(key)
-
-    def _record(self, key: str) -> None:
-        """Handle R, M and U: record, mark and undo.
-
-        Raises:
-            RobotRefused: If the robot refuses.
-        """
-        state = self._robot.recorder
-        if key == "r":
+        elif key == "r":
+            state = self._robot.recorder
             self._robot.record(on=state is None or not state.recording)
         elif key == "m":
             self._robot.mark()
-        else:
+        elif key == "u":
             self._robot.undo()
 
     def _hand_over(self) -> str:
-        """Hand the robot to a waiting program, arm it, and describe the outcome.
-
-        Raises:
-            RobotRefused: If the robot does not arm.
-        """
+        """Hand the robot to a waiting program, arm it, and describe the outcome."""
         self._robot.release()
         until_s = time.monotonic() + _TAKEN_WITHIN_S
         while time.monotonic() < until_s:
@@ -292,6 +258,7 @@ class Driving:
             for feature, value in zip(self._state, seen.state, strict=True)
             if not feature.name.endswith("/applied")
         )
+        pilot_note = "" if self._pilot is None else self._pilot.note
         parts = [
             state,
             f"cap {self._cap:.1f}",
@@ -299,7 +266,7 @@ class Driving:
             self._values(seen.action_applied),
             f"{seen.suggested_by} wants {self._values(seen.suggested)}" if seen.suggested else "",
             senses,
-            self._note or seen.stop_reason or remark or ("" if seen.mine else self._pilot_says()),
+            self._note or seen.stop_reason or remark or ("" if seen.mine else pilot_note),
         ]
         return Text(" · ".join(part for part in parts if part))
 
@@ -315,9 +282,6 @@ class Driving:
             return state.text
         return f"recording {state.seconds:.0f} s, {state.steps - state.dropped} steps"
 
-    def _pilot_says(self) -> str:
-        return "" if self._pilot is None else self._pilot.note
-
 
 # s. A reset waits in steps of this length, and checks between them whether to end.
 _PILOTING_LOOK_EVERY_S: Final = 1.0
@@ -325,12 +289,7 @@ _END_S: Final = 10.0
 
 
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
-    """Load a policy and check that it can drive the robot.
-
-    Raises:
-        PolicyError: If the file is not a policy, or is one for another robot.
-        LinkError: If the robot cannot be reached.
-    """
+    """Load a policy and check that it can drive the robot."""
     from shapechanger.demos.cloning.policy import CameraPolicy
 
     policy = CameraPolicy.load(path)

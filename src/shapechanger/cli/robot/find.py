@@ -11,7 +11,7 @@ from typing import Annotated
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import print_table, say
 from shapechanger.errors import LinkError, ShapechangerError
 
 _KEY_VARIABLE = "SHAPECHANGER_KEY"
@@ -33,12 +33,10 @@ class Find:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
         known = _known_here()
         found = find(self.seconds)
-        console = plain_console()
         if not found:
-            console.print(
+            say(
                 "No robot answers. A network may block multicast DNS; connecting by address works "
-                "all the same.",
-                soft_wrap=True,
+                "all the same."
             )
             return
         table = Table("robot", "body", "address", "known as", "", box=None, pad_edge=False)
@@ -46,7 +44,7 @@ class Find:
             other = "" if robot.version == str(VERSION) else f"speaks version {robot.version}"
             name = known.get(robot.fingerprint, "")
             table.add_row(robot.name, robot.body, str(robot.address), name, other)
-        console.print(table)
+        print_table(table)
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class Remember:
 
         key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
         path = remember(KnownRobot(self.name, self.address, key.strip(), self.fingerprint))
-        plain_console().print(f"wrote {path}", soft_wrap=True)
+        say(f"wrote {path}")
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ def _known_here() -> dict[str, str]:
         try:
             known[recall(name).fingerprint] = name
         except (ShapechangerError, OSError) as error:
-            plain_console(stderr=True).print(f"{name} is skipped: {error}", soft_wrap=True)
+            say(f"{name} is skipped: {error}", stderr=True)
     return known
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import tyro
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import say
 from shapechanger.errors import LinkError, MissingExtra, UnknownName
 from shapechanger.link.address import parse_address
 from shapechanger.remote.known_robots import INSECURE
@@ -50,10 +50,7 @@ class Key:
                 "robot of this machine", self.name, sorted(path.name for path in there)
             )
         credentials = load_credentials(folder)
-        plain_console().print(
-            f"{shown_credentials(credentials)}\n\n{how_to_remember(self.name, credentials)}",
-            soft_wrap=True,
-        )
+        say(f"{shown_credentials(credentials)}\n\n{how_to_remember(self.name, credentials)}")
         if self.qr:
             self._show_qr(credentials)
 
@@ -70,7 +67,7 @@ class Key:
         address = self.address or f"{socket.gethostname()}.local"
         robot = KnownRobot(self.name, address, key, fingerprint_hex(credentials.fingerprint))
         console = _console_address(robot)
-        plain_console().print(f"\nThe console is at {console}; this brings a phone there:\n")
+        say(f"\nThe console is at {console}; this brings a phone there:\n")
         # Printed verbatim: wrapping would break the code.
         segno.make(f"{console}#key={key}", micro=False).terminal(sys.stdout, compact=True)
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import plain_console, say
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
@@ -60,11 +60,10 @@ class Selftest:
 
         profile = load_profile(find_profile(self.profile))
         # Makes the output self-contained.
-        plain_console().print(
+        say(
             f"shapechanger {version('shapechanger')}, {profile.name} ({profile.body}), "
             f"{'twin' if self.twin else 'hardware'}, Python {platform.python_version()}, "
-            f"{platform.platform()}",
-            soft_wrap=True,
+            f"{platform.platform()}"
         )
         good = self._on_twin(profile) if self.twin else self._on_hardware(profile)
         if not good:
@@ -101,19 +100,16 @@ class Selftest:
 
         if not 0.0 < self.cap <= 1.0:
             raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
-        console = plain_console()
         if not self.wheels_up:
             ask_for_wheels_up()
         good = True
         if self.jumper is not None:
             sentence = check_jumper(*self.jumper, profile.guard_plan())
-            console.print(f"good  jumper: {sentence}")
+            say(f"good  jumper: {sentence}")
         with run_robot(profile, twin=False) as robot:
             for check in check_robot(robot, profile, self.cap):
                 good = good and check.level != "bad"
-                console.print(
-                    f"{_MARKS[check.level]:4}  {check.name}: {check.sentence}", soft_wrap=True
-                )
+                say(f"{_MARKS[check.level]:4}  {check.name}: {check.sentence}")
         return good
 
 

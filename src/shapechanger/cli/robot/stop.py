@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 import tyro
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import say
 from shapechanger.errors import LinkError
 
 # s. A guard stops within a tick and reports it in the next observation.
@@ -39,13 +39,12 @@ class Stop:
                     if time.monotonic() > until_s:
                         raise LinkError("The robot answers, and does not say that it stopped.")
         except LinkError as error:
-            plain_console(stderr=True).print(
+            say(
                 f"error: {error}\nThe stop was not confirmed: go there, and cut its power.",
-                soft_wrap=True,
+                stderr=True,
             )
             sys.exit(1)
-        plain_console().print(
+        say(
             f"{self.robot} is stopped. {seen.stop_reason}\n"
-            f"Only a person lets it drive again: shapechanger robot drive {self.robot}, and E.",
-            soft_wrap=True,
+            f"Only a person lets it drive again: shapechanger robot drive {self.robot}, and E."
         )

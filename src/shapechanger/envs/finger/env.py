@@ -147,12 +147,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     _options: tuple[str, ...] = ("posture",)
 
     def _act(self, action: Any) -> FingerSenses:
-        """Apply an action, and return the measurements after it.
-
-        Raises:
-            BadAction: If it has another shape or is not finite; nothing has moved then.
-            ResetNeeded: If `reset` was never called.
-        """
+        """Apply an action, and return the measurements after it."""
         if self._senses is None:
             raise gym.error.ResetNeeded("Call reset() before the first step.")
         checked = check_action(self, action)

@@ -216,9 +216,6 @@ def _closed(
         centre: Mean position, m.
         cosines: Coefficients of the cosines, m.
         sines: Coefficients of the sines, m; as many.
-
-    Raises:
-        PathError: If an argument is out of its range, or the path too fast.
     """
     hz = positive(f"The hz of a {what}", hz)
     motion = Harmonics(

@@ -47,11 +47,7 @@ class _Function:
         return np.array([self.point(float(now)) for now in t]).reshape(-1, 3)
 
     def point(self, t: float) -> Points:
-        """Return the position at one time, m, shape (3,).
-
-        Raises:
-            PathError: If the function does not return three finite numbers.
-        """
+        """Return the position at one time, m, shape (3,)."""
         given = self.function(t)
         try:
             point = np.array(given, dtype=np.float64)

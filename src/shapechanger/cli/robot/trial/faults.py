@@ -130,30 +130,10 @@ def _kill_both(scene: Scene) -> int:
     return at_ns
 
 
-def _go_silent(scene: Scene) -> None:
-    scene.network.silent = True
-
-
-def _speak_again(scene: Scene) -> None:
+def _restore_network(scene: Scene) -> None:
     scene.network.reset()
     scene.network.silent = False
-
-
-def _be_late(scene: Scene) -> None:
-    scene.network.latency_s = _LATE_S
-
-
-def _be_prompt(scene: Scene) -> None:
-    scene.network.reset()
     scene.network.latency_s = 0.0
-
-
-def _slice(scene: Scene) -> None:
-    scene.network.slice_bytes = 1
-
-
-def _mend(scene: Scene) -> None:
-    scene.network.slice_bytes = 0
 
 
 def _knock_with_a_wrong_key(scene: Scene) -> None:
@@ -175,7 +155,7 @@ def _command_without_the_lease(client: RobotClient) -> None:
         client.command([1.0] * wanted, answers=client.ask().message.seq)
 
 
-def _stand_at_the_door(scene: Scene) -> None:
+def _connect_silently(scene: Scene) -> None:
     """Open connections without authenticating, as many as the robot accepts."""
     for _ in range(40):
         scene.strangers.append(socket.create_connection(("127.0.0.1", scene.robot.port)))
@@ -202,9 +182,15 @@ def _mend_camera(scene: Scene) -> None:
     scene.operator.break_camera("")
 
 
-FAULTS: Final[dict[str, Fault]] = {
-    fault.name: fault
-    for fault in (
+def _list_faults() -> list[Fault]:
+    """Return all faults."""
+    cameras: dict[CameraFault, str] = {
+        "freeze": "camera frozen",
+        "garbage": "camera garbage",
+        "short": "camera sends half pictures",
+        "off": "camera off",
+    }
+    return [
         Fault("driver killed", _at_once(lambda s: s.driver.process.kill()), 20.0, "deadline"),
         Fault(
             "driver stopped",
@@ -212,12 +198,24 @@ FAULTS: Final[dict[str, Fault]] = {
             20.0,
             "deadline",
         ),
-        Fault("network silent", _at_once(_go_silent), 20.0, "deadline", _speak_again),
+        Fault(
+            "network silent",
+            _at_once(lambda s: setattr(s.network, "silent", True)),
+            20.0,
+            "deadline",
+            undo=_restore_network,
+        ),
         Fault("network reset", _at_once(lambda s: s.network.reset()), 20.0, "deadline"),
         Fault("network half closed", _at_once(lambda s: s.network.half_close()), 20.0, "deadline"),
         # What answers an observation of a second ago is refused, so the last command that acts is
         # one that had arrived already.
-        Fault("network late by 1 s", _at_once(_be_late), 20.0, "deadline", _be_prompt),
+        Fault(
+            "network late by 1 s",
+            _at_once(lambda s: setattr(s.network, "latency_s", _LATE_S)),
+            20.0,
+            "deadline",
+            undo=_restore_network,
+        ),
         Fault(
             "emergency stop by another",
             _by_another("program", lambda c: c.emergency_stop("A trial.")),
@@ -229,46 +227,36 @@ FAULTS: Final[dict[str, Fault]] = {
         ),
         Fault("a person disarms", _by_another("person", lambda c: c.disarm()), 20.0, silences=True),
         Fault(
-            "network in slices of 1 byte", _at_once(_slice), 20.0, "deadline", _mend, harms=False
-        ),
-        Fault(
-            "a stranger with a wrong key",
-            _now(_knock_with_a_wrong_key),
+            "network in slices of 1 byte",
+            _at_once(lambda s: setattr(s.network, "slice_bytes", 1)),
             20.0,
             "deadline",
+            undo=lambda s: setattr(s.network, "slice_bytes", 0),
             harms=False,
         ),
-        Fault("a message of 1 MB", _now(_say_too_much), 20.0, "deadline", harms=False),
-        Fault(
-            "a second program commands",
-            _by_another("program", _command_without_the_lease),
-            20.0,
-            "deadline",
-            harms=False,
+        *(
+            Fault(name, make, 20.0, "deadline", harms=False)
+            for name, make in (
+                ("a stranger with a wrong key", _now(_knock_with_a_wrong_key)),
+                ("a message of 1 MB", _now(_say_too_much)),
+                (
+                    "a second program commands",
+                    _by_another("program", _command_without_the_lease),
+                ),
+            )
         ),
         Fault(
             "strangers who say nothing",
-            _now(_stand_at_the_door),
+            _now(_connect_silently),
             20.0,
             "deadline",
-            lambda scene: [stranger.close() for stranger in scene.strangers],
+            undo=lambda s: [stranger.close() for stranger in s.strangers],
             harms=False,
         ),
-        Fault(
-            "camera frozen", _break_camera("freeze"), 70.0, "camera", _mend_camera, needs="camera"
+        *(
+            Fault(name, _break_camera(how), 70.0, "camera", _mend_camera, needs="camera")
+            for how, name in cameras.items()
         ),
-        Fault(
-            "camera garbage", _break_camera("garbage"), 70.0, "camera", _mend_camera, needs="camera"
-        ),
-        Fault(
-            "camera sends half pictures",
-            _break_camera("short"),
-            70.0,
-            "camera",
-            _mend_camera,
-            needs="camera",
-        ),
-        Fault("camera off", _break_camera("off"), 70.0, "camera", _mend_camera, needs="camera"),
         Fault(
             "bumper pressed",
             _now(lambda s: s.operator.press_bumper()),
@@ -322,6 +310,8 @@ FAULTS: Final[dict[str, Fault]] = {
             needs="one-shot",
             guards_late=True,
         ),
-    )
-}
+    ]
+
+
+FAULTS: Final[dict[str, Fault]] = {fault.name: fault for fault in _list_faults()}
 """All faults, by name."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,7 +26,7 @@ from shapechanger.twin.oracle import (
 )
 from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 from shapechanger.twin.signals import read_ledger
-from shapechanger.twin.start import RunningBoard, start_board
+from shapechanger.twin.start import start_board
 from shapechanger.twin.wiring import TwinWiring
 
 _ATTEMPTS: Final = 3
@@ -97,8 +97,7 @@ class Trial:
         self._wiring = TwinWiring(self._plan, self._one_shot_ms)
         self._robot: RunningRobot | None = None
         self._restarts = 0
-        self._board: RunningBoard | None = None
-        self._folder: TemporaryDirectory[str] | None = None
+        self._stack = ExitStack()
 
     def __enter__(self) -> Self:
         """Return the trial."""
@@ -110,16 +109,9 @@ class Trial:
 
     def close(self) -> None:
         """Stop the robot and remove its files."""
-        if self._robot is not None:
-            self._robot.close()
-            self._robot = None
-            self._restarts = 0
-        if self._board is not None:
-            self._board.close()
-            self._board = None
-        if self._folder is not None:
-            self._folder.cleanup()
-            self._folder = None
+        self._robot = None
+        self._restarts = 0
+        self._stack.close()
 
     def run(self, fault: Fault) -> TrialResult:
         """Drive, inject a fault, and judge by the ledger.
@@ -156,11 +148,7 @@ class Trial:
     def _driven(
         self, robot: RunningRobot, operator: Operator, network: BadNetwork
     ) -> Generator[Driver]:
-        """Return a driver of the robot.
-
-        Raises:
-            _NotDriven: If the robot cannot be driven.
-        """
+        """Return a driver of the robot."""
         try:
             _calm(robot)
             operator.place(0)
@@ -196,16 +184,17 @@ class Trial:
 
     def _running(self) -> RunningRobot:
         if self._robot is None:
-            self._folder = TemporaryDirectory(prefix="shapechanger-trial-")
+            folder = self._stack.enter_context(TemporaryDirectory(prefix="shapechanger-trial-"))
             # Separate, so that it outlives the robot's processes, as hardware does.
-            self._board = start_board(
+            board = start_board(
                 self._plan,
                 clock="real",
-                folder=self._folder.name,
+                folder=folder,
                 camera=self._profile.camera,
                 one_shot_ms=self._one_shot_ms,
             )
-            self._robot = run_robot(self._profile, folder=Path(self._folder.name))
+            self._stack.enter_context(board)
+            self._robot = self._stack.enter_context(run_robot(self._profile, folder=Path(folder)))
         return self._robot
 
     def _recover(self, fault: Fault) -> None:
