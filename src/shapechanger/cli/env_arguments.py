@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
+from typing import Annotated, Any, Final, Literal, cast
 
 import gymnasium as gym
 import tyro
@@ -25,9 +25,9 @@ from shapechanger.envs.catalogue import (
 from shapechanger.errors import MorphologyError, OutputError, StudyError, UnknownName
 from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
-
-if TYPE_CHECKING:
-    from shapechanger.transfer.executor import Executor
+from shapechanger.transfer.executor import Executor, Processes
+from shapechanger.transfer.files import make_folder
+from shapechanger.transfer.references import reference_policy
 
 EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
 """Argument: the id of an env."""
@@ -103,16 +103,12 @@ def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
     Raises:
         StudyError: If it has no camera.
     """
-    if env.id in WAYPOINT_ENVS or env.id in RANGES_ENVS:
-        env = EnvRef(env.id, {**env.kwargs, "put_back": True})
-    if env.id not in VEHICLE_ENVS:
-        if lenses:
-            raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
+    if lenses and env.id not in VEHICLE_ENVS:
+        raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
+    if env.id not in {*VEHICLE_ENVS, *WAYPOINT_ENVS, *RANGES_ENVS}:
         return env
-    more: dict[str, Any] = {"put_back": True}
-    if lenses:
-        more["lenses"] = list(lenses)
-    return EnvRef(env.id, {**env.kwargs, **more})
+    more: dict[str, Any] = {"lenses": list(lenses)} if lenses else {}
+    return EnvRef(env.id, {**env.kwargs, "put_back": True, **more})
 
 
 def name_of(env: gym.Env[Any, Any]) -> str:
@@ -189,7 +185,6 @@ def executor_of(kind: str, workers: int | None, address: str | None) -> Executor
         return RayCluster(address)
     if address is not None:
         raise StudyError("--address is that of a Ray cluster: give --executor ray, too.")
-    from shapechanger.transfer.executor import Processes
 
     return Processes(workers)
 
@@ -206,7 +201,6 @@ def policy_file(given: Path, env: EnvRef) -> Path:
     """
     if str(given) != _REFERENCE or given.exists():
         return given
-    from shapechanger.transfer.references import reference_policy
 
     return reference_policy(env.id)
 
@@ -247,8 +241,6 @@ def require_file(path: Path) -> None:
     Raises:
         OutputError: If it is a folder, or its folder cannot be made or written to.
     """
-    from shapechanger.transfer.files import make_folder
-
     if path.is_dir():
         raise OutputError(f"Cannot write {path}: it is a folder.")
     make_folder(path.parent)

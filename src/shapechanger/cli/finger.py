@@ -13,6 +13,8 @@ from rich.table import Table
 from shapechanger.cli.console import print_table, say
 from shapechanger.cli.env_arguments import EnvId, env_ref, options_of, require_file, require_seed
 from shapechanger.errors import FingerError, OutputError, UnknownName
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.files import write_atomic
 
 if TYPE_CHECKING:
     from shapechanger.identify import IdentifiedFinger
@@ -34,7 +36,6 @@ class Identify:
         """Print the parameters, and write them and the report."""
         from shapechanger.identify import identify, load_log
         from shapechanger.reports.finger import finger_html, summary_line
-        from shapechanger.transfer.files import write_atomic
 
         page = self.report or self.log.with_name(f"{self.log.stem}.html")
         files = [path for path in (self.out, page) if path is not None]
@@ -90,7 +91,6 @@ class RecordFinger:
         """Record and print a summary."""
         from shapechanger.envs.finger.identification import record_babble
         from shapechanger.identify import save_log
-        from shapechanger.transfer.env_ref import EnvRef
 
         require_seed(self.seed)
         require_seed(self.finger_seed)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rich.table import Table
 
 from shapechanger.cli.console import print_table
+from shapechanger.transfer.methods import load_method, method_names
 
 
 @dataclass(frozen=True)
@@ -15,8 +16,6 @@ class Methods:
 
     def run(self) -> None:
         """Print a table."""
-        from shapechanger.transfer.methods import load_method, method_names
-
         table = Table("method", "what it does", "source", box=None)
         for name in method_names():
             method = load_method(name)

@@ -14,11 +14,15 @@ from rich.table import Table
 from shapechanger.cli.console import print_table, say
 from shapechanger.cli.env_arguments import EnvId, env_ref, opened
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
+from shapechanger.transfer.body_map import BodyMap, MappedEnv
+from shapechanger.transfer.body_map.envs import check_size
+from shapechanger.transfer.env_ref import layouts_of, measures_of
+from shapechanger.transfer.learners.settings import PpoSettings
+from shapechanger.transfer.references import load_references
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
     from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
-    from shapechanger.transfer.learners.settings import PpoSettings
     from shapechanger.transfer.onnx_policy import OnnxCard, OnnxPolicy
 
 _FILE_WIDTH: Final = 160
@@ -118,8 +122,6 @@ class ListPolicies:
 
     def _print_references(self) -> None:
         """Print a line for each env, with its floor and what each seed reached."""
-        from shapechanger.transfer.references import load_references
-
         table = Table("env", "learner", "steps", "measure", "no skill", "each seed", box=None)
         for env, reference in load_references().items():
             measure = next(iter(reference.ends))
@@ -137,7 +139,8 @@ class EvaluatePolicy:
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A policy, or one that was exported as ONNX."""
     env: str = ""
-    """Id of another env, where it acts through the body map of same names; its own by default."""
+    """Id of another env, where it acts through the body map of same names; that of its training by
+    default."""
     body: str = ""
     """Another body of that env's family: its name, or edits as JSON."""
     episodes: int = 10
@@ -145,7 +148,6 @@ class EvaluatePolicy:
 
     def run(self) -> None:
         """Evaluate."""
-        from shapechanger.transfer.env_ref import measures_of
         from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 
         if self.episodes < 1:
@@ -188,9 +190,6 @@ def fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any,
     Raises:
         MapError: If there is no such body map.
     """
-    from shapechanger.transfer.body_map import BodyMap, MappedEnv
-    from shapechanger.transfer.env_ref import layouts_of
-
     observation, action = layouts_of(env)
     if (observation, action) == (card.observation, card.action):
         return env
@@ -230,13 +229,11 @@ class Convert:
     body: str = ""
     """Body that it was trained in: its name, or edits as JSON."""
     trust: bool = False
-    """Needed, because the zip holds pickled objects: give it only if you trust its author."""
+    """Required, because the zip holds pickled objects: give it only if you trust its author."""
 
     def run(self) -> None:
         """Convert the policy."""
         import shapechanger
-        from shapechanger.transfer.body_map.envs import check_size
-        from shapechanger.transfer.env_ref import layouts_of
         from shapechanger.transfer.learners.policy_file import (
             PolicyCard,
             TrainedPolicy,
@@ -286,8 +283,6 @@ def _settings(model: Any) -> PpoSettings:
     """Return the settings of a model, whose two networks must be alike, with tanh."""
     from torch import nn
 
-    from shapechanger.transfer.learners.settings import PpoSettings
-
     widths = model.policy.net_arch
     of_each: Any = widths if "pi" in widths else {"pi": widths, "vf": widths}
     actor: list[int] = list(of_each["pi"])
@@ -298,16 +293,11 @@ def _settings(model: Any) -> PpoSettings:
             f"{model.policy.activation_fn.__name__}: both must be the same, with Tanh."
         )
     update = model.n_envs * model.n_steps
+    same = ("n_envs", "n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "ent_coef")
     return PpoSettings(
-        n_envs=model.n_envs,
-        n_steps=model.n_steps,
-        batch_size=model.batch_size,
-        n_epochs=model.n_epochs,
+        **{name: getattr(model, name) for name in same},
         learning_rate=float(model.lr_schedule(1.0)),
-        gamma=model.gamma,
-        gae_lambda=model.gae_lambda,
         clip_range=float(model.clip_range(1.0)),
-        ent_coef=model.ent_coef,
         net_arch=tuple(actor),
         steps=max(int(model.num_timesteps), update),
         eval_every=update,

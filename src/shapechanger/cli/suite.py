@@ -38,11 +38,15 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.cli.transfer import run_steps, write_study_report
 from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
+from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.files import read_json, write_json
+from shapechanger.transfer.learners.settings import resolve_learner
+from shapechanger.transfer.plan import SOURCE, Plan, TransferTask
 
 if TYPE_CHECKING:
     from shapechanger.reports.suite import FilmStrip
-    from shapechanger.transfer.plan import Plan, TransferTask
     from shapechanger.transfer.study import Study, TaskTraits
     from shapechanger.transfer.suite import StudyOutcome
 
@@ -161,8 +165,6 @@ def suite_tasks(suite: SuiteFile) -> list[tuple[str, TransferTask]]:
         StudyError: If the suite has no pairs, or names them in two ways.
         UnknownName: If an env, or a name in a body, does not exist.
     """
-    from shapechanger.transfer.plan import TransferTask
-
     ways = [bool(suite.envs), bool(suite.pairs), bool(suite.sources)]
     if sum(ways) != 1 or bool(suite.sources) != bool(suite.targets or suite.sweep):
         raise StudyError(
@@ -235,7 +237,16 @@ class RunSuite:
         from shapechanger.transfer.suite import open_study_folder, run_in_suite
 
         suite = load_suite(self.name)
-        require_seed(suite.seed if self.seed is None else self.seed)
+        given = {
+            "seeds": self.seeds,
+            "steps": self.steps,
+            "source_steps": self.source_steps,
+            "seed": self.seed,
+        }
+        chosen = msgspec.structs.replace(
+            suite, **{name: value for name, value in given.items() if value is not None}
+        )
+        require_seed(chosen.seed)
         tasks = dict(suite_tasks(suite))
         for name in self.only:
             if name not in tasks:
@@ -246,7 +257,7 @@ class RunSuite:
         page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in self.only or tasks:
             traits = inspect_task(tasks[name])
-            plan = self._plan(suite, tasks[name], traits)
+            plan = _plan(chosen, tasks[name], traits)
             try:
                 folder = open_study_folder(plan, out, name)
                 with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
@@ -269,36 +280,36 @@ class RunSuite:
         if failed:
             raise FailedRuns(" ".join(failed))
 
-    def _plan(self, suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
-        """The plan of one study."""
-        from shapechanger.transfer.learners.settings import resolve_learner
-        from shapechanger.transfer.study import default_arms, make_plan
 
-        learner, settings = resolve_learner(
-            suite.learner or default_learner(task.target), suite.settings
-        )
-        return make_plan(
-            task,
-            learner,
-            settings,
-            seeds=suite.seeds if self.seeds is None else self.seeds,
-            steps=suite.steps if self.steps is None else self.steps,
-            source_steps=suite.source_steps if self.source_steps is None else self.source_steps,
-            arms=suite.arms or default_arms(traits),  # pyright: ignore[reportArgumentType]
-            seed=suite.seed if self.seed is None else self.seed,
-            measure=suite.measure,
-            traits=traits,
-        )
+def _plan(suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
+    """Return the plan of one study."""
+    from shapechanger.transfer.study import default_arms, make_plan
+
+    learner, settings = resolve_learner(
+        suite.learner or default_learner(task.target), suite.settings
+    )
+    return make_plan(
+        task,
+        learner,
+        settings,
+        seeds=suite.seeds,
+        steps=suite.steps,
+        source_steps=suite.source_steps,
+        arms=suite.arms or default_arms(traits),  # pyright: ignore[reportArgumentType]
+        seed=suite.seed,
+        measure=suite.measure,
+        traits=traits,
+    )
 
 
 @dataclass(frozen=True)
 class WatchSuite:
-    """Watch a suite that runs elsewhere: its runs, and where the last evaluations stand."""
+    """Watch a suite that runs elsewhere: progress and last evaluations of its runs."""
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
     """The suite's folder, such as results/ants."""
     every: float = 5.0
-    """Seconds between two looks, where the output is a terminal; elsewhere there is one look."""
+    """Seconds between updates of a terminal; other outputs get the table once."""
 
     def run(self) -> None:
         """Show a table until every study is complete."""
@@ -322,13 +333,12 @@ class MergeSuites:
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
     """A TOML file, or the name of a suite that comes with Shapechanger."""
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
-    """The folders; a study may be in several of them, with other seeds and arms."""
+    """The folders; a study may be in several of them, with different seeds and arms."""
     out: Path | None = None
     """The folder to write; results/NAME if not given."""
 
     def run(self) -> None:
         """Copy what has ended, and report the studies that are complete."""
-        from shapechanger.transfer.executor import Serial
         from shapechanger.transfer.study import PLAN_FILE, run_study, unfinished_runs
         from shapechanger.transfer.suite import merge_study
 
@@ -381,8 +391,6 @@ class Suite:
 
 def _progress_table(out: Path) -> tuple[Table, bool]:
     """A row for each study in a suite's folder, and whether all are complete."""
-    from shapechanger.transfer.files import read_json
-    from shapechanger.transfer.plan import SOURCE, Plan
     from shapechanger.transfer.runs import last_evaluation, load_result
     from shapechanger.transfer.study import PLAN_FILE
 
@@ -430,7 +438,6 @@ class _Page:
     def __init__(
         self, suite: SuiteFile, name: str, out: Path, tasks: dict[str, TransferTask]
     ) -> None:
-        from shapechanger.transfer.files import read_json
         from shapechanger.transfer.study import STUDY_FILE, Study
 
         self.path = out / "index.html"
@@ -446,7 +453,6 @@ class _Page:
         """Add a study that has ended, or replace it; write its report and the page."""
         from shapechanger.cli.films import film_study
         from shapechanger.reports.suite import Sweep, write_suite_report
-        from shapechanger.transfer.files import write_json
 
         write_study_report(study, self._out / name)
         self._studies[name] = study
@@ -492,8 +498,6 @@ class _Page:
 
 def _table(found: list[StudyOutcome]) -> Table:
     """Format the results: values and steps, then gains with intervals."""
-    from shapechanger.reports.numbers import estimate_text
-
     table = Table(
         *("study", "measure", "scratch", "zero-shot", "fine-tuned", "scratch, steps"),
         *("fine-tune, steps", "jumpstart", "total reward gain", "gain at the end"),

@@ -21,9 +21,11 @@ from shapechanger.cli.env_arguments import (
     settings_of,
 )
 from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.transfer.env_ref import EnvRef, env_traits
+from shapechanger.transfer.files import make_folder
+from shapechanger.transfer.learners.settings import Sb3Settings, resolve_learner, tuning_text
 
 if TYPE_CHECKING:
-    from shapechanger.transfer.env_ref import EnvRef
     from shapechanger.transfer.learners.evaluation import Evaluation
 
 # Trains with a callback that takes the number of steps done, and writes the policy.
@@ -49,8 +51,8 @@ class Train:
     seed: int = 0
     """Seed of everything random."""
     teacher: Path | None = None
-    """Policy of the same vehicle on distances, such as one of CarRanges: its student, which sees
-    pictures alone, is trained instead of learning by trial."""
+    """Policy of the same vehicle on distances, such as one of CarRanges: trains a student of it,
+    which sees pictures alone, instead of learning by trial."""
     tensorboard: Path | None = None
     """Folder for TensorBoard's logs; none are written if not given."""
 
@@ -78,16 +80,9 @@ class Train:
 
     def _by_learner(self, env: EnvRef, out: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training by a learner, after checking both."""
-        from shapechanger.transfer.env_ref import env_traits
-        from shapechanger.transfer.files import make_folder
         from shapechanger.transfer.learners.cloning import DemonstrationFile, train_clones
         from shapechanger.transfer.learners.policy_file import save_policy
         from shapechanger.transfer.learners.sb3 import require_budget, train
-        from shapechanger.transfer.learners.settings import (
-            Sb3Settings,
-            resolve_learner,
-            tuning_text,
-        )
         from shapechanger.transfer.runs import learner_of
 
         learner, settings = resolve_learner(

@@ -27,9 +27,10 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners.settings import resolve_learner
+from shapechanger.transfer.plan import Plan, Run, TransferTask
 
 if TYPE_CHECKING:
-    from shapechanger.transfer.plan import Plan, Run, TransferTask
     from shapechanger.transfer.study import Study, TaskTraits
 
 # Divisor of the budget and number of seeds of --quick: enough to see that everything works.
@@ -48,16 +49,16 @@ class Transfer:
     source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
     """Id of the env that the policy is learned in, such as Ant."""
     target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
-    """Id of the env that it is moved to, such as ExtendedAnt."""
+    """Id of the env that it is transferred to, such as ExtendedAnt."""
     seeds: int | None = None
     """Runs of each arm; 5 if not given."""
     steps: int | None = None
     """Target steps of a run; the learner's own number if not given."""
     source_steps: int | None = None
-    """Source steps of a source policy; the learner's own number if not given, which is half as many
-    as target steps, and more for a rig."""
+    """Source steps of a source policy; the learner's own number if not given: half as many as target
+    steps, and more for a rig."""
     quick: bool = False
-    """Two seeds and an eighth of the steps: to see that it works, not to believe the numbers."""
+    """Two seeds and an eighth of the steps: a check that everything works, not a result."""
     out: Path | None = None
     """The study's folder; results/SOURCE-to-TARGET if not given."""
     source_policy: Path | None = None
@@ -155,8 +156,6 @@ class Transfer:
 
     def _task(self) -> TransferTask:
         """Source and target, with their bodies and options."""
-        from shapechanger.transfer.plan import TransferTask
-
         source = driven(env_ref(self.source, self.source_body))
         target = driven(env_ref(self.target, self.target_body), self.target_lens)
         return TransferTask(
@@ -166,7 +165,6 @@ class Transfer:
 
     def _plan(self, task: TransferTask, traits: TaskTraits, given: Path | None) -> Plan:
         """The plan of the study."""
-        from shapechanger.transfer.learners.settings import resolve_learner
         from shapechanger.transfer.study import default_arms, make_plan
 
         learner, settings = resolve_learner(

@@ -56,7 +56,7 @@ def test_a_file_that_cannot_be_read_is_left_alone() -> None:
     remember(_MINE)
     path = known_folder() / "rover.toml"
     path.write_text("key = ")
-    assert make_known(_MINE).startswith("It is not made known here: ")
+    assert make_known(_MINE).startswith("It is not stored as a known robot: ")
     assert path.read_text() == "key = "
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers import TimeLimit
 from numpy.typing import NDArray
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, counted, say
@@ -24,10 +25,10 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.errors import DemosError
+from shapechanger.transfer.env_ref import EnvRef, layouts_of
 
 if TYPE_CHECKING:
     from shapechanger.demos.drivers import Act, EpisodeDriver, TaskExpert
-    from shapechanger.transfer.env_ref import EnvRef
 
 _EXPERT: Final = "expert"
 
@@ -89,7 +90,6 @@ def _expert(env: gym.Env[Any, Any], seed: int) -> TaskExpert:
 
 def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     """Load a policy and check that its observations and actions fit the env."""
-    from shapechanger.transfer.env_ref import layouts_of
     from shapechanger.transfer.learners.cloning import is_clone
     from shapechanger.transfer.learners.policy_file import load_policy
 
@@ -148,21 +148,21 @@ class RecordDemonstrations:
     env: EnvId
     """Id of the env, such as Car."""
     out: Path
-    """Folder of the recording; what is there already stays, and more comes to it."""
+    """Folder of the recording; new episodes are added to those there."""
     minutes: float = 10.0
     """Duration, minutes of the env's time."""
     driver: str = _EXPERT
     """"expert", or the file of a policy."""
     corrected_by: str = ""
-    """"expert" to let it take over where the policy would go wrong. Only what the expert does is
-    learned from then."""
+    """"expert" to let it take over where the policy would fail. Only the expert's steps are then
+    learned from."""
     episode_s: float = 50.0
     """Longest episode, s; a collision ends it earlier."""
     body: Body = ""
     lenses: tuple[str, ...] = ()
     """Disturbances of a vehicle's camera, such as night."""
     put_back: bool = False
-    """Put a vehicle that runs into something back on its lane, in place of ending the episode."""
+    """Put a vehicle back on its lane after a collision, in place of ending the episode."""
     options: str = ""
     """More arguments of the env as JSON, such as '{"courses": "held-out"}'."""
     seed: int = 0
@@ -170,8 +170,6 @@ class RecordDemonstrations:
 
     def run(self) -> None:
         """Record and print a summary."""
-        from gymnasium.wrappers import TimeLimit
-
         from shapechanger.demos.drivers import record_steps
         from shapechanger.demos.recording import RecordEpisodes
 
@@ -198,7 +196,9 @@ class RecordDemonstrations:
                     env, pilot, steps, self.seed, lambda done: progress(ref.id, done, done == steps)
                 )
         except KeyboardInterrupt:
-            raise Interrupted(f"Stopped; what was recorded is in {self.out}, whole.") from None
+            raise Interrupted(
+                f"Stopped; the recording so far is in {self.out}, complete."
+            ) from None
         finally:
             made.close()
         say(
@@ -209,8 +209,6 @@ class RecordDemonstrations:
 
     def _ref(self) -> EnvRef:
         """Return the env with the requested options."""
-        from shapechanger.transfer.env_ref import EnvRef
-
         ref = env_ref(self.env, self.body)
         more: dict[str, Any] = {}
         if ref.id in VEHICLE_ENVS:

@@ -9,19 +9,27 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import counted, plain_console, say
 from shapechanger.cli.env_arguments import require_file
-from shapechanger.demos.episodes import Episode, drop, episodes_of, keep, mark, read_episode, repair
+from shapechanger.demos.episodes import (
+    Episode,
+    Repair,
+    drop,
+    episodes_of,
+    keep,
+    mark,
+    read_episode,
+    repair,
+)
+from shapechanger.demos.statistics import summary
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.reports.numbers import duration_text, shares_text
-
-if TYPE_CHECKING:
-    from shapechanger.demos.episodes import Repair
+from shapechanger.transfer.files import write_atomic
 
 _WIDEST: Final = 400
 _MB: Final = 1e6
@@ -40,8 +48,6 @@ class ListEpisodes:
 
     def run(self) -> None:
         """Print a line per episode and the totals."""
-        from shapechanger.demos.statistics import summary
-
         table = Table(
             "episode", "of", "when (UTC)", "steps", "length", "drivers", "marks", "outcome",
             box=None, pad_edge=False,
@@ -114,7 +120,6 @@ class ShowEpisodes:
         if self.out is None:
             return
         from shapechanger.reports.demonstrations import recording_html
-        from shapechanger.transfer.files import write_atomic
 
         name = self.data.resolve().name
         write_atomic(self.out, recording_html(name, episodes, broken).encode())
@@ -296,7 +301,7 @@ class RepairEpisodes:
 def _told(done: Repair) -> str:
     """Describe a repair."""
     if not done.changed:
-        return f"was whole, with {done.kept} steps"
+        return f"was complete, with {done.kept} steps"
     parts = [f"kept {done.kept} steps"]
     if done.lost:
         parts.append(f"moved {counted(len(done.lost), 'line')} aside, because {done.lost[0]}")
@@ -316,9 +321,9 @@ class Import:
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FROM")]
     """The folder to read."""
     out: Path
-    """The recording to make; nothing is there yet."""
+    """The recording to make; it must not exist yet."""
     format: str = "auto"
-    """Format of the folder: 2017, tub, minari or csv; auto looks for itself."""
+    """Format of the folder: 2017, tub, minari or csv; auto detects it."""
 
     def run(self) -> None:
         """Import and print a summary."""
@@ -338,11 +343,12 @@ class Export:
     data: _Data
     """A recording, or one episode of it."""
     out: Path
-    """The folder to make; nothing is there yet. For minari its name ends in a version: drive-v0."""
+    """The folder to make; it must not exist yet. For minari its name ends in a version, as in
+    drive-v0."""
     to: str
     """Format to write: minari, csv, 2017 or tub."""
     dropped: bool = False
-    """Write the steps that were dropped, too, and that they were; only minari and csv can."""
+    """Write dropped steps too, marked as such; only minari and csv can."""
 
     def run(self) -> None:
         """Export and print a summary."""
@@ -354,8 +360,8 @@ class Export:
             f"{counted(done.episodes, 'episode')}"
         )
         if done.left_out:
-            where = "; --dropped takes them with it" if done.format in {"minari", "csv"} else ""
-            say(f"left out {done.left_out} steps that were dropped{where}")
+            where = "; --dropped includes them" if done.format in {"minari", "csv"} else ""
+            say(f"left out {done.left_out} dropped steps{where}")
         if done.format == "minari":
             say(
                 f"load it with MINARI_DATASETS_PATH={self.out.absolute().parent} and "

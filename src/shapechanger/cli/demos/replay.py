@@ -15,18 +15,18 @@ from shapechanger.cli.console import say
 from shapechanger.cli.demos.recordings import episode_at
 from shapechanger.cli.env_arguments import env_ref, opened
 from shapechanger.demos.dataset import decode_picture
-from shapechanger.demos.episodes import Episode
+from shapechanger.demos.episodes import Episode, Step
 from shapechanger.demos.overlay import blank, overlay
 from shapechanger.errors import DemosError, LinkError, RobotRefused
 from shapechanger.layout import Layout
+from shapechanger.link.messages import Welcome
+from shapechanger.remote.known_robots import recall
+from shapechanger.teleop import Terminal
+from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
-    from shapechanger.demos.episodes import Step
     from shapechanger.demos.recording import Seen
-    from shapechanger.link.messages import Welcome
     from shapechanger.remote.client import RobotClient
-    from shapechanger.teleop import Terminal
-    from shapechanger.transfer.env_ref import EnvRef
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,7 @@ class Replay:
     film: Path | None = None
     """A film to write, such as out.mp4, with the actions drawn in."""
     env: str = ""
-    """Id of an env to play the actions in, from the seed that was recorded; it says how far the
-    two come apart."""
+    """Id of an env to play the actions in, from the recorded seed; differences are reported."""
     robot: str = ""
     """Name of a robot to play the actions on, see `robot remember`; a person at this terminal
     arms it, and any key stops it."""
@@ -96,7 +95,7 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
             played += 1
             apart.earn(step, float(reward))
             if terminated or truncated:
-                ended = "; there it was over" if played < len(kept) else ""
+                ended = "; the episode ended there" if played < len(kept) else ""
                 break
     say(f"played {played} of {len(kept)} steps in {env_id}{ended}")
     for line in _caveats(episode):
@@ -107,8 +106,6 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
 
 def _ref(episode: Episode, env_id: str) -> EnvRef:
     """Return the env, with the recorded arguments if it is the recorded one."""
-    from shapechanger.transfer.env_ref import EnvRef
-
     ref, header = env_ref(env_id), episode.header
     kwargs = header.env_kwargs if ref.id == header.env else {}
     return EnvRef(ref.id, {**kwargs, **ref.kwargs})
@@ -118,12 +115,12 @@ def _caveats(episode: Episode) -> list[str]:
     """Return reasons why a replay cannot be identical."""
     caveats: list[str] = []
     if episode.header.seed is None:
-        caveats.append("it was recorded without a seed, so it began somewhere else")
+        caveats.append("it was recorded without a seed, so it starts elsewhere")
     kept = episode.kept
     if kept[0].index != 0 or kept[-1].index - kept[0].index != len(kept) - 1:
-        caveats.append("steps of it do not count and were not played, so it went on from elsewhere")
+        caveats.append("dropped steps were not played, so later steps start elsewhere")
     if any(step.applied is None for step in kept):
-        caveats.append("what its outputs did is not known, so what was decided was played")
+        caveats.append("applied actions are unknown, so the decided ones were played")
     return caveats
 
 
@@ -174,8 +171,8 @@ class _Apart:
                     )
         if self._rewards:
             then, now = np.sum(self._rewards, axis=0)
-            lines.append(f"it was worth {then:.2f} and is now worth {now:.2f}")
-        return lines or ["there is nothing to compare it with"]
+            lines.append(f"return {then:.2f} when recorded, {now:.2f} now")
+        return lines or ["nothing to compare"]
 
 
 _WITHOUT_CAMERA: Final = (480, 40)
@@ -222,8 +219,6 @@ def _play_on_robot(episode: Episode, name: str) -> None:
     The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.
     """
     from shapechanger.remote.client import RobotClient
-    from shapechanger.remote.known_robots import recall
-    from shapechanger.teleop import Terminal
 
     known = recall(name)
     with (
@@ -237,7 +232,7 @@ def _play_on_robot(episode: Episode, name: str) -> None:
             "E arms it and starts · any other key cancels; during the replay, any key stops it."
         )
         if not _agreed(robot, terminal):
-            say("left; nothing was played")
+            say("cancelled; nothing was played")
             return
         try:
             robot.take()

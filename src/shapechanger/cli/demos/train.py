@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import tyro
+from numpy.typing import NDArray
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
 from shapechanger.cli.env_arguments import require_file, require_seed
+from shapechanger.demos.cloning.pictures import Framing, prepare
+from shapechanger.demos.dataset import count_steps, load_dataset
 from shapechanger.errors import OutputError
+from shapechanger.transfer.files import write_atomic
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from shapechanger.demos.cloning.judge import Judgement
     from shapechanger.demos.cloning.learn import MemberCheck
-    from shapechanger.demos.cloning.pictures import Framing
     from shapechanger.demos.cloning.policy import CameraPolicy
 
 
@@ -55,7 +56,6 @@ class TrainClone:
         from shapechanger.demos.cloning.demonstrations import judged_steps
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.learn import learn, settings_for
-        from shapechanger.demos.dataset import count_steps, load_dataset
         from shapechanger.reports.clone import write_clone_report, write_numbers
         from shapechanger.transfer.learners.sb3 import use_one_thread
 
@@ -92,7 +92,7 @@ class TrainClone:
         note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
         if not judged.any():
             judged = learned
-            note = "These are the steps that it learned from, so others will come out worse."
+            note = "These are the steps that it learned from, so expect less on others."
         judgement = judge(policy, data, judged)
         policy.save(self.out)
         for path in self._write_for_sb3(policy, shrinking.size):
@@ -120,7 +120,6 @@ class TrainClone:
         if self.sac is None and self.ppo is None:
             return written
         from shapechanger.demos.cloning.sb3 import as_ppo, as_sac
-        from shapechanger.transfer.files import write_atomic
 
         for path, make in ((self.sac, as_sac), (self.ppo, as_ppo)):
             if path is not None:
@@ -148,8 +147,6 @@ class Shrinking:
     def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the policy's view of a frame."""
         import hashlib
-
-        from shapechanger.demos.cloning.pictures import prepare
 
         self.size = picture.shape[0], picture.shape[1]
         small = prepare(picture[None], self.framing)[0]
@@ -219,7 +216,6 @@ class Evaluate:
         """Evaluate and print."""
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.policy import CameraPolicy
-        from shapechanger.demos.dataset import load_dataset
 
         policy = CameraPolicy.load(self.policy)
         shrinking = Shrinking(policy.card.framing)

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import change_profile, own_profile
 from shapechanger.errors import OutputError, RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, open_camera
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:
-    from shapechanger.robot.cameras.camera import CameraPlan
-    from shapechanger.robot.profile.profile import Profile
     from shapechanger.worlds.rectify import CameraGeometry
 
 # As in a profile.
@@ -51,8 +52,6 @@ class CameraView:
         Raises:
             RobotError: If the options contradict each other, or something is missing.
         """
-        from shapechanger.robot.profile.load import find_profile, load_profile
-
         if self.board and self.horizon is not None:
             raise RobotError("Give --board or --horizon, not both.")
         if self.fovy is not None and not _LEAST_FOVY_DEG <= self.fovy <= _MOST_FOVY_DEG:
@@ -130,8 +129,6 @@ def _stated(profile: Profile) -> CameraGeometry:
 def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
     """Read a picture from a file, or take one, shape (height, width, 3)."""
     import simplejpeg
-
-    from shapechanger.robot.cameras.camera import open_camera
 
     if path is None:
         camera = open_camera(plan)

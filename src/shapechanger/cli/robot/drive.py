@@ -14,15 +14,17 @@ from rich.live import Live
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console, say
+from shapechanger.cli.robot.fetch import recorded
+from shapechanger.cli.robot.key import can_open, open_console
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
-from shapechanger.remote.known_robots import KnownRobot
+from shapechanger.link.messages import Observation
+from shapechanger.remote.known_robots import KnownRobot, recall
 from shapechanger.teleop import DIRECTIONS, HeldKeys, Terminal
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
-    from shapechanger.link.messages import Observation
     from shapechanger.remote.client import RobotClient
 
 _LOOK_EVERY_S: Final = 0.2
@@ -43,16 +45,13 @@ class Drive:
     terminal: bool = False
     """Drive with the keys of this terminal, even where a browser could show the console."""
     policy: Path | None = None
-    """A policy that drives when you let it, such as `shapechanger demos train` writes."""
+    """A policy that drives when you permit it, such as one of `shapechanger demos train`."""
     record: Path | None = None
-    """Record all of it on the robot, and bring it to this folder at the end."""
+    """Record on the robot, and download the recording to this folder at the end."""
 
     def run(self) -> None:
         """Drive until Q, or until Ctrl-C if the console is used."""
-        from shapechanger.cli.robot.fetch import recorded
-        from shapechanger.cli.robot.key import can_open, open_console
         from shapechanger.remote.client import RobotClient
-        from shapechanger.remote.known_robots import recall
 
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
@@ -103,7 +102,7 @@ def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:
 
 _HELP: Final = (
     "W A S D or arrows drive · E arms · Space stops everything · X disarms · + and - set the cap · "
-    "P lets a waiting program drive · R records · M marks · U undoes 5 s · Q leaves"
+    "P lets a waiting program drive · R records · M marks · U undoes 5 s · Q quits"
 )
 _CAP_STEP: Final = 0.1
 # s. A program waiting in `reset` takes a free robot within this time.
@@ -382,9 +381,11 @@ class PolicyDriver:
         while not self._ended.is_set():
             action = self._policy.predict(*self._perceived(observation))
             observation, _, terminated, truncated, info = env.step(action)
-            self.note = "you drive, and it watches" if "intervene_action" in info else "it drives"
+            self.note = (
+                "you drive, and the policy watches" if "intervene_action" in info else "it drives"
+            )
             if terminated or truncated:
-                self._why = info["truncated_because"] or "It ran into something."
+                self._why = info["truncated_because"] or "It collided."
                 return
 
     def _perceived(self, observation: Any) -> tuple[Any, Any]:

@@ -28,6 +28,7 @@ from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import Step, decode_line, split_lines
 from shapechanger.errors import DemosError, RobotRefused, UnknownName
 from shapechanger.link.messages import EpisodeSummary, Piece
+from shapechanger.remote.known_robots import recall
 
 if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
@@ -40,14 +41,13 @@ class FetchEpisodes:
     robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
     """Name of a robot that is known here, see `remember`."""
     out: Annotated[Path, tyro.conf.arg(metavar="DATA")]
-    """Folder to put the episodes into. What was cut off there goes on where it was."""
+    """Folder for the episodes; interrupted downloads there are resumed."""
     episodes: tuple[str, ...] = ()
     """Only these episodes, by their ids; all of them if not given."""
 
     def run(self) -> None:
         """Download; exit with 1 if an episode failed."""
         from shapechanger.remote.client import RobotClient
-        from shapechanger.remote.known_robots import recall
 
         failed = 0
         with RobotClient.connect(recall(self.robot), frames=False) as robot:
@@ -57,7 +57,7 @@ class FetchEpisodes:
             for episode in there:
                 busy = robot.recorder
                 if busy is not None and busy.recording and busy.episode == episode.id:
-                    say(f"{episode.id} is being recorded: later.")
+                    say(f"{episode.id} is still being recorded: fetch it later.")
                     continue
                 try:
                     came = fetch_episode(robot, episode.id, self.out)
@@ -68,7 +68,7 @@ class FetchEpisodes:
                 news = f"{came} lines came" if came else "nothing new"
                 say(f"{episode.id}: {episode.kept} steps kept of {episode.steps}, {news}")
                 if not episode.closed:
-                    say(f"  it was cut off: shapechanger demos repair {self.out / episode.id}")
+                    say(f"  it is incomplete: shapechanger demos repair {self.out / episode.id}")
         if failed:
             sys.exit(1)
 
@@ -242,8 +242,8 @@ def recorded(robot: RobotClient, name: str, data: Path | None) -> Generator[None
             say(f"recorded {episode.kept} steps in {data / episode.id}")
     except BaseException:
         say(
-            f"What was recorded is on the robot: `shapechanger robot fetch {name} --out {data}` "
-            "brings it.",
+            f"The recording is on the robot: `shapechanger robot fetch {name} --out {data}` "
+            "downloads it.",
             stderr=True,
         )
         raise

@@ -13,6 +13,8 @@ from rich.table import Table
 
 from shapechanger.cli.console import print_table, say
 from shapechanger.errors import LinkError, ShapechangerError
+from shapechanger.link.messages import VERSION
+from shapechanger.remote.known_robots import KnownRobot, forget, known_names, recall, remember
 
 _KEY_VARIABLE = "SHAPECHANGER_KEY"
 
@@ -26,7 +28,6 @@ class Find:
 
     def run(self) -> None:
         """Print a table with the robots' local names."""
-        from shapechanger.link.messages import VERSION
         from shapechanger.remote.discovery import find
 
         if not 0.0 < self.seconds <= 60.0:
@@ -60,8 +61,6 @@ class Remember:
 
     def run(self) -> None:
         """Ask for the key, which does not belong on a command line, and store everything."""
-        from shapechanger.remote.known_robots import KnownRobot, remember
-
         key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
         path = remember(KnownRobot(self.name, self.address, key.strip(), self.fingerprint))
         say(f"wrote {path}")
@@ -76,15 +75,11 @@ class Forget:
 
     def run(self) -> None:
         """Remove its file."""
-        from shapechanger.remote.known_robots import forget
-
         forget(self.name)
 
 
 def _known_here() -> dict[str, str]:
     """Return the local names of known robots by fingerprint, skipping broken files."""
-    from shapechanger.remote.known_robots import known_names, recall
-
     known: dict[str, str] = {}
     for name in known_names():
         try:

@@ -11,18 +11,16 @@ import time
 import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.errors import LinkError, MissingExtra, UnknownName
 from shapechanger.link.address import parse_address
-from shapechanger.remote.known_robots import INSECURE
-
-if TYPE_CHECKING:
-    from shapechanger.remote.known_robots import KnownRobot
-    from shapechanger.robot.daemon.credentials import Credentials
+from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
+from shapechanger.remote.known_robots import INSECURE, KnownRobot
+from shapechanger.robot.daemon.credentials import Credentials, credentials_folder, load_credentials
 
 
 @dataclass(frozen=True)
@@ -41,8 +39,6 @@ class Key:
 
     def run(self) -> None:
         """Print them, and the command that stores them on another computer."""
-        from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
-
         folder = self.credentials or credentials_folder(self.name)
         if not folder.exists() and self.credentials is None:
             there = folder.parent.iterdir() if folder.parent.is_dir() else ()
@@ -60,8 +56,6 @@ class Key:
             import segno
         except ImportError as error:
             raise MissingExtra("segno", "robot") from error
-        from shapechanger.link.authentication import fingerprint_hex
-        from shapechanger.remote.known_robots import KnownRobot
 
         key = credentials.key_file.read_text().strip()
         address = self.address or f"{socket.gethostname()}.local"
@@ -74,8 +68,6 @@ class Key:
 
 def shown_credentials(credentials: Credentials) -> str:
     """Format the key and the fingerprint for people to compare."""
-    from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
-
     key = credentials.key_file.read_text().strip()
     fingerprint = credentials.fingerprint
     return (
@@ -87,8 +79,6 @@ def shown_credentials(credentials: Credentials) -> str:
 
 def how_to_remember(name: str, credentials: Credentials) -> str:
     """Return the command for the computer that is to drive the robot."""
-    from shapechanger.link.authentication import fingerprint_hex
-
     return (
         "On the workstation, with the key from above:\n"
         f"      shapechanger robot remember {name} {socket.gethostname()}.local "

@@ -17,11 +17,13 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import plain_console, say
+from shapechanger.cli.robot.calibrate import ask_for_wheels_up
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
+from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:
@@ -42,9 +44,9 @@ class Selftest:
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
     twin: bool = False
-    """Break the twin of this robot in every way, and let the ledger of its pins be the judge."""
+    """Inject every fault into the robot's twin, and judge by the ledger of its pins."""
     trials: int = 1
-    """With --twin: how often each fault is tried."""
+    """With --twin: trials of each fault."""
     one_shot: bool = True
     """With --twin: whether the one-shot of the enable line is fitted, where the profile has one."""
     wheels_up: bool = False
@@ -56,8 +58,6 @@ class Selftest:
 
     def run(self) -> None:
         """Run the tests, print the results, and exit with 1 on a failure."""
-        from shapechanger.robot.profile.load import find_profile, load_profile
-
         profile = load_profile(find_profile(self.profile))
         # Makes the output self-contained.
         say(
@@ -95,7 +95,6 @@ class Selftest:
         return good
 
     def _on_hardware(self, profile: Profile) -> bool:
-        from shapechanger.cli.robot.calibrate import ask_for_wheels_up
         from shapechanger.twin.robot import run_robot
 
         if not 0.0 < self.cap <= 1.0:

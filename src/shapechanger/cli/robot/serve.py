@@ -18,8 +18,10 @@ import msgspec
 import tyro
 
 from shapechanger.cli.console import say
+from shapechanger.cli.robot.setup import require_pins
 from shapechanger.errors import LinkError, MissingExtra, ProfileError, RobotError, UnknownName
-from shapechanger.link.address import is_loopback, parse_address
+from shapechanger.link.address import Address, is_loopback, parse_address
+from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.remote.known_robots import KnownRobot, check_name, known_names, recall, remember
 from shapechanger.robot.daemon.credentials import (
     credentials_folder,
@@ -27,7 +29,7 @@ from shapechanger.robot.daemon.credentials import (
     make_credentials,
 )
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard.serve_plan import ServePlan
+from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd, supervisor_command
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.start import BoardAt, find_board, start_board
@@ -63,20 +65,20 @@ class Serve:
     seed: int = 0
     """With --twin: seed of the world."""
     world: str = ""
-    """With --twin: corridor, yard or harbour, or room for a plain room that needs no MuJoCo; where
-    the vehicle is at home if not given."""
+    """With --twin: corridor, yard or harbour, or room for a plain room that needs no MuJoCo; the
+    vehicle's default if not given."""
     lens: tuple[str, ...] = ()
-    """With --twin: what is wrong with the camera, such as night or dirt."""
+    """With --twin: disturbances of the camera, such as night or dirt."""
     gap: str = ""
-    """With --twin, for a finger: what the finger is drawn from, such as real-like; the nominal one
-    if not given."""
+    """With --twin, for a finger: name of the gap that it is drawn from, such as real-like; the
+    nominal finger if not given."""
     finger_seed: int | None = None
-    """With --gap: which finger of it this is, as finger_seed of Finger-v1."""
+    """With --gap: seed of the finger drawn from it, as finger_seed of Finger-v1."""
     twin_folder: Path | None = None
     """With --twin: folder for the ledger of all pins and the twin's socket; a new one if not
     given. A twin that runs there already is used as it is."""
     insecure: bool = False
-    """Speak without TLS. The key is still needed."""
+    """Serve without TLS. The key is still needed."""
     credentials: Path | None = None
     """Folder of the robot's key and certificate, if not the one that `init` made."""
     arm_by_program: bool = False
@@ -87,14 +89,11 @@ class Serve:
     """File to write the port and the fingerprint into, as JSON, once the robot can be reached."""
 
     recordings: Path | None = None
-    """Folder for what is recorded on the robot; ~/.local/share/shapechanger/recordings/NAME if not
+    """Folder for the robot's recordings; ~/.local/share/shapechanger/recordings/NAME if not
     given."""
 
     def run(self) -> None:
         """Become the robot's supervisor; return only on an error."""
-        from shapechanger.cli.robot.setup import require_pins
-        from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
-
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
         # Undone only after an error: exec keeps everything.
@@ -114,9 +113,6 @@ class Serve:
 
     def _make_known(self, name: str) -> None:
         """Store the twin's address and key for this machine, as `init` does, and print that."""
-        from shapechanger.link.address import Address
-        from shapechanger.link.authentication import fingerprint_hex
-
         # With any free port, or without TLS, the address is passed on by the caller.
         if not self.port or self.insecure or not can_be_known(name):
             return
@@ -353,7 +349,7 @@ def make_known(robot: KnownRobot) -> str:
     try:
         known = recall(name)
     except (LinkError, UnknownName) as error:
-        return f"It is not made known here: {error}"
+        return f"It is not stored as a known robot: {error}"
     if (known.key, known.fingerprint) != (robot.key, robot.fingerprint):
         return (
             f"Another robot is known here as {name}, at {known.address}, and stays known: "

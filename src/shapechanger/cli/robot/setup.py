@@ -11,9 +11,28 @@ from typing import Annotated, Any, Final
 import tyro
 
 from shapechanger.cli.console import say
+from shapechanger.cli.robot.key import how_to_remember, shown_credentials
 from shapechanger.errors import RobotError, ShapechangerError
+from shapechanger.link.authentication import fingerprint_hex
+from shapechanger.remote.known_robots import KnownRobot, check_name, remember
+from shapechanger.robot.daemon.credentials import (
+    credentials_folder,
+    load_credentials,
+    make_credentials,
+)
+from shapechanger.robot.guard.outputs import make_safe
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.robot.setup.doctor import uses_pins
+from shapechanger.robot.hardware import REAL, connect
+from shapechanger.robot.profile.load import (
+    find_profile,
+    load_profile,
+    shipped_profiles,
+    starter_text,
+    write_profile,
+)
+from shapechanger.robot.setup.doctor import Finding, examine_robot, uses_pins
+from shapechanger.robot.setup.systemd import write_unit
+from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
 
 
 @dataclass(frozen=True)
@@ -32,13 +51,6 @@ class Init:
 
     def run(self) -> None:
         """Write the files and print the next steps."""
-        from shapechanger.cli.robot.key import how_to_remember, shown_credentials
-        from shapechanger.link.authentication import fingerprint_hex
-        from shapechanger.remote.known_robots import KnownRobot, check_name, remember
-        from shapechanger.robot.daemon.credentials import credentials_folder, make_credentials
-        from shapechanger.robot.profile.load import starter_text, write_profile
-        from shapechanger.robot.setup.systemd import write_unit
-
         name = self.name or self.kind
         check_name(name)
         out = self.out or Path(f"{name}.toml")
@@ -53,7 +65,7 @@ class Init:
         # command can be repeated.
         profile = write_profile(self.kind, out, name)
         say(
-            f"wrote {profile}: look at its pins before anything moves\n"
+            f"wrote {profile}: check its pins before anything moves\n"
             f"{'wrote' if is_new else 'kept'} {unit}: for systemd, see docs/hardware.md\n"
             f"key and certificate in {credentials.key_file.parent}\n\n"
             f"{shown_credentials(credentials)}\n\n"
@@ -73,8 +85,6 @@ def own_profile(name: str) -> Path:
         ProfileError: If there is none.
         RobotError: If it comes with Shapechanger.
     """
-    from shapechanger.robot.profile.load import find_profile, shipped_profiles
-
     path = find_profile(name)
     if path in shipped_profiles().values():
         raise RobotError(
@@ -119,10 +129,6 @@ class Home:
 
     def run(self) -> None:
         """Pull gently and store the positions at which motion stops."""
-        from shapechanger.robot.hardware import REAL, connect
-        from shapechanger.robot.profile.load import load_profile
-        from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
-
         path = own_profile(self.profile)
         plan = load_profile(path).guard_plan()
         if not self.straight:
@@ -154,12 +160,8 @@ class Doctor:
 
     def run(self) -> None:
         """Print the findings and exit with 1 if something is missing."""
-        from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
-        from shapechanger.robot.profile.load import find_profile, load_profile
-        from shapechanger.robot.setup.doctor import Finding, examine_robot
-
         profile = load_profile(find_profile(self.profile))
-        findings = [Finding("profile", "good", f"{profile.path} holds together.")]
+        findings = [Finding("profile", "good", f"{profile.path} is valid.")]
         try:
             folder = self.credentials or credentials_folder(profile.name)
             folder = load_credentials(folder).key_file.parent
@@ -176,7 +178,7 @@ class Doctor:
             say(f"{_MARKS[finding.level]}  {finding.check}: {finding.sentence}")
         missing = sum(finding.level == "missing" for finding in findings)
         if missing:
-            say(f"\n{missing} of {len(findings)} to mend.")
+            say(f"\n{missing} of {len(findings)} to fix.")
             sys.exit(1)
 
 
@@ -189,10 +191,6 @@ class SafePins:
 
     def run(self) -> None:
         """Put the outputs at rest and print failures."""
-        from shapechanger.robot.guard.outputs import make_safe
-        from shapechanger.robot.hardware import REAL, connect
-        from shapechanger.robot.profile.load import find_profile, load_profile
-
         plan = load_profile(find_profile(self.profile)).guard_plan()
         require_pins(plan)
         hardware = connect(REAL, "")

@@ -11,6 +11,7 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.errors import LinkError
+from shapechanger.remote.known_robots import recall
 
 # s. A guard stops within a tick and reports it in the next observation.
 _CONFIRMED_WITHIN_S: Final = 2.0
@@ -28,7 +29,6 @@ class Stop:
     def run(self) -> None:
         """Stop the robot; exit with 1 if it does not confirm."""
         from shapechanger.remote.client import RobotClient
-        from shapechanger.remote.known_robots import recall
 
         known = recall(self.robot)
         try:

@@ -160,6 +160,13 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         tension = np.abs(self.plant.data.actuator_force) / self._most
         return distance, self._reward.terms(distance, float(np.mean(tension**2)), CONTROL_DT)
 
+    def _stepped(
+        self, observation: Any, info: dict[str, Any], terms: dict[str, float]
+    ) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Return the result of a step, whose reward is the sum of `terms`."""
+        diverged = {"diverged": True} if self.plant.diverged else {}
+        return observation, sum(terms.values()), False, False, {**info, **terms, **diverged}
+
     def render(self) -> Any:
         """Return a frame of `render_mode`; None without one.
 
