@@ -30,13 +30,12 @@ try:
     from shapechanger.cli.demos import Demos
     from shapechanger.cli.envs import Envs
     from shapechanger.cli.finger import Finger
-    from shapechanger.cli.methods import Methods
     from shapechanger.cli.play import Play
     from shapechanger.cli.policies import Policies
     from shapechanger.cli.robot import Robot
     from shapechanger.cli.suite import Suite
     from shapechanger.cli.train import Train
-    from shapechanger.cli.transfer import Transfer
+    from shapechanger.cli.transfer import Methods, Transfer
 except KeyboardInterrupt:  # pragma: no cover  # Tested in a subprocess.
     print("Stopped.", file=sys.stderr)
     sys.exit(_INTERRUPTED)

@@ -1,4 +1,4 @@
-"""`shapechanger transfer`: a complete transfer study."""
+"""`shapechanger transfer | methods`: a transfer study, and the methods that it can compare."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from shapechanger.cli.env_arguments import (
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import resolve_learner
+from shapechanger.transfer.methods import load_method, method_names
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 
 if TYPE_CHECKING:
@@ -55,8 +56,8 @@ class Transfer:
     steps: int | None = None
     """Target steps of a run; the learner's own number if not given."""
     source_steps: int | None = None
-    """Source steps of a source policy; the learner's own number if not given: half as many as target
-    steps, and more for a rig."""
+    """Source steps of a source policy; the learner's own number if not given: half as many as
+    target steps, and more for a rig."""
     quick: bool = False
     """Two seeds and an eighth of the steps: a check that everything works, not a result."""
     out: Path | None = None
@@ -192,6 +193,20 @@ class Transfer:
             measure=self.measure,
             traits=traits,
         )
+
+
+@dataclass(frozen=True)
+class Methods:
+    """List the transfer methods that a study can compare: shipped ones and those of plug-ins."""
+
+    def run(self) -> None:
+        """Print a table."""
+        table = Table("method", "what it does", "source", box=None)
+        for name in method_names():
+            method = load_method(name)
+            about = (type(method).__doc__ or "").strip().partition("\n")[0]
+            table.add_row(name, about, method.paper)
+        print_table(table)
 
 
 def write_study_report(study: Study, out: Path) -> Path:

@@ -11,12 +11,11 @@ from shapechanger.cli.robot.calibrate import Calibrate
 from shapechanger.cli.robot.camera import CameraView
 from shapechanger.cli.robot.drive import Drive
 from shapechanger.cli.robot.fetch import FetchEpisodes
-from shapechanger.cli.robot.find import Find, Forget, Remember
 from shapechanger.cli.robot.key import Key
+from shapechanger.cli.robot.remote import Find, Forget, Remember, Stop
 from shapechanger.cli.robot.selftest import Selftest
 from shapechanger.cli.robot.serve import Serve
 from shapechanger.cli.robot.setup import Doctor, Home, Init, SafePins
-from shapechanger.cli.robot.stop import Stop
 
 __all__ = ["Robot"]
 

@@ -57,13 +57,23 @@ class Key:
         except ImportError as error:
             raise MissingExtra("segno", "robot") from error
 
-        key = credentials.key_file.read_text().strip()
-        address = self.address or f"{socket.gethostname()}.local"
-        robot = KnownRobot(self.name, address, key, fingerprint_hex(credentials.fingerprint))
+        robot = robot_at(self.address or f"{socket.gethostname()}.local", self.name, credentials)
         console = _console_address(robot)
         say(f"\nThe console is at {console}; this brings a phone there:\n")
         # Printed verbatim: wrapping would break the code.
-        segno.make(f"{console}#key={key}", micro=False).terminal(sys.stdout, compact=True)
+        segno.make(f"{console}#key={robot.key}", micro=False).terminal(sys.stdout, compact=True)
+
+
+def robot_at(address: str, name: str, credentials: Credentials) -> KnownRobot:
+    """Return a robot as its clients know it.
+
+    Args:
+        address: Its address, HOST or HOST:PORT.
+        name: Its name.
+        credentials: Its key and certificate.
+    """
+    key = credentials.key_file.read_text().strip()
+    return KnownRobot(name, address, key, fingerprint_hex(credentials.fingerprint))
 
 
 def shown_credentials(credentials: Credentials) -> str:

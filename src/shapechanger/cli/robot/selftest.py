@@ -27,8 +27,7 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:
-    from shapechanger.cli.robot.trial.faults import Fault
-    from shapechanger.cli.robot.trial.trial import Trial, TrialResult
+    from shapechanger.cli.robot.trial import Fault, Trial, TrialResult
     from shapechanger.remote.client import RobotClient
     from shapechanger.twin.robot import RunningRobot
 
@@ -70,8 +69,7 @@ class Selftest:
             sys.exit(1)
 
     def _on_twin(self, profile: Profile) -> bool:
-        from shapechanger.cli.robot.trial.faults import FAULTS
-        from shapechanger.cli.robot.trial.trial import Trial, has
+        from shapechanger.cli.robot.trial import FAULTS, Trial, has
 
         if self.trials < 1:
             raise RobotError(f"At least one trial is needed, got {self.trials}.")

@@ -18,10 +18,10 @@ import msgspec
 import tyro
 
 from shapechanger.cli.console import say
+from shapechanger.cli.robot.key import robot_at
 from shapechanger.cli.robot.setup import require_pins
 from shapechanger.errors import LinkError, MissingExtra, ProfileError, RobotError, UnknownName
 from shapechanger.link.address import Address, is_loopback, parse_address
-from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.remote.known_robots import KnownRobot, check_name, known_names, recall, remember
 from shapechanger.robot.daemon.credentials import (
     credentials_folder,
@@ -114,14 +114,15 @@ class Serve:
     def _make_known(self, name: str) -> None:
         """Store the twin's address and key for this machine, as `init` does, and print that."""
         # With any free port, or without TLS, the address is passed on by the caller.
-        if not self.port or self.insecure or not can_be_known(name):
+        if not self.port or self.insecure:
+            return
+        try:
+            check_name(name)
+        except LinkError:  # Not every name of a robot is that of a file.
             return
         credentials = load_credentials(self.credentials or credentials_folder(name))
         host = _HERE if self.host in {"", "0.0.0.0", "::"} else self.host
-        address = str(Address(host, self.port))
-        key = credentials.key_file.read_text().strip()
-        robot = KnownRobot(name, address, key, fingerprint_hex(credentials.fingerprint))
-        say(make_known(robot))
+        say(make_known(robot_at(str(Address(host, self.port)), name, credentials)))
 
     def _refuse_contradictions(self) -> None:
         """Refuse options that only apply to a twin."""
@@ -362,12 +363,3 @@ def make_known(robot: KnownRobot) -> str:
         return f"Known here as {name} at {before}, which stays; this one is at {now}."
     remember(robot)
     return f"Known here as {name}, now at {now} and no more at {before}: {drives}."
-
-
-def can_be_known(name: str) -> bool:
-    """Return whether a robot can be stored under a name."""
-    try:
-        check_name(name)
-    except LinkError:
-        return False
-    return True

@@ -11,10 +11,9 @@ from typing import Annotated, Any, Final
 import tyro
 
 from shapechanger.cli.console import say
-from shapechanger.cli.robot.key import how_to_remember, shown_credentials
+from shapechanger.cli.robot.key import how_to_remember, robot_at, shown_credentials
 from shapechanger.errors import RobotError, ShapechangerError
-from shapechanger.link.authentication import fingerprint_hex
-from shapechanger.remote.known_robots import KnownRobot, check_name, remember
+from shapechanger.remote.known_robots import check_name, remember
 from shapechanger.robot.daemon.credentials import (
     credentials_folder,
     load_credentials,
@@ -56,10 +55,8 @@ class Init:
         out = self.out or Path(f"{name}.toml")
         starter_text(self.kind, out, name)  # Check everything before creating anything.
         credentials = make_credentials(self.credentials or credentials_folder(name), name)
-        key = credentials.key_file.read_text().strip()
-        digits = fingerprint_hex(credentials.fingerprint)
         # Lets this machine drive it, especially on a twin.
-        remember(KnownRobot(name, "127.0.0.1", key, digits))
+        remember(robot_at("127.0.0.1", name, credentials))
         unit, is_new = write_unit(name, out, self.credentials)
         # Last, because an existing profile is refused: after a failure, such as a full disk, the
         # command can be repeated.
