@@ -117,7 +117,11 @@ def name_of(env: gym.Env[Any, Any]) -> str:
 
 
 def asked(env: gym.Env[Any, Any], ability: str) -> Any:
-    """Return a method that an env offers beyond Gymnasium's, such as "picture".
+    """Return a method that an env offers beyond Gymnasium's.
+
+    Args:
+        env: The env.
+        ability: Name of the method, such as "picture".
 
     Raises:
         MorphologyError: If it does not offer it.

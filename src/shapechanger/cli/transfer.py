@@ -210,7 +210,15 @@ class Methods:
 
 
 def write_study_report(study: Study, out: Path) -> Path:
-    """Write the report, without pictures of the bodies if they cannot be rendered."""
+    """Write the report of a study, without pictures of the bodies if they cannot be rendered.
+
+    Args:
+        study: The study.
+        out: Its folder.
+
+    Returns:
+        The page.
+    """
     from shapechanger.reports.study import write_report
 
     path = out / "report.html"
@@ -224,7 +232,12 @@ def write_study_report(study: Study, out: Path) -> Path:
 
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
-    """Return the number of steps of each run for the progress; an evaluation counts as one."""
+    """Return the number of steps of each run for the progress; an evaluation counts as one.
+
+    Args:
+        plan: The plan of the study.
+        runs: The runs.
+    """
     return {run.name: max(1, plan.steps_of(run.kind)) for run in runs}
 
 

@@ -181,6 +181,10 @@ _WITHOUT_CAMERA: Final = (480, 40)
 def film(episode: Episode, path: Path) -> None:
     """Write the kept steps of an episode as a video.
 
+    Args:
+        episode: The episode.
+        path: The file.
+
     Raises:
         OutputError: If it cannot be written.
         DemosError: If a frame is damaged.

@@ -375,7 +375,12 @@ class TrialResult:
 
 
 def has(profile: Profile, needs: str) -> bool:
-    """Return whether a robot has the part that a fault needs."""
+    """Return whether a robot has the part that a fault needs.
+
+    Args:
+        profile: The robot.
+        needs: The part, as in `Fault.needs`.
+    """
     return {
         "": True,
         "camera": profile.camera is not None,
