@@ -20,8 +20,7 @@ import numpy as np
 
 import shapechanger
 from benchmarks.row import Row
-from shapechanger.cli.robot.trial.faults import FAULTS, Fault
-from shapechanger.cli.robot.trial.trial import Trial
+from shapechanger.cli.robot.trial import FAULTS, Fault, Trial
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile
 from tests.robots import CAR

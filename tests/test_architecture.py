@@ -53,7 +53,7 @@ _RULES = {
     # Courses, their scenes, and the expert that drives them with a vehicle.
     "worlds": _Rule(_names("errors rendering bodies"), never=_HARDWARE | {"torch", "gymnasium"}),
     # Rewards and endings: no model file.
-    "tasks": _Rule(_names("errors layout"), _names("numpy msgspec")),
+    "tasks": _Rule(_names("errors layout"), _names("numpy msgspec scipy")),
     # Envs join bodies and tasks. A vehicle's env runs the whole robot in one process, and the
     # remote ones reach it over the link.
     "envs": _Rule(

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.trial.faults import FAULTS
-from shapechanger.cli.robot.trial.trial import Trial
+from shapechanger.cli.robot.trial import FAULTS, Trial
 from shapechanger.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 

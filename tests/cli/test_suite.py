@@ -14,10 +14,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from shapechanger.cli import main
+from shapechanger.cli import env_arguments, main
 from shapechanger.cli import suite as suite_command
 from shapechanger.cli.suite import SuiteFile
-from shapechanger.transfer import executor
 from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.learners.settings import LEARNERS
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
@@ -77,7 +76,7 @@ def _run(
         contextlib.redirect_stdout(said),
         contextlib.redirect_stderr(complained),
     ):
-        patch.setattr(executor, "Processes", lambda workers: counting)
+        patch.setattr(env_arguments, "Processes", lambda workers: counting)
         patch.setattr(sys, "argv", ["shapechanger", *typed])
         try:
             main(typed)

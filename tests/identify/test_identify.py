@@ -97,7 +97,6 @@ DYNAMICS = Dynamics(
     values={name: 2.0 * value for name, value in FACTORS.items()},
     sd={name: 0.1 for name in FACTORS},
     arms=NOMINAL.arms,
-    rms=0.01,
 )
 
 

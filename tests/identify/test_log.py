@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from shapechanger.bodies.finger import JOINTS, TENDONS
 from shapechanger.errors import FingerError, OutputError, UnknownName
 from shapechanger.identify import FingerLog, identify, load_log, save_log
 from shapechanger.identify.log import SIGNALS, require_informative
@@ -22,7 +24,7 @@ def test_a_log_comes_back_as_it_was(tmp_path: Path) -> None:
     back = load_log(tmp_path / "log")
     for name in SIGNALS:
         np.testing.assert_array_equal(getattr(back, name), getattr(log, name))
-    for name in ("actions", "control_dt", "joints", "tendons", "source"):
+    for name in ("actions", "control_dt", "source"):
         assert getattr(back, name) == getattr(log, name)
 
 
@@ -47,8 +49,6 @@ def with_row(name: str, row: int, value: float) -> dict[str, Any]:
         (with_row("tensions", 0, math.inf), "tensions is not finite in row 0"),
         (with_row("t", 20, 0.1), r"backwards in row 20 .* 0\.100 s comes after 0\.380 s"),
         ({"t": 0.02 * np.r_[:100, 150:350]}, r"every 20 ms, .* none between 1\.980 s and 3\.000 s"),
-        ({"joints": ("thumb", "b", "c", "d")}, "joints thumb, b, c, d, but the finger has MCP_fle"),
-        ({"tendons": ()}, "tendons none, but the finger has FDP"),
         ({"lengths": np.zeros((300, 6))}, r"lengths must have the shape \(300, 7\), got \(300, 6"),
         ({"t": np.zeros((300, 1))}, r"t must have the shape \(300,\), got \(300, 1\)"),
         ({"control_dt": 0.0}, r"control_dt must be above 0 s and finite, got 0\.0"),
@@ -174,9 +174,29 @@ def test_other_archives_are_rejected(
     tmp_path: Path, kind: str, arrays: dict[str, np.ndarray], sentence: str
 ) -> None:
     """Another format, a later version, and arrays that are missing or of another kind."""
-    rest = ', "actions": "tension", "control_dt": 0.02, "joints": [], "tendons": []'
-    header = np.frombuffer(f"{{{kind}{rest}}}".encode(), np.uint8)
+    names = {"actions": "tension", "control_dt": 0.02, "joints": JOINTS, "tendons": TENDONS}
+    rest = json.dumps(names).removeprefix("{")
+    header = np.frombuffer(f"{{{kind}, {rest}".encode(), np.uint8)
     np.savez(tmp_path / "log.npz", header=header, **{"t": np.zeros(3), **arrays})
+    with pytest.raises(FingerError, match=sentence):
+        load_log(tmp_path / "log.npz")
+
+
+@pytest.mark.parametrize(
+    ("joints", "tendons", "sentence"),
+    [
+        (["thumb", "b"], TENDONS, "the joints thumb, b, but the finger has MCP_flexion"),
+        (JOINTS, [], "the tendons none, but the finger has FDP"),
+    ],
+)
+def test_logs_of_other_fingers_are_rejected(
+    tmp_path: Path, joints: list[str], tendons: list[str], sentence: str
+) -> None:
+    """Other joints or tendons than those of the model."""
+    names = {"actions": "tension", "control_dt": 0.02, "joints": joints, "tendons": tendons}
+    whole = {"format": "shapechanger finger log", "version": 1, **names}
+    header = np.frombuffer(json.dumps(whole).encode(), np.uint8)
+    np.savez(tmp_path / "log.npz", header=header, t=np.zeros(3))
     with pytest.raises(FingerError, match=sentence):
         load_log(tmp_path / "log.npz")
 

@@ -12,7 +12,7 @@ from typing import Final
 
 import pytest
 
-from shapechanger.cli.robot.trial.driver import Driver
+from shapechanger.cli.robot.trial_driver import Driver
 from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.twin.oracle import propelled
 from shapechanger.twin.robot import RunningRobot, run_robot

@@ -1,9 +1,10 @@
-"""Consoles and progress bars of the commands."""
+"""Output of the commands: text, tables and progress bars."""
 
 from __future__ import annotations
 
+import shlex
+import sys
 import time
-from types import TracebackType
 from typing import Final, Self
 
 from rich.console import Console
@@ -15,6 +16,7 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.table import Table
 
 
 def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
@@ -25,6 +27,41 @@ def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
         width: Columns; None for those of the terminal.
     """
     return Console(stderr=stderr, width=width, markup=False, emoji=False, highlight=False)
+
+
+def say(text: str, *, stderr: bool = False) -> None:
+    """Print text verbatim; only the terminal wraps its lines.
+
+    Args:
+        text: One or more lines.
+        stderr: Whether to print on the standard error.
+    """
+    plain_console(stderr=stderr).print(text, soft_wrap=True)
+
+
+def print_table(table: Table, file_width: int | None = None) -> None:
+    """Print a table, as wide as the terminal.
+
+    Args:
+        table: The table.
+        file_width: Columns where the output is a file, which has no width; None for 80.
+    """
+    plain_console(width=None if sys.stdout.isatty() else file_width).print(table)
+
+
+def counted(number: int, what: str) -> str:
+    """Format a count, such as "1 step" or "2 steps".
+
+    Args:
+        number: The count.
+        what: What is counted, in the singular.
+    """
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def command_line() -> str:
+    """Return the command that runs, as typed in a shell."""
+    return shlex.join(["shapechanger", *sys.argv[1:]])
 
 
 _LINE_EVERY_S: Final = 10.0
@@ -66,12 +103,7 @@ class StudyProgress:
             self._bar.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Restore the terminal."""
         if self._bar is not None:
             self._bar.stop()

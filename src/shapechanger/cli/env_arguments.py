@@ -7,9 +7,10 @@ import tomllib
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Annotated, Any, Final, Literal, cast
 
 import gymnasium as gym
+import tyro
 
 from shapechanger.envs.catalogue import (
     CATALOGUE,
@@ -21,13 +22,30 @@ from shapechanger.envs.catalogue import (
     find,
     find_task,
 )
-from shapechanger.errors import MorphologyError, StudyError, UnknownName
+from shapechanger.errors import MorphologyError, OutputError, StudyError, UnknownName
 from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Executor, Processes
+from shapechanger.transfer.files import make_folder
+from shapechanger.transfer.references import reference_policy
 
-if TYPE_CHECKING:
-    from shapechanger.transfer.executor import Executor
-
+EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+"""Argument: the id of an env."""
+Body = Annotated[str, tyro.conf.arg(help="Another body of the family: its name, or edits as JSON.")]
+"""Option: the body of an env."""
+ExecutorKind = Annotated[
+    Literal["processes", "ray"],
+    tyro.conf.arg(help="Where runs run: in processes of this machine, or on a Ray cluster."),
+]
+"""Option: what runs the jobs of a study."""
+ClusterAddress = Annotated[
+    str | None,
+    tyro.conf.arg(
+        help="Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not "
+        "given."
+    ),
+]
+"""Option: the Ray cluster of a study."""
 _REFERENCE: Final = "reference"
 # The largest seed that both PyTorch and NumPy accept.
 _LARGEST_SEED: Final = 2**32 - 1
@@ -85,28 +103,34 @@ def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
     Raises:
         StudyError: If it has no camera.
     """
-    if env.id in WAYPOINT_ENVS or env.id in RANGES_ENVS:
-        env = EnvRef(env.id, {**env.kwargs, "put_back": True})
-    if env.id not in VEHICLE_ENVS:
-        if lenses:
-            raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
+    if lenses and env.id not in VEHICLE_ENVS:
+        raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
+    if env.id not in {*VEHICLE_ENVS, *WAYPOINT_ENVS, *RANGES_ENVS}:
         return env
-    more: dict[str, Any] = {"put_back": True}
-    if lenses:
-        more["lenses"] = list(lenses)
-    return EnvRef(env.id, {**env.kwargs, **more})
+    more: dict[str, Any] = {"lenses": list(lenses)} if lenses else {}
+    return EnvRef(env.id, {**env.kwargs, "put_back": True, **more})
+
+
+def name_of(env: gym.Env[Any, Any]) -> str:
+    """Return the id of an env, or the name of its class."""
+    return env.spec.id if env.spec else type(env.unwrapped).__name__
 
 
 def asked(env: gym.Env[Any, Any], ability: str) -> Any:
-    """Return a method that an env offers beyond Gymnasium's, such as "picture".
+    """Return a method that an env offers beyond Gymnasium's.
+
+    Args:
+        env: The env.
+        ability: Name of the method, such as "picture".
 
     Raises:
         MorphologyError: If it does not offer it.
     """
     offered = getattr(env.unwrapped, ability, None)
     if offered is None:
-        name = env.spec.id if env.spec else type(env.unwrapped).__name__
-        raise MorphologyError(f"{name} offers no {ability}; these envs do: {', '.join(CATALOGUE)}.")
+        raise MorphologyError(
+            f"{name_of(env)} offers no {ability}; these envs do: {', '.join(CATALOGUE)}."
+        )
     return offered
 
 
@@ -165,7 +189,6 @@ def executor_of(kind: str, workers: int | None, address: str | None) -> Executor
         return RayCluster(address)
     if address is not None:
         raise StudyError("--address is that of a Ray cluster: give --executor ray, too.")
-    from shapechanger.transfer.executor import Processes
 
     return Processes(workers)
 
@@ -182,7 +205,6 @@ def policy_file(given: Path, env: EnvRef) -> Path:
     """
     if str(given) != _REFERENCE or given.exists():
         return given
-    from shapechanger.transfer.references import reference_policy
 
     return reference_policy(env.id)
 
@@ -212,6 +234,20 @@ def settings_of(given: Sequence[str]) -> dict[str, Any]:
             raise StudyError(f"--set names {name} more than once.")
         settings[name] = parsed["value"]
     return settings
+
+
+def require_file(path: Path) -> None:
+    """Make the folder of a file that is to be written.
+
+    Args:
+        path: The file.
+
+    Raises:
+        OutputError: If it is a folder, or its folder cannot be made or written to.
+    """
+    if path.is_dir():
+        raise OutputError(f"Cannot write {path}: it is a folder.")
+    make_folder(path.parent)
 
 
 def require_seed(seed: int) -> None:

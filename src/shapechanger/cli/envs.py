@@ -10,8 +10,8 @@ import tyro
 from rich.table import Table
 from rich.text import Text
 
-from shapechanger.cli.console import plain_console
-from shapechanger.cli.env_arguments import asked, env_ref, opened
+from shapechanger.cli.console import plain_console, print_table, say
+from shapechanger.cli.env_arguments import Body, EnvId, asked, env_ref, opened
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
@@ -21,8 +21,6 @@ from shapechanger.envs.catalogue import (
 )
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
-
-_EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
 
 
 @dataclass(frozen=True)
@@ -39,29 +37,27 @@ class ListEnvs:
             table.add_row(env_id, f"{vehicle}: {summary}")
         for env_id, task in FINGER_ENVS.items():
             table.add_row(env_id, task.summary)
-        plain_console().print(table)
+        print_table(table)
 
 
 @dataclass(frozen=True)
 class ShowEnv:
     """Show the name, unit and range of each number of an env's observation and action."""
 
-    env: _EnvId
+    env: EnvId
     """Id of the env, such as BigAnt or shapechanger/BigAnt-v1."""
-    body: str = ""
-    """Another body of the family: its name, or edits as JSON."""
+    body: Body = ""
 
     def run(self) -> None:
         """Print both layouts and the properties of the body."""
         with opened(env_ref(self.env, self.body)) as env:
             observation, action = layouts_of(env)
-            console = plain_console()
-            console.print(_layout_table("action", action))
-            console.print(_layout_table("observation", observation))
+            print_table(_layout_table("action", action))
+            print_table(_layout_table("observation", observation))
             for name, unit in (("standing_height", "m"), ("healthy_z_range", "m"), ("body", "")):
                 value = getattr(env.unwrapped, name, None)
                 if value is not None and value != ():
-                    console.print(f"{name.replace('_', ' ')}: {_in_words(value)} {unit}".rstrip())
+                    say(f"{name.replace('_', ' ')}: {_in_words(value)} {unit}".rstrip())
 
 
 @dataclass(frozen=True)
@@ -85,17 +81,16 @@ class Compare:
         ):
             asked(target, "certify_shift")
             certificate = asked(source, "certify_shift")(source, target)
-            plain_console().print(str(certificate), soft_wrap=True)
+            say(str(certificate))
 
 
 @dataclass(frozen=True)
 class CheckEnv:
     """Check that an env satisfies the contract that learners rely on."""
 
-    env: _EnvId
+    env: EnvId
     """Id of the env."""
-    body: str = ""
-    """Another body of the family: its name, or edits as JSON."""
+    body: Body = ""
 
     def run(self) -> None:
         """Run the exam on the env."""
@@ -110,12 +105,11 @@ class CheckEnv:
 class Render:
     """Render an env's body in its start pose."""
 
-    env: _EnvId
+    env: EnvId
     """Id of the env."""
     out: Path
     """The picture to write, a PNG file."""
-    body: str = ""
-    """Another body of the family: its name, or edits as JSON."""
+    body: Body = ""
     width: int = 640
     """Width of the picture in pixels."""
     height: int = 480
@@ -128,7 +122,7 @@ class Render:
         with opened(env_ref(self.env, self.body)) as env:
             picture = asked(env, "picture")(self.width, self.height)
             write_picture(picture, self.out)
-        plain_console().print(f"wrote {self.out}")
+        say(f"wrote {self.out}")
 
 
 @dataclass(frozen=True)
@@ -142,10 +136,6 @@ class Envs:
         | Annotated[CheckEnv, tyro.conf.subcommand("check")]
         | Annotated[Render, tyro.conf.subcommand("render")]
     )
-
-    def run(self) -> None:
-        """Run the subcommand."""
-        self.command.run()
 
 
 def _layout_table(side: str, layout: Layout) -> Table:

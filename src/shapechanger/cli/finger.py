@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
-from shapechanger.cli.env_arguments import env_ref, options_of, require_seed
+from shapechanger.cli.console import print_table, say
+from shapechanger.cli.env_arguments import EnvId, env_ref, options_of, require_file, require_seed
 from shapechanger.errors import FingerError, OutputError, UnknownName
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.files import write_atomic
 
 if TYPE_CHECKING:
     from shapechanger.identify import IdentifiedFinger
@@ -34,28 +36,24 @@ class Identify:
         """Print the parameters, and write them and the report."""
         from shapechanger.identify import identify, load_log
         from shapechanger.reports.finger import finger_html, summary_line
-        from shapechanger.transfer.files import make_folder, write_atomic
 
         page = self.report or self.log.with_name(f"{self.log.stem}.html")
         files = [path for path in (self.out, page) if path is not None]
         for path in files:
-            if path.is_dir():
-                raise OutputError(f"Cannot write {path}: it is a folder.")
             if path.resolve() == self.log.resolve():
                 raise OutputError(f"Cannot write {path}: it is the log.")
         log = load_log(self.log)
         for path in files:
-            make_folder(path.parent)
-        console, notes = plain_console(), plain_console(stderr=True)
-        found = identify(log, lambda words: notes.print(f"{words} …", soft_wrap=True))
+            require_file(path)
+        found = identify(log, lambda words: say(f"{words} …", stderr=True))
         write_atomic(page, finger_html(found, self.log.name).encode())
         if self.out is not None:
             write_atomic(self.out, found.parameters.to_json().encode())
-        console.print(_table(found))
+        print_table(_table(found))
         for name, why in found.undetermined:
-            console.print(f"{name} cannot be determined: {why}", soft_wrap=True)
-        console.print(f"wrote {' and '.join(str(path) for path in files)}", soft_wrap=True)
-        console.print(summary_line(found), soft_wrap=True)
+            say(f"{name} cannot be determined: {why}")
+        say(f"wrote {' and '.join(str(path) for path in files)}")
+        say(summary_line(found))
 
 
 def _table(found: IdentifiedFinger) -> Table:
@@ -71,7 +69,7 @@ def _table(found: IdentifiedFinger) -> Table:
 class RecordFinger:
     """Excite all joints of a finger and log the motion."""
 
-    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+    env: EnvId
     """Id of the env, such as Finger."""
     out: Path
     """The log to write, such as finger.npz."""
@@ -93,14 +91,12 @@ class RecordFinger:
         """Record and print a summary."""
         from shapechanger.envs.finger.identification import record_babble
         from shapechanger.identify import save_log
-        from shapechanger.transfer.env_ref import EnvRef
-        from shapechanger.transfer.files import make_folder
 
         require_seed(self.seed)
         require_seed(self.finger_seed)
         if not 0.0 < self.seconds < float("inf"):
             raise FingerError(f"--seconds is more than 0, got {self.seconds}.")
-        make_folder(self.out.parent)
+        require_file(self.out)
         ref = env_ref(self.env)
         more: dict[str, Any] = {"actions": self.actions}
         if self.gap:
@@ -116,10 +112,9 @@ class RecordFinger:
         finally:
             env.close()
         save_log(log, self.out)
-        plain_console().print(
+        say(
             f"wrote {len(log)} rows, {log.seconds:g} s, to {self.out}\n"
-            f"identify the finger: shapechanger finger identify {shlex.quote(str(self.out))}",
-            soft_wrap=True,
+            f"identify the finger: shapechanger finger identify {shlex.quote(str(self.out))}"
         )
 
 
@@ -131,7 +126,3 @@ class Finger:
         Annotated[RecordFinger, tyro.conf.subcommand("record")]
         | Annotated[Identify, tyro.conf.subcommand("identify")]
     )
-
-    def run(self) -> None:
-        """Run the subcommand."""
-        self.command.run()

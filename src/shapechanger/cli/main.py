@@ -7,7 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Final, NoReturn
+from typing import Annotated, Any, Final, NoReturn
 
 from shapechanger.errors import MissingExtra, ShapechangerError
 
@@ -30,13 +30,12 @@ try:
     from shapechanger.cli.demos import Demos
     from shapechanger.cli.envs import Envs
     from shapechanger.cli.finger import Finger
-    from shapechanger.cli.methods import Methods
     from shapechanger.cli.play import Play
     from shapechanger.cli.policies import Policies
     from shapechanger.cli.robot import Robot
     from shapechanger.cli.suite import Suite
     from shapechanger.cli.train import Train
-    from shapechanger.cli.transfer import Transfer
+    from shapechanger.cli.transfer import Methods, Transfer
 except KeyboardInterrupt:  # pragma: no cover  # Tested in a subprocess.
     print("Stopped.", file=sys.stderr)
     sys.exit(_INTERRUPTED)
@@ -73,7 +72,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             args=arguments,
             config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
         )
-        command.run()
+        leaf: Any = getattr(command, "command", command)  # A group holds its subcommand.
+        leaf.run()
         sys.stdout.flush()
     except ShapechangerError as error:
         _stop(f"error: {error}", _WRONG_USAGE)

@@ -7,8 +7,8 @@ from typing import Any, Final, cast
 
 from numpy.typing import NDArray
 
+from shapechanger.cli.env_arguments import require_file
 from shapechanger.errors import MissingExtra, OutputError
-from shapechanger.transfer.files import make_folder
 
 try:
     import imageio.v3 as iio
@@ -25,11 +25,9 @@ def require_film(path: Path) -> None:
         OutputError: If it is a folder, its folder is not writable, or its suffix is not that of a
             video.
     """
-    if path.is_dir():
-        raise OutputError(f"Cannot write {path}: it is a folder.")
-    if path.suffix.lower() not in _FILMS:
+    if path.suffix.lower() not in _FILMS and not path.is_dir():
         raise OutputError(f"Cannot write {path}: a film ends with one of {', '.join(_FILMS)}.")
-    make_folder(path.parent)
+    require_file(path)
 
 
 def write_picture(picture: NDArray[Any], path: Path) -> None:

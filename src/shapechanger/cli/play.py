@@ -4,34 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import Any, cast
 
 import numpy as np
-import tyro
 from numpy.typing import NDArray
 
-from shapechanger.cli.console import plain_console
-from shapechanger.cli.env_arguments import env_ref, opened, policy_file, require_seed
+from shapechanger.cli.console import say
+from shapechanger.cli.env_arguments import Body, EnvId, env_ref, opened, policy_file, require_seed
+from shapechanger.cli.policies import fitting, load_any_policy
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
-
-if TYPE_CHECKING:
-    from shapechanger.transfer.learners.policy_file import TrainedPolicy
-    from shapechanger.transfer.onnx_policy import OnnxPolicy
 
 
 @dataclass(frozen=True)
 class Play:
     """Watch a policy in an env, in a window or as a video."""
 
-    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+    env: EnvId
     """Id of the env, such as BigAnt."""
     policy: Path | None = None
     """A policy that `train`, a study or `policies export` has written, or `reference` for the one
     that ships for the env; random actions if not given. One of another body acts through the body
     map of same names."""
-    body: str = ""
-    """Another body of the family: its name, or edits as JSON."""
+    body: Body = ""
     out: Path | None = None
     """A film to write in place of a window, such as ant.mp4; play.mp4 where there is no screen."""
     episodes: int = 1
@@ -51,7 +46,6 @@ class Play:
             from shapechanger.cli.pictures import require_film
 
             require_film(out)
-        console = plain_console()
         frames: list[NDArray[Any]] = []
         mode = "human" if out is None else "rgb_array"
         ref = env_ref(self.env, self.body)
@@ -68,12 +62,12 @@ class Play:
                     over = terminated or truncated
                     if out is not None:
                         frames.append(cast("NDArray[Any]", env.render()))
-                console.print(f"episode {episode}: return {worth:.1f} in {steps} steps")
+                say(f"episode {episode}: return {worth:.1f} in {steps} steps")
             if out is not None:
                 from shapechanger.cli.pictures import write_film
 
                 write_film(frames, out, float(env.metadata["render_fps"]))
-                console.print(f"wrote {out}")
+                say(f"wrote {out}")
 
     def _acting(self, env: Any, file: Path | None) -> tuple[Any, Any]:
         """Return the env and the policy in it."""
@@ -81,27 +75,14 @@ class Play:
 
         if file is None:
             return env, random_actions(env.action_space, self.seed)
-        from shapechanger.transfer.body_map import BodyMap, MappedEnv
-        from shapechanger.transfer.env_ref import layouts_of
-
-        policy: TrainedPolicy | OnnxPolicy
-        if file.suffix == ".onnx":  # Without PyTorch.
-            from shapechanger.transfer.onnx_policy import OnnxPolicy
-
-            policy = OnnxPolicy(file)
-        else:
+        if file.suffix != ".onnx":  # ONNX needs no PyTorch.
             from shapechanger.demos.cloning.policy import CameraPolicy
             from shapechanger.transfer.learners.cloning import is_clone
-            from shapechanger.transfer.learners.policy_file import load_policy
 
             if is_clone(file):
                 clone = CameraPolicy.load(file)
                 if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
                     clone.card.require_layouts(layout, clone.card.state_layout)
                 return env, clone.predict_many
-            policy = load_policy(file)
-        observation, action = layouts_of(env)
-        if (observation, action) == (policy.card.observation, policy.card.action):
-            return env, policy.act
-        body_map = BodyMap.between(policy.card.observation, observation, policy.card.action, action)
-        return MappedEnv(env, body_map), policy.act
+        policy = load_any_policy(file)
+        return fitting(env, policy.card), policy.act

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
 
+import gymnasium as gym
 import msgspec
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
-from shapechanger.cli.env_arguments import env_ref, opened
+from shapechanger.cli.console import print_table, say
+from shapechanger.cli.env_arguments import EnvId, env_ref, opened
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
+from shapechanger.transfer.body_map import BodyMap, MappedEnv
+from shapechanger.transfer.body_map.envs import check_size
+from shapechanger.transfer.env_ref import layouts_of, measures_of
+from shapechanger.transfer.learners.settings import PpoSettings
+from shapechanger.transfer.references import load_references
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
-    from shapechanger.demos.cloning.settings import CloneSettings
-    from shapechanger.transfer.learners.settings import PpoSettings
+    from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
+    from shapechanger.transfer.onnx_policy import OnnxCard, OnnxPolicy
 
 _FILE_WIDTH: Final = 160
 
@@ -37,36 +42,39 @@ class Show:
         from shapechanger.transfer.learners.policy_file import load_policy
 
         if is_clone(self.file):
-            self._print(*_clone_lines(CameraPolicy.load(self.file).card))
-            return
-        policy = load_policy(self.file)
-        card = policy.card
-        lines = {
-            "env": str(card.env),
-            "learner": card.learner,
-            "steps": f"{card.steps:,}",
-            "seed": str(card.seed),
-            "version": card.version,
-            "normalised": "no" if policy.normalisation is None else "yes",
-            "observation": ", ".join(card.observation.names),
-            "action": ", ".join(card.action.names),
-        }
-        self._print(lines, card.settings)
-
-    def _print(self, lines: dict[str, str], settings: msgspec.Struct | None) -> None:
-        """Print lines, and below them the settings of the learner."""
-        console = plain_console()
+            card = CameraPolicy.load(self.file).card
+            lines = _clone_lines(card)
+        else:
+            policy = load_policy(self.file)
+            card = policy.card
+            lines = {
+                **_card_lines(card),
+                "version": card.version,
+                "normalised": "no" if policy.normalisation is None else "yes",
+                "observation": ", ".join(card.observation.names),
+                "action": ", ".join(card.action.names),
+            }
         for name, text in lines.items():
-            console.print(f"{name:12} {text}", soft_wrap=True)
-        if settings is not None:
-            for name, value in msgspec.structs.asdict(settings).items():
-                console.print(f"  {name:16} {value}", soft_wrap=True)
+            say(f"{name:12} {text}")
+        if card.settings is not None:
+            for name, value in msgspec.structs.asdict(card.settings).items():
+                say(f"  {name:16} {value}")
 
 
-def _clone_lines(card: CloneCard) -> tuple[dict[str, str], CloneSettings | None]:
-    """Return what a clone's card says, and its settings."""
+def _card_lines(card: PolicyCard) -> dict[str, str]:
+    """Return the origin of a policy, by name."""
+    return {
+        "env": str(card.env),
+        "learner": card.learner,
+        "steps": f"{card.steps:,}",
+        "seed": str(card.seed),
+    }
+
+
+def _clone_lines(card: CloneCard) -> dict[str, str]:
+    """Return what a clone's card says, by name."""
     actions = ("steering", "throttle") if card.action_layout is None else card.action_layout.names
-    lines = {
+    return {
         "env": str(card.data.get("env", "recorded")),
         "learner": "cloning",
         "steps": f"{card.steps:,}",
@@ -77,7 +85,6 @@ def _clone_lines(card: CloneCard) -> tuple[dict[str, str], CloneSettings | None]
         "state": "none" if card.state_layout is None else ", ".join(card.state_layout.names),
         "action": ", ".join(actions),
     }
-    return lines, card.settings
 
 
 @dataclass(frozen=True)
@@ -104,24 +111,19 @@ class ListPolicies:
             name = str(path.relative_to(self.folder))
             try:
                 if is_clone(path):
-                    lines, _ = _clone_lines(CameraPolicy.load(path).card)
-                    table.add_row(
-                        name, *(lines[each] for each in ("env", "learner", "steps", "seed"))
-                    )
-                    continue
-                card = load_policy(path).card
+                    lines = _clone_lines(CameraPolicy.load(path).card)
+                else:
+                    lines = _card_lines(load_policy(path).card)
             except ShapechangerError as error:
                 table.add_row(name, str(error))
                 continue
-            table.add_row(name, str(card.env), card.learner, f"{card.steps:,}", str(card.seed))
+            table.add_row(name, *(lines[each] for each in ("env", "learner", "steps", "seed")))
         if not table.rows:
             raise StudyError(f"There is no policy in {self.folder}: train one, or name a folder.")
-        plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH).print(table)
+        print_table(table, _FILE_WIDTH)
 
     def _print_references(self) -> None:
         """Print a line for each env, with its floor and what each seed reached."""
-        from shapechanger.transfer.references import load_references
-
         table = Table("env", "learner", "steps", "measure", "no skill", "each seed", box=None)
         for env, reference in load_references().items():
             measure = next(iter(reference.ends))
@@ -129,7 +131,7 @@ class ListPolicies:
             ends = ", ".join(f"{value:.4g}" for value in reference.ends[measure])
             steps = f"{reference.steps:,}"
             table.add_row(env, reference.learner, steps, measure, f"{floor:.4g}", ends)
-        plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH).print(table)
+        print_table(table, _FILE_WIDTH)
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,8 @@ class EvaluatePolicy:
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A policy, or one that was exported as ONNX."""
     env: str = ""
-    """Id of another env, where it acts through the body map of same names; its own by default."""
+    """Id of another env, where it acts through the body map of same names; that of its training by
+    default."""
     body: str = ""
     """Another body of that env's family: its name, or edits as JSON."""
     episodes: int = 10
@@ -147,33 +150,52 @@ class EvaluatePolicy:
 
     def run(self) -> None:
         """Evaluate."""
-        from shapechanger.transfer.body_map import BodyMap, MappedEnv
-        from shapechanger.transfer.env_ref import layouts_of, measures_of
         from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 
         if self.episodes < 1:
             raise StudyError("An evaluation takes at least one episode.")
-        if self.file.suffix == ".onnx":
-            from shapechanger.transfer.onnx_policy import OnnxPolicy
-
-            policy = OnnxPolicy(self.file)
-        else:
-            from shapechanger.transfer.learners.policy_file import load_policy
-
-            policy = load_policy(self.file)
-        card = policy.card
-        with opened(env_ref(self.env, self.body) if self.env else card.env) as env:
-            observation, action = layouts_of(env)
-            acting: Any = env
-            if (observation, action) != (card.observation, card.action):
-                body_map = BodyMap.between(card.observation, observation, card.action, action)
-                acting = MappedEnv(env, body_map)
+        policy = load_any_policy(self.file)
+        with opened(env_ref(self.env, self.body) if self.env else policy.card.env) as env:
+            acting = fitting(env, policy.card)
             found = evaluate(policy.act, [acting], EVALUATION_SEED, episodes=self.episodes)
-            console = plain_console()
             for measure in measures_of(env):
                 unit = "" if measure.unit == "1" else f" {measure.unit}"
-                console.print(f"{measure.name:14} {found.value(measure.name):.4g}{unit}")
-            console.print(f"{'length':14} {found.mean_length:.4g} steps")
+                say(f"{measure.name:14} {found.value(measure.name):.4g}{unit}")
+            say(f"{'length':14} {found.mean_length:.4g} steps")
+
+
+def load_any_policy(file: Path) -> TrainedPolicy | OnnxPolicy:
+    """Load a policy, or one that was exported as ONNX, without PyTorch.
+
+    Args:
+        file: The file.
+
+    Raises:
+        CorruptStudy: If it cannot be read.
+    """
+    if file.suffix == ".onnx":
+        from shapechanger.transfer.onnx_policy import OnnxPolicy
+
+        return OnnxPolicy(file)
+    from shapechanger.transfer.learners.policy_file import load_policy
+
+    return load_policy(file)
+
+
+def fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any, Any]:
+    """Return an env with a policy's layouts, through the body map of same names if needed.
+
+    Args:
+        env: The env.
+        card: The policy's card.
+
+    Raises:
+        MapError: If there is no such body map.
+    """
+    observation, action = layouts_of(env)
+    if (observation, action) == (card.observation, card.action):
+        return env
+    return MappedEnv(env, BodyMap.between(card.observation, observation, card.action, action))
 
 
 @dataclass(frozen=True)
@@ -193,7 +215,7 @@ class ExportPolicy:
         from shapechanger.transfer.onnx_policy import export_onnx
 
         export_onnx(load_policy(self.file), self.out)
-        plain_console().print(f"wrote {self.out}", soft_wrap=True)
+        say(f"wrote {self.out}")
 
 
 @dataclass(frozen=True)
@@ -202,25 +224,18 @@ class Convert:
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A zip that PPO.save wrote."""
-    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+    env: EnvId
     """Id of the env that it was trained in; its layouts must fit the policy's spaces."""
     out: Path
     """The file to write, such as mine.safetensors."""
     body: str = ""
     """Body that it was trained in: its name, or edits as JSON."""
     trust: bool = False
-    """Needed, because the zip holds pickled objects: give it only if you trust its author."""
+    """Required, because the zip holds pickled objects: give it only if you trust its author."""
 
     def run(self) -> None:
-        """Convert the policy.
-
-        Raises:
-            StudyError: If it is not trusted, or its network is of another kind.
-            CorruptStudy: If the file is not such a zip.
-        """
+        """Convert the policy."""
         import shapechanger
-        from shapechanger.transfer.body_map.envs import check_size
-        from shapechanger.transfer.env_ref import layouts_of
         from shapechanger.transfer.learners.policy_file import (
             PolicyCard,
             TrainedPolicy,
@@ -251,15 +266,11 @@ class Convert:
             shapechanger.__version__,
         )
         save_policy(TrainedPolicy(model, None, card), self.out)
-        plain_console().print(f"wrote {self.out}", soft_wrap=True)
+        say(f"wrote {self.out}")
 
 
 def _load_zip(path: Path) -> Any:
-    """Load a model with Stable-Baselines3.
-
-    Raises:
-        CorruptStudy: If it cannot be loaded.
-    """
+    """Load a model with Stable-Baselines3."""
     from stable_baselines3 import PPO
 
     try:
@@ -271,14 +282,8 @@ def _load_zip(path: Path) -> Any:
 
 
 def _settings(model: Any) -> PpoSettings:
-    """The settings of a model.
-
-    Raises:
-        StudyError: If its two networks differ, or have another activation than tanh.
-    """
+    """Return the settings of a model, whose two networks must be alike, with tanh."""
     from torch import nn
-
-    from shapechanger.transfer.learners.settings import PpoSettings
 
     widths = model.policy.net_arch
     of_each: Any = widths if "pi" in widths else {"pi": widths, "vf": widths}
@@ -290,16 +295,11 @@ def _settings(model: Any) -> PpoSettings:
             f"{model.policy.activation_fn.__name__}: both must be the same, with Tanh."
         )
     update = model.n_envs * model.n_steps
+    same = ("n_envs", "n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "ent_coef")
     return PpoSettings(
-        n_envs=model.n_envs,
-        n_steps=model.n_steps,
-        batch_size=model.batch_size,
-        n_epochs=model.n_epochs,
+        **{name: getattr(model, name) for name in same},
         learning_rate=float(model.lr_schedule(1.0)),
-        gamma=model.gamma,
-        gae_lambda=model.gae_lambda,
         clip_range=float(model.clip_range(1.0)),
-        ent_coef=model.ent_coef,
         net_arch=tuple(actor),
         steps=max(int(model.num_timesteps), update),
         eval_every=update,
@@ -318,7 +318,3 @@ class Policies:
         | Annotated[ExportPolicy, tyro.conf.subcommand("export")]
         | Annotated[Convert, tyro.conf.subcommand("convert")]
     )
-
-    def run(self) -> None:
-        """Run the subcommand."""
-        self.command.run()

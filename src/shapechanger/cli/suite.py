@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import json
 import re
-import shlex
 import sys
 import time
 import tomllib
@@ -13,16 +12,24 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import msgspec
 import tyro
-from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
+from shapechanger.cli.console import (
+    Interrupted,
+    StudyProgress,
+    command_line,
+    plain_console,
+    print_table,
+    say,
+)
 from shapechanger.cli.env_arguments import (
+    ClusterAddress,
+    ExecutorKind,
     default_learner,
     driven,
     env_ref,
@@ -31,11 +38,15 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.cli.transfer import run_steps, write_study_report
 from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
+from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.files import read_json, write_json
+from shapechanger.transfer.learners.settings import resolve_learner
+from shapechanger.transfer.plan import SOURCE, Plan, TransferTask
 
 if TYPE_CHECKING:
     from shapechanger.reports.suite import FilmStrip
-    from shapechanger.transfer.plan import Plan, TransferTask
     from shapechanger.transfer.study import Study, TaskTraits
     from shapechanger.transfer.suite import StudyOutcome
 
@@ -154,8 +165,6 @@ def suite_tasks(suite: SuiteFile) -> list[tuple[str, TransferTask]]:
         StudyError: If the suite has no pairs, or names them in two ways.
         UnknownName: If an env, or a name in a body, does not exist.
     """
-    from shapechanger.transfer.plan import TransferTask
-
     ways = [bool(suite.envs), bool(suite.pairs), bool(suite.sources)]
     if sum(ways) != 1 or bool(suite.sources) != bool(suite.targets or suite.sweep):
         raise StudyError(
@@ -217,10 +226,8 @@ class RunSuite:
     """The suite's folder; results/NAME if not given."""
     seed: int | None = None
     """Number that the seeds of all runs are drawn from; the suite's own if not given."""
-    executor: Literal["processes", "ray"] = "processes"
-    """Where runs run: in processes of this machine, or on a Ray cluster."""
-    address: str | None = None
-    """Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not given."""
+    executor: ExecutorKind = "processes"
+    address: ClusterAddress = None
     workers: int | None = None
     """Runs at a time; one for each core if not given."""
 
@@ -230,21 +237,27 @@ class RunSuite:
         from shapechanger.transfer.suite import open_study_folder
 
         suite = load_suite(self.name)
-        require_seed(suite.seed if self.seed is None else self.seed)
+        given = {
+            "seeds": self.seeds,
+            "steps": self.steps,
+            "source_steps": self.source_steps,
+            "seed": self.seed,
+        }
+        chosen = msgspec.structs.replace(
+            suite, **{name: value for name, value in given.items() if value is not None}
+        )
+        require_seed(chosen.seed)
         tasks = dict(suite_tasks(suite))
         for name in self.only:
             if name not in tasks:
                 raise UnknownName("study", name, tasks)
         out = self.out or Path("results", Path(self.name).stem)
-        command = shlex.join(["shapechanger", *sys.argv[1:]])
-        # Files have no width; do not wrap tables in them.
-        console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         executor = executor_of(self.executor, self.workers, self.address)
         failed: list[str] = []
         page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in self.only or tasks:
             traits = inspect_task(tasks[name])
-            plan = self._plan(suite, tasks[name], traits)
+            plan = _plan(chosen, tasks[name], traits)
             try:
                 folder = open_study_folder(plan, out, name)
                 with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
@@ -253,51 +266,49 @@ class RunSuite:
                         folder,
                         executor=executor,
                         on_progress=progress,
-                        command=command,
+                        command=command_line(),
                         traits=traits,
                     )
             except FailedRuns as error:
                 failed.append(f"{name}: {error}")
                 continue
             except KeyboardInterrupt:
-                raise Interrupted(f"Stopped. Go on with: {command}") from None
-            write_study_report(study, folder)
+                raise Interrupted(f"Stopped. Go on with: {command_line()}") from None
             page.add(name, study)
-            console.print(f"wrote {folder / 'report.html'} and {page.path}", soft_wrap=True)
-        _print_outcomes(page.outcomes(), console)
+        _print_outcomes(page.outcomes())
         if failed:
             raise FailedRuns(" ".join(failed))
 
-    def _plan(self, suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
-        """The plan of one study."""
-        from shapechanger.transfer.learners.settings import resolve_learner
-        from shapechanger.transfer.study import default_arms, make_plan
 
-        learner, settings = resolve_learner(
-            suite.learner or default_learner(task.target), suite.settings
-        )
-        return make_plan(
-            task,
-            learner,
-            settings,
-            seeds=suite.seeds if self.seeds is None else self.seeds,
-            steps=suite.steps if self.steps is None else self.steps,
-            source_steps=suite.source_steps if self.source_steps is None else self.source_steps,
-            arms=suite.arms or default_arms(traits),  # pyright: ignore[reportArgumentType]
-            seed=suite.seed if self.seed is None else self.seed,
-            measure=suite.measure,
-            traits=traits,
-        )
+def _plan(suite: SuiteFile, task: TransferTask, traits: TaskTraits) -> Plan:
+    """Return the plan of one study."""
+    from shapechanger.transfer.study import default_arms, make_plan
+
+    learner, settings = resolve_learner(
+        suite.learner or default_learner(task.target), suite.settings
+    )
+    return make_plan(
+        task,
+        learner,
+        settings,
+        seeds=suite.seeds,
+        steps=suite.steps,
+        source_steps=suite.source_steps,
+        arms=suite.arms or default_arms(traits),  # pyright: ignore[reportArgumentType]
+        seed=suite.seed,
+        measure=suite.measure,
+        traits=traits,
+    )
 
 
 @dataclass(frozen=True)
 class WatchSuite:
-    """Watch a suite that runs elsewhere: its runs, and where the last evaluations stand."""
+    """Watch a suite that runs elsewhere: progress and last evaluations of its runs."""
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
     """The suite's folder, such as results/ants."""
     every: float = 5.0
-    """Seconds between two looks, where the output is a terminal; elsewhere there is one look."""
+    """Seconds between updates of a terminal; other outputs get the table once."""
 
     def run(self) -> None:
         """Show a table until every study is complete."""
@@ -305,7 +316,7 @@ class WatchSuite:
             raise StudyError(f"--every is a number of seconds above 0, got {self.every:g}.")
         table, complete = _progress_table(self.folder)
         if not sys.stdout.isatty():
-            plain_console(width=_FILE_WIDTH).print(table)
+            print_table(table, _FILE_WIDTH)
             return
         with Live(table, console=plain_console(), auto_refresh=False) as live:
             while not complete:
@@ -321,13 +332,12 @@ class MergeSuites:
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
     """A TOML file, or the name of a suite that comes with Shapechanger."""
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
-    """The folders; a study may be in several of them, with other seeds and arms."""
+    """The folders; a study may be in several of them, with different seeds and arms."""
     out: Path | None = None
     """The folder to write; results/NAME if not given."""
 
     def run(self) -> None:
         """Copy what has ended, and report the studies that are complete."""
-        from shapechanger.transfer.executor import Serial
         from shapechanger.transfer.study import PLAN_FILE, run_study, unfinished_runs
         from shapechanger.transfer.suite import merge_study
 
@@ -339,8 +349,6 @@ class MergeSuites:
         for folder in self.folders:
             if not any((folder / name / PLAN_FILE).exists() for name in tasks):
                 raise StudyError(f"{folder} holds no study of the suite {self.name}.")
-        console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
-        command = shlex.join(["shapechanger", *sys.argv[1:]])
         page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in tasks:
             parts = [one / name for one in self.folders if (one / name / PLAN_FILE).exists()]
@@ -348,13 +356,10 @@ class MergeSuites:
                 continue
             plan = merge_study(parts, out / name)
             if missing := unfinished_runs(plan, out / name):
-                console.print(f"{name} lacks {', '.join(run.name for run in missing)}.")
+                say(f"{name} lacks {', '.join(run.name for run in missing)}.")
                 continue
-            study = run_study(plan, out / name, executor=Serial(), command=command)
-            write_study_report(study, out / name)
-            page.add(name, study)
-            console.print(f"wrote {out / name / 'report.html'} and {page.path}", soft_wrap=True)
-        _print_outcomes(page.outcomes(), console)
+            page.add(name, run_study(plan, out / name, executor=Serial(), command=command_line()))
+        _print_outcomes(page.outcomes())
 
 
 @dataclass(frozen=True)
@@ -368,7 +373,7 @@ class ListSuites:
             suite = load_suite(name)
             studies = str(len(suite_tasks(suite)))
             table.add_row(name, studies, str(suite.seeds), ", ".join(suite.arms) or "the default")
-        plain_console().print(table)
+        print_table(table)
 
 
 @dataclass(frozen=True)
@@ -382,19 +387,9 @@ class Suite:
         | Annotated[ListSuites, tyro.conf.subcommand("list")]
     )
 
-    def run(self) -> None:
-        """Run the subcommand."""
-        self.command.run()
-
 
 def _progress_table(out: Path) -> tuple[Table, bool]:
-    """A row for each study in a suite's folder, and whether all are complete.
-
-    Raises:
-        StudyError: If there is none.
-    """
-    from shapechanger.transfer.files import read_json
-    from shapechanger.transfer.plan import SOURCE, Plan
+    """A row for each study in a suite's folder, and whether all are complete."""
     from shapechanger.transfer.runs import last_evaluation, load_result
     from shapechanger.transfer.study import PLAN_FILE
 
@@ -421,15 +416,14 @@ def _progress_table(out: Path) -> tuple[Table, bool]:
     return table, complete
 
 
-def _print_outcomes(found: list[StudyOutcome], console: Console) -> None:
-    console.print(_table(found))
+def _print_outcomes(found: list[StudyOutcome]) -> None:
+    print_table(_table(found), _FILE_WIDTH)
     halves = sum(outcome.halves for outcome in found)
-    console.print(
+    say(
         "Gains are of fine-tuning over scratch, in scores (0: what takes no skill, 1: the "
         "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
         f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
-        "half of scratch's steps.",
-        soft_wrap=True,
+        "half of scratch's steps."
     )
 
 
@@ -443,7 +437,6 @@ class _Page:
     def __init__(
         self, suite: SuiteFile, name: str, out: Path, tasks: dict[str, TransferTask]
     ) -> None:
-        from shapechanger.transfer.files import read_json
         from shapechanger.transfer.study import STUDY_FILE, Study
 
         self.path = out / "index.html"
@@ -456,11 +449,12 @@ class _Page:
         }
 
     def add(self, name: str, study: Study) -> None:
-        """Add a study that has ended, or replace it, and write the page."""
+        """Add a study that has ended, or replace it; write its report and the page."""
         from shapechanger.cli.films import film_study
         from shapechanger.reports.suite import Sweep, suite_html
-        from shapechanger.transfer.files import write_atomic, write_json
+        from shapechanger.transfer.files import write_atomic
 
+        write_study_report(study, self._out / name)
         self._studies[name] = study
         for one in self._studies:
             if one not in self._strips or one == name:
@@ -469,7 +463,7 @@ class _Page:
                     self._strips[one] = film_study(
                         self._studies[one], self._out / one, self._out / one / _FILM
                     )
-        ordered = {one: self._studies[one] for one in self._tasks if one in self._studies}
+        ordered = self._ordered()
         swept = self._suite.sweep
         page = suite_html(
             self._name,
@@ -490,19 +484,20 @@ class _Page:
         )
         write_atomic(self.path, page.encode())
         write_json(self._out / _SUMMARY, self.outcomes())
+        say(f"wrote {self._out / name / 'report.html'} and {self.path}")
 
     def outcomes(self) -> list[StudyOutcome]:
         """Return the outcome of each study, in the order of the suite."""
         from shapechanger.transfer.suite import study_outcome
 
-        studies = self._studies
-        return [study_outcome(one, studies[one]) for one in self._tasks if one in studies]
+        return [study_outcome(name, study) for name, study in self._ordered().items()]
+
+    def _ordered(self) -> dict[str, Study]:
+        return {one: self._studies[one] for one in self._tasks if one in self._studies}
 
 
 def _table(found: list[StudyOutcome]) -> Table:
     """Format the results: values and steps, then gains with intervals."""
-    from shapechanger.reports.numbers import estimate_text
-
     table = Table(
         *("study", "measure", "scratch", "zero-shot", "fine-tuned", "scratch, steps"),
         *("fine-tune, steps", "jumpstart", "total reward gain", "gain at the end"),

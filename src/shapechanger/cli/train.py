@@ -2,41 +2,48 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import tyro
-
-from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
+from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
 from shapechanger.cli.env_arguments import (
+    Body,
+    EnvId,
     default_learner,
     driven,
     env_ref,
     opened,
+    require_file,
     require_seed,
     settings_of,
 )
-from shapechanger.errors import MissingExtra, OutputError, StudyError
+from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.transfer.env_ref import EnvRef, env_traits
+from shapechanger.transfer.files import make_folder
+from shapechanger.transfer.learners.settings import (
+    Sb3Settings,
+    require_budget,
+    resolve_learner,
+    tuning_text,
+)
 
 if TYPE_CHECKING:
-    from shapechanger.transfer.env_ref import EnvRef
     from shapechanger.transfer.learners.evaluation import Evaluation
-    from shapechanger.transfer.learners.settings import CloningSettings
+
+# Trains with a callback that takes the number of steps done, and writes the policy.
+_Training = Callable[[Callable[[int], None]], None]
 
 
 @dataclass(frozen=True)
 class Train:
     """Train a policy in one env and write it to a file for `play` and `transfer`."""
 
-    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+    env: EnvId
     """Id of the env, such as BigAnt."""
-    body: str = ""
-    """Another body of the family: its name, or edits as JSON."""
+    body: Body = ""
     out: Path | None = None
     """The file to write; results/policies/ENV.safetensors if not given."""
     steps: int | None = None
@@ -49,139 +56,97 @@ class Train:
     seed: int = 0
     """Seed of everything random."""
     teacher: Path | None = None
-    """Policy of the same vehicle on distances, such as one of CarRanges: its student, which sees
-    pictures alone, is trained instead of learning by trial."""
+    """Policy of the same vehicle on distances, such as one of CarRanges: trains a student of it,
+    which sees pictures alone, instead of learning by trial."""
     tensorboard: Path | None = None
     """Folder for TensorBoard's logs; none are written if not given."""
 
     def run(self) -> None:
         """Train and print evaluations as they complete."""
-        from shapechanger.transfer.env_ref import env_traits
-        from shapechanger.transfer.files import make_folder
-        from shapechanger.transfer.learners.policy_file import save_policy
-        from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
-        from shapechanger.transfer.learners.settings import (
-            Sb3Settings,
-            require_budget,
-            resolve_learner,
-            tuning_text,
-        )
-        from shapechanger.transfer.runs import learner_of
+        from shapechanger.transfer.learners.sb3 import use_one_thread
 
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))
-        if self.teacher is not None:
-            self._train_student(env, self.teacher)
-            return
+        out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
+        # The policy is written last; check first that it can be.
+        steps, training = (
+            self._by_learner(env, out)
+            if self.teacher is None
+            else self._by_teacher(env, out, self.teacher)
+        )
+        require_file(out)
+        use_one_thread()
+        try:
+            with StudyProgress({env.id: steps}) as progress:
+                training(lambda done: progress(env.id, done, False))
+        except KeyboardInterrupt:
+            raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
+        say(f"wrote {out}")
+
+    def _by_learner(self, env: EnvRef, out: Path) -> tuple[int, _Training]:
+        """Return the number of steps, and the training by a learner, after checking both."""
+        from shapechanger.transfer.learners import DemonstrationFile
+        from shapechanger.transfer.learners.cloning import CloneLearner
+        from shapechanger.transfer.learners.policy_file import save_policy
+        from shapechanger.transfer.learners.sb3 import Sb3Learner
+        from shapechanger.transfer.runs import learner_of
+
         learner, settings = resolve_learner(
             self.learner or default_learner(env), settings_of(self.set)
         )
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
-        out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
-        # The policy is written last; check first that it can be.
         with opened(env) as made:
             learner_of(learner, settings).require(env, env_traits(made))
-        if out.is_dir():
-            raise OutputError(f"Cannot write {out}: it is a folder.")
         if self.tensorboard is not None:
-            _require_tensorboard()
+            try:
+                import_module("torch.utils.tensorboard")
+            except ImportError as error:
+                raise MissingExtra("tensorboard", "learn") from error
             make_folder(self.tensorboard)
-        make_folder(out.parent)
-        use_one_thread()
-        console = plain_console()
-        console.print(f"{learner}: {tuning_text(learner, env.id)}")
+        say(f"{learner}: {tuning_text(learner, env.id)}")
+        whole = settings.whole_updates(steps)
 
-        def show(result: Evaluation) -> None:
-            terms = ", ".join(f"{name} {value:.4g}" for name, value in result.terms.items())
-            console.print(
-                f"{result.steps:>9} steps: return {result.mean_return:.1f} "
-                f"over {result.mean_length:.0f} steps an episode ({terms})"
-            )
-
-        try:
-            with StudyProgress({env.id: settings.whole_updates(steps)}) as progress:
-                if not isinstance(settings, Sb3Settings):
-                    _learn_to_drive(env, learner, settings, steps, self.seed, out, show, progress)
-                    console.print(f"wrote {out}")
-                    return
+        def training(on_steps: Callable[[int], None]) -> None:
+            if isinstance(settings, Sb3Settings):
                 policy = Sb3Learner(
                     learner, settings, tensorboard=self.tensorboard, threads=None
-                ).train(
-                    env,
-                    steps,
-                    self.seed,
-                    on_evaluation=show,
-                    on_steps=lambda done: progress(env.id, done, False),
-                )
-        except KeyboardInterrupt:
-            raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
-        save_policy(policy, out)
-        console.print(f"wrote {out}")
+                ).train(env, steps, self.seed, on_evaluation=_print_evaluation, on_steps=on_steps)
+                save_policy(policy, out)
+                return
+            name = f"{env.id.split('/')[-1]}-{self.seed}.npz"
+            demonstrations = Path("results", "demonstrations", name)
+            clone = CloneLearner(learner, settings).train(
+                env,
+                whole,
+                self.seed,
+                demonstrations=DemonstrationFile(demonstrations, self.seed),
+                on_evaluation=_print_evaluation,
+                on_steps=on_steps,
+            )
+            clone.described(command=command_line()).save(out)
 
-    def _train_student(self, env: EnvRef, teacher: Path) -> None:
-        from shapechanger.transfer.files import make_folder
+        return whole, training
+
+    def _by_teacher(self, env: EnvRef, out: Path, teacher: Path) -> tuple[int, _Training]:
+        """Return the number of steps, and the training of a student of another policy."""
         from shapechanger.transfer.learners.policy_file import load_policy
-        from shapechanger.transfer.learners.sb3 import use_one_thread
         from shapechanger.transfer.learners.student import STUDENT_STEPS, train_student
 
         if self.learner is not None or self.set or self.tensorboard is not None:
             raise StudyError("A student has no learner of its own: give --teacher without one.")
         steps = STUDENT_STEPS if self.steps is None else self.steps
-        out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
-        if out.is_dir():
-            raise OutputError(f"Cannot write {out}: it is a folder.")
-        make_folder(out.parent)
-        use_one_thread()
-        try:
-            with StudyProgress({env.id: steps}) as progress:
-                policy = train_student(
-                    env,
-                    load_policy(teacher),
-                    steps,
-                    self.seed,
-                    on_steps=lambda done: progress(env.id, done, False),
-                )
-        except KeyboardInterrupt:
-            raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
-        policy.described(command=shlex.join(["shapechanger", *sys.argv[1:]])).save(out)
-        plain_console().print(f"wrote {out}")
+
+        def training(on_steps: Callable[[int], None]) -> None:
+            policy = train_student(env, load_policy(teacher), steps, self.seed, on_steps=on_steps)
+            policy.described(command=command_line()).save(out)
+
+        return steps, training
 
 
-def _learn_to_drive(
-    env: EnvRef,
-    learner: str,
-    settings: CloningSettings,
-    steps: int,
-    seed: int,
-    out: Path,
-    show: Callable[[Evaluation], None],
-    progress: StudyProgress,
-) -> None:
-    """Clone the demonstrator of an env, and write the policy and its demonstrations."""
-    from shapechanger.transfer.learners import DemonstrationFile
-    from shapechanger.transfer.learners.cloning import CloneLearner
-
-    policy = CloneLearner(learner, settings).train(
-        env,
-        settings.whole_updates(steps),
-        seed,
-        demonstrations=DemonstrationFile(
-            Path("results", "demonstrations", f"{env.id.split('/')[-1]}-{seed}.npz"), seed
-        ),
-        on_evaluation=show,
-        on_steps=lambda done: progress(env.id, done, False),
+def _print_evaluation(result: Evaluation) -> None:
+    terms = ", ".join(f"{name} {value:.4g}" for name, value in result.terms.items())
+    say(
+        f"{result.steps:>9} steps: return {result.mean_return:.1f} "
+        f"over {result.mean_length:.0f} steps an episode ({terms})"
     )
-    policy.described(command=shlex.join(["shapechanger", *sys.argv[1:]])).save(out)
-
-
-def _require_tensorboard() -> None:
-    """Check that TensorBoard is installed.
-
-    Raises:
-        MissingExtra: If it is not.
-    """
-    try:
-        import_module("torch.utils.tensorboard")
-    except ImportError as error:
-        raise MissingExtra("tensorboard", "learn") from error

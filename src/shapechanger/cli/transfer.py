@@ -1,9 +1,7 @@
-"""`shapechanger transfer`: a complete transfer study."""
+"""`shapechanger transfer | methods`: a transfer study, and the methods that it can compare."""
 
 from __future__ import annotations
 
-import shlex
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
@@ -13,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
+from shapechanger.cli.console import Interrupted, StudyProgress, command_line, print_table, say
 from shapechanger.cli.env_arguments import (
+    ClusterAddress,
+    ExecutorKind,
     default_learner,
     driven,
     env_ref,
@@ -27,11 +27,11 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners.settings import resolve_learner
+from shapechanger.transfer.methods import load_method, method_names
+from shapechanger.transfer.plan import Plan, Run, TransferTask
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from shapechanger.transfer.plan import Plan, Run, TransferTask
     from shapechanger.transfer.study import Study, TaskTraits
 
 # Divisor of the budget and number of seeds of --quick: enough to see that everything works.
@@ -50,16 +50,16 @@ class Transfer:
     source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
     """Id of the env that the policy is learned in, such as Ant."""
     target: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
-    """Id of the env that it is moved to, such as ExtendedAnt."""
+    """Id of the env that it is transferred to, such as ExtendedAnt."""
     seeds: int | None = None
     """Runs of each arm; 5 if not given."""
     steps: int | None = None
     """Target steps of a run; the learner's own number if not given."""
     source_steps: int | None = None
-    """Source steps of a source policy; the learner's own number if not given, which is half as many
-    as target steps, and more for a rig."""
+    """Source steps of a source policy; the learner's own number if not given: half as many as
+    target steps, and more for a rig."""
     quick: bool = False
-    """Two seeds and an eighth of the steps: to see that it works, not to believe the numbers."""
+    """Two seeds and an eighth of the steps: a check that everything works, not a result."""
     out: Path | None = None
     """The study's folder; results/SOURCE-to-TARGET if not given."""
     source_policy: Path | None = None
@@ -96,10 +96,8 @@ class Transfer:
     """Whether actions are mapped directly or by the torque that they produce."""
     seed: int = 0
     """Number that the seeds of all runs are drawn from."""
-    executor: Literal["processes", "ray"] = "processes"
-    """Where runs run: in processes of this machine, or on a Ray cluster."""
-    address: str | None = None
-    """Address of the Ray cluster, as 10.0.0.1:6379 or auto; Ray on this machine if not given."""
+    executor: ExecutorKind = "processes"
+    address: ClusterAddress = None
     workers: int | None = None
     """Runs at a time; one for each core if not given, and one where the target is a robot."""
 
@@ -115,8 +113,6 @@ class Transfer:
         self._require_sense()
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
-        # Files have no width; do not wrap tables in them.
-        console = plain_console(width=None if sys.stdout.isatty() else _FILE_WIDTH)
         task = self._task()
         traits = inspect_task(task)
         given = self.source_policy and policy_file(self.source_policy, task.source)
@@ -127,7 +123,7 @@ class Transfer:
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):
-            console.print(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
+            say(f"{len(plan.runs()) - len(to_do)} runs in {out} had ended before.")
         try:
             with StudyProgress(run_steps(plan, to_do)) as progress:
                 study = run_study(
@@ -136,24 +132,19 @@ class Transfer:
                     source_policy=given,
                     executor=executor,
                     on_progress=progress,
-                    command=_command(),
+                    command=command_line(),
                     traits=traits,
                 )
         except KeyboardInterrupt:
             raise Interrupted(f"Stopped. {_way_on(plan, out)}".rstrip()) from None
         except OutputError as error:
             raise OutputError(f"{error} {_way_on(plan, out)}".rstrip()) from error
-        _print(console, study)
+        _print(study)
         report = write_study_report(study, out)
-        console.print(f"\nwrote {out / 'study.json'} and {report}", soft_wrap=True)
+        say(f"\nwrote {out / 'study.json'} and {report}")
 
     def _require_sense(self) -> None:
-        """Refuse contradictory or unused options.
-
-        Raises:
-            StudyError: If a seed or an arm is invalid.
-            MapError: If the body map is given twice.
-        """
+        """Refuse contradictory or unused options."""
         require_seed(self.seed)
         twice = sorted({arm for arm in self.arms if self.arms.count(arm) > 1})
         if twice:
@@ -166,8 +157,6 @@ class Transfer:
 
     def _task(self) -> TransferTask:
         """Source and target, with their bodies and options."""
-        from shapechanger.transfer.plan import TransferTask
-
         source = driven(env_ref(self.source, self.source_body))
         target = driven(env_ref(self.target, self.target_body), self.target_lens)
         return TransferTask(
@@ -177,7 +166,6 @@ class Transfer:
 
     def _plan(self, task: TransferTask, traits: TaskTraits, given: Path | None) -> Plan:
         """The plan of the study."""
-        from shapechanger.transfer.learners.settings import resolve_learner
         from shapechanger.transfer.study import default_arms, make_plan
 
         learner, settings = resolve_learner(
@@ -207,8 +195,30 @@ class Transfer:
         )
 
 
+@dataclass(frozen=True)
+class Methods:
+    """List the transfer methods that a study can compare: shipped ones and those of plug-ins."""
+
+    def run(self) -> None:
+        """Print a table."""
+        table = Table("method", "what it does", "source", box=None)
+        for name in method_names():
+            method = load_method(name)
+            about = (type(method).__doc__ or "").strip().partition("\n")[0]
+            table.add_row(name, about, method.paper)
+        print_table(table)
+
+
 def write_study_report(study: Study, out: Path) -> Path:
-    """Write the report, without pictures of the bodies if they cannot be rendered."""
+    """Write the report of a study, without pictures of the bodies if they cannot be rendered.
+
+    Args:
+        study: The study.
+        out: Its folder.
+
+    Returns:
+        The page.
+    """
     from shapechanger.reports.study import study_html
     from shapechanger.transfer.files import write_atomic
 
@@ -223,16 +233,17 @@ def write_study_report(study: Study, out: Path) -> Path:
 
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
-    """Return the number of steps of each run for the progress; an evaluation counts as one."""
+    """Return the number of steps of each run for the progress; an evaluation counts as one.
+
+    Args:
+        plan: The plan of the study.
+        runs: The runs.
+    """
     return {run.name: max(1, plan.steps_of(run.kind)) for run in runs}
 
 
 def _split_rule(text: str) -> tuple[str, str]:
-    """Split `NAME=RULE`.
-
-    Raises:
-        MapError: If it has another form.
-    """
+    """Split NAME=RULE."""
     name, equals, rule = text.partition("=")
     if not (name and equals and rule):
         raise MapError(f"A rule is written NAME=RULE, as in 'foot_*/motor=learn', not {text!r}.")
@@ -240,11 +251,7 @@ def _split_rule(text: str) -> tuple[str, str]:
 
 
 def _read(path: Path) -> str:
-    """Read a text file.
-
-    Raises:
-        MapError: If it cannot be read.
-    """
+    """Read a text file."""
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -273,16 +280,11 @@ def _way_on(plan: Plan, out: Path) -> str:
     if not is_folder_of(plan, out):
         return ""
     if len(unfinished_runs(plan, out)) == len(plan.runs()):
-        return f"No run had ended; begin again with: {_command()}"
-    return f"Runs that had ended are kept in {out}; go on with: {_command()}"
+        return f"No run had ended; begin again with: {command_line()}"
+    return f"Runs that had ended are kept in {out}; go on with: {command_line()}"
 
 
-def _command() -> str:
-    """Return the command line."""
-    return shlex.join(["shapechanger", *sys.argv[1:]])
-
-
-def _print(console: Console, study: Study) -> None:
+def _print(study: Study) -> None:
     """Print the table of measures and the verdict."""
     from shapechanger.reports.verdict import measure_rows, verdict
 
@@ -290,5 +292,5 @@ def _print(console: Console, study: Study) -> None:
     # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
     for row in [row for row in measure_rows(study) if row.target != "undefined"]:
         table.add_row(row.arm, row.measure, row.target, row.total, row.unit)
-    console.print(table)
-    console.print(f"\n{verdict(study)}", soft_wrap=True)
+    print_table(table, _FILE_WIDTH)
+    say(f"\n{verdict(study)}")

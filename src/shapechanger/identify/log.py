@@ -53,13 +53,11 @@ class FingerLog:
         lengths: Tendon lengths as wound by their motors, m, (n, 7); winding up shortens them.
         actions: Meaning of a command; see `shapechanger.bodies.finger.DRIVES`.
         control_dt: Control period, s.
-        joints: Joint names, in the order of `angles`.
-        tendons: Tendon names, in the order of the arrays over tendons.
         source: Recorded env or robot, such as an env id.
 
     Raises:
         FingerError: If the arrays differ in length, hold a number that is not finite, run backwards
-            in time or have gaps, or if the joints or tendons are not those of the finger.
+            in time or have gaps.
         UnknownName: If `actions` is not a known mode.
     """
 
@@ -70,22 +68,11 @@ class FingerLog:
     lengths: NDArray[np.float64]
     actions: str
     control_dt: float
-    joints: tuple[str, ...] = JOINTS
-    tendons: tuple[str, ...] = TENDONS
     source: str = ""
 
     def __post_init__(self) -> None:
         if self.actions not in DRIVES:
             raise UnknownName("mode of action", self.actions, DRIVES)
-        for kind, given, known in (
-            ("joints", self.joints, JOINTS),
-            ("tendons", self.tendons, TENDONS),
-        ):
-            if given != known:
-                raise FingerError(
-                    f"The log has the {kind} {', '.join(given) or 'none'}, "
-                    f"but the finger has {', '.join(known)}."
-                )
         if not 0.0 < self.control_dt < float("inf"):
             raise FingerError(f"control_dt must be above 0 s and finite, got {self.control_dt}.")
         for name, columns in SIGNALS.items():
@@ -96,18 +83,6 @@ class FingerLog:
             rows = ~np.isfinite(given).all(axis=tuple(range(1, given.ndim)))
             if rows.any():
                 raise FingerError(f"{name} is not finite in row {int(rows.argmax())} of the log.")
-        self._check_time()
-
-    def __len__(self) -> int:
-        """Number of rows."""
-        return len(self.t)
-
-    @property
-    def seconds(self) -> float:
-        """Time from the first row to the last, s."""
-        return float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
-
-    def _check_time(self) -> None:
         steps = np.diff(self.t)
         if (steps <= 0.0).any():
             row = int((steps <= 0.0).argmax()) + 1
@@ -123,6 +98,15 @@ class FingerLog:
                 f"none between {self.t[row]:.3f} s and {self.t[row + 1]:.3f} s."
             )
 
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.t)
+
+    @property
+    def seconds(self) -> float:
+        """Time from the first row to the last, s."""
+        return float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
+
 
 def require_informative(log: FingerLog) -> None:
     """Check that every joint moves far enough and independently of the others.
@@ -136,14 +120,14 @@ def require_informative(log: FingerLog) -> None:
             f"{_SHORTEST_S:g} s, and works well with 10 s."
         )
     low, high = np.percentile(log.angles, [5.0, 95.0], axis=0)
-    for joint, moved in zip(log.joints, high - low, strict=True):
+    for joint, moved in zip(JOINTS, high - low, strict=True):
         if moved < _LEAST_RANGE:
             raise FingerError(
                 f"{joint} moved by {math.degrees(moved):.1f} degrees only; its moment arms need at "
                 f"least {math.degrees(_LEAST_RANGE):.0f}."
             )
     centred = log.angles - log.angles.mean(axis=0)
-    for j, joint in enumerate(log.joints):
+    for j, joint in enumerate(JOINTS):
         others = np.delete(centred, j, axis=1)
         shares = np.asarray(np.linalg.lstsq(others, centred[:, j])[0], np.float64)
         own = float(np.std(centred[:, j] - others @ shares))
@@ -181,8 +165,8 @@ def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
         version=_VERSION,
         actions=log.actions,
         control_dt=log.control_dt,
-        joints=log.joints,
-        tendons=log.tendons,
+        joints=JOINTS,
+        tendons=TENDONS,
         source=log.source,
     )
     arrays = {name: getattr(log, name) for name in SIGNALS}
@@ -227,8 +211,6 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
         **arrays,
         actions=header.actions,
         control_dt=header.control_dt,
-        joints=header.joints,
-        tendons=header.tendons,
         source=header.source,
     )
 
@@ -258,4 +240,13 @@ def _read_header(name: str, read: dict[str, Any]) -> _Header:
         raise FingerError(
             f"{name} has version {header.version}; this Shapechanger reads up to {_VERSION}."
         )
+    for kind, given, known in (
+        ("joints", header.joints, JOINTS),
+        ("tendons", header.tendons, TENDONS),
+    ):
+        if given != known:
+            raise FingerError(
+                f"{name} has the {kind} {', '.join(given) or 'none'}, "
+                f"but the finger has {', '.join(known)}."
+            )
     return header

@@ -13,7 +13,6 @@ import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, Final
 
 import mujoco
@@ -38,14 +37,12 @@ MOTOR_KG: Final = 0.02
 fitted values were two to eight times too large, because they absorb the stretch."""
 
 _N: Final = len(JOINTS)
-FACTORS: Final[Mapping[str, float]] = MappingProxyType(
-    {
-        **{f"joint_stiffness/{j}": v for j, v in zip(JOINTS, NOMINAL.joint_stiffness, strict=True)},
-        **{f"joint_damping/{j}": v for j, v in zip(JOINTS, NOMINAL.joint_damping, strict=True)},
-        # N. The nominal finger has no friction, but the fit needs a logarithm. Chosen.
-        "tendon_friction": 0.5,
-    }
-)
+FACTORS: Final[Mapping[str, float]] = {
+    **{f"joint_stiffness/{j}": v for j, v in zip(JOINTS, NOMINAL.joint_stiffness, strict=True)},
+    **{f"joint_damping/{j}": v for j, v in zip(JOINTS, NOMINAL.joint_damping, strict=True)},
+    # N. The nominal finger has no friction, but the fit needs a logarithm. Chosen.
+    "tendon_friction": 0.5,
+}
 """Fitted parameters and their initial values, in SI units. The fit changes the logarithms of
 factors over these values, so that no parameter can change its sign."""
 
@@ -165,13 +162,11 @@ class Dynamics:
         values: Parameters by the names of `FACTORS`, in SI units.
         sd: Standard errors of their logarithms, by name, if the model is right.
         arms: Moment arms, m, (7, 4); those of the kinematics unless they were fitted as well.
-        rms: Root mean square error of the simulated angles over windows of a second, rad.
     """
 
     values: dict[str, float]
     sd: dict[str, float]
     arms: NDArray[np.float64]
-    rms: float
 
 
 def fit_dynamics(
@@ -216,7 +211,6 @@ def fit_dynamics(
         values={name: begin * math.exp(x[i]) for i, (name, begin) in enumerate(FACTORS.items())},
         sd={name: float(sd[i]) for i, name in enumerate(FACTORS)},
         arms=fit.arms(x),
-        rms=fit.rms(x),
     )
 
 
@@ -298,12 +292,6 @@ class _MotionFit:
         if self._n_arms:
             arms[ARMS] += self._arm_axes @ x[len(FACTORS) :]
         return arms
-
-    def rms(self, x: NDArray[np.float64]) -> float:
-        """Root mean square error of the simulated angles, rad."""
-        errors, _, _ = self._residual(x, self.parameters())
-        flat = np.concatenate([np.ravel(error) for error in errors])
-        return _ANGLE_SD * float(np.sqrt(np.mean(flat**2)))
 
     def covariance(
         self, x: NDArray[np.float64], jacobian: NDArray[np.float64]

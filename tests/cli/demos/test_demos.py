@@ -151,7 +151,7 @@ def test_repair(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     printed = said(capsys, "repair", data)
     assert f"{first.name}: kept 30 steps, moved 1 line aside, because it is cut off" in printed
     assert f"{second.name}: kept 9 steps, moved 1 line aside" in printed
-    assert said(capsys, "repair", data).count("was whole") == 2
+    assert said(capsys, "repair", data).count("was complete") == 2
 
 
 def test_repair_waits_for_no_recorder(data: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.demos.exchange import Export, Import
+from shapechanger.cli.demos.recordings import Export, Import
 from shapechanger.demos.episodes import drop
 from shapechanger.errors import UnknownName
 from tests.demos.exchange.small import drive, keys_folder
@@ -30,7 +30,7 @@ def test_export_says_what_stayed_and_how_to_load(
     Export(tmp_path / "data", tmp_path / "sets/drive-v0", "minari").run()
     said = capsys.readouterr().out
     assert "3 steps of 1 episode\n" in said
-    assert "left out 2 steps that were dropped; --dropped takes them with it" in said
+    assert "left out 2 dropped steps; --dropped includes them" in said
     assert f"MINARI_DATASETS_PATH={tmp_path / 'sets'}" in said
     assert "minari.load_dataset('drive-v0')" in said
     Export(tmp_path / "data", tmp_path / "csv", "csv", dropped=True).run()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.serve import can_be_known, make_known
+from shapechanger.cli.robot.serve import make_known
 from shapechanger.link.authentication import new_key
 from shapechanger.remote.known_robots import KnownRobot, known_folder, recall, remember
 
@@ -56,11 +56,5 @@ def test_a_file_that_cannot_be_read_is_left_alone() -> None:
     remember(_MINE)
     path = known_folder() / "rover.toml"
     path.write_text("key = ")
-    assert make_known(_MINE).startswith("It is not made known here: ")
+    assert make_known(_MINE).startswith("It is not stored as a known robot: ")
     assert path.read_text() == "key = "
-
-
-def test_not_every_name_of_a_robot_is_one_of_a_file() -> None:
-    """Such a robot is served all the same."""
-    assert can_be_known("my-car.2")
-    assert not can_be_known("my car")

@@ -9,12 +9,13 @@ import pytest
 
 from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.cli.robot import serve as serving
-from shapechanger.cli.robot.serve import TwinOptions, finger_of, place_of, start_twin
+from shapechanger.cli.robot.serve import finger_of, place_of
 from shapechanger.envs.finger.gap import GAPS
 from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.robot import Operator
+from shapechanger.twin.start import start_board
 from shapechanger.twin.world.place import Place
 from tests.robots import CAR, changed, write_profile
 
@@ -104,6 +105,13 @@ def test_what_there_is_not_is_told_with_what_there_is() -> None:
 def test_a_twin_is_where_its_place_says(tmp_path: Path) -> None:
     """A place for a command is a place for the board that it starts."""
     profile = write_profile(tmp_path, CAR)
-    options = TwinOptions(tmp_path, "twin", seed=4, place=place_of(profile, "yard", ()))
-    with start_twin(profile, options) as board, Operator(board.socket_path) as operator:
+    board = start_board(
+        profile.guard_plan(),
+        "twin",
+        tmp_path,
+        profile.camera,
+        seed=4,
+        place=place_of(profile, "yard", ()),
+    )
+    with board, Operator(board.socket_path) as operator:
         assert operator.where().truth == {"progress_m": 0.0, "collisions": 0.0}

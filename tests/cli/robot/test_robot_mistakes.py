@@ -264,7 +264,7 @@ def test_a_profile_in_this_folder_is_found_by_its_name(run: Run, home: Path) -> 
     """A newcomer types what `init` was told; a shipped profile of that name comes first."""
     fits(home)
     _, said, _ = run("doctor", "test-car", "--port", "0")
-    assert "good     profile: test-car.toml holds together" in said
+    assert "good     profile: test-car.toml is valid" in said
     (home / "work" / "car.toml").write_text("broken")
     _, said, _ = run("doctor", "car", "--port", "0")
     assert "shipped" in said

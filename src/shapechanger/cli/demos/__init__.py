@@ -7,11 +7,20 @@ from typing import Annotated
 
 import tyro
 
-from shapechanger.cli.demos.edit import Bad, CutEpisode, Good, MarkStep, Merge, RepairEpisodes
-from shapechanger.cli.demos.exchange import Export, Import
 from shapechanger.cli.demos.record import RecordDemonstrations
+from shapechanger.cli.demos.recordings import (
+    Bad,
+    CutEpisode,
+    Export,
+    Good,
+    Import,
+    ListEpisodes,
+    MarkStep,
+    Merge,
+    RepairEpisodes,
+    ShowEpisodes,
+)
 from shapechanger.cli.demos.replay import Replay
-from shapechanger.cli.demos.show import ListEpisodes, ShowEpisodes
 from shapechanger.cli.demos.train import Evaluate, TrainClone
 
 __all__ = ["Demos"]
@@ -37,7 +46,3 @@ class Demos:
         | Annotated[TrainClone, tyro.conf.subcommand("train")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     )
-
-    def run(self) -> None:
-        """Run the subcommand."""
-        self.command.run()

@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
-import tyro
+from gymnasium.wrappers import TimeLimit
 from numpy.typing import NDArray
 
-from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
-from shapechanger.cli.env_arguments import driven, env_ref, options_of, require_seed
+from shapechanger.cli.console import Interrupted, StudyProgress, command_line, counted, say
+from shapechanger.cli.env_arguments import (
+    Body,
+    EnvId,
+    driven,
+    env_ref,
+    name_of,
+    options_of,
+    require_seed,
+)
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.errors import DemosError
+from shapechanger.transfer.env_ref import EnvRef, layouts_of
 
 if TYPE_CHECKING:
-    from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.demos.drivers import Act, EpisodeDriver, TaskExpert
-    from shapechanger.demos.recording import RecordEpisodes
-    from shapechanger.transfer.env_ref import EnvRef
 
 _EXPERT: Final = "expert"
 
@@ -65,24 +70,28 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
         return PolicyPilot(act)
     rule = GateRule()
     period_s = 1.0 / float(env.metadata.get("render_fps") or 20.0)
-    return CorrectedPilot(act, _expert(env, seed), Gate(rule, period_s), _Danger(env, rule.near_s))
+    return CorrectedPilot(
+        act,
+        _expert(env, seed),
+        Gate(rule, period_s),
+        lambda action: _danger(env, action, rule.near_s),
+    )
 
 
 def _expert(env: gym.Env[Any, Any], seed: int) -> TaskExpert:
     give = getattr(env.unwrapped, "demonstrator", None)
     if give is None:
-        name = env.spec.id if env.spec else type(env.unwrapped).__name__
         raise DemosError(
-            f"{name} has no expert: let a policy drive with `--driver FILE`, or drive a robot "
-            "yourself with `shapechanger robot drive`."
+            f"{name_of(env)} has no expert: let a policy drive with `--driver FILE`, or drive a "
+            "robot yourself with `shapechanger robot drive`."
         )
     return cast("TaskExpert", give(seed))
 
 
 def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     """Load a policy and check that its observations and actions fit the env."""
-    from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.transfer.learners.cloning import is_clone
+    from shapechanger.transfer.learners.policy_file import load_policy
 
     box = cast("gym.spaces.Box", env.action_space)
 
@@ -90,96 +99,70 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
         return np.clip(np.asarray(actions, np.float32)[0], box.low, box.high)
 
     if is_clone(path):
-        clone = CameraPolicy.load(path)
-        part = _parts(clone, path, env)
-        return lambda seen: fitting(clone.predict_many(part(seen, "image"), part(seen, "state")))
-    from shapechanger.transfer.env_ref import layouts_of
-    from shapechanger.transfer.learners.policy_file import load_policy
-
+        clone = _clone(path, env)
+        return lambda seen: fitting(clone(seen))
     policy = load_policy(path)
     if (policy.card.observation, policy.card.action) != layouts_of(env):
         raise DemosError(
             f"{path} was trained in {policy.card.env}, which senses or moves something else than "
-            f"{_name(env)}."
+            f"{name_of(env)}."
         )
     return lambda seen: fitting(policy.act(np.asarray(seen)[np.newaxis]))
 
 
-class _Danger:
-    """Danger signal from the env's world.
-
-    Args:
-        env: The env; without a world there is no danger.
-        near_s: Time to collision that counts as danger, s.
-    """
-
-    def __init__(self, env: gym.Env[Any, Any], near_s: float) -> None:
-        self._env, self._near_s = env, near_s
-
-    def __call__(self, action: NDArray[np.float32]) -> str:
-        world = getattr(self._env.unwrapped, "world", None)
-        if world is None:
-            return ""
-        if world.touches:
-            return "it touches something"
-        speed, ahead_m = world.inputs().speed, world.distance_m()
-        drives_on = speed > _CRAWLS_MPS and action[-1] > _BRAKES
-        if drives_on and ahead_m < speed * self._near_s:
-            return f"{ahead_m:.1f} m to what is ahead"
+def _danger(env: gym.Env[Any, Any], action: NDArray[np.float32], near_s: float) -> str:
+    """Describe the danger in the env's world, such as a collision within `near_s`; else empty."""
+    world = getattr(env.unwrapped, "world", None)
+    if world is None:
         return ""
+    if world.touches:
+        return "it touches something"
+    speed, ahead_m = world.inputs().speed, world.distance_m()
+    drives_on = speed > _CRAWLS_MPS and action[-1] > _BRAKES
+    return f"{ahead_m:.1f} m to what is ahead" if drives_on and ahead_m < speed * near_s else ""
 
 
-def _parts(
-    clone: CameraPolicy, path: Path, env: gym.Env[Any, Any]
-) -> Callable[[Any, str], NDArray[Any] | None]:
-    """Return the function that extracts a clone's part of an observation; None if there is none.
-
-    Raises:
-        DemosError: If the clone needs frames and the env has none.
-        PolicyError: If its state or actions differ from the env's.
-    """
+def _clone(path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
+    """Load a clone, and check that it fits the env's frames, state and actions."""
+    from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.demos.recording import QUALITY, ObservationEncoder
 
+    clone = CameraPolicy.load(path)
     encoder = ObservationEncoder(env, QUALITY)
     needs = {"image": clone.card.eyes != "none", "state": clone.card.state_layout is not None}
     if needs["image"] and not encoder.has_picture:
-        raise DemosError(f"{path} drives by pictures, and {_name(env)} shows none.")
+        raise DemosError(f"{path} drives by pictures, and {name_of(env)} shows none.")
     clone.card.require_layouts(encoder.action_layout, encoder.state_layout)
     is_dict = isinstance(env.observation_space, gym.spaces.Dict)
 
     def part(seen: Any, name: str) -> NDArray[Any] | None:
         return np.asarray(seen[name] if is_dict else seen)[np.newaxis] if needs[name] else None
 
-    return part
-
-
-def _name(env: gym.Env[Any, Any]) -> str:
-    return env.spec.id if env.spec else type(env.unwrapped).__name__
+    return lambda seen: clone.predict_many(part(seen, "image"), part(seen, "state"))
 
 
 @dataclass(frozen=True)
 class RecordDemonstrations:
     """Record an expert or a policy in an env."""
 
-    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
+    env: EnvId
     """Id of the env, such as Car."""
     out: Path
-    """Folder of the recording; what is there already stays, and more comes to it."""
+    """Folder of the recording; new episodes are added to those there."""
     minutes: float = 10.0
     """Duration, minutes of the env's time."""
     driver: str = _EXPERT
     """"expert", or the file of a policy."""
     corrected_by: str = ""
-    """"expert" to let it take over where the policy would go wrong. Only what the expert does is
-    learned from then."""
+    """"expert" to let it take over where the policy would fail. Only the expert's steps are then
+    learned from."""
     episode_s: float = 50.0
     """Longest episode, s; a collision ends it earlier."""
-    body: str = ""
-    """Another body of the family: its name, or edits as JSON."""
+    body: Body = ""
     lenses: tuple[str, ...] = ()
     """Disturbances of a vehicle's camera, such as night."""
     put_back: bool = False
-    """Put a vehicle that runs into something back on its lane, in place of ending the episode."""
+    """Put a vehicle back on its lane after a collision, in place of ending the episode."""
     options: str = ""
     """More arguments of the env as JSON, such as '{"courses": "held-out"}'."""
     seed: int = 0
@@ -187,8 +170,6 @@ class RecordDemonstrations:
 
     def run(self) -> None:
         """Record and print a summary."""
-        from gymnasium.wrappers import TimeLimit
-
         from shapechanger.demos.drivers import record_steps
         from shapechanger.demos.recording import RecordEpisodes
 
@@ -197,8 +178,11 @@ class RecordDemonstrations:
             if not 0.0 < value < float("inf"):
                 raise DemosError(f"--{name} is more than 0, got {value}.")
         ref = self._ref()
-        console = plain_console()
-        made = _made(ref)
+        try:
+            made = ref.make(max_episode_steps=-1)
+        except TypeError as error:
+            reason = str(error).partition(" was raised from")[0]
+            raise DemosError(f"{ref.id} cannot be made with these --options: {reason}.") from error
         try:
             hz = float(made.metadata.get("render_fps") or 20.0)
             longest = max(1, round(self.episode_s * hz))
@@ -212,15 +196,19 @@ class RecordDemonstrations:
                     env, pilot, steps, self.seed, lambda done: progress(ref.id, done, done == steps)
                 )
         except KeyboardInterrupt:
-            raise Interrupted(f"Stopped; what was recorded is in {self.out}, whole.") from None
+            raise Interrupted(
+                f"Stopped; the recording so far is in {self.out}, complete."
+            ) from None
         finally:
             made.close()
-        console.print(_told(env, self.out), soft_wrap=True)
+        say(
+            f"wrote {env.steps} steps, {env.steps / env.control_hz / 60.0:.1f} minutes, in "
+            f"{counted(env.episodes, 'episode')} to {self.out}\n"
+            f"look at them: shapechanger demos show {shlex.quote(str(self.out))} --out page.html"
+        )
 
     def _ref(self) -> EnvRef:
         """Return the env with the requested options."""
-        from shapechanger.transfer.env_ref import EnvRef
-
         ref = env_ref(self.env, self.body)
         more: dict[str, Any] = {}
         if ref.id in VEHICLE_ENVS:
@@ -232,7 +220,7 @@ class RecordDemonstrations:
                 more["put_back"] = True
         elif self.lenses or self.put_back:
             raise DemosError(
-                f"--put-back and --lens are for vehicles, and {ref.id} is not one of them: "
+                f"--put-back and --lenses are for vehicles, and {ref.id} is not one of them: "
                 f"{', '.join(VEHICLE_ENVS)}."
             )
         return EnvRef(ref.id, {**ref.kwargs, **more, **options_of(self.options, "--options")})
@@ -249,29 +237,6 @@ class RecordDemonstrations:
         return {
             **body,
             "driver": who,
-            "source": shlex.join(["shapechanger", *sys.argv[1:]]),
+            "source": command_line(),
             "notes": notes,
         }
-
-
-def _made(ref: EnvRef) -> gym.Env[Any, Any]:
-    """Make the env without its time limit.
-
-    Raises:
-        DemosError: If it does not accept the arguments.
-    """
-    try:
-        return ref.make(max_episode_steps=-1)
-    except TypeError as error:
-        reason = str(error).partition(" was raised from")[0]
-        raise DemosError(f"{ref.id} cannot be made with these --options: {reason}.") from error
-
-
-def _told(env: RecordEpisodes, out: Path) -> str:
-    """Describe the recording and the next commands."""
-    seconds = env.steps / env.control_hz
-    episodes = f"{env.episodes} episode{'' if env.episodes == 1 else 's'}"
-    return (
-        f"wrote {env.steps} steps, {seconds / 60.0:.1f} minutes, in {episodes} to {out}\n"
-        f"look at them: shapechanger demos show {shlex.quote(str(out))} --out page.html"
-    )

@@ -11,22 +11,23 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from shapechanger.cli.console import plain_console
-from shapechanger.cli.demos.edit import episode_at
+from shapechanger.cli.console import say
+from shapechanger.cli.demos.recordings import episode_at
 from shapechanger.cli.env_arguments import env_ref, opened
 from shapechanger.demos.dataset import decode_picture
-from shapechanger.demos.episodes import Episode
+from shapechanger.demos.episodes import Episode, Step
 from shapechanger.demos.overlay import blank, overlay
 from shapechanger.errors import DemosError, LinkError, RobotRefused
 from shapechanger.layout import Layout
+from shapechanger.link.messages import Welcome
+from shapechanger.remote.known_robots import recall
+from shapechanger.teleop import Terminal
+from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import Step
     from shapechanger.demos.recording import EncodedObservation
-    from shapechanger.link.messages import Welcome
     from shapechanger.remote.client import RobotClient
-    from shapechanger.teleop import Terminal
-    from shapechanger.transfer.env_ref import EnvRef
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,7 @@ class Replay:
     film: Path | None = None
     """A film to write, such as out.mp4, with the actions drawn in."""
     env: str = ""
-    """Id of an env to play the actions in, from the seed that was recorded; it says how far the
-    two come apart."""
+    """Id of an env to play the actions in, from the recorded seed; differences are reported."""
     robot: str = ""
     """Name of a robot to play the actions on, see `robot remember`; a person at this terminal
     arms it, and any key stops it."""
@@ -65,10 +65,6 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
 
     The applied actions are replayed where they are known, because the frames follow from them; the
     expert's intended actions may differ.
-
-    Raises:
-        DemosError: If the env has other actions.
-        UnknownName: If the env is unknown.
     """
     from shapechanger.demos.recording import ObservationEncoder
 
@@ -100,20 +96,17 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
             played += 1
             apart.earn(step, float(reward))
             if terminated or truncated:
-                ended = "; there it was over" if played < len(kept) else ""
+                ended = "; the episode ended there" if played < len(kept) else ""
                 break
-    console = plain_console()
-    console.print(f"played {played} of {len(kept)} steps in {env_id}{ended}", soft_wrap=True)
+    say(f"played {played} of {len(kept)} steps in {env_id}{ended}")
     for line in _caveats(episode):
-        console.print(line, soft_wrap=True)
+        say(line)
     for line in apart.lines(states if compares else None):
-        console.print(line, soft_wrap=True)
+        say(line)
 
 
 def _ref(episode: Episode, env_id: str) -> EnvRef:
     """Return the env, with the recorded arguments if it is the recorded one."""
-    from shapechanger.transfer.env_ref import EnvRef
-
     ref, header = env_ref(env_id), episode.header
     kwargs = header.env_kwargs if ref.id == header.env else {}
     return EnvRef(ref.id, {**kwargs, **ref.kwargs})
@@ -123,12 +116,12 @@ def _caveats(episode: Episode) -> list[str]:
     """Return reasons why a replay cannot be identical."""
     caveats: list[str] = []
     if episode.header.seed is None:
-        caveats.append("it was recorded without a seed, so it began somewhere else")
+        caveats.append("it was recorded without a seed, so it starts elsewhere")
     kept = episode.kept
     if kept[0].index != 0 or kept[-1].index - kept[0].index != len(kept) - 1:
-        caveats.append("steps of it do not count and were not played, so it went on from elsewhere")
+        caveats.append("dropped steps were not played, so later steps start elsewhere")
     if any(step.applied is None for step in kept):
-        caveats.append("what its outputs did is not known, so what was decided was played")
+        caveats.append("applied actions are unknown, so the decided ones were played")
     return caveats
 
 
@@ -179,8 +172,8 @@ class _Apart:
                     )
         if self._rewards:
             then, now = np.sum(self._rewards, axis=0)
-            lines.append(f"it was worth {then:.2f} and is now worth {now:.2f}")
-        return lines or ["there is nothing to compare it with"]
+            lines.append(f"return {then:.2f} when recorded, {now:.2f} now")
+        return lines or ["nothing to compare"]
 
 
 _WITHOUT_CAMERA: Final = (480, 40)
@@ -188,6 +181,10 @@ _WITHOUT_CAMERA: Final = (480, 40)
 
 def film(episode: Episode, path: Path) -> None:
     """Write the kept steps of an episode as a video.
+
+    Args:
+        episode: The episode.
+        path: The file.
 
     Raises:
         OutputError: If it cannot be written.
@@ -214,10 +211,7 @@ def film(episode: Episode, path: Path) -> None:
     write_film(frames, path, episode.header.control_hz)
     left = len(episode.kept) - len(frames)
     rest = f"; {left} pictures of another size are left out" if left else ""
-    plain_console().print(
-        f"wrote {path}: {len(frames)} steps, {len(frames) / episode.header.control_hz:.1f} s{rest}",
-        soft_wrap=True,
-    )
+    say(f"wrote {path}: {len(frames)} steps, {len(frames) / episode.header.control_hz:.1f} s{rest}")
 
 
 _SAME_RATE: Final = 0.01
@@ -228,31 +222,22 @@ def _play_on_robot(episode: Episode, name: str) -> None:
     """Replay an episode on a robot after a person at this terminal has armed it.
 
     The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.
-
-    Raises:
-        DemosError: If the robot has other actions or another rate.
-        LinkError: If it cannot be reached, or is lost.
-        NoTerminal: If there is no terminal to stop it from.
     """
     from shapechanger.remote.client import RobotClient
-    from shapechanger.remote.known_robots import recall
-    from shapechanger.teleop import Terminal
 
     known = recall(name)
-    console = plain_console()
     with (
         Terminal() as terminal,
         RobotClient.connect(known, role="person", frames=False) as robot,
     ):
         _require_fit(episode, robot.welcome)
-        console.print(
+        say(
             f"{episode.seconds:.1f} s of {episode.path.name}, replayed without looking: "
             f"{robot.welcome.robot} starts from where it stands now.\n"
-            "E arms it and starts · any other key cancels; during the replay, any key stops it.",
-            soft_wrap=True,
+            "E arms it and starts · any other key cancels; during the replay, any key stops it."
         )
         if not _agreed(robot, terminal):
-            console.print("left; nothing was played")
+            say("cancelled; nothing was played")
             return
         try:
             robot.take()
@@ -262,15 +247,11 @@ def _play_on_robot(episode: Episode, name: str) -> None:
             if robot.alive:
                 robot.disarm()
                 robot.release()
-        console.print(ended, soft_wrap=True)
+        say(ended)
 
 
 def _require_fit(episode: Episode, welcome: Welcome) -> None:
-    """Refuse a robot that does not fit the recording.
-
-    Raises:
-        DemosError: If its actions, units, ranges or rate differ.
-    """
+    """Refuse a robot that does not fit the recording."""
     recorded = Layout.from_json(episode.header.action_layout)
     moved = Layout.from_json(welcome.action_layout)
     if [_range(f) for f in recorded] != [_range(f) for f in moved]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import shlex
-import sys
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -12,18 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import tyro
+from numpy.typing import NDArray
 
-from shapechanger.cli.console import Interrupted, StudyProgress, plain_console
-from shapechanger.cli.env_arguments import require_seed
+from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
+from shapechanger.cli.env_arguments import require_file, require_seed
+from shapechanger.demos.cloning.pictures import Framing, prepare
+from shapechanger.demos.dataset import count_steps, load_dataset
 from shapechanger.errors import OutputError
+from shapechanger.transfer.files import write_atomic
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from rich.console import Console
-
     from shapechanger.demos.cloning.judge import Judgement
     from shapechanger.demos.cloning.learn import MemberCheck
-    from shapechanger.demos.cloning.pictures import Framing
     from shapechanger.demos.cloning.policy import CameraPolicy
 
 
@@ -58,12 +56,10 @@ class TrainClone:
         from shapechanger.demos.cloning.demonstrations import judged_steps
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.learn import learn, settings_for
-        from shapechanger.demos.dataset import count_steps, load_dataset
         from shapechanger.reports.clone import clone_html, write_numbers
         from shapechanger.transfer.files import write_atomic
         from shapechanger.transfer.learners.sb3 import use_one_thread
 
-        console = plain_console()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
         if settings.members > 1:
             use_one_thread()  # More threads slow down networks this small.
@@ -72,7 +68,7 @@ class TrainClone:
         judged = judged_steps(data.episodes, self.split, self.held_out)
         learned = ~judged
         n = int(learned.sum())
-        console.print(f"{n} steps to learn from, {len(data) - n} to judge by", soft_wrap=True)
+        say(f"{n} steps to learn from, {len(data) - n} to judge by")
         try:
             with _Progress(settings.members, settings.steps(n)) as progress:
                 policy, training = learn(
@@ -86,9 +82,9 @@ class TrainClone:
                 )
         except KeyboardInterrupt:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
-        console.print(training.mirror_note, soft_wrap=True)
+        say(training.mirror_note)
         policy = policy.described(
-            command=shlex.join(["shapechanger", *sys.argv[1:]]),
+            command=command_line(),
             data=str(self.data),
             digest=shrinking.digest(data.actions),
             learned=n,
@@ -97,37 +93,28 @@ class TrainClone:
         note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
         if not judged.any():
             judged = learned
-            note = "These are the steps that it learned from, so others will come out worse."
+            note = "These are the steps that it learned from, so expect less on others."
         judgement = judge(policy, data, judged)
         policy.save(self.out)
         for path in self._write_for_sb3(policy, shrinking.size):
-            console.print(f"wrote {path}", soft_wrap=True)
+            say(f"wrote {path}")
         page, numbers = self.out.with_suffix(".html"), self.out.with_suffix(".json")
         report = clone_html(self.out.name, policy, data, judgement, training, note)
         write_atomic(page, report.encode())
         write_numbers(numbers, policy, judgement, training)
-        console.print(f"wrote {self.out}, {page} and {numbers}", soft_wrap=True)
-        console.print(note, soft_wrap=True)
-        _print_judgement(console, judgement)
+        say(f"wrote {self.out}, {page} and {numbers}")
+        say(note)
+        _print_judgement(judgement)
 
     def _require_files(self) -> None:
-        """Check before the work that the files can be written.
-
-        Raises:
-            OutputError: If a file cannot be written, or two have the same name.
-            StudyError: If the seed is invalid.
-        """
-        from shapechanger.transfer.files import make_folder
-
+        """Check before the work that the files can be written."""
         require_seed(self.seed)
         written = [self.out, self.out.with_suffix(".html"), self.out.with_suffix(".json")]
         written += [path for path in (self.sac, self.ppo) if path is not None]
         for path in written:
-            if path.is_dir():
-                raise OutputError(f"Cannot write {path}: it is a folder.")
             if written.count(path) > 1:
                 raise OutputError(f"Cannot write two files to {path}: give each a name of its own.")
-            make_folder(path.parent)
+            require_file(path)
 
     def _write_for_sb3(self, policy: CameraPolicy, size: tuple[int, int] | None) -> list[Path]:
         """Write a Stable-Baselines3 file if requested."""
@@ -135,7 +122,6 @@ class TrainClone:
         if self.sac is None and self.ppo is None:
             return written
         from shapechanger.demos.cloning.sb3 import as_ppo, as_sac
-        from shapechanger.transfer.files import write_atomic
 
         for path, make in ((self.sac, as_sac), (self.ppo, as_ppo)):
             if path is not None:
@@ -163,8 +149,6 @@ class Shrinking:
     def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the policy's view of a frame."""
         import hashlib
-
-        from shapechanger.demos.cloning.pictures import prepare
 
         self.size = picture.shape[0], picture.shape[1]
         small = prepare(picture[None], self.framing)[0]
@@ -197,27 +181,26 @@ class _Progress(StudyProgress):
         return f"network {member + 1}"
 
 
-def _print_judgement(console: Console, judgement: Judgement) -> None:
+def _print_judgement(judgement: Judgement) -> None:
     """Print an evaluation; the last line is the accuracy."""
     always = f"always the same: {judgement.always:.3f}"
-    console.print(f"{judgement.steps} steps; {always}", soft_wrap=True)
+    say(f"{judgement.steps} steps; {always}")
     if judgement.head == "class":
         for name, row in zip(judgement.classes, judgement.confusion, strict=True):
             if sum(row):
                 right = row[judgement.classes.index(name)]
-                console.print(f"  {name}: {right} of {sum(row)} right", soft_wrap=True)
-        console.print(f"calibration error {judgement.ece or 0.0:.3f}")
+                say(f"  {name}: {right} of {sum(row)} right")
+        say(f"calibration error {judgement.ece or 0.0:.3f}")
     else:
         for name, error in zip(judgement.numbers, judgement.errors, strict=False):
-            console.print(f"  {name}: mean absolute error {error:.3f}", soft_wrap=True)
-        console.print(f"within {judgement.tolerance:g} of half the range {judgement.within:.3f}")
-        console.print(
+            say(f"  {name}: mean absolute error {error:.3f}")
+        say(f"within {judgement.tolerance:g} of half the range {judgement.within:.3f}")
+        say(
             "accuracy counts steps whose numbers all fall in the driver's third of their range, "
-            "such as left, straight or right",
-            soft_wrap=True,
+            "such as left, straight or right"
         )
-    console.print(f"macro-F1 {judgement.macro_f1:.3f}")
-    console.print(f"accuracy {judgement.accuracy:.3f}")
+    say(f"macro-F1 {judgement.macro_f1:.3f}")
+    say(f"accuracy {judgement.accuracy:.3f}")
 
 
 @dataclass(frozen=True)
@@ -235,12 +218,10 @@ class Evaluate:
         """Evaluate and print."""
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.policy import CameraPolicy
-        from shapechanger.demos.dataset import load_dataset
 
         policy = CameraPolicy.load(self.policy)
         shrinking = Shrinking(policy.card.framing)
         data = load_dataset(self.data, shrink=shrinking)
-        console = plain_console()
         judgement = judge(policy, data)
         note = f"These are the {len(data)} steps of {self.data}."
         learned = policy.card.data.get("learned", 0)
@@ -249,15 +230,15 @@ class Evaluate:
             if learned < len(data):
                 unseen = judge(policy, data, np.arange(len(data)) >= learned)
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
-            console.print(note, soft_wrap=True)
+            say(note)
         if self.report is not None:
             from shapechanger.reports.clone import clone_html, write_numbers
-            from shapechanger.transfer.files import make_folder, write_atomic
+            from shapechanger.transfer.files import write_atomic
 
-            make_folder(self.report.parent)
+            require_file(self.report)
             page = clone_html(self.policy.name, policy, data, judgement, None, note)
             write_atomic(self.report, page.encode())
             numbers = self.report.with_suffix(".json")
             write_numbers(numbers, policy, judgement, None)
-            console.print(f"wrote {self.report} and {numbers}", soft_wrap=True)
-        _print_judgement(console, judgement)
+            say(f"wrote {self.report} and {numbers}")
+        _print_judgement(judgement)

@@ -9,16 +9,13 @@ import tyro
 
 from shapechanger.cli.robot.calibrate import Calibrate
 from shapechanger.cli.robot.camera import CameraView
-from shapechanger.cli.robot.doctor import Doctor
 from shapechanger.cli.robot.drive import Drive
 from shapechanger.cli.robot.fetch import FetchEpisodes
-from shapechanger.cli.robot.find import Find, Forget, Remember
-from shapechanger.cli.robot.init import Home, Init
 from shapechanger.cli.robot.key import Key
-from shapechanger.cli.robot.safe_pins import SafePins
+from shapechanger.cli.robot.remote import Find, Forget, Remember, Stop
 from shapechanger.cli.robot.selftest import Selftest
 from shapechanger.cli.robot.serve import Serve
-from shapechanger.cli.robot.stop import Stop
+from shapechanger.cli.robot.setup import Doctor, Home, Init, SafePins
 
 __all__ = ["Robot"]
 
@@ -44,7 +41,3 @@ class Robot:
         | Annotated[SafePins, tyro.conf.subcommand("safe-pins")]
         | Annotated[Selftest, tyro.conf.subcommand("selftest")]
     )
-
-    def run(self) -> None:
-        """Run the subcommand."""
-        self.command.run()

@@ -7,18 +7,18 @@ import math
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import tyro
-from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import plain_console, say
+from shapechanger.cli.robot.setup import change_profile, own_profile
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.drivers.pulse import PULSE_KEYS
@@ -33,6 +33,7 @@ from shapechanger.robot.setup.calibration import (
     wheel_changes,
     with_widest_pulses,
 )
+from shapechanger.teleop import Terminal
 
 if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
@@ -43,9 +44,9 @@ class Calibrate:
     """Calibrate servo ends and centres, motor directions and wheel circumferences."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
-    """The robot's profile; what is found is written into it, and its comments stay."""
+    """The robot's profile; the results are written into it, and its comments stay."""
     twin: bool = False
-    """Practise on the twin: nothing real moves, and what is found is written all the same."""
+    """Practise on the twin: no hardware moves, but the results are written all the same."""
     cap: float = 0.4
     """Largest value that a motor or an ESC is jogged with, 0 to 1; of an ESC you are asked whether
     to go beyond."""
@@ -54,47 +55,27 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate interactively and write the result, or the partial result after an error."""
-        from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
-        from shapechanger.teleop import Terminal
-
         if not 0.0 < self.cap <= 1.0:
             raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
-        path = find_profile(self.profile)
-        if path in shipped_profiles().values():
-            raise RobotError(
-                f"{path.stem} comes with Shapechanger and is not changed: "
-                f"`shapechanger robot init {path.stem}` writes one of your own."
-            )
+        path = own_profile(self.profile)
         profile = load_profile(path)
         if not (self.twin or self.wheels_up):
             ask_for_wheels_up()
-        console = plain_console()
         with Terminal() as terminal:
-            calibration = Calibration(profile, terminal, console, self.cap, twin=self.twin)
+            calibration = Calibration(profile, terminal, self.cap, twin=self.twin)
             try:
                 changes = calibration.run()
             except ShapechangerError:
                 # Keep the results so far if the last wire was loose. The date is
                 # left out: it is not calibrated.
                 if calibration.found:
-                    console.print("\nIt did not come to its end. What was found before:")
-                    _write(path, calibration.found)
+                    say("\nCalibration was interrupted. Results so far:")
+                    change_profile(path, calibration.found)
                 raise
         if not changes:
-            console.print("Nothing was found, and nothing was written.")
+            say("No results; nothing was written.")
             return
-        _write(path, {**changes, "robot.calibrated": datetime.date.today()})
-
-
-def _write(path: Path, changes: dict[str, Any]) -> None:
-    """Write the changes to the profile and print them."""
-    from shapechanger.robot.profile.edit import rewrite
-
-    rewrite(path, changes)
-    console = plain_console()
-    for name, value in changes.items():
-        console.print(f"{name} = {value}")
-    console.print(f"wrote {path}")
+        change_profile(path, {**changes, "robot.calibrated": datetime.date.today()})
 
 
 _STEP: Final = 0.02
@@ -104,122 +85,13 @@ _SETTLES_S: Final = 4.0
 _STOP_LOOKS: Final = 50  # Observations within which an emergency stop must be visible.
 
 
-class Keys(Protocol):
-    """Source of key presses, such as a terminal."""
-
-    def keys(self, wait_s: float) -> list[str]:
-        """Return pressed keys, waiting up to `wait_s` seconds for the first."""
-        ...
-
-
-class Ended(Exception):
+class _Ended(Exception):
     """The person quits."""
 
 
-class Jogger:
-    """Jog one output with keys.
-
-    Args:
-        robot: The robot, armed for this client.
-        profile: Its profile.
-        output: The output, with the settings for jogging.
-        keys: Source of key presses.
-        console: Display of the output's value.
-        step: Change per key press.
-    """
-
-    def __init__(
-        self,
-        robot: RobotClient,
-        profile: Profile,
-        output: OutputPlan,
-        keys: Keys,
-        console: Console,
-        step: float = _STEP,
-    ) -> None:
-        self._robot = robot
-        self._keys = keys
-        self._console = console
-        self._step = step
-        self._output = output
-        # The action with the largest weight on this output.
-        name = max(output.mix, key=lambda action: abs(output.mix[action]))
-        self._names = [action.name for action in profile.actions]
-        self._rests = [action.rest for action in profile.actions]
-        self._place = self._names.index(name)
-        self._action = profile.actions[self._place]
-        self._way = math.copysign(1.0, output.mix[name])
-
-    def find(self, cap: float, ask_beyond: Callable[[float], None] | None = None) -> float | None:
-        """Jog until Enter.
-
-        Args:
-            cap: Largest commanded value.
-            ask_beyond: Question at the cap, on which Y goes beyond it; None to forbid that.
-
-        Returns:
-            The applied value of the output, or None if skipped.
-
-        Raises:
-            RobotError: If the robot stopped.
-        """
-        with _live_line(self._console) as live:
-            return self._jogged(cap, ask_beyond, live)
-
-    def _jogged(
-        self, cap: float, ask_beyond: Callable[[float], None] | None, live: Live
-    ) -> float | None:
-        """Run `find` with a live display."""
-        value = self._action.rest
-        self._robot.acknowledge()
-        newest = self._robot.newest
-        seq = newest.message.seq if newest else 0
-        accepted: int | None = None
-        accepted_s = 0.0
-        asked = False
-        before: tuple[float, ...] = ()
-        while True:
-            seen = self._robot.observation(seq).message
-            seq = seen.seq
-            if not seen.armed:
-                raise RobotError(f"The robot stopped: {seen.stop_reason}")
-            live.update(Text(f"  {reading(self._output, self._is_at(seen.action_applied))}"))
-            values = list(self._rests)
-            values[self._place] = value
-            sent = self._robot.command(values, answers=seq)
-            if accepted is None:
-                for key in self._keys.keys(0.0):
-                    if key == "enter":
-                        accepted, accepted_s = sent + 1, time.monotonic()
-                        break
-                    _end_if_asked(key, self._robot)
-                    if key == "n":
-                        return None
-                    if key == "y" and asked:
-                        cap = 1.0
-                    step = self._way * {"d": self._step, "a": -self._step}.get(key, 0.0)
-                    if abs(value + step) > cap and ask_beyond is not None and not asked and cap < 1:
-                        ask_beyond(cap)
-                        asked = True
-                    value = min(max(value + step, -cap), cap)
-                    value = min(max(value, self._action.low), self._action.high)
-            # It may still be moving: a slew, or a controller that is not armed yet.
-            elif (seen.applied_seq or 0) >= accepted and seen.action_applied == before:
-                is_there = abs(seen.action_applied[self._place] - value) < _THERE
-                if is_there or time.monotonic() > accepted_s + _SETTLES_S:
-                    return self._is_at(before)
-            before = seen.action_applied
-
-    def _is_at(self, applied: tuple[float, ...]) -> float:
-        """Return the value of the output for the applied actions."""
-        mix = self._output.mix
-        mixed = sum(mix.get(name, 0.0) * v for name, v in zip(self._names, applied, strict=True))
-        return min(max(self._output.offset + mixed, -1.0), 1.0)
-
-
-def _live_line(console: Console) -> Live:
+def _live_line() -> Live:
     """Return a live line that disappears afterwards."""
-    return Live(console=console, refresh_per_second=10, transient=True)
+    return Live(console=plain_console(), refresh_per_second=10, transient=True)
 
 
 def _end_if_asked(key: str, robot: RobotClient | None = None) -> None:
@@ -232,7 +104,7 @@ def _end_if_asked(key: str, robot: RobotClient | None = None) -> None:
             if not robot.observation(newest.message.seq if newest else 0).message.armed:
                 break
     if key in {"q", "space"}:
-        raise Ended
+        raise _Ended
 
 
 _START_STEP: Final = 0.05
@@ -245,7 +117,6 @@ class Calibration:
     Args:
         profile: The robot.
         keys: Source of key presses.
-        console: Console for questions.
         cap: Largest value for motors, and for ESCs unless the person goes beyond.
         twin: Whether on the twin.
 
@@ -253,12 +124,9 @@ class Calibration:
         found: Results so far by dotted name, for completed outputs and sensors.
     """
 
-    def __init__(
-        self, profile: Profile, keys: Keys, console: Console, cap: float, *, twin: bool
-    ) -> None:
+    def __init__(self, profile: Profile, keys: Terminal, cap: float, *, twin: bool) -> None:
         self._profile = profile
         self._keys = keys
-        self._console = console
         self._cap = cap
         self._twin = twin
         self.found: dict[str, Any] = {}
@@ -272,28 +140,94 @@ class Calibration:
         Raises:
             RobotError: If a result is impossible.
         """
-        self._console.print(
+        say(
             "Lift the robot so that nothing can drive away. Enter accepts, N skips this output, "
-            "Q ends without writing, Space stops everything and ends.",
-            soft_wrap=True,
+            "Q ends without writing, Space stops everything and ends."
         )
         try:
-            self._everything()
-        except Ended:
+            for output in self._profile.outputs:
+                if output.mix and output.driver in PULSE_KEYS:
+                    self.found |= self._pulses(output)
+                elif output.mix and output.driver in _MOTORS:
+                    self.found |= self._motor(output)
+            for sensor in self._profile.sensors:
+                if sensor.driver == "encoder":
+                    self.found |= self._wheel(sensor.name, sensor.settings["wheel_m"])
+        except _Ended:
             self.found = {}
         return self.found
 
-    def _everything(self) -> None:
-        for output in self._profile.outputs:
-            if not output.mix:
-                continue
-            if output.driver in PULSE_KEYS:
-                self.found |= self._pulses(output)
-            elif output.driver in _MOTORS:
-                self.found |= self._motor(output)
-        for sensor in self._profile.sensors:
-            if sensor.driver == "encoder":
-                self.found |= self._wheel(sensor.name, sensor.settings["wheel_m"])
+    def _jogged(
+        self,
+        robot: RobotClient,
+        output: OutputPlan,
+        cap: float,
+        step: float = _STEP,
+        *,
+        goes_beyond: bool = False,
+    ) -> float | None:
+        """Jog one output with keys until Enter.
+
+        Args:
+            robot: The robot, armed for this client.
+            output: The output, with the settings for jogging.
+            cap: Largest commanded value.
+            step: Change per key press.
+            goes_beyond: Whether to ask at the cap, where Y goes beyond it.
+
+        Returns:
+            The applied value of the output, or None if skipped.
+        """
+        # The action with the largest weight on this output.
+        name = max(output.mix, key=lambda action: abs(output.mix[action]))
+        values = {action.name: action.rest for action in self._profile.actions}
+        place = list(values).index(name)
+        action = self._profile.actions[place]
+        way = math.copysign(step, output.mix[name])
+
+        def applied_value(applied: tuple[float, ...]) -> float:
+            mixed = sum(output.mix.get(n, 0.0) * v for n, v in zip(values, applied, strict=True))
+            return min(max(output.offset + mixed, -1.0), 1.0)
+
+        robot.acknowledge()
+        newest = robot.newest
+        seq = newest.message.seq if newest else 0
+        accepted: int | None = None
+        accepted_s = 0.0
+        asked = False
+        before: tuple[float, ...] = ()
+        with _live_line() as live:
+            while True:
+                seen = robot.observation(seq).message
+                seq = seen.seq
+                if not seen.armed:
+                    raise RobotError(f"The robot stopped: {seen.stop_reason}")
+                live.update(Text(f"  {reading(output, applied_value(seen.action_applied))}"))
+                sent = robot.command([*values.values()], answers=seq)
+                if accepted is None:
+                    for key in self._keys.keys(0.0):
+                        if key == "enter":
+                            accepted, accepted_s = sent + 1, time.monotonic()
+                            break
+                        _end_if_asked(key, robot)
+                        if key == "n":
+                            return None
+                        if key == "y" and asked:
+                            cap = 1.0
+                        wanted = values[name] + {"d": way, "a": -way}.get(key, 0.0)
+                        if goes_beyond and not asked and abs(wanted) > cap and cap < 1:
+                            live.console.print(
+                                f"  That is the cap of {cap:g}. Go beyond it? Y does."
+                            )
+                            asked = True
+                        wanted = min(max(wanted, -cap), cap)
+                        values[name] = min(max(wanted, action.low), action.high)
+                # It may still be moving: a slew, or a controller that is not armed yet.
+                elif (seen.applied_seq or 0) >= accepted and seen.action_applied == before:
+                    is_there = abs(seen.action_applied[place] - values[name]) < _THERE
+                    if is_there or time.monotonic() > accepted_s + _SETTLES_S:
+                        return applied_value(before)
+                before = seen.action_applied
 
     def _pulses(self, output: OutputPlan) -> dict[str, Any]:
         wide = with_widest_pulses(output)
@@ -304,39 +238,32 @@ class Calibration:
         names = {"servo": ("full left", "straight", "full right")}.get(
             output.driver, ("its fastest backward", "surely at rest", "its fastest forward")
         )
-        self._console.print(f"\n{output.name}: A and D move it, Enter where it is …")
+        say(f"\n{output.name}: A and D move it, Enter where it is …")
         with self._served(settings) as robot:
-            jogger = Jogger(robot, self._profile, wide, self._keys, self._console)
             # Servo ends are searched for; an ESC's end is full speed.
             cap = self._cap if output.driver == "esc" else 1.0
             found: list[float] = []
             for name in names:
-                self._console.print(f"  … {name}")
-                value = jogger.find(cap, self._ask_beyond)
+                say(f"  … {name}")
+                value = self._jogged(robot, wide, cap, goes_beyond=True)
                 if value is None:
                     return {}
                 found.append(value)
         return dict(pulse_changes(wide, JogResult(*found)))
 
-    def _ask_beyond(self, cap: float) -> None:
-        self._console.print(f"  That is the cap of {cap:g}. Go beyond it? Y does.")
-
     def _motor(self, output: OutputPlan) -> dict[str, Any]:
-        self._console.print(f"\n{output.name}: D raises its duty; Enter when it begins to move …")
+        say(f"\n{output.name}: D raises its duty; Enter when it begins to move …")
         with self._served({f"output.{output.name}.start": 0.0}) as robot:
-            jogger = Jogger(
-                robot, self._profile, output, self._keys, self._console, step=_START_STEP
-            )
-            value = jogger.find(self._cap)
+            value = self._jogged(robot, output, self._cap, _START_STEP)
         if value is None or value == 0.0:
             return {}
-        self._console.print("  … did it go forward, or right? Y or N")
+        say("  … did it go forward, or right? Y or N")
         went = self._answer()
         return motor_changes(output, went, abs(value) * output.settings["full"])
 
     def _wheel(self, name: str, wheel_m: float) -> dict[str, Any]:
-        self._console.print(f"\n{name}: push the robot 1 m forward by hand, then Enter …")
-        with self._served({}) as robot, _live_line(self._console) as live:
+        say(f"\n{name}: push the robot 1 m forward by hand, then Enter …")
+        with self._served({}) as robot, _live_line() as live:
             state = Layout.from_json(robot.welcome.state_layout)
             place: int = state.slices["speed"].start
             travelled_m = 0.0

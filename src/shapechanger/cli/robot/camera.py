@@ -11,12 +11,14 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import say
+from shapechanger.cli.robot.setup import change_profile, own_profile
 from shapechanger.errors import OutputError, RobotError
+from shapechanger.robot.cameras.camera import CameraPlan, open_camera
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:
-    from shapechanger.robot.cameras.camera import CameraPlan
-    from shapechanger.robot.profile.profile import Profile
     from shapechanger.worlds.rectify import CameraGeometry
 
 # As in a profile.
@@ -50,9 +52,6 @@ class CameraView:
         Raises:
             RobotError: If the options contradict each other, or something is missing.
         """
-        from shapechanger.robot.profile.edit import rewrite
-        from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
-
         if self.board and self.horizon is not None:
             raise RobotError("Give --board or --horizon, not both.")
         if self.fovy is not None and not _LEAST_FOVY_DEG <= self.fovy <= _MOST_FOVY_DEG:
@@ -61,31 +60,23 @@ class CameraView:
                 f"{self.fovy:g}."
             )
         corners = _corners(self.board) if self.board else None
-        path = find_profile(self.profile)
+        measures = corners is not None or self.horizon is not None or self.fovy is not None
+        path = own_profile(self.profile) if measures else find_profile(self.profile)
         profile = load_profile(path)
         if profile.camera is None:
             raise RobotError(f"{path} has no [camera].")
-        measures = corners is not None or self.horizon is not None or self.fovy is not None
-        if measures and path in shipped_profiles().values():
-            raise RobotError(
-                f"{path.stem} comes with Shapechanger and is not changed: "
-                f"`shapechanger robot init {path.stem}` writes one of your own."
-            )
         picture = _picture(profile.camera, self.picture)
-        console = plain_console()
         if measures:
             found = self._measured(picture, corners, profile.camera)
             changes: dict[str, Any] = {
                 "camera.pitch_deg": round(found.pitch_deg, 1),
                 "camera.fovy_deg": round(found.fovy_deg, 1),
             }
-            profile = rewrite(path, changes)
-            for name, value in changes.items():
-                console.print(f"{name} = {value}")
-            console.print(f"wrote {path}", soft_wrap=True)
+            change_profile(path, changes)
+            profile = load_profile(path)
         geometry = _stated(profile)
         _write(_drawing(picture, geometry), self.out)
-        console.print(f"wrote {self.out}", soft_wrap=True)
+        say(f"wrote {self.out}")
 
     def _measured(
         self, picture: NDArray[np.uint8], corners: tuple[int, int] | None, stated: CameraPlan
@@ -95,12 +86,11 @@ class CameraView:
 
         if corners is not None:
             found = measure_camera(picture, corners, self.fovy)
-            plain_console().print(
+            say(
                 f"The corners fit to {found.error_px:.2f} pixels: pitch "
                 f"{found.geometry.pitch_deg:.1f} ± {2 * found.pitch_sd_deg:.1f}, field of view "
                 f"{found.geometry.fovy_deg:.1f} ± {2 * found.fovy_sd_deg:.1f}, roll "
-                f"{found.roll_deg:.1f} degrees.",
-                soft_wrap=True,
+                f"{found.roll_deg:.1f} degrees."
             )
             return found.geometry
         fovy = stated.fovy_deg if self.fovy is None else self.fovy
@@ -114,11 +104,7 @@ class CameraView:
 
 
 def _corners(board: str) -> tuple[int, int]:
-    """Parse the corners of a board, such as "9x6".
-
-    Raises:
-        RobotError: If it is not such a text.
-    """
+    """Parse the corners of a board, such as "9x6"."""
     match = re.fullmatch(r"(\d+)x(\d+)", board)
     if not match:
         raise RobotError(
@@ -128,11 +114,7 @@ def _corners(board: str) -> tuple[int, int]:
 
 
 def _stated(profile: Profile) -> CameraGeometry:
-    """Return the geometry that a profile states.
-
-    Raises:
-        RobotError: If it does not.
-    """
+    """Return the geometry that a profile states."""
     from shapechanger.worlds.rectify import CameraGeometry
 
     camera = profile.camera
@@ -145,14 +127,8 @@ def _stated(profile: Profile) -> CameraGeometry:
 
 
 def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
-    """Read a picture from a file, or take one, shape (height, width, 3).
-
-    Raises:
-        RobotError: If there is none, or it is not a JPEG.
-    """
+    """Read a picture from a file, or take one, shape (height, width, 3)."""
     import simplejpeg
-
-    from shapechanger.robot.cameras.camera import open_camera
 
     if path is None:
         camera = open_camera(plan)

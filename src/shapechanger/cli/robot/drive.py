@@ -13,16 +13,18 @@ import tyro
 from rich.live import Live
 from rich.text import Text
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import plain_console, say
+from shapechanger.cli.robot.fetch import recorded
+from shapechanger.cli.robot.key import can_open, open_console
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
-from shapechanger.remote.known_robots import KnownRobot
+from shapechanger.link.messages import Observation
+from shapechanger.remote.known_robots import KnownRobot, recall
 from shapechanger.teleop import DIRECTIONS, HeldKeys, Terminal
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
-    from shapechanger.link.messages import Observation
     from shapechanger.remote.client import RobotClient
 
 _LOOK_EVERY_S: Final = 0.2
@@ -43,67 +45,47 @@ class Drive:
     terminal: bool = False
     """Drive with the keys of this terminal, even where a browser could show the console."""
     policy: Path | None = None
-    """A policy that drives when you let it, such as `shapechanger demos train` writes."""
+    """A policy that drives when you permit it, such as one of `shapechanger demos train`."""
     record: Path | None = None
-    """Record all of it on the robot, and bring it to this folder at the end."""
+    """Record on the robot, and download the recording to this folder at the end."""
 
     def run(self) -> None:
         """Drive until Q, or until Ctrl-C if the console is used."""
-        from shapechanger.cli.robot.key import can_open
-        from shapechanger.remote.known_robots import recall
+        from shapechanger.remote.client import RobotClient
 
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
         known = recall(self.robot)
         pilot = None if self.policy is None else _load_pilot(self.policy, known)
-        if self.terminal or not can_open():
-            self._drive_here(known, pilot)
-        else:
-            self._drive_there(known, pilot)
-
-    def _drive_here(self, known: KnownRobot, pilot: PolicyDriver | None) -> None:
-        """Drive with the keys of this terminal."""
-        from contextlib import nullcontext
-
-        from shapechanger.cli.robot.fetch import recorded
-        from shapechanger.remote.client import RobotClient
-        from shapechanger.teleop import Terminal
-
-        with (
-            Terminal() as terminal,
-            RobotClient.connect(known, role="person", frames=False) as robot,
-        ):
-            driving = Driving(robot, terminal, self.cap, pilot)
-            robot.take()
-            with recorded(robot, known.name, self.record), pilot or nullcontext():
+        uses_keys = self.terminal or not can_open()
+        with contextlib.ExitStack() as stack:
+            terminal = stack.enter_context(Terminal()) if uses_keys else None
+            robot = stack.enter_context(RobotClient.connect(known, role="person", frames=False))
+            driving = None
+            if terminal is not None:
+                driving = Driving(robot, terminal, self.cap, pilot)
+                robot.take()
+            else:
+                address = open_console(known)
+                say(
+                    f"The console of {known.name} is at {address}, and opens in your browser, "
+                    "which warns of its certificate once. --terminal drives with the keys of this "
+                    "terminal."
+                )
+                if pilot is None and self.record is None:
+                    return
+            stack.enter_context(recorded(robot, known.name, self.record))
+            if pilot is not None:
+                stack.enter_context(pilot)
+            if driving is not None:
                 driving.run()
-
-    def _drive_there(self, known: KnownRobot, pilot: PolicyDriver | None) -> None:
-        """Drive in the console; this process stays only for a policy."""
-        from contextlib import nullcontext
-
-        from shapechanger.cli.robot.fetch import recorded
-        from shapechanger.cli.robot.key import open_console
-        from shapechanger.remote.client import RobotClient
-
-        with RobotClient.connect(known, role="person", frames=False) as robot:
-            console = plain_console()
-            address = open_console(known)
-            console.print(
-                f"The console of {known.name} is at {address}, and opens in your browser, which "
-                "warns of its certificate once. --terminal drives with the keys of this terminal.",
-                soft_wrap=True,
-            )
-            if pilot is None and self.record is None:
-                return
-            with recorded(robot, known.name, self.record), pilot or nullcontext():
-                console.print("Ctrl-C ends this.")
+            else:
+                say("Ctrl-C ends this.")
                 _stay(robot, pilot)
 
 
 def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:
     """Print the policy's state until Ctrl-C or until it fails."""
-    console = plain_console()
     said = ""
     try:
         while robot.alive:
@@ -112,15 +94,15 @@ def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:
                 pilot.require_well()
                 if pilot.note != said:
                     said = pilot.note
-                    console.print(said, soft_wrap=True)
+                    say(said)
             time.sleep(_LOOK_EVERY_S)
     except KeyboardInterrupt:
-        console.print("Ended.")
+        say("Ended.")
 
 
 _HELP: Final = (
     "W A S D or arrows drive · E arms · Space stops everything · X disarms · + and - set the cap · "
-    "P lets a waiting program drive · R records · M marks · U undoes 5 s · Q leaves"
+    "P lets a waiting program drive · R records · M marks · U undoes 5 s · Q quits"
 )
 _CAP_STEP: Final = 0.1
 # s. A program waiting in `reset` takes a free robot within this time.
@@ -204,11 +186,7 @@ class Driving:
         return True
 
     def _act(self, key: str, seen: Observation) -> None:
-        """Handle one key press.
-
-        Raises:
-            RobotRefused: If the robot refuses.
-        """
+        """Handle one key press."""
         if key in DIRECTIONS:
             # A driving key takes the robot from a policy immediately.
             if not seen.mine and seen.holder_role == "program":
@@ -233,29 +211,16 @@ class Driving:
         elif key == "p":
             self._keys.let_go()
             self._note = self._hand_over()
-        elif key in {"r", "m", "u"}:
-            self._record(key)
-
-    def _record(self, key: str) -> None:
-        """Handle R, M and U: record, mark and undo.
-
-        Raises:
-            RobotRefused: If the robot refuses.
-        """
-        state = self._robot.recorder
-        if key == "r":
+        elif key == "r":
+            state = self._robot.recorder
             self._robot.record(on=state is None or not state.recording)
         elif key == "m":
             self._robot.mark()
-        else:
+        elif key == "u":
             self._robot.undo()
 
     def _hand_over(self) -> str:
-        """Hand the robot to a waiting program, arm it, and describe the outcome.
-
-        Raises:
-            RobotRefused: If the robot does not arm.
-        """
+        """Hand the robot to a waiting program, arm it, and describe the outcome."""
         self._robot.release()
         until_s = time.monotonic() + _TAKEN_WITHIN_S
         while time.monotonic() < until_s:
@@ -292,6 +257,7 @@ class Driving:
             for feature, value in zip(self._state, seen.state, strict=True)
             if not feature.name.endswith("/applied")
         )
+        pilot_note = "" if self._pilot is None else self._pilot.note
         parts = [
             state,
             f"cap {self._cap:.1f}",
@@ -299,7 +265,7 @@ class Driving:
             self._values(seen.action_applied),
             f"{seen.suggested_by} wants {self._values(seen.suggested)}" if seen.suggested else "",
             senses,
-            self._note or seen.stop_reason or remark or ("" if seen.mine else self._pilot_says()),
+            self._note or seen.stop_reason or remark or ("" if seen.mine else pilot_note),
         ]
         return Text(" · ".join(part for part in parts if part))
 
@@ -315,9 +281,6 @@ class Driving:
             return state.text
         return f"recording {state.seconds:.0f} s, {state.steps - state.dropped} steps"
 
-    def _pilot_says(self) -> str:
-        return "" if self._pilot is None else self._pilot.note
-
 
 # s. A reset waits in steps of this length, and checks between them whether to end.
 _PILOTING_LOOK_EVERY_S: Final = 1.0
@@ -325,12 +288,7 @@ _END_S: Final = 10.0
 
 
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
-    """Load a policy and check that it can drive the robot.
-
-    Raises:
-        PolicyError: If the file is not a policy, or is one for another robot.
-        LinkError: If the robot cannot be reached.
-    """
+    """Load a policy and check that it can drive the robot."""
     from shapechanger.demos.cloning.policy import CameraPolicy
 
     policy = CameraPolicy.load(path)
@@ -423,9 +381,11 @@ class PolicyDriver:
         while not self._ended.is_set():
             action = self._policy.predict(*self._perceived(observation))
             observation, _, terminated, truncated, info = env.step(action)
-            self.note = "you drive, and it watches" if "intervene_action" in info else "it drives"
+            self.note = (
+                "you drive, and the policy watches" if "intervene_action" in info else "it drives"
+            )
             if terminated or truncated:
-                self._why = info["truncated_because"] or "It ran into something."
+                self._why = info["truncated_because"] or "It collided."
                 return
 
     def _perceived(self, observation: Any) -> tuple[Any, Any]:

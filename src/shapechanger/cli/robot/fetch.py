@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import tyro
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import say
 from shapechanger.demos.episodes.files import (
     FRAMES,
     HEADER,
@@ -28,6 +28,7 @@ from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import Step, decode_line, split_lines
 from shapechanger.errors import DemosError, RobotRefused, UnknownName
 from shapechanger.link.messages import EpisodeSummary, Piece
+from shapechanger.remote.known_robots import recall
 
 if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
@@ -40,41 +41,34 @@ class FetchEpisodes:
     robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
     """Name of a robot that is known here, see `remember`."""
     out: Annotated[Path, tyro.conf.arg(metavar="DATA")]
-    """Folder to put the episodes into. What was cut off there goes on where it was."""
+    """Folder for the episodes; interrupted downloads there are resumed."""
     episodes: tuple[str, ...] = ()
     """Only these episodes, by their ids; all of them if not given."""
 
     def run(self) -> None:
         """Download; exit with 1 if an episode failed."""
         from shapechanger.remote.client import RobotClient
-        from shapechanger.remote.known_robots import recall
 
-        console, failed = plain_console(), 0
+        failed = 0
         with RobotClient.connect(recall(self.robot), frames=False) as robot:
             there = _episodes_there(robot, self.episodes)
             if not there:
-                console.print(f"{self.robot} has recorded nothing yet.", soft_wrap=True)
+                say(f"{self.robot} has recorded nothing yet.")
             for episode in there:
                 busy = robot.recorder
                 if busy is not None and busy.recording and busy.episode == episode.id:
-                    console.print(f"{episode.id} is being recorded: later.", soft_wrap=True)
+                    say(f"{episode.id} is still being recorded: fetch it later.")
                     continue
                 try:
                     came = fetch_episode(robot, episode.id, self.out)
                 except (DemosError, RobotRefused) as error:
                     failed += 1
-                    plain_console(stderr=True).print(f"{episode.id}: {error}", soft_wrap=True)
+                    say(f"{episode.id}: {error}", stderr=True)
                     continue
                 news = f"{came} lines came" if came else "nothing new"
-                console.print(
-                    f"{episode.id}: {episode.kept} steps kept of {episode.steps}, {news}",
-                    soft_wrap=True,
-                )
+                say(f"{episode.id}: {episode.kept} steps kept of {episode.steps}, {news}")
                 if not episode.closed:
-                    console.print(
-                        f"  it was cut off: shapechanger demos repair {self.out / episode.id}",
-                        soft_wrap=True,
-                    )
+                    say(f"  it is incomplete: shapechanger demos repair {self.out / episode.id}")
         if failed:
             sys.exit(1)
 
@@ -89,10 +83,6 @@ def _episodes_there(robot: RobotClient, wanted: Sequence[str]) -> list[EpisodeSu
     Args:
         robot: The robot.
         wanted: Ids of the episodes; empty for all.
-
-    Raises:
-        UnknownName: If one does not exist.
-        LinkError: If the robot does not respond.
     """
     found: list[EpisodeSummary] = []
     more = True
@@ -137,7 +127,8 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
         have = _complete_lines(folder, fd)
         begin = len(have)
         piece = robot.fetch(name, max(begin - 1, 0), _LINES)
-        if piece.total < begin or (have and not _goes_on(piece, have[-1])):
+        overlap = [line.encode() + b"\n" for line in piece.lines[:1]] if have else []
+        if piece.total < begin or overlap != have[-1:]:
             raise DemosError(
                 f"{folder} is not the beginning of what the robot has: it was changed here. Move "
                 "it away, and fetch it again."
@@ -149,7 +140,9 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
             written = piece.first + len(lines)
             piece = robot.fetch(name, written, _LINES)
         os.fsync(fd)
-        _write_header(folder, piece.header)
+        header = folder / f".{HEADER}.part"
+        header.write_bytes(piece.header.encode())
+        header.replace(folder / HEADER)
         read_header(folder)
         if folder is part:
             part.rename(here)
@@ -163,11 +156,7 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
 
 
 def _complete_lines(folder: Path, fd: int) -> list[bytes]:
-    """Return the number of local lines, after removing a truncated last one.
-
-    Raises:
-        DemosError: If a line of a complete episode is truncated.
-    """
+    """Return the local lines, after removing a truncated last one."""
     lines = split_lines((folder / STEPS).read_bytes())
     if lines and not lines[-1].endswith(b"\n"):
         if (folder / HEADER).is_file():
@@ -177,18 +166,8 @@ def _complete_lines(folder: Path, fd: int) -> list[bytes]:
     return lines
 
 
-def _goes_on(piece: Piece, last: bytes) -> bool:
-    """Return whether a piece starts with the last local line."""
-    return bool(piece.lines) and piece.lines[0].encode() + b"\n" == last
-
-
 def _checked(piece: Piece, folder: Path) -> list[bytes]:
-    """Check the lines of a piece and store their frames.
-
-    Raises:
-        DemosError: If a line is incomplete or not part of an episode.
-        OSError: If a frame cannot be written.
-    """
+    """Check the lines of a piece and store their frames."""
     lines = [line.encode() + b"\n" for line in piece.lines]
     if len(piece.frames) != len(lines):
         raise DemosError(f"The robot sent {len(piece.frames)} pictures for {len(lines)} lines.")
@@ -207,12 +186,7 @@ def _checked(piece: Piece, folder: Path) -> list[bytes]:
 
 
 def _keep_picture(frames: Path, step: Step, jpeg: bytes | None) -> None:
-    """Write the frame of a step, unless it exists.
-
-    Raises:
-        DemosError: If it is not the frame of the step.
-        OSError: If it cannot be written.
-    """
+    """Write the frame of a step, unless it exists."""
     # A robot's data must not escape the folder.
     if not (step.frame.endswith(".jpg") and step.frame[:-4].isdecimal()):
         raise DemosError(f"A step names the picture {step.frame!r}.")
@@ -228,13 +202,6 @@ def _keep_picture(frames: Path, step: Step, jpeg: bytes | None) -> None:
             if file.stat().st_size == len(jpeg) and file.read_bytes() == jpeg:
                 return
         file.write_bytes(jpeg)
-
-
-def _write_header(folder: Path, text: str) -> None:
-    """Write the robot's header atomically."""
-    part = folder / f".{HEADER}.part"
-    part.write_bytes(text.encode())
-    part.replace(folder / HEADER)
 
 
 # s. Time that a memory card may need for the last steps.
@@ -270,15 +237,14 @@ def recorded(robot: RobotClient, name: str, data: Path | None) -> Generator[None
         state = robot.recorder
         if state is not None and state.recording:
             robot.record(on=False)
-        console = plain_console()
         for episode in _closed(robot, before):
             fetch_episode(robot, episode.id, data)
-            console.print(f"recorded {episode.kept} steps in {data / episode.id}", soft_wrap=True)
+            say(f"recorded {episode.kept} steps in {data / episode.id}")
     except BaseException:
-        plain_console(stderr=True).print(
-            f"What was recorded is on the robot: `shapechanger robot fetch {name} --out {data}` "
-            "brings it.",
-            soft_wrap=True,
+        say(
+            f"The recording is on the robot: `shapechanger robot fetch {name} --out {data}` "
+            "downloads it.",
+            stderr=True,
         )
         raise
 

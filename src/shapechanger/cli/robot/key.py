@@ -11,18 +11,16 @@ import time
 import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import tyro
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import say
 from shapechanger.errors import LinkError, MissingExtra, UnknownName
 from shapechanger.link.address import parse_address
-from shapechanger.remote.known_robots import INSECURE
-
-if TYPE_CHECKING:
-    from shapechanger.remote.known_robots import KnownRobot
-    from shapechanger.robot.daemon.credentials import Credentials
+from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
+from shapechanger.remote.known_robots import INSECURE, KnownRobot
+from shapechanger.robot.daemon.credentials import Credentials, credentials_folder, load_credentials
 
 
 @dataclass(frozen=True)
@@ -41,8 +39,6 @@ class Key:
 
     def run(self) -> None:
         """Print them, and the command that stores them on another computer."""
-        from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
-
         folder = self.credentials or credentials_folder(self.name)
         if not folder.exists() and self.credentials is None:
             there = folder.parent.iterdir() if folder.parent.is_dir() else ()
@@ -50,10 +46,7 @@ class Key:
                 "robot of this machine", self.name, sorted(path.name for path in there)
             )
         credentials = load_credentials(folder)
-        plain_console().print(
-            f"{shown_credentials(credentials)}\n\n{how_to_remember(self.name, credentials)}",
-            soft_wrap=True,
-        )
+        say(f"{shown_credentials(credentials)}\n\n{how_to_remember(self.name, credentials)}")
         if self.qr:
             self._show_qr(credentials)
 
@@ -63,22 +56,28 @@ class Key:
             import segno
         except ImportError as error:
             raise MissingExtra("segno", "robot") from error
-        from shapechanger.link.authentication import fingerprint_hex
-        from shapechanger.remote.known_robots import KnownRobot
 
-        key = credentials.key_file.read_text().strip()
-        address = self.address or f"{socket.gethostname()}.local"
-        robot = KnownRobot(self.name, address, key, fingerprint_hex(credentials.fingerprint))
+        robot = robot_at(self.address or f"{socket.gethostname()}.local", self.name, credentials)
         console = _console_address(robot)
-        plain_console().print(f"\nThe console is at {console}; this brings a phone there:\n")
+        say(f"\nThe console is at {console}; this brings a phone there:\n")
         # Printed verbatim: wrapping would break the code.
-        segno.make(f"{console}#key={key}", micro=False).terminal(sys.stdout, compact=True)
+        segno.make(f"{console}#key={robot.key}", micro=False).terminal(sys.stdout, compact=True)
+
+
+def robot_at(address: str, name: str, credentials: Credentials) -> KnownRobot:
+    """Return a robot as its clients know it.
+
+    Args:
+        address: Its address, HOST or HOST:PORT.
+        name: Its name.
+        credentials: Its key and certificate.
+    """
+    key = credentials.key_file.read_text().strip()
+    return KnownRobot(name, address, key, fingerprint_hex(credentials.fingerprint))
 
 
 def shown_credentials(credentials: Credentials) -> str:
     """Format the key and the fingerprint for people to compare."""
-    from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
-
     key = credentials.key_file.read_text().strip()
     fingerprint = credentials.fingerprint
     return (
@@ -89,9 +88,12 @@ def shown_credentials(credentials: Credentials) -> str:
 
 
 def how_to_remember(name: str, credentials: Credentials) -> str:
-    """Return the command for the computer that is to drive the robot."""
-    from shapechanger.link.authentication import fingerprint_hex
+    """Return the command for the computer that is to drive the robot.
 
+    Args:
+        name: Name of the robot.
+        credentials: Its key and certificate.
+    """
     return (
         "On the workstation, with the key from above:\n"
         f"      shapechanger robot remember {name} {socket.gethostname()}.local "

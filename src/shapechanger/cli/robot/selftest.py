@@ -16,17 +16,18 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import plain_console, say
+from shapechanger.cli.robot.calibrate import ask_for_wheels_up
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
+from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:
-    from shapechanger.cli.robot.trial.faults import Fault
-    from shapechanger.cli.robot.trial.trial import Trial, TrialResult
+    from shapechanger.cli.robot.trial import Fault, Trial, TrialResult
     from shapechanger.remote.client import RobotClient
     from shapechanger.twin.robot import RunningRobot
 
@@ -42,9 +43,9 @@ class Selftest:
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
     twin: bool = False
-    """Break the twin of this robot in every way, and let the ledger of its pins be the judge."""
+    """Inject every fault into the robot's twin, and judge by the ledger of its pins."""
     trials: int = 1
-    """With --twin: how often each fault is tried."""
+    """With --twin: trials of each fault."""
     one_shot: bool = True
     """With --twin: whether the one-shot of the enable line is fitted, where the profile has one."""
     wheels_up: bool = False
@@ -56,23 +57,19 @@ class Selftest:
 
     def run(self) -> None:
         """Run the tests, print the results, and exit with 1 on a failure."""
-        from shapechanger.robot.profile.load import find_profile, load_profile
-
         profile = load_profile(find_profile(self.profile))
         # Makes the output self-contained.
-        plain_console().print(
+        say(
             f"shapechanger {version('shapechanger')}, {profile.name} ({profile.body}), "
             f"{'twin' if self.twin else 'hardware'}, Python {platform.python_version()}, "
-            f"{platform.platform()}",
-            soft_wrap=True,
+            f"{platform.platform()}"
         )
         good = self._on_twin(profile) if self.twin else self._on_hardware(profile)
         if not good:
             sys.exit(1)
 
     def _on_twin(self, profile: Profile) -> bool:
-        from shapechanger.cli.robot.trial.faults import FAULTS
-        from shapechanger.cli.robot.trial.trial import Trial, has
+        from shapechanger.cli.robot.trial import FAULTS, Trial, has
 
         if self.trials < 1:
             raise RobotError(f"At least one trial is needed, got {self.trials}.")
@@ -96,24 +93,20 @@ class Selftest:
         return good
 
     def _on_hardware(self, profile: Profile) -> bool:
-        from shapechanger.cli.robot.calibrate import ask_for_wheels_up
         from shapechanger.twin.robot import run_robot
 
         if not 0.0 < self.cap <= 1.0:
             raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
-        console = plain_console()
         if not self.wheels_up:
             ask_for_wheels_up()
         good = True
         if self.jumper is not None:
             sentence = check_jumper(*self.jumper, profile.guard_plan())
-            console.print(f"good  jumper: {sentence}")
+            say(f"good  jumper: {sentence}")
         with run_robot(profile, twin=False) as robot:
             for check in check_robot(robot, profile, self.cap):
                 good = good and check.level != "bad"
-                console.print(
-                    f"{_MARKS[check.level]:4}  {check.name}: {check.sentence}", soft_wrap=True
-                )
+                say(f"{_MARKS[check.level]:4}  {check.name}: {check.sentence}")
         return good
 
 

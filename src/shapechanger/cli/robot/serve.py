@@ -17,27 +17,31 @@ from typing import Annotated, Final, Literal
 import msgspec
 import tyro
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import say
+from shapechanger.cli.robot.key import robot_at
+from shapechanger.cli.robot.setup import require_pins
 from shapechanger.errors import LinkError, MissingExtra, ProfileError, RobotError, UnknownName
-from shapechanger.link.address import is_loopback, parse_address
+from shapechanger.link.address import Address, is_loopback, parse_address
 from shapechanger.remote.known_robots import KnownRobot, check_name, known_names, recall, remember
 from shapechanger.robot.daemon.credentials import (
-    Credentials,
     credentials_folder,
     load_credentials,
     make_credentials,
 )
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.robot.guard.serve_plan import ServePlan
+from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd, supervisor_command
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.start import BoardAt, RunningBoard, start_board
+from shapechanger.twin.start import BoardAt, find_board, start_board
 from shapechanger.twin.world.place import Place
 from shapechanger.worlds.course import HOME, require_element
 
 _LAST_PORT: Final = 65535
 _HERE: Final = "127.0.0.1"
+_EVERYWHERE: Final = "0.0.0.0"
+_ROOM: Final = "room"
+# A twin's clock is paused while it renders, and a guard that waits for it is alive.
+_TWIN_PATIENCE_MS: Final = 10_000
 
 
 @dataclass(frozen=True)
@@ -61,20 +65,20 @@ class Serve:
     seed: int = 0
     """With --twin: seed of the world."""
     world: str = ""
-    """With --twin: corridor, yard or harbour, or room for a plain room that needs no MuJoCo; where
-    the vehicle is at home if not given."""
+    """With --twin: corridor, yard or harbour, or room for a plain room that needs no MuJoCo; the
+    vehicle's default if not given."""
     lens: tuple[str, ...] = ()
-    """With --twin: what is wrong with the camera, such as night or dirt."""
+    """With --twin: disturbances of the camera, such as night or dirt."""
     gap: str = ""
-    """With --twin, for a finger: what the finger is drawn from, such as real-like; the nominal one
-    if not given."""
+    """With --twin, for a finger: name of the gap that it is drawn from, such as real-like; the
+    nominal finger if not given."""
     finger_seed: int | None = None
-    """With --gap: which finger of it this is, as finger_seed of Finger-v1."""
+    """With --gap: seed of the finger drawn from it, as finger_seed of Finger-v1."""
     twin_folder: Path | None = None
     """With --twin: folder for the ledger of all pins and the twin's socket; a new one if not
     given. A twin that runs there already is used as it is."""
     insecure: bool = False
-    """Speak without TLS. The key is still needed."""
+    """Serve without TLS. The key is still needed."""
     credentials: Path | None = None
     """Folder of the robot's key and certificate, if not the one that `init` made."""
     arm_by_program: bool = False
@@ -85,63 +89,40 @@ class Serve:
     """File to write the port and the fingerprint into, as JSON, once the robot can be reached."""
 
     recordings: Path | None = None
-    """Folder for what is recorded on the robot; ~/.local/share/shapechanger/recordings/NAME if not
+    """Folder for the robot's recordings; ~/.local/share/shapechanger/recordings/NAME if not
     given."""
 
     def run(self) -> None:
         """Become the robot's supervisor; return only on an error."""
-        from shapechanger.cli.robot.safe_pins import require_pins
-        from shapechanger.robot.guard.serve_plan import plan_fd, supervisor_command
-
         self._refuse_contradictions()
         profile = load_profile(find_profile(self.profile))
         # Undone only after an error: exec keeps everything.
         with contextlib.ExitStack() as undo:
             board = self._board(profile, undo) if self.twin else None
-            plan = serve_plan(
-                profile,
-                ServeOptions(
-                    host=self.host,
-                    port=self.port,
-                    insecure=self.insecure,
-                    credentials=self.credentials,
-                    arm_by_program=self.arm_by_program,
-                    announce=self.announce,
-                    ready_file=self.ready_file,
-                    recordings=self.recordings,
-                ),
-                board,
-                self.clock,
-            )
+            plan = self._plan(profile, board)
             if board is None:
                 require_pins(profile.guard_plan())
             _require_free(str(plan.daemon["host"]), self.port)
             with contextlib.suppress(OSError):  # A full disk loses messages, not the robot.
                 if board is not None:
-                    plain_console().print(f"twin of {profile.name}: ledger {board.ledger_path}")
+                    say(f"twin of {profile.name}: ledger {board.ledger_path}")
                     self._make_known(profile.name)
                 sys.stdout.flush()
             # Replaces this process, which has loaded much that a supervisor does not need.
             os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
 
     def _make_known(self, name: str) -> None:
-        """Store the twin's address and key for this machine, as `init` does, and print that.
-
-        Raises:
-            OutputError: If it cannot be stored.
-        """
-        from shapechanger.link.address import Address
-        from shapechanger.link.authentication import fingerprint_hex
-
+        """Store the twin's address and key for this machine, as `init` does, and print that."""
         # With any free port, or without TLS, the address is passed on by the caller.
-        if not self.port or self.insecure or not can_be_known(name):
+        if not self.port or self.insecure:
             return
-        credentials = credentials_of(name, self.credentials, make=False)
+        try:
+            check_name(name)
+        except LinkError:  # Not every name of a robot is that of a file.
+            return
+        credentials = load_credentials(self.credentials or credentials_folder(name))
         host = _HERE if self.host in {"", "0.0.0.0", "::"} else self.host
-        address = str(Address(host, self.port))
-        key = credentials.key_file.read_text().strip()
-        robot = KnownRobot(name, address, key, fingerprint_hex(credentials.fingerprint))
-        plain_console().print(make_known(robot), soft_wrap=True)
+        say(make_known(robot_at(str(Address(host, self.port)), name, credentials)))
 
     def _refuse_contradictions(self) -> None:
         """Refuse options that only apply to a twin."""
@@ -167,17 +148,7 @@ class Serve:
             )
 
     def _board(self, profile: Profile, undo: contextlib.ExitStack) -> BoardAt:
-        """Return the twin's board: a running one in the folder, or a new one.
-
-        Args:
-            profile: The robot.
-            undo: Stack for cleaning up.
-
-        Raises:
-            RobotError: If it does not start or has another clock.
-        """
-        from shapechanger.twin.start import find_board
-
+        """Return the twin's board: a running one in the folder, or a new one, in a new process."""
         folder = self.twin_folder
         if folder is None:
             folder = Path(tempfile.mkdtemp(prefix="shapechanger-twin-"))
@@ -185,15 +156,61 @@ class Serve:
         found = find_board(folder)
         if found is None:
             place = finger_of(profile, self.gap, self.finger_seed) if self.gap else None
-            place = place or place_of(profile, self.world, self.lens)
-            options = TwinOptions(folder, self.clock, self.wired_as, self.seed, place=place)
-            started = undo.enter_context(start_twin(profile, options))
+            wired = load_profile(find_profile(self.wired_as)) if self.wired_as else profile
+            wiring = wired.guard_plan()
+            started = start_board(
+                wiring,
+                clock=self.clock,
+                folder=folder,
+                camera=profile.camera,
+                seed=self.seed,
+                one_shot_ms=float(wiring.enable_hold_ms),
+                place=place or place_of(profile, self.world, self.lens),
+            )
+            undo.enter_context(started)
             started.outlive_exec()
             return started
         board, clock = found
         if clock != self.clock:
             raise RobotError(f"The twin in {folder} runs on --clock {clock}.")
         return board
+
+    def _plan(self, profile: Profile, board: BoardAt | None) -> ServePlan:
+        """Return the plan for the robot's processes; without a board, on this machine's pins."""
+        folder = self.credentials or credentials_folder(profile.name)
+        is_twin = board is not None
+        credentials = (
+            make_credentials(folder, profile.name) if is_twin else load_credentials(folder)
+        )
+        daemon = DaemonPlan(
+            robot=profile.name,
+            body=profile.body,
+            action_layout=profile.action_layout().to_json(),
+            state_layout=profile.state_layout().to_json(),
+            camera=profile.camera,
+            control_hz=profile.control_hz,
+            deadline_ms=profile.limits.deadline_ms,
+            max_observation_age_ms=profile.max_observation_age_ms,
+            reward=profile.reward_weights(),
+            reset=profile.reset_routine(),
+            arming="anyone" if self.arm_by_program or is_twin else profile.arming,
+            host=self.host or (_HERE if is_twin or self.insecure else _EVERYWHERE),
+            port=self.port,
+            certificate="" if self.insecure else str(credentials.certificate),
+            private_key="" if self.insecure else str(credentials.private_key),
+            key_file=str(credentials.key_file),
+            insecure=self.insecure,
+            discovery=self.announce,
+            ready_file=str(self.ready_file.absolute()) if self.ready_file else "",
+            recordings=str((self.recordings or recordings_folder(profile.name)).absolute()),
+        )
+        guard = profile.guard_plan()
+        if board is None:
+            return ServePlan(guard, daemon.to_dict())
+        camera = board.camera_plan(profile.camera) if profile.camera else None
+        daemon = msgspec.structs.replace(daemon, camera=camera, clock=self.clock)
+        patience_ms = _TWIN_PATIENCE_MS if self.clock == "twin" else 0
+        return ServePlan(guard, daemon.to_dict(), board.hardware, patience_ms=patience_ms)
 
 
 def _require_free(host: str, port: int) -> None:
@@ -213,58 +230,6 @@ def _require_free(host: str, port: int) -> None:
         ) from error
 
 
-_EVERYWHERE: Final = "0.0.0.0"
-_ROOM: Final = "room"
-# A twin's clock is paused while it renders, and a guard that waits for it is alive.
-_TWIN_PATIENCE_MS: Final = 10_000
-
-
-@dataclass(frozen=True)
-class TwinOptions:
-    """Options of a twin.
-
-    Attributes:
-        folder: Existing folder for its socket, ledger and frame pipe.
-        clock: Real time, or simulated time that passes on request.
-        wired_as: Profile of the attached hardware; "" for the served one.
-        seed: Seed of the world.
-        one_shot: Whether the one-shot of the enable line is fitted, where the profile has one.
-        place: World of its vehicle; None for the plain room.
-    """
-
-    folder: Path
-    clock: Literal["real", "twin"] = "real"
-    wired_as: str = ""
-    seed: int = 0
-    one_shot: bool = True
-    place: Place | None = None
-
-
-@dataclass(frozen=True)
-class ServeOptions:
-    """Options of a served robot.
-
-    Attributes:
-        host: Address to listen on; "" for all, or for loopback on a twin or without TLS.
-        port: Port to listen on; 0 for any free one.
-        insecure: Whether to disable TLS.
-        credentials: Folder of the key and the certificate; None for the default.
-        arm_by_program: Whether programs may arm it; always true on a twin.
-        announce: Whether to announce it on the network.
-        ready_file: File for the address; None for none.
-        recordings: Folder for recordings; None for the default.
-    """
-
-    host: str = ""
-    port: int = 5000
-    insecure: bool = False
-    credentials: Path | None = None
-    arm_by_program: bool = False
-    announce: bool = True
-    ready_file: Path | None = None
-    recordings: Path | None = None
-
-
 def recordings_folder(name: str) -> Path:
     """Return the default folder for a robot's recordings.
 
@@ -275,22 +240,6 @@ def recordings_folder(name: str) -> Path:
     # As for credentials: a relative path is ignored.
     base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
     return base / "shapechanger" / "recordings" / credentials_folder(name).name
-
-
-def credentials_of(name: str, folder: Path | None, *, make: bool) -> Credentials:
-    """Return the credentials of a robot, creating them if permitted.
-
-    Args:
-        name: Name of the robot.
-        folder: Folder of the credentials; None for the robot's own.
-        make: Whether missing ones are created.
-
-    Raises:
-        RobotError: If they are missing or readable by others.
-        OutputError: If they cannot be written.
-    """
-    folder = folder or credentials_folder(name)
-    return make_credentials(folder, name) if make else load_credentials(folder)
 
 
 def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
@@ -381,78 +330,6 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
     return Place(world, profile.body, tuple(lenses))
 
 
-def start_twin(profile: Profile, options: TwinOptions) -> RunningBoard:
-    """Start the twin of a robot's pins in a separate process.
-
-    Raises:
-        ProfileError: If `wired_as` is not a profile.
-        RobotError: If the twin does not start.
-    """
-    wiring: GuardPlan = profile.guard_plan()
-    if options.wired_as:
-        wiring = load_profile(find_profile(options.wired_as)).guard_plan()
-    return start_board(
-        wiring,
-        clock=options.clock,
-        folder=options.folder,
-        camera=profile.camera,
-        seed=options.seed,
-        one_shot_ms=float(wiring.enable_hold_ms) if options.one_shot else None,
-        place=options.place,
-    )
-
-
-def serve_plan(
-    profile: Profile,
-    options: ServeOptions,
-    board: BoardAt | None = None,
-    clock: Literal["real", "twin"] = "real",
-) -> ServePlan:
-    """Return the plan for the processes of a robot.
-
-    Args:
-        profile: The robot.
-        options: Options of serving.
-        board: The twin of its pins; None for the pins of this machine.
-        clock: Source of its time.
-
-    Raises:
-        RobotError: If credentials are missing or readable by others, or the robot would be open to
-            everyone.
-    """
-    credentials = credentials_of(profile.name, options.credentials, make=board is not None)
-    here = board is not None or options.insecure
-    daemon = DaemonPlan(
-        robot=profile.name,
-        body=profile.body,
-        action_layout=profile.action_layout().to_json(),
-        state_layout=profile.state_layout().to_json(),
-        camera=profile.camera,
-        control_hz=profile.control_hz,
-        deadline_ms=profile.limits.deadline_ms,
-        max_observation_age_ms=profile.max_observation_age_ms,
-        reward=profile.reward,
-        reset=profile.reset,
-        arming="anyone" if options.arm_by_program or board else profile.arming,
-        host=options.host or (_HERE if here else _EVERYWHERE),
-        port=options.port,
-        certificate="" if options.insecure else str(credentials.certificate),
-        private_key="" if options.insecure else str(credentials.private_key),
-        key_file=str(credentials.key_file),
-        insecure=options.insecure,
-        discovery=options.announce,
-        ready_file=str(options.ready_file.absolute()) if options.ready_file else "",
-        recordings=str((options.recordings or recordings_folder(profile.name)).absolute()),
-    )
-    guard = profile.guard_plan()
-    if board is None:
-        return ServePlan(guard, daemon.to_dict())
-    camera = board.camera_plan(profile.camera) if profile.camera else None
-    daemon = msgspec.structs.replace(daemon, camera=camera, clock=clock)
-    patience_ms = _TWIN_PATIENCE_MS if clock == "twin" else 0
-    return ServePlan(guard, daemon.to_dict(), board.hardware, patience_ms=patience_ms)
-
-
 def make_known(robot: KnownRobot) -> str:
     """Store a local robot among the known robots, unless its name is taken.
 
@@ -473,7 +350,7 @@ def make_known(robot: KnownRobot) -> str:
     try:
         known = recall(name)
     except (LinkError, UnknownName) as error:
-        return f"It is not made known here: {error}"
+        return f"It is not stored as a known robot: {error}"
     if (known.key, known.fingerprint) != (robot.key, robot.fingerprint):
         return (
             f"Another robot is known here as {name}, at {known.address}, and stays known: "
@@ -486,12 +363,3 @@ def make_known(robot: KnownRobot) -> str:
         return f"Known here as {name} at {before}, which stays; this one is at {now}."
     remember(robot)
     return f"Known here as {name}, now at {now} and no more at {before}: {drives}."
-
-
-def can_be_known(name: str) -> bool:
-    """Return whether a robot can be stored under a name."""
-    try:
-        check_name(name)
-    except LinkError:
-        return False
-    return True

@@ -147,12 +147,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     _options: tuple[str, ...] = ("posture",)
 
     def _act(self, action: Any) -> FingerSenses:
-        """Apply an action, and return the measurements after it.
-
-        Raises:
-            BadAction: If it has another shape or is not finite; nothing has moved then.
-            ResetNeeded: If `reset` was never called.
-        """
+        """Apply an action, and return the measurements after it."""
         if self._senses is None:
             raise gym.error.ResetNeeded("Call reset() before the first step.")
         checked = check_action(self, action)
@@ -164,6 +159,13 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         distance = float(np.linalg.norm(self.plant.fingertip - place))
         tension = np.abs(self.plant.data.actuator_force) / self._most
         return distance, self._reward.terms(distance, float(np.mean(tension**2)), CONTROL_DT)
+
+    def _stepped(
+        self, observation: Any, info: dict[str, Any], terms: dict[str, float]
+    ) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Return the result of a step, whose reward is the sum of `terms`."""
+        diverged = {"diverged": True} if self.plant.diverged else {}
+        return observation, sum(terms.values()), False, False, {**info, **terms, **diverged}
 
     def render(self) -> Any:
         """Return a frame of `render_mode`; None without one.

@@ -69,10 +69,7 @@ class FingerBabble:
         seed: int = 0,
         control_dt: float = CONTROL_DT,
     ) -> None:
-        for name in JOINTS:
-            _ = layout[f"{name}/angle"]
-        places = layout.slices
-        self._angles = [places[f"{name}/angle"].start for name in JOINTS]
+        self._angles = _places(layout, JOINTS, "angle")
         self._drive = drive_of(actions, NOMINAL)
         rng = np.random.default_rng(seed)
         self._joints = _Waves(rng, len(JOINTS))
@@ -141,18 +138,18 @@ def record_babble(
     """
     if not isinstance(env.observation_space, gym.spaces.Box):
         raise FingerError("Recording a finger needs Box observations: omit `goal`.")
-    layout = _layout_of(env)
+    name = env.spec.id if env.spec else type(env.unwrapped).__name__
+    layout = getattr(env.unwrapped, "observation_layout", None)
+    if not isinstance(layout, Layout):
+        raise LayoutError(
+            f"{name} publishes no observation_layout, so its observations have no names."
+        )
     control_dt = 1.0 / float(env.metadata.get("render_fps") or 1.0 / CONTROL_DT)
     babble = FingerBabble(layout, actions, seed, control_dt)
-    places = {
-        kind: _places(layout, names, kind)
-        for kind, names in (
-            ("angle", JOINTS),
-            ("tension", TENDONS),
-            ("length", TENDONS),
-            ("command", TENDONS),
-        )
-    }
+    angles = _places(layout, JOINTS, "angle")
+    tensions, lengths, commands = (
+        _places(layout, TENDONS, kind) for kind in ("tension", "length", "command")
+    )
     observation, _ = env.reset(seed=seed)
     rows: list[NDArray[np.float64]] = [np.array(observation, np.float64)]
     for step in range(round(seconds / control_dt)):
@@ -165,27 +162,18 @@ def record_babble(
     seen = np.array(rows)
     return FingerLog(
         t=np.asarray(control_dt * np.arange(len(seen)), np.float64),
-        commands=seen[:, places["command"]],
-        angles=seen[:, places["angle"]],
-        tensions=seen[:, places["tension"]],
-        lengths=seen[:, places["length"]],
+        commands=seen[:, commands],
+        angles=seen[:, angles],
+        tensions=seen[:, tensions],
+        lengths=seen[:, lengths],
         actions=actions,
         control_dt=control_dt,
-        source=env.spec.id if env.spec else type(env.unwrapped).__name__,
+        source=name,
     )
 
 
-def _layout_of(env: gym.Env[Any, Any]) -> Layout:
-    layout = getattr(env.unwrapped, "observation_layout", None)
-    if not isinstance(layout, Layout):
-        name = env.spec.id if env.spec else type(env.unwrapped).__name__
-        raise LayoutError(
-            f"{name} publishes no observation_layout, so its observations have no names."
-        )
-    return layout
-
-
 def _places(layout: Layout, names: tuple[str, ...], kind: str) -> list[int]:
+    """Return the indices of a quantity of the joints or tendons; refuse a layout without it."""
     slices = layout.slices
     for name in names:
         _ = layout[f"{name}/{kind}"]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -65,7 +64,13 @@ class FingerOracle:
         self._data = mujoco.MjData(self._model)
         # Fraction of a change of tension that a motor completes in one step.
         self._follows = 1.0 - math.exp(-CONTROL_DT / parameters.motor_lag)
-        self._places = _Places(layout)
+        names = layout.names
+        # Indices of the parts of an observation that the controller uses.
+        self._angles, self._velocities, self._tensions = (
+            [i for i, name in enumerate(names) if name.endswith(end)]
+            for end in ("/angle", "/velocity", "/tension")
+        )
+        self._target = [names.index(f"target/{axis}") for axis in "xyz"]
         self._wanted: NDArray[np.float64] | None = None
 
     def reset(self) -> None:
@@ -74,57 +79,21 @@ class FingerOracle:
 
     def __call__(self, observation: Any) -> NDArray[np.float32]:
         """Return the action, (7,), for an observation, (n,)."""
-        seen = self._places.read(np.asarray(observation, np.float64))
-        wanted, _ = angles_for(
-            seen.next_place, seen.angles if self._wanted is None else self._wanted
-        )
+        seen = np.asarray(observation, np.float64)
+        angles, tensions = seen[self._angles], seen[self._tensions]
+        wanted, _ = angles_for(seen[self._target], angles if self._wanted is None else self._wanted)
         self._wanted = wanted
-        speed = np.clip(self._gain * (wanted - seen.angles), -_MOST_SPEED, _MOST_SPEED)
+        speed = np.clip(self._gain * (wanted - angles), -_MOST_SPEED, _MOST_SPEED)
+        # To have this speed by the end of the step.
+        acceleration = (speed - seen[self._velocities]) / CONTROL_DT
+        torque = joint_torque(self._model, self._data, angles, speed, acceleration)
         # Lengths change while the command acts, so use those in the middle of the step.
-        length = -self._arms @ (seen.angles + 0.5 * CONTROL_DT * speed)
+        length = -self._arms @ (angles + 0.5 * CONTROL_DT * speed)
         pulling = -self._arms @ speed
         low, high = (self._drive.tension(end, length, pulling) for end in _ENDS)
         low = np.clip(low, LEAST_TENSION_N, self._most)
         high = np.clip(high, low, self._most)
-        tensions, _ = tensions_for_torque(self._arms, self._torque(seen, speed), low, high)
-        ahead = seen.tensions + (tensions - seen.tensions) / self._follows
+        given, _ = tensions_for_torque(self._arms, torque, low, high)
+        ahead = tensions + (given - tensions) / self._follows
         command = self._drive.command(ahead, length, pulling)
         return np.clip(command, -1.0, 1.0).astype(np.float32)
-
-    def _torque(self, seen: _Seen, speed: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the torque that gives the joints this speed by the end of the step, N·m, (4,)."""
-        acceleration = (speed - seen.velocities) / CONTROL_DT
-        return joint_torque(self._model, self._data, seen.angles, speed, acceleration)
-
-
-class _Seen(NamedTuple):
-    """The parts of an observation that the controller uses."""
-
-    angles: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    tensions: NDArray[np.float64]
-    next_place: NDArray[np.float64]
-
-
-class _Places:
-    """Reads these parts from an observation."""
-
-    def __init__(self, layout: Layout) -> None:
-        names = layout.names
-
-        def those(*ends: str) -> list[int]:
-            return [i for i, name in enumerate(names) if name.endswith(ends)]
-
-        self._angles = those("/angle")
-        self._velocities = those("/velocity")
-        self._tensions = those("/tension")
-        target: Sequence[str] = tuple(f"target/{axis}" for axis in "xyz")
-        self._target = [names.index(name) for name in target]
-
-    def read(self, observation: NDArray[np.float64]) -> _Seen:
-        return _Seen(
-            observation[self._angles],
-            observation[self._velocities],
-            observation[self._tensions],
-            observation[self._target],
-        )

@@ -162,12 +162,10 @@ class FingerPlant:
             angles=self._angles,
             velocities=self._velocities,
             tensions=tensions,
-            lengths=self._lengths(),
+            # Winding up by 1 m shortens a tendon that gives by 1 m.
+            lengths=(
+                -self.data.qpos[_N_JOINTS:] if self.parameters.gives else -self._arms @ self.angles
+            ),
             commands=self._command,
             fingertip=fingertip(self._angles, PHALANX_LENGTH_M),
         )
-
-    def _lengths(self) -> NDArray[np.float64]:
-        if self.parameters.gives:  # Winding up by 1 m shortens the tendon by 1 m.
-            return -self.data.qpos[_N_JOINTS:]
-        return -self._arms @ self.angles

@@ -127,10 +127,7 @@ class FingerReachEnv(FingerEnv):
         if self._has_goal:
             reached = self.compute_reward(senses.fingertip, self._target, info)
             terms = {"reward_goal": float(reached)}
-        info |= terms
-        if self.plant.diverged:
-            info["diverged"] = True
-        return self._observation(senses), sum(terms.values()), False, False, info
+        return self._stepped(self._observation(senses), info, terms)
 
     def compute_reward(
         self, achieved_goal: NDArray[np.float64], desired_goal: NDArray[np.float64], info: object

@@ -41,18 +41,6 @@ _OFF_M: Final = 0.0005
 _LOOKS: Final = 20
 
 
-def beginning_if_reachable(path: FingertipPath, looks: int) -> NDArray[np.float64] | None:
-    """Return the first angles of a path, rad, (4,); None if the nominal finger cannot follow it.
-
-    Args:
-        path: The path in the finger's frame, m.
-        looks: Approximate number of points to check.
-    """
-    times, points = sample(path, looks / path.duration_s)
-    angles, left = _angles_along(points)
-    return None if left is not None or _weakness(times, angles) else angles[0]
-
-
 def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
     """Require that the nominal finger can follow a path.
 
@@ -134,7 +122,8 @@ def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float
         size = rng.uniform(*_SIZE)
         hz = rng.uniform(*_SPEED) / (2.0 * math.pi * size)
         hz = min(max(hz, _SLOWEST_HZ), _FASTEST_HZ)
-        normal = _direction(rng)
+        normal = rng.standard_normal(3)
+        normal /= np.linalg.norm(normal)
         kind = rng.integers(3)
         if kind == 0:
             path = circle(size, tuple(centre), hz, tuple(normal))
@@ -144,14 +133,10 @@ def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float
             path = line(tuple(centre - size * normal), tuple(centre + size * normal), hz)
         # The number of points does not depend on the speed: paths are smooth, and each reset
         # draws one.
-        begin = beginning_if_reachable(path, _RANDOM_PATHS_LOOKS)
-        if begin is not None:
-            return path, begin
-
-
-def _direction(rng: np.random.Generator) -> NDArray[np.float64]:
-    drawn = rng.standard_normal(3)
-    return drawn / np.linalg.norm(drawn)
+        times, points = sample(path, _RANDOM_PATHS_LOOKS / path.duration_s)
+        angles, left = _angles_along(points)
+        if left is None and _weakness(times, angles) is None:
+            return path, angles[0]
 
 
 PREVIEW_S: Final = (0.06, 0.12, 0.20)
@@ -289,10 +274,7 @@ class FingerTrackEnv(FingerEnv):
             self._squares += distance**2
             self._counted += 1
         self.plant.mark(point)
-        info = self._info(distance) | terms
-        if self.plant.diverged:
-            info["diverged"] = True
-        return self._observation(senses), sum(terms.values()), False, False, info
+        return self._stepped(self._observation(senses), self._info(distance), terms)
 
     def _look(self) -> None:
         """Compute the present and coming points of the path."""

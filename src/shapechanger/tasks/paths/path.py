@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,8 +15,6 @@ from shapechanger.errors import PathError
 
 Vector = tuple[float, float, float]
 """x, y and z."""
-
-_DIMENSIONS: Final = (3,)
 
 
 def finite(what: str, value: Any) -> float:
@@ -28,7 +27,7 @@ def finite(what: str, value: Any) -> float:
     Raises:
         PathError: If it is not a finite number.
     """
-    if not _is_number(value) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise PathError(f"{what} must be a finite number, got {value!r}.")
     return float(value)
 
@@ -43,9 +42,13 @@ def positive(what: str, value: Any) -> float:
     Raises:
         PathError: If it is not a finite number above 0.
     """
-    if not _is_number(value) or not (math.isfinite(value) and value > 0.0):
+    try:
+        number = finite(what, value)
+    except PathError:
+        number = 0.0
+    if not number > 0.0:
         raise PathError(f"{what} must be a finite number above 0, got {value!r}.")
-    return float(value)
+    return number
 
 
 def vector(what: str, value: Any) -> Vector:
@@ -62,40 +65,20 @@ def vector(what: str, value: Any) -> Vector:
         numbers = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         numbers = np.empty(0)
-    if numbers.shape != _DIMENSIONS or not np.isfinite(numbers).all():
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
         raise PathError(f"{what} must be three finite numbers (x, y, z), got {value!r}.")
     x, y, z = numbers.tolist()
     return x, y, z
-
-
-def _is_number(value: Any) -> bool:
-    return not isinstance(value, bool) and isinstance(value, Real)
 
 
 Times = NDArray[np.float64]
 """Seconds, shape (n,)."""
 
 Points = NDArray[np.float64]
-"""Positions in m, or their derivatives by time, shape (n, 3)."""
+"""Positions, m, or velocities, m/s, shape (n, 3)."""
 
 CLOSED_M: Final = 1e-4
 """Largest distance between the two ends of a closed path, m."""
-
-
-class PathMotion(Protocol):
-    """Motion of a point from 0 s to the end of its path or period."""
-
-    def derivative(self, t: Times, order: int) -> Points:
-        """Return position, velocity or acceleration.
-
-        Args:
-            t: Times from 0 to the end, inclusive, s, shape (n,).
-            order: 0 for positions in m, 1 for m/s, 2 for m/s².
-
-        Returns:
-            A new array, shape (n, 3).
-        """
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,13 +89,13 @@ class FingertipPath:
     before and after, the point rests at its ends.
 
     Attributes:
-        motion: Motion of the point.
+        position: Positions, m, shape (n, 3), at times from 0 to `duration_s`, s, shape (n,).
         duration_s: Period of a closed path, or duration of an open one, s, above 0; infinite for an
             endless function.
         closed: Whether it is periodic.
     """
 
-    motion: PathMotion
+    position: Callable[[Times], Points]
     duration_s: float
     closed: bool
 
@@ -133,46 +116,12 @@ class FingertipPath:
         Raises:
             PathError: If a time is not finite, or a function returns no position for it.
         """
-        return self._derivative(t, 0)
-
-    def velocity(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Return the velocity of the point; 0 before an open path begins and after it ends.
-
-        Args:
-            t: Times, s, finite, of any shape and sign.
-
-        Returns:
-            Velocities, m/s, shape (..., 3).
-
-        Raises:
-            PathError: As `at`.
-        """
-        return self._derivative(t, 1)
-
-    def acceleration(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Return the acceleration of the point; 0 before an open path begins and after it ends.
-
-        Args:
-            t: Times, s, finite, of any shape and sign.
-
-        Returns:
-            Accelerations, m/s², shape (..., 3).
-
-        Raises:
-            PathError: As `at`.
-        """
-        return self._derivative(t, 2)
-
-    def _derivative(self, t: ArrayLike, order: int) -> NDArray[np.float64]:
         times = np.asarray(t, dtype=np.float64)
         if not np.isfinite(times).all():
             raise PathError("Times of a path must be finite, got NaN or infinity.")
         flat = times.ravel()
         within = np.mod(flat, self.duration_s) if self.closed else flat.clip(0.0, self.duration_s)
-        points = self.motion.derivative(within, order)
-        if order and not self.closed:
-            points[within != flat] = 0.0
-        return points.reshape(*times.shape, 3)
+        return self.position(within).reshape(*times.shape, 3)
 
 
 def sample(
@@ -208,23 +157,15 @@ A faster path is a jump, or has wrong units.
 """
 
 
-def jumps(distance_m: float, seconds: float) -> bool:
-    """Return whether a path would jump.
-
-    Args:
-        distance_m: Distance between two points, m.
-        seconds: Time between them, s.
-    """
-    return distance_m > FASTEST_MPS * seconds
-
-
 def too_fast(distance_m: float, seconds: float) -> str:
-    """Return the end of a sentence about a path that is too fast.
+    """Return the end of a sentence about a path that jumps; empty if it does not.
 
     Args:
         distance_m: Distance between two points, m.
         seconds: Time between them, s.
     """
+    if not distance_m > FASTEST_MPS * seconds:
+        return ""
     return (
         f"the point moves {distance_m:.3g} m in {seconds:.3g} s, and no fingertip is faster than "
         f"{FASTEST_MPS:g} m/s"

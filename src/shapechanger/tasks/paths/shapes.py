@@ -46,12 +46,12 @@ class Harmonics:
     cosines: tuple[Vector, ...]
     sines: tuple[Vector, ...]
 
-    def derivative(self, t: Times, order: int) -> Points:
-        """Return position, velocity or acceleration, as in `PathMotion`, at any times.
+    def __call__(self, t: Times, order: int = 0) -> Points:
+        """Return the positions, or their derivative of an order.
 
         Args:
             t: Times, s, shape (n,).
-            order: 0, 1 or 2.
+            order: 0 for positions, 1 for velocities.
         """
         multiples = np.arange(1.0, len(self.cosines) + 1.0)
         rates = math.tau * self.hz * multiples  # rad/s, shape (k,).
@@ -67,7 +67,6 @@ class Harmonics:
 
 _CENTRE: Final = (0.050, 0.0, -0.045)
 _RADIAL: Final = (0.0, 1.0, 0.0)
-_NOWHERE: Final = (0.0, 0.0, 0.0)
 
 # Of each of three axes at right angles, shape (3,).
 _Axes = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
@@ -126,7 +125,7 @@ def figure_eight(
     size = positive("The size of a figure eight", size)
     along, across, _ = _axes(normal)
     sines = [size / 2.0 * along, size / 4.0 * across]
-    return _closed("figure eight", hz, phase, centre, [], sines)
+    return _closed("figure eight", hz, phase, centre, [np.zeros(3)] * 2, sines)
 
 
 def line(
@@ -134,12 +133,12 @@ def line(
     end: Vector = (0.040, 0.0, -0.050),
     hz: float = 0.5,
 ) -> FingertipPath:
-    """A straight line, there and back, as a pendulum goes: it rests at both ends for a moment.
+    """Return a straight line, traversed back and forth in harmonic motion.
 
     Args:
-        start: Where it begins, m, in the frame of the finger.
-        end: Where it turns, m; elsewhere than `start`.
-        hz: How often it goes there and back in a second, above 0.
+        start: First end, m, in the frame of the finger.
+        end: Other end, m; elsewhere than `start`.
+        hz: Periods per second, above 0; one period covers both directions.
 
     Raises:
         PathError: If an argument is out of its range, or the speed above `FASTEST_MPS`.
@@ -149,7 +148,7 @@ def line(
     if np.array_equal(first, last):
         raise PathError(f"A line must end elsewhere than it starts, got {start!r} twice.")
     middle = first / 2.0 + last / 2.0
-    return _closed("line", hz, 0.0, _vector(middle), [first - middle], [])
+    return _closed("line", hz, 0.0, _vector(middle), [first - middle], [np.zeros(3)])
 
 
 def curve_3d(
@@ -216,23 +215,19 @@ def _closed(
         phase: Phase at 0 s, rad.
         centre: Mean position, m.
         cosines: Coefficients of the cosines, m.
-        sines: Coefficients of the sines, m.
-
-    Raises:
-        PathError: If an argument is out of its range, or the path too fast.
+        sines: Coefficients of the sines, m; as many.
     """
-    n = max(len(cosines), len(sines))
     hz = positive(f"The hz of a {what}", hz)
     motion = Harmonics(
         hz=hz,
         phase=finite(f"The phase of a {what}", phase),
         centre=vector(f"The centre of a {what}", centre),
-        cosines=_padded(cosines, n),
-        sines=_padded(sines, n),
+        cosines=tuple(map(_vector, cosines)),
+        sines=tuple(map(_vector, sines)),
     )
     path = FingertipPath(motion, duration_s=1.0 / hz, closed=True)
     with np.errstate(over="ignore", invalid="ignore"):
-        around = motion.derivative(np.linspace(0.0, path.duration_s, 721), 1)
+        around = motion(np.linspace(0.0, path.duration_s, 721), 1)
         fastest = np.hypot(np.hypot(around[:, 0], around[:, 1]), around[:, 2]).max()
     if not fastest <= FASTEST_MPS:
         raise PathError(
@@ -240,11 +235,6 @@ def _closed(
             f"{FASTEST_MPS:g} m/s: make it smaller, or hz lower."
         )
     return path
-
-
-def _padded(vectors: list[NDArray[np.float64]], n: int) -> tuple[Vector, ...]:
-    missing: list[Vector] = [_NOWHERE] * (n - len(vectors))
-    return (*map(_vector, vectors), *missing)
 
 
 def _vector(values: NDArray[np.float64]) -> Vector:

@@ -7,14 +7,14 @@ import inspect
 import io
 import math
 import os
-import pathlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import PurePath
+from dataclasses import dataclass
+from pathlib import Path, PurePath
 from typing import Any, Final, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 
 from shapechanger.errors import PathError, UnknownName
 from shapechanger.tasks.paths.path import (
@@ -22,71 +22,32 @@ from shapechanger.tasks.paths.path import (
     FingertipPath,
     Points,
     Times,
-    jumps,
     positive,
     too_fast,
 )
 from shapechanger.tasks.paths.shapes import circle, curve_3d, figure_eight, line
 
-_STEP_S: Final = 1e-3  # Of differences: the error at 5 Hz is a millionth of the velocity.
-_NODES: Final = np.arange(-2.0, 3.0)
-# Values at the nodes become coefficients of the polynomial through them, shape (5, 5).
-_COEFFICIENTS: Final = np.linalg.inv(np.vander(_NODES, increasing=True))
-
-# How a function is checked: over all its time, or as much of it where it never ends; ...
+# Checked time of an endless function, s; rate and number of the checked points.
 _CHECKED_S: Final = 10.0
 _CHECKED_HZ: Final = 500.0
 _FEWEST_CHECKED: Final = 200
 _MOST_CHECKED: Final = 10_000
-# ... and where it is least smooth, down to such a short time.
+# Number of the roughest intervals that are bisected, and the shortest time that they are cut to, s.
 _SUSPECTS: Final = 16
 _SHORTEST_S: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Function:
-    """Motion by a function, with derivatives by differences.
-
-    Attributes:
-        function: Maps a time in s to x, y and z in m.
-        duration_s: End of its domain, s, above 0; infinite for none.
-    """
+class _Function:
+    """Positions by a function of one time in s, which returns x, y and z in m."""
 
     function: Callable[[float], ArrayLike]
-    duration_s: float
 
-    def derivative(self, t: Times, order: int) -> Points:
-        """Return position, velocity or acceleration, as in `PathMotion`.
-
-        Args:
-            t: Times, s, shape (n,).
-            order: 0, 1 or 2.
-
-        Raises:
-            PathError: If the function does not return three finite numbers.
-        """
-        if order == 0:
-            return np.array([self.point(float(now)) for now in t]).reshape(-1, 3)
-        # A polynomial through five points around the time. At both ends of the domain the time is
-        # not in their middle.
-        step = min(_STEP_S, self.duration_s / 4.0)
-        middle = t.clip(2.0 * step, self.duration_s - 2.0 * step)
-        nodes = (middle + step * _NODES[:, None]).clip(0.0, self.duration_s)
-        values = self.derivative(nodes.ravel(), 0).reshape(5, -1, 3)
-        u = (t - middle) / step
-        ones, zeros = np.ones_like(u), np.zeros_like(u)
-        powers = {
-            1: np.stack([zeros, ones, 2.0 * u, 3.0 * u**2, 4.0 * u**3]),
-            2: np.stack([zeros, zeros, 2.0 * ones, 6.0 * u, 12.0 * u**2]),
-        }
-        return np.einsum("kn,kj,jnd->nd", powers[order] / step**order, _COEFFICIENTS, values)
+    def __call__(self, t: Times) -> Points:
+        return np.array([self.point(float(now)) for now in t]).reshape(-1, 3)
 
     def point(self, t: float) -> Points:
-        """Return the position at one time, m, shape (3,).
-
-        Raises:
-            PathError: If the function does not return three finite numbers.
-        """
+        """Return the position at one time, m, shape (3,)."""
         given = self.function(t)
         try:
             point = np.array(given, dtype=np.float64)
@@ -108,8 +69,7 @@ def from_callable(
     """Create a path from a function of time.
 
     The function is sampled 500 times per second, at most 10 000 times, and more densely where it is
-    least smooth. This finds jumps of 0.01 mm, except in rough functions. Velocity and acceleration
-    are differences over 4 ms, so the function should be smooth at that scale.
+    least smooth. This finds jumps of 0.01 mm, except in rough functions.
 
     Args:
         function: Maps a time in s, from 0 to the end, to x, y and z in the finger's frame, m. It
@@ -132,8 +92,8 @@ def from_callable(
         length = positive("duration_s", duration_s)
     if period_s is not None:
         length = positive("period_s", period_s)
-    motion = Function(function, length)
-    _require_continuous(motion)
+    motion = _Function(function)
+    _require_continuous(motion, length)
     if period_s is not None:
         apart = math.dist(motion.point(0.0), motion.point(length))
         if apart > CLOSED_M:
@@ -145,16 +105,12 @@ def from_callable(
     return FingertipPath(motion, length, closed=period_s is not None)
 
 
-def _require_continuous(motion: Function) -> None:
-    """Check a function for jumps.
-
-    Raises:
-        PathError: If it jumps.
-    """
-    length = _CHECKED_S if math.isinf(motion.duration_s) else motion.duration_s
+def _require_continuous(motion: _Function, duration_s: float) -> None:
+    """Check a function for jumps."""
+    length = _CHECKED_S if math.isinf(duration_s) else duration_s
     n = round(min(max(length * _CHECKED_HZ, _FEWEST_CHECKED), _MOST_CHECKED))
     times = np.linspace(0.0, length, n + 1)
-    points = motion.derivative(times, 0)
+    points = motion(times)
     with np.errstate(over="ignore", invalid="ignore"):
         steps = np.diff(points, axis=0)
         around = np.vstack([steps[:1], steps, steps[-1:]])
@@ -164,22 +120,13 @@ def _require_continuous(motion: Function) -> None:
         _require_no_jump(motion, float(times[i]), float(times[i + 1]))
 
 
-def _require_no_jump(motion: Function, start: float, end: float) -> None:
-    """Bisect an interval towards its largest change: only a jump does not shrink.
-
-    Args:
-        motion: The motion.
-        start: Beginning of the interval, s.
-        end: End of the interval, s.
-
-    Raises:
-        PathError: If it contains a jump.
-    """
+def _require_no_jump(motion: _Function, start: float, end: float) -> None:
+    """Bisect an interval, s, towards its largest change: only a jump does not shrink."""
     first, last = motion.point(start), motion.point(end)
     while True:
         distance = math.dist(first, last)
-        if jumps(distance, end - start):
-            raise PathError(f"At {start:.6g} s the path jumps: {too_fast(distance, end - start)}.")
+        if reason := too_fast(distance, end - start):
+            raise PathError(f"At {start:.6g} s the path jumps: {reason}.")
         middle = start / 2.0 + end / 2.0
         if end - start < _SHORTEST_S or not start < middle < end:
             return
@@ -188,107 +135,6 @@ def _require_no_jump(motion: Function, start: float, end: float) -> None:
             end, last = middle, between
         else:
             start, first = middle, between
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Spline:
-    """Cubic spline with continuous velocity and acceleration; create it with `through`.
-
-    Formulas and names follow Press et al., Numerical Recipes, 3rd edition (2007), sections 2.4 and
-    3.3.
-
-    Attributes:
-        knots: Times of the points, s, increasing from 0, shape (n,), with n at least 3.
-        points: m, shape (n, 3).
-        bends: Accelerations at the points, m/s², shape (n, 3); linear in between.
-    """
-
-    knots: Times = field(repr=False)
-    points: Points = field(repr=False)
-    bends: Points = field(repr=False)
-
-    @classmethod
-    def through(cls, knots: Times, points: Points, periodic: bool) -> Spline:
-        """Return the spline through points.
-
-        Args:
-            knots: Their times, s, increasing from 0, shape (n,), with n at least 3.
-            points: m, shape (n, 3). For a periodic spline the last equals the first.
-            periodic: Whether velocity and acceleration are equal at both ends; otherwise the
-                acceleration is 0 there ("natural" spline).
-        """
-        knots, points = knots.copy(), points.copy()
-        bends = _bends(knots, points, periodic)
-        for array in (knots, points, bends):
-            array.setflags(write=False)
-        return cls(knots, points, bends)
-
-    def derivative(self, t: Times, order: int) -> Points:
-        """Return position, velocity or acceleration, as in `PathMotion`.
-
-        Args:
-            t: Times, s, shape (n,).
-            order: 0, 1 or 2.
-        """
-        piece = (np.searchsorted(self.knots, t, side="right") - 1).clip(0, len(self.knots) - 2)
-        h = (self.knots[piece + 1] - self.knots[piece])[:, None]
-        b = (t - self.knots[piece])[:, None] / h  # Elapsed fraction of the piece, 0 to 1.
-        a = 1.0 - b
-        y0, y1 = self.points[piece], self.points[piece + 1]
-        m0, m1 = self.bends[piece], self.bends[piece + 1]
-        if order == 0:
-            return a * y0 + b * y1 + ((a**3 - a) * m0 + (b**3 - b) * m1) * h**2 / 6.0
-        if order == 1:
-            return (y1 - y0) / h + ((3.0 * b**2 - 1.0) * m1 - (3.0 * a**2 - 1.0) * m0) * h / 6.0
-        return a * m0 + b * m1
-
-
-def _bends(knots: Times, points: Points, periodic: bool) -> Points:
-    """Return the accelerations at the knots that make the velocity continuous, m/s², (n, 3).
-
-    Inside, h[i-1] m[i-1] + 2 (h[i-1] + h[i]) m[i] + h[i] m[i+1] = 6 (slope[i] - slope[i-1]). The
-    acceleration at both ends is one unknown: 0 in a natural spline; in a periodic one the same
-    equation holds across the seam, on which all others depend linearly.
-    """
-    h = np.diff(knots)
-    slopes = np.diff(points, axis=0) / h[:, None]
-    right = np.zeros(
-        (len(h) - 1, 4)
-    )  # Three columns for the points, one for the unknown at the ends.
-    right[:, :3] = 6.0 * np.diff(slopes, axis=0)
-    right[0, 3] -= h[0]
-    right[-1, 3] -= h[-1]  # With three points, the inner one has the unknown on both sides.
-    solved = _tridiagonal(2.0 * (h[:-1] + h[1:]), h[1:-1], right)
-    alone, influence = solved[:, :3], solved[:, 3:]
-    end = np.zeros(3)
-    if periodic:
-        seam = 6.0 * (slopes[0] - slopes[-1]) - h[0] * alone[0] - h[-1] * alone[-1]
-        end = seam / (2.0 * (h[0] + h[-1]) + h[0] * influence[0] + h[-1] * influence[-1])
-    return np.vstack([end, alone + influence * end, end])
-
-
-def _tridiagonal(
-    diagonal: NDArray[np.float64], beside: NDArray[np.float64], right: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Solve a symmetric tridiagonal system.
-
-    Args:
-        diagonal: Shape (n,); each larger than the sum of the numbers beside it.
-        beside: Off-diagonal, shape (n - 1,).
-        right: Right-hand sides, shape (n, k).
-
-    Returns:
-        Shape (n, k).
-    """
-    pivots, solved = diagonal.copy(), right.copy()
-    for i in range(1, len(pivots)):
-        factor = beside[i - 1] / pivots[i - 1]
-        pivots[i] -= factor * beside[i - 1]
-        solved[i] -= factor * solved[i - 1]
-    solved[-1] /= pivots[-1]
-    for i in range(len(pivots) - 2, -1, -1):
-        solved[i] = (solved[i] - beside[i] * solved[i + 1]) / pivots[i]
-    return solved
 
 
 _COLUMNS: Final = ("t", "x", "y", "z")
@@ -316,54 +162,48 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
             The message names the line.
     """
     name = os.fspath(path)
-    lines, rows = _rows(name, _text(name))
+    where, rows = _rows(name, _text(name))
     if len(rows) < _FEWEST_ROWS:
         raise PathError(f"{name} has too few rows: {len(rows)}, and a path needs {_FEWEST_ROWS}.")
     table = np.array(rows)
     times, points = table[:, 0] - table[0, 0], table[:, 1:]
-    where = [f"{name}, line {line}" for line in lines]
     _require_steady(table[:, 0], where)
     _require_slow(times, points, where)
     closed = math.dist(points[0], points[-1]) <= CLOSED_M
     if closed:
         points[[0, -1]] = (points[0] + points[-1]) / 2.0
-    return FingertipPath(Spline.through(times, points, closed), float(times[-1]), closed)
+    spline = CubicSpline(times, points, bc_type="periodic" if closed else "natural")
+    return FingertipPath(cast("Any", spline), float(times[-1]), closed)
 
 
 def _text(name: str) -> str:
     try:
-        return pathlib.Path(name).read_text("utf-8-sig")  # Spreadsheets write a mark.
+        return Path(name).read_text("utf-8-sig")  # Spreadsheets write a mark.
     except OSError as error:
         raise PathError(f"{name} cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
         raise PathError(f"{name} is not UTF-8 text: {error.reason}.") from error
 
 
-def _rows(name: str, text: str) -> tuple[list[int], list[list[float]]]:
-    """Return line numbers, and rows of t, x, y and z."""
+def _rows(name: str, text: str) -> tuple[list[str], list[list[float]]]:
+    """Return the file and line of each row, and its t, x, y and z."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    lines: list[int] = []
-    rows: list[list[float]] = []
-    order: list[int] | None = None
     try:
-        for cells in reader:
-            if not cells:
-                continue
-            where = f"{name}, line {reader.line_num}"
-            if order is None:
-                order = _order([cell.strip() for cell in cells], where)
-                continue
-            if len(cells) != len(_COLUMNS):
-                raise PathError(f"{where} has {len(cells)} cells, and there are four columns.")
-            rows.append(
-                [_number(cells[place], c, where) for c, place in zip(_COLUMNS, order, strict=True)]
-            )
-            lines.append(reader.line_num)
+        found = [(f"{name}, line {reader.line_num}", cells) for cells in reader if cells]
     except csv.Error as error:
         raise PathError(f"{name}, line {reader.line_num}, is not valid CSV: {error}.") from error
-    if order is None:
+    if not found:
         raise PathError(f"{name} is empty: {_HEADER}.")
-    return lines, rows
+    (first, header), *body = found
+    order = _order([cell.strip() for cell in header], first)
+    rows: list[list[float]] = []
+    for where, cells in body:
+        if len(cells) != len(_COLUMNS):
+            raise PathError(f"{where} has {len(cells)} cells, and there are four columns.")
+        rows.append(
+            [_number(cells[place], c, where) for c, place in zip(_COLUMNS, order, strict=True)]
+        )
+    return [where for where, _ in body], rows
 
 
 def _order(found: Sequence[str], where: str) -> list[int]:
@@ -390,15 +230,7 @@ def _number(cell: str, column: str, where: str) -> float:
 
 
 def _require_steady(times: Times, where: Sequence[str]) -> None:
-    """Refuse times that do not increase, and gaps.
-
-    Args:
-        times: Times of the rows, s.
-        where: File and line of each row, for messages.
-
-    Raises:
-        PathError: If time stands still, runs backwards or has a gap.
-    """
+    """Refuse times that do not increase, and gaps."""
     steps = np.diff(times)
     for i in np.flatnonzero(steps <= 0.0).tolist():
         how = "stands still" if steps[i] == 0.0 else "runs backwards"
@@ -412,22 +244,11 @@ def _require_steady(times: Times, where: Sequence[str]) -> None:
 
 
 def _require_slow(times: Times, points: Points, where: Sequence[str]) -> None:
-    """Refuse jumps.
-
-    Args:
-        times: Times of the rows, s.
-        points: Their points, m.
-        where: File and line of each row, for messages.
-
-    Raises:
-        PathError: If the point is faster than `FASTEST_MPS`.
-    """
+    """Refuse jumps."""
     for i in range(1, len(where)):
         seconds, distance = float(times[i] - times[i - 1]), math.dist(points[i], points[i - 1])
-        if jumps(distance, seconds):
-            raise PathError(
-                f"{where[i]}: {too_fast(distance, seconds)}; t must be in s, and x, y, z in m."
-            )
+        if reason := too_fast(distance, seconds):
+            raise PathError(f"{where[i]}: {reason}; t must be in s, and x, y, z in m.")
 
 
 PathSource = FingertipPath | str | PurePath | Mapping[str, Any] | Callable[[float], ArrayLike]

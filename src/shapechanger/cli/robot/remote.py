@@ -1,18 +1,21 @@
-"""`shapechanger robot find | remember | forget`: discover robots and manage known ones."""
+"""`shapechanger robot find | remember | forget | stop`: robots on the network."""
 
 from __future__ import annotations
 
 import getpass
 import os
 import sys
+import time
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Final
 
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import plain_console
+from shapechanger.cli.console import print_table, say
 from shapechanger.errors import LinkError, ShapechangerError
+from shapechanger.link.messages import VERSION
+from shapechanger.remote.known_robots import KnownRobot, forget, known_names, recall, remember
 
 _KEY_VARIABLE = "SHAPECHANGER_KEY"
 
@@ -26,19 +29,16 @@ class Find:
 
     def run(self) -> None:
         """Print a table with the robots' local names."""
-        from shapechanger.link.messages import VERSION
         from shapechanger.remote.discovery import find
 
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
         known = _known_here()
         found = find(self.seconds)
-        console = plain_console()
         if not found:
-            console.print(
+            say(
                 "No robot answers. A network may block multicast DNS; connecting by address works "
-                "all the same.",
-                soft_wrap=True,
+                "all the same."
             )
             return
         table = Table("robot", "body", "address", "known as", "", box=None, pad_edge=False)
@@ -46,7 +46,7 @@ class Find:
             other = "" if robot.version == str(VERSION) else f"speaks version {robot.version}"
             name = known.get(robot.fingerprint, "")
             table.add_row(robot.name, robot.body, str(robot.address), name, other)
-        console.print(table)
+        print_table(table)
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,9 @@ class Remember:
 
     def run(self) -> None:
         """Ask for the key, which does not belong on a command line, and store everything."""
-        from shapechanger.remote.known_robots import KnownRobot, remember
-
         key = os.environ.get(_KEY_VARIABLE) or _asked_key(self.name)
         path = remember(KnownRobot(self.name, self.address, key.strip(), self.fingerprint))
-        plain_console().print(f"wrote {path}", soft_wrap=True)
+        say(f"wrote {path}")
 
 
 @dataclass(frozen=True)
@@ -78,21 +76,17 @@ class Forget:
 
     def run(self) -> None:
         """Remove its file."""
-        from shapechanger.remote.known_robots import forget
-
         forget(self.name)
 
 
 def _known_here() -> dict[str, str]:
     """Return the local names of known robots by fingerprint, skipping broken files."""
-    from shapechanger.remote.known_robots import known_names, recall
-
     known: dict[str, str] = {}
     for name in known_names():
         try:
             known[recall(name).fingerprint] = name
         except (ShapechangerError, OSError) as error:
-            plain_console(stderr=True).print(f"{name} is skipped: {error}", soft_wrap=True)
+            say(f"{name} is skipped: {error}", stderr=True)
     return known
 
 
@@ -107,3 +101,40 @@ def _asked_key(name: str) -> str:
             "`shapechanger robot key NAME` shows it on the robot."
         )
     return key
+
+
+# s. A guard stops within a tick and reports it in the next observation.
+_CONFIRMED_WITHIN_S: Final = 2.0
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Stop a robot immediately, whoever drives it, until a person arms it again."""
+
+    robot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT")]
+    """Name of a robot that is known here, see `remember`."""
+    reason: str = "a person typed `robot stop`"
+    """Why, for people to read."""
+
+    def run(self) -> None:
+        """Stop the robot; exit with 1 if it does not confirm."""
+        from shapechanger.remote.client import RobotClient
+
+        known = recall(self.robot)
+        try:
+            with RobotClient.connect(known, role="person", frames=False) as robot:
+                robot.emergency_stop(self.reason)
+                until_s = time.monotonic() + _CONFIRMED_WITHIN_S
+                while not (seen := robot.ask().message).emergency:
+                    if time.monotonic() > until_s:
+                        raise LinkError("The robot answers, and does not say that it stopped.")
+        except LinkError as error:
+            say(
+                f"error: {error}\nThe stop was not confirmed: go there, and cut its power.",
+                stderr=True,
+            )
+            sys.exit(1)
+        say(
+            f"{self.robot} is stopped. {seen.stop_reason}\n"
+            f"Only a person lets it drive again: shapechanger robot drive {self.robot}, and E."
+        )

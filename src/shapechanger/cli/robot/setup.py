@@ -1,0 +1,219 @@
+"""`shapechanger robot init | doctor | home | safe-pins`: set up a robot."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import tyro
+
+from shapechanger.cli.console import say
+from shapechanger.cli.robot.key import how_to_remember, robot_at, shown_credentials
+from shapechanger.errors import RobotError, ShapechangerError
+from shapechanger.remote.known_robots import check_name, remember
+from shapechanger.robot.daemon.credentials import (
+    credentials_folder,
+    load_credentials,
+    make_credentials,
+)
+from shapechanger.robot.guard.outputs import make_safe
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.hardware import REAL, connect
+from shapechanger.robot.profile.load import (
+    find_profile,
+    load_profile,
+    shipped_profiles,
+    starter_text,
+    write_profile,
+)
+from shapechanger.robot.setup.doctor import Finding, examine_robot, uses_pins
+from shapechanger.robot.setup.systemd import write_unit
+from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
+
+
+@dataclass(frozen=True)
+class Init:
+    """Create the profile, key and certificate of a new robot."""
+
+    kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="KIND")]
+    """Name of a shipped profile, such as car."""
+    name: str = ""
+    """Name of the robot; that of its kind if not given."""
+    out: Path | None = None
+    """The profile to write; NAME.toml if not given."""
+    credentials: Path | None = None
+    """Folder for the key and the certificate, if not the robot's own in the user's
+    configuration."""
+
+    def run(self) -> None:
+        """Write the files and print the next steps."""
+        name = self.name or self.kind
+        check_name(name)
+        out = self.out or Path(f"{name}.toml")
+        starter_text(self.kind, out, name)  # Check everything before creating anything.
+        credentials = make_credentials(self.credentials or credentials_folder(name), name)
+        # Lets this machine drive it, especially on a twin.
+        remember(robot_at("127.0.0.1", name, credentials))
+        unit, is_new = write_unit(name, out, self.credentials)
+        # Last, because an existing profile is refused: after a failure, such as a full disk, the
+        # command can be repeated.
+        profile = write_profile(self.kind, out, name)
+        say(
+            f"wrote {profile}: check its pins before anything moves\n"
+            f"{'wrote' if is_new else 'kept'} {unit}: for systemd, see docs/hardware.md\n"
+            f"key and certificate in {credentials.key_file.parent}\n\n"
+            f"{shown_credentials(credentials)}\n\n"
+            f"Next: shapechanger robot doctor {profile}\n"
+            f"      shapechanger robot serve {profile}   (with --twin: without any hardware)\n"
+            f"{how_to_remember(name, credentials)}"
+        )
+
+
+def own_profile(name: str) -> Path:
+    """Return the file of a profile that may be written.
+
+    Args:
+        name: A file, or the name of a profile.
+
+    Raises:
+        ProfileError: If there is none.
+        RobotError: If it comes with Shapechanger.
+    """
+    path = find_profile(name)
+    if path in shipped_profiles().values():
+        raise RobotError(
+            f"{path.stem} comes with Shapechanger and is not changed: "
+            f"`shapechanger robot init {path.stem}` writes one of your own."
+        )
+    return path
+
+
+def change_profile(path: Path, changes: dict[str, Any]) -> None:
+    """Write changes into a profile, and print them.
+
+    Args:
+        path: The profile.
+        changes: New values by dotted name.
+
+    Raises:
+        ProfileError: If the result is not a valid profile.
+        OutputError: If it cannot be written.
+    """
+    from shapechanger.robot.profile.edit import rewrite
+
+    rewrite(path, changes)
+    for name, value in changes.items():
+        say(f"{name} = {value}")
+    say(f"wrote {path}")
+
+
+_CYCLE_S: Final = 0.01
+
+
+@dataclass(frozen=True)
+class Home:
+    """Find the zeros of a rig's tendons and joints while a person holds the finger straight."""
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """The rig's profile; the zeros are written into it, and its comments stay. The rig must not be
+    served meanwhile. Do it again whenever the servos were without power; encoders at the joints
+    keep their zeros."""
+    straight: bool = False
+    """Somebody holds the finger straight already, so do not ask."""
+
+    def run(self) -> None:
+        """Pull gently and store the positions at which motion stops."""
+        path = own_profile(self.profile)
+        plan = load_profile(path).guard_plan()
+        if not self.straight:
+            input("All tendons pull gently. Hold the finger straight, and press Enter. ")
+        hardware = connect(REAL, "")
+        try:
+            zeros = find_zeros(plan, hardware, lambda: time.sleep(_CYCLE_S))
+            joints = find_joint_zeros(plan, hardware, lambda: time.sleep(_CYCLE_S))
+        finally:
+            hardware.close()
+        found = {f"output.{name}.zero": zero for name, zero in zeros.items()}
+        found |= {f"sensor.{name}.zero": zero for name, zero in joints.items()}
+        change_profile(path, found)
+
+
+_MARKS = {"good": "good   ", "missing": "MISSING", "unknown": "?      "}
+
+
+@dataclass(frozen=True)
+class Doctor:
+    """Check everything that a robot's safety and operation depend on, without moving it."""
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """The robot's profile."""
+    port: int = 5000
+    """Port that it will be served at."""
+    credentials: Path | None = None
+    """Folder of its key and certificate, if not the one that `init` made."""
+
+    def run(self) -> None:
+        """Print the findings and exit with 1 if something is missing."""
+        profile = load_profile(find_profile(self.profile))
+        findings = [Finding("profile", "good", f"{profile.path} is valid.")]
+        try:
+            folder = self.credentials or credentials_folder(profile.name)
+            folder = load_credentials(folder).key_file.parent
+            findings.append(Finding("credentials", "good", f"Key and certificate: {folder}."))
+        except ShapechangerError as error:
+            findings.append(Finding("credentials", "missing", str(error)))
+        if profile.calibrated is None:
+            sentence = f"Never calibrated: shapechanger robot calibrate {profile.path}"
+            findings.append(Finding("calibration", "unknown", sentence))
+        findings += examine_robot(
+            profile.guard_plan(), profile.camera, self.port, profile=profile.path.absolute()
+        )
+        for finding in findings:
+            say(f"{_MARKS[finding.level]}  {finding.check}: {finding.sentence}")
+        missing = sum(finding.level == "missing" for finding in findings)
+        if missing:
+            say(f"\n{missing} of {len(findings)} to fix.")
+            sys.exit(1)
+
+
+@dataclass(frozen=True)
+class SafePins:
+    """Put every output of a robot at rest after a crash, as systemd's ExecStopPost."""
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """The robot's profile."""
+
+    def run(self) -> None:
+        """Put the outputs at rest and print failures."""
+        plan = load_profile(find_profile(self.profile)).guard_plan()
+        require_pins(plan)
+        hardware = connect(REAL, "")
+        try:
+            failures = make_safe(plan, hardware)
+        finally:
+            hardware.close()
+        if failures:
+            raise RobotError(
+                "Not everything is at rest: take the battery off. " + " ".join(failures)
+            )
+        say(f"All {len(plan.outputs)} outputs of {plan.name} are at rest.")
+
+
+def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
+    """Refuse a machine without GPIO pins.
+
+    Args:
+        plan: The robot.
+        root: Root of the file system, for tests.
+
+    Raises:
+        RobotError: If an output needs a pin and the machine has none.
+    """
+    if any(map(uses_pins, plan.outputs)) and not any((root / "dev").glob("gpiochip*")):
+        raise RobotError(
+            f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
+            "`shapechanger robot serve --twin` runs it on simulated ones."
+        )

@@ -1,1 +1,0 @@
-"""Fault trials of a robot on its twin, judged by the twin's ledger."""
