@@ -276,21 +276,8 @@ class Reshapable(MujocoEnv):
 
     def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Set the pose (nq,) and the velocities (nv,)."""
-        pose = self._feasible(qpos) if self._starting else qpos
+        pose = self._start_rules().feasible(qpos, self.data) if self._starting else qpos
         cast("Any", super()).set_state(pose, qvel)
-
-    def _feasible(self, drawn: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the feasible start pose next to a drawn one."""
-        rules = self._start_rules()
-        pose = rules.keep_within_limits(drawn)
-        mujoco.mj_normalizeQuat(self.model, pose)
-        if rules.lift is not None:
-            self.data.qpos[:] = pose
-            mujoco.mj_kinematics(self.model, self.data)
-            gap = rules.floor_gap(self.model, self.data)
-            if gap < 0.0:
-                rules.lift.raise_by(pose, -gap)
-        return pose
 
     def _start_rules(self) -> StartRules:
         """Return the rules that make a start pose feasible, for the model as it is now."""

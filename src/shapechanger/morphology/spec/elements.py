@@ -102,7 +102,7 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
         bodies_by_joint: For a joint's name the name of the unnamed body that it moves.
     """
     chosen = bodies_by_joint or {}
-    body_name = _namer(spec.bodies)
+    body_name = unique_namer(body.name for body in spec.bodies)
     for body in limbs_and_trunks(spec):
         if not body.name:
             joint = next((j.name for j in body.joints if j.name), "")
@@ -113,24 +113,29 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
         ("site", spec.sites),
         ("camera", spec.cameras),
     ):
-        free = _namer(elements)
+        free = unique_namer(element.name for element in elements)
         for element in elements:
             element.name = element.name or free(f"{element.parent.name}_{kind}")
-    free = _namer(spec.actuators)
+    free = unique_namer(actuator.name for actuator in spec.actuators)
     for actuator in spec.actuators:
         actuator.name = actuator.name or free(actuator.target)
 
 
-def _namer(elements: Iterable[_Named]) -> Callable[[str], str]:
-    """A function that gives the name asked for, or the next free one after it."""
-    taken = {element.name for element in elements}
+def unique_namer(taken: Iterable[str], numbered: str = "_{}") -> Callable[[str], str]:
+    """Return a function that returns the name it is given, numbered if that is taken.
+
+    Args:
+        taken: Names that are taken; so is each name that the function has returned.
+        numbered: Format of the number after the name.
+    """
+    used = set(taken)
 
     def free(name: str) -> str:
         candidate, count = name, 1
-        while candidate in taken:
+        while candidate in used:
             count += 1
-            candidate = f"{name}_{count}"
-        taken.add(candidate)
+            candidate = name + numbered.format(count)
+        used.add(candidate)
         return candidate
 
     return free
