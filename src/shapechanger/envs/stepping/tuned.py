@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.reshapable import Reshapable
+from shapechanger.envs.reshapable import BAD_STATE, Reshapable
 from shapechanger.envs.stepping.fast_model import find_fast_model, known_fast_model
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.pose import StartRules
@@ -66,10 +66,6 @@ def paused_timer() -> AbstractContextManager[None]:
 # Result of `step`; Gymnasium's own steps promise that they never truncate.
 StepResult = tuple[NDArray[np.float64], Any, bool, Literal[False], dict[str, Any]]
 
-# The warnings of a bad position, velocity or acceleration are neighbours in `data.warning`.
-_BAD_STATE: Final = slice(
-    int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1
-)
 NO_WARNINGS: Final = [0, 0, 0]
 """`Binding.warnings` of a simulation that has not diverged."""
 
@@ -133,7 +129,7 @@ class Binding:
         self.ctrl = data.ctrl
         self.qpos = data.qpos
         self.qvel = data.qvel
-        self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[_BAD_STATE]
+        self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[BAD_STATE]
         self.kind: str | None = None
         self.valid = False
 

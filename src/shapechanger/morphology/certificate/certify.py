@@ -68,12 +68,12 @@ class Certificate(msgspec.Struct, frozen=True):
         """Verdict in one sentence."""
         if self.is_empty and self.source_fingerprint != self.target_fingerprint:
             return (
-                f"{self.source} and {self.target} do the same: their models and their first steps "
+                f"{self.source} and {self.target} behave alike: their models and their first steps "
                 "differ by rounding only."
             )
         if self.is_empty:
             return (
-                f"{self.source} and {self.target} do the same: both models have the fingerprint "
+                f"{self.source} and {self.target} behave alike: both models have the fingerprint "
                 f"{self.source_fingerprint}, and {self.rollout.steps} steps gave the same numbers."
             )
         if self.same_model:
@@ -86,7 +86,7 @@ class Certificate(msgspec.Struct, frozen=True):
                 f"The models of {self.source} and {self.target} differ, but "
                 f"{self.rollout.steps} steps did not show it."
             )
-        return f"{self.target} does something else than {self.source}."
+        return f"{self.target} behaves differently from {self.source}."
 
     def __str__(self) -> str:
         """Return the certificate as text; a change that several elements share is listed once."""
