@@ -25,7 +25,7 @@ from shapechanger.morphology.spec.geometry import (
     require_geometry,
     scale_mass,
     stretch_segment,
-    thicken_segment,
+    thicken_geom,
 )
 
 if TYPE_CHECKING:
@@ -237,7 +237,8 @@ class Radius(Edit, frozen=True):
         factor = part_of_the_way(1.0, self.factor, self.amount)
         for body in select("body", self.body, limbs_and_trunks(spec)):
             require_geometry(spec, body)
-            thicken_segment(spec, body, factor)
+            for geom in body.geoms:
+                thicken_geom(spec, geom, factor)
 
 
 # Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.

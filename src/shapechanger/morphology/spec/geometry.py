@@ -174,8 +174,14 @@ def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: 
     _keep_density(spec, geom, before)
 
 
-def _thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
-    """Scale the thickness of a geom: its radius, or its two smaller half-sizes."""
+def thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
+    """Scale the thickness of a geom: its radius, or its two smaller half-sizes.
+
+    Args:
+        spec: Specification that contains it.
+        geom: The geom.
+        factor: New thickness over the old one.
+    """
     before = volume(spec, geom)
     size = np.array(geom.size)
     if geom.type in (*_LONG, _G.mjGEOM_SPHERE) or has_ends(geom):
@@ -328,18 +334,6 @@ def _carry_outwards(
     for child in body.bodies:
         held_there = held_at(spec, child)
         child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
-
-
-def thicken_segment(spec: mujoco.MjSpec, body: mujoco.MjsBody, factor: float) -> None:
-    """Scale the thickness of every geom of a body, at the same length.
-
-    Args:
-        spec: Specification that contains it.
-        body: The body.
-        factor: New thickness over the old one.
-    """
-    for geom in body.geoms:
-        _thicken_geom(spec, geom, factor)
 
 
 def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
