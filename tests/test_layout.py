@@ -90,7 +90,7 @@ def test_features_print_with_their_unit() -> None:
         ({"gain": -1.0}, "gain must be above zero"),
         ({"gain": math.nan}, "gain must be above zero"),
         ({"gain": math.inf}, "gain must be above zero"),
-        ({"shape": (2, 0)}, r"shape \(2, 0\) holds a number below one"),
+        ({"shape": (2, 0)}, r"shape \(2, 0\) has a number below one"),
     ],
 )
 def test_impossible_features_are_refused(wrong: dict[str, Any], message: str) -> None:
@@ -101,7 +101,7 @@ def test_impossible_features_are_refused(wrong: dict[str, Any], message: str) ->
 
 def test_names_are_unique() -> None:
     """A name that stands for two numbers stands for none."""
-    with pytest.raises(LayoutError, match="Two features are called 'eye/image'"):
+    with pytest.raises(LayoutError, match="Two features have the name 'eye/image'"):
         Layout((HINGE, EYE, SPEED, EYE))
 
 

@@ -113,8 +113,8 @@ def test_a_sentence_says_what_to_install(broken: str) -> None:
     run = run_python(_installed(**libraries) + broken + _CHOOSE)
     assert run.returncode == 1
     assert run.stderr.splitlines()[-1] == (
-        "shapechanger.errors.RenderError: There is no screen, and neither EGL nor OSMesa to draw "
-        "without one: on Debian or Ubuntu run `apt-get install libegl1 libgl1-mesa-dri`, or "
+        "shapechanger.errors.RenderError: There is no screen, and neither EGL nor OSMesa works: "
+        "on Debian or Ubuntu run `apt-get install libegl1 libgl1-mesa-dri`, or "
         "libosmesa6."
     )
 
@@ -130,8 +130,8 @@ def test_a_choice_that_does_not_draw_is_refused(choice: str) -> None:
     """The sentence names those that do."""
     run = run_python(_CHOOSE, MUJOCO_GL=choice)
     assert run.stderr.splitlines()[-1] == (
-        f"shapechanger.errors.RenderError: MUJOCO_GL={choice} draws nothing here: set it to one of "
-        "egl, osmesa, glfw, or not at all."
+        f"shapechanger.errors.RenderError: With MUJOCO_GL={choice} nothing can be drawn: set it to "
+        "one of egl, osmesa, glfw, or unset it."
     )
 
 

@@ -254,9 +254,9 @@ _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
     (Strong, names_every_number, "bounds of the action layout"),
     (Chooser, names_every_number, "action layout has 1 numbers, its space Discrete"),
     (Holding, pickles, "cannot be copied: cannot pickle 'generator' object"),
-    (Changed, pickles, "copy of the env does something else"),
-    (Richer, pickles, "copy of the env does something else"),
-    (Brief, pickles, "copy of the env does something else"),
+    (Changed, pickles, "copy of the env behaves differently"),
+    (Richer, pickles, "copy of the env behaves differently"),
+    (Brief, pickles, "copy of the env behaves differently"),
     (Vague, reward_is_the_sum_of_its_terms, "reports no reward terms"),
     (Generous, reward_is_the_sum_of_its_terms, "its terms add up to"),
     (Still, starts_where_it_may, "Every start is the same"),
@@ -313,7 +313,7 @@ def test_a_spec_that_makes_another_env_is_found() -> None:
             env.unwrapped.spec.entry_point = f"{__name__}:Generous"
             return env
 
-        with pytest.raises(BrokenPromise, match="does something else"):
+        with pytest.raises(BrokenPromise, match="behaves differently"):
             pickles(make)
     finally:
         del gym.registry["testing_test/Walk-v0"]

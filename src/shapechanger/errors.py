@@ -1,4 +1,4 @@
-"""Exceptions. Each message is one sentence that names what exists instead.
+"""Exceptions. Each message is one sentence with the names that exist, or the way out.
 
 ```
 ShapechangerError
@@ -104,27 +104,27 @@ class VectorEnvError(ShapechangerError, ValueError):
 
 
 class FingerError(ShapechangerError, ValueError):
-    """A finger that cannot be built as it was asked for, or cannot do what it should."""
+    """Finger that cannot be built or moved as requested."""
 
 
 class WorldError(ShapechangerError, ValueError):
-    """A world to drive in that cannot be laid out as it was asked for."""
+    """World that cannot be laid out as requested."""
 
 
 class PathError(ShapechangerError, ValueError):
-    """A path for a fingertip that cannot be made, or read, as it was asked for."""
+    """Fingertip path that cannot be made, or read, as requested."""
 
 
 class MapError(ShapechangerError, ValueError):
-    """A body map that cannot be built, inverted or composed."""
+    """Body map that cannot be built, inverted or composed."""
 
 
 class TransplantError(ShapechangerError, ValueError):
-    """A policy whose weights cannot be moved to the target's shapes."""
+    """Policy whose weights cannot be transplanted to the target's shapes."""
 
 
 class StudyError(ShapechangerError, ValueError):
-    """A study that cannot start as it was asked for."""
+    """Study that cannot start as requested."""
 
 
 class FailedRuns(StudyError):
@@ -132,11 +132,11 @@ class FailedRuns(StudyError):
 
 
 class ForeignStudy(StudyError):
-    """The output folder belongs to something else."""
+    """Output folder of something else than the study."""
 
 
 class CorruptStudy(StudyError):
-    """A file of the study cannot be read."""
+    """Unreadable file of a study."""
 
 
 class DemosError(ShapechangerError, ValueError):
@@ -144,15 +144,15 @@ class DemosError(ShapechangerError, ValueError):
 
 
 class BrokenEpisode(DemosError):
-    """An episode that is not whole."""
+    """Incomplete episode; the message has the command that repairs it."""
 
 
 class LinkError(ShapechangerError, ConnectionError):
-    """A robot that cannot be reached, or that does not understand."""
+    """Robot that cannot be reached or breaks the protocol."""
 
 
 class RobotRefused(LinkError):
-    """The robot says no; the message says why."""
+    """The robot refuses; the message is its reason."""
 
 
 class StaleObservation(LinkError):
@@ -160,19 +160,19 @@ class StaleObservation(LinkError):
 
 
 class RobotError(ShapechangerError, RuntimeError):
-    """A device of the robot does not answer, or answers nonsense."""
+    """Error on the robot, such as a device that does not respond."""
 
 
 class ProfileError(RobotError, ValueError):
-    """A profile that contradicts itself; the message names the file and the line."""
+    """Invalid profile; the message names the file and the line."""
 
 
 class OutputError(ShapechangerError, OSError):
-    """A file or folder that cannot be written."""
+    """File or folder that cannot be written."""
 
 
 class RenderError(ShapechangerError, RuntimeError):
-    """No picture can be drawn here."""
+    """Rendering is not possible here."""
 
 
 class MissingExtra(ShapechangerError, ImportError):
@@ -192,12 +192,12 @@ class MissingExtra(ShapechangerError, ImportError):
         )
 
     def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str]]:
-        """Let the error cross from a worker process: it is made from two arguments, not one."""
+        """Pickle the error with its two arguments, for worker processes."""
         return type(self), (self.package, self.extra)
 
 
 def _listed(names: tuple[str, ...]) -> str:
-    """The names in one line, at most forty of them."""
+    """List names in one line, at most forty of them."""
     if not names:
         return "none"
     shown = ", ".join(names[:_MOST_NAMES_LISTED])

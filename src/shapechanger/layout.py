@@ -1,7 +1,7 @@
 """Layouts: the meaning of each number of an observation or an action.
 
-A `Layout` is an ordered list of `Feature`s. Every embodiment, simulated or real, publishes two:
-one for what it senses and one for what it moves. Transfer is a map between two layouts.
+A `Layout` is an ordered list of `Feature`s. Every embodiment, simulated or real, has two: one of
+its observations and one of its actions. A body map maps between two layouts.
 
 >>> layout = Layout((Feature("hinge/angle", "rad", -1.6, 1.6), Feature("hinge/velocity", "rad/s")))
 >>> layout.size, layout.names
@@ -32,8 +32,8 @@ class Element(msgspec.Struct, frozen=True):
     """The part of the embodiment that a feature belongs to.
 
     Attributes:
-        kind: What it is; "task" for a number that belongs to no part, such as a goal.
-        name: Its name in the model or in the robot's profile.
+        kind: Kind of part; "task" for a number that belongs to no part, such as a goal.
+        name: Name in the model or in the robot's profile.
     """
 
     kind: ElementKind
@@ -45,19 +45,19 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
 
     Attributes:
         name: Path from the element to the quantity, such as `hip_1/angle` or `shank_4/contact/fx`.
-        unit: SI unit of the number as the env gives it; "1" for a pure number.
-        low: Smallest value, in `unit`; minus infinity where there is none. A joint's limit is soft:
-            a contact or a motor can press it a little beyond.
-        high: Largest value, in `unit`.
+        unit: SI unit of the number as the env returns it; "1" for a dimensionless number.
+        low: Smallest value, in `unit`; minus infinity for none. Limits of joints are soft: a
+            contact or a motor can press a joint a little beyond them.
+        high: Largest value, in `unit`; infinity for none.
         element: The body, joint, actuator or other part that the feature belongs to.
         shape: () for one number; the shape of the block otherwise, such as (120, 160, 3).
-        gain: What one unit of an action does, in `gain_unit`: 150 for a motor whose control of 1
-            gives 150 N·m. 1 for anything that is not an action.
-        gain_unit: Unit of `gain` times the feature; empty for anything that is not an action.
+        gain: Effect of one unit of an action, in `gain_unit`: 150 for a motor whose control of 1
+            is a torque of 150 N·m; 1 for observations.
+        gain_unit: Unit of `gain` times the feature; empty for observations.
 
     Raises:
         LayoutError: If the name is empty, the range is empty or NaN, the gain is not finite and
-            above zero, or the shape holds a number below one.
+            above zero, or the shape has a number below one.
     """
 
     name: str
@@ -72,32 +72,32 @@ class Feature(msgspec.Struct, frozen=True, omit_defaults=True):
     def __post_init__(self) -> None:
         if not self.name:
             raise LayoutError("A feature needs a name.")
-        # Also refuses NaN, and ranges that hold no finite number, which JSON could not tell apart.
+        # Also refuses NaN, and ranges without finite numbers, which JSON cannot distinguish.
         if not self.low <= self.high or self.low == math.inf or self.high == -math.inf:
             raise LayoutError(f"{self.name}: the range {self.low} to {self.high} is empty.")
         if not (math.isfinite(self.gain) and self.gain > 0.0):
             raise LayoutError(f"{self.name}: the gain must be above zero, got {self.gain}.")
         if any(n < 1 for n in self.shape):
-            raise LayoutError(f"{self.name}: the shape {self.shape} holds a number below one.")
-        # JSON has no infinity, so infinite bounds are left out; msgspec leaves out what *is* the
-        # default, not what equals it.
+            raise LayoutError(f"{self.name}: the shape {self.shape} has a number below one.")
+        # JSON has no infinity, so infinite bounds are omitted; msgspec omits values that are
+        # identical to the default, not equal to it.
         if self.low == _LOWEST:
             msgspec.structs.force_setattr(self, "low", _LOWEST)
         if self.high == _HIGHEST:
             msgspec.structs.force_setattr(self, "high", _HIGHEST)
 
     def __str__(self) -> str:
-        """The name with its unit, as in `torso/z [m]`."""
+        """Return the name with its unit, as in `torso/z [m]`."""
         return f"{self.name} [{self.unit}]"
 
     @property
     def size(self) -> int:
-        """Size of the feature."""
+        """Number of values."""
         return math.prod(self.shape)
 
     @property
     def middle(self) -> float:
-        """The middle of the range; 0, or the bound nearest to it, where the range is unbounded."""
+        """The middle of the range; 0, or the bound nearest to it, if a bound is infinite."""
         if math.isfinite(self.low) and math.isfinite(self.high):
             return 0.5 * (self.low + self.high)
         return min(max(0.0, self.low), self.high)
@@ -110,7 +110,7 @@ class Layout(msgspec.Struct, frozen=True):
         features: The features; a block of n numbers takes n places, in C order.
 
     Raises:
-        LayoutError: If two features bear the same name.
+        LayoutError: If two features have the same name.
     """
 
     features: tuple[Feature, ...]
@@ -119,14 +119,14 @@ class Layout(msgspec.Struct, frozen=True):
         names = self.names
         if len(set(names)) != len(names):
             twice = next(name for i, name in enumerate(names) if name in names[:i])
-            raise LayoutError(f"Two features are called {twice!r}.")
+            raise LayoutError(f"Two features have the name {twice!r}.")
 
     def __len__(self) -> int:
-        """The number of features, which is `size` only where no feature is a block."""
+        """Return the number of features; it equals `size` if no feature is a block."""
         return len(self.features)
 
     def __iter__(self) -> Iterator[Feature]:
-        """The features in order."""
+        """Iterate over the features in order."""
         return iter(self.features)
 
     def __contains__(self, name: object) -> bool:
@@ -137,7 +137,7 @@ class Layout(msgspec.Struct, frozen=True):
         return False
 
     def __getitem__(self, name: str) -> Feature:
-        """The feature of this name.
+        """Return the feature of this name.
 
         Raises:
             UnknownName: If there is none.
@@ -159,7 +159,7 @@ class Layout(msgspec.Struct, frozen=True):
 
     @property
     def slices(self) -> dict[str, slice]:
-        """For each name the places that it takes in the flat vector."""
+        """Indices in the flat vector by name."""
         places: dict[str, slice] = {}
         start = 0
         for feature in self.features:
@@ -178,7 +178,7 @@ class Layout(msgspec.Struct, frozen=True):
         return self._per_number([feature.high for feature in self.features])
 
     def matching(self, pattern: str) -> tuple[Feature, ...]:
-        """The features whose name is `pattern` or fits it as a glob, such as `hip_*/angle`.
+        """Return the features whose name is `pattern` or matches it, such as `hip_*/angle`.
 
         Raises:
             UnknownName: If there is none.
@@ -191,7 +191,7 @@ class Layout(msgspec.Struct, frozen=True):
         return found
 
     def to_json(self) -> str:
-        """The layout as JSON; infinite bounds are left out."""
+        """Return the layout as JSON; infinite bounds are omitted."""
         return msgspec.json.encode(self).decode()
 
     @classmethod

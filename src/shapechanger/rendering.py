@@ -1,4 +1,4 @@
-"""Choosing how MuJoCo draws where there is no screen."""
+"""Choose the OpenGL library with which MuJoCo draws, and check that it works."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any, Final
 from shapechanger.errors import RenderError
 
 _LIBRARIES: Final = ("egl", "osmesa", "glfw")
-# What else MuJoCo takes for MUJOCO_GL, to draw with GLFW or not at all; else it does not load.
+# Other values of MUJOCO_GL, for GLFW or for no drawing; with any other MuJoCo does not load.
 _OTHER_VALUES: Final = (
     *("", "enable", "enabled", "on", "true", "1", "glx", "wgl", "cgl"),
     *("disable", "disabled", "off", "false", "0"),
@@ -22,7 +22,7 @@ _OTHER_VALUES: Final = (
 # From the Khronos registry: EGL_EXT_platform_device.
 _EGL_PLATFORM_DEVICE_EXT: Final = 0x313F
 _MOST_DEVICES: Final = 16
-# Pixels of a context that is only tried.
+# Width and height of a context that is only a test, pixels.
 _PROBE: Final = 16
 
 
@@ -34,10 +34,10 @@ def has_screen() -> bool:
 
 
 def require_screen() -> None:
-    """Refuse to open a window where there is no screen; GLFW would end the process.
+    """Require that a window can be opened; GLFW would end the process otherwise.
 
     Raises:
-        RenderError: If there is none, or it does not open.
+        RenderError: If there is no screen, or no window opens.
     """
     if not has_screen():
         raise RenderError(
@@ -48,10 +48,10 @@ def require_screen() -> None:
 
 
 def choose_gl() -> None:
-    """Set `MUJOCO_GL` to EGL or OSMesa where there is no screen and nobody has set it.
+    """Set `MUJOCO_GL` to EGL or OSMesa if there is no screen and it is not set.
 
     Raises:
-        RenderError: If neither works, or somebody has set it to what cannot draw.
+        RenderError: If neither works, or it is set to a value with which nothing is drawn.
     """
     chosen = os.environ.get("MUJOCO_GL", "")
     if chosen and chosen not in _LIBRARIES:
@@ -64,16 +64,16 @@ def choose_gl() -> None:
         os.environ["MUJOCO_GL"] = "osmesa"
     else:
         raise RenderError(
-            "There is no screen, and neither EGL nor OSMesa to draw without one: on Debian or "
+            "There is no screen, and neither EGL nor OSMesa works: on Debian or "
             "Ubuntu run `apt-get install libegl1 libgl1-mesa-dri`, or libosmesa6."
         )
 
 
 def require_known_gl() -> None:
-    """Refuse a `MUJOCO_GL` with which MuJoCo would not load.
+    """Require a `MUJOCO_GL` with which MuJoCo can be imported.
 
     Raises:
-        RenderError: If it is so.
+        RenderError: If it has an unknown value.
     """
     chosen = os.environ.get("MUJOCO_GL", "").lower().strip()
     if chosen not in (*_LIBRARIES, *_OTHER_VALUES):
@@ -81,9 +81,9 @@ def require_known_gl() -> None:
 
 
 def require_context() -> None:
-    """Open a context of what draws without a window, and close it again.
+    """Require that a context for drawing without a window opens.
 
-    MuJoCo's own errors come late, of many kinds, and GLFW gives none at all.
+    MuJoCo's own errors are late and of many kinds, and GLFW reports none.
 
     Raises:
         RenderError: If none opens.
@@ -95,13 +95,14 @@ def require_context() -> None:
 
 
 def open_context(width: int, height: int) -> Any:
-    """A context of what draws without a window, which is current from now on.
+    """Open a context for drawing without a window, and make it current.
 
-    `mujoco.GLContext` is what `MUJOCO_GL` said when MuJoCo was imported, and not what it says now.
+    `mujoco.GLContext` is that of `MUJOCO_GL` when MuJoCo was imported; this is that of its present
+    value.
 
     Args:
-        width: In pixels.
-        height: In pixels.
+        width: Width, pixels.
+        height: Height, pixels.
 
     Raises:
         RenderError: If none opens.
@@ -110,10 +111,10 @@ def open_context(width: int, height: int) -> Any:
     try:
         context: Any = import_module(f"mujoco.{library}").GLContext(width, height)
         context.make_current()
-    except Exception as error:  # Of PyOpenGL, ctypes or MuJoCo, by what is missing.
+    except Exception as error:  # Of PyOpenGL, ctypes or MuJoCo, depending on what is missing.
         raise RenderError(
-            f"MUJOCO_GL={library} does not draw here ({_first_line(error)}): set it to one of "
-            f"{', '.join(_LIBRARIES)}, or not at all."
+            f"MUJOCO_GL={library} does not work here ({_first_line(error)}): set it to one of "
+            f"{', '.join(_LIBRARIES)}, or unset it."
         ) from error
     return context
 
@@ -124,21 +125,21 @@ def _library() -> str:
 
 def _no_library(chosen: str) -> RenderError:
     return RenderError(
-        f"MUJOCO_GL={chosen} draws nothing here: set it to one of {', '.join(_LIBRARIES)}, or not "
-        "at all."
+        f"With MUJOCO_GL={chosen} nothing can be drawn: set it to one of {', '.join(_LIBRARIES)}, "
+        "or unset it."
     )
 
 
 def _require_glfw() -> None:
-    """Open a hidden window, and close it again.
+    """Require that GLFW opens a window.
 
     Raises:
-        RenderError: If it does not open.
+        RenderError: If it opens none.
     """
     try:
         glfw: Any = import_module("glfw")
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # What it says is in the error below.
+            warnings.simplefilter("ignore")  # The error below has the reason.
             window = None
             if glfw.init() and glfw.get_primary_monitor():
                 glfw.window_hint(glfw.VISIBLE, False)
@@ -147,12 +148,12 @@ def _require_glfw() -> None:
             if window:
                 glfw.destroy_window(window)
                 return
-    except ImportError as error:  # Its library is not there.
+    except ImportError as error:  # Its library is missing.
         raise RenderError(f"GLFW opens no window here: {_first_line(error)}.") from error
     display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or ""
     where = f" on the display {display}" if display else ""
     raise RenderError(
-        f"GLFW opens no window{where}: set DISPLAY to a display that is there, or unset it and "
+        f"GLFW opens no window{where}: set DISPLAY to an existing display, or unset it and "
         "MUJOCO_GL to draw without a screen."
     )
 
@@ -169,7 +170,7 @@ def _egl_works() -> bool:
         return False
     try:
         egl = ctypes.CDLL(name)
-    except OSError:  # Found, and built for another machine.
+    except OSError:  # Built for another machine.
         return False
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     query = egl.eglGetProcAddress(b"eglQueryDevicesEXT")

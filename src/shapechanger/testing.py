@@ -1,8 +1,8 @@
-"""The exam that every env sits, for the tests of Shapechanger and of those who bring an env.
+"""Checks that every env must pass, for the tests of Shapechanger and of third-party envs.
 
 >>> from shapechanger.testing import examine
->>> for promise in examine(lambda: gym.make("shapechanger/Ant-v1")):
-...     print(promise)
+>>> for check in examine(lambda: gym.make("shapechanger/Ant-v1")):
+...     print(check)
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from shapechanger.errors import LayoutError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import layouts_of
 
-# Makes a fresh env.
 MakeEnv = Callable[[], gym.Env[Any, Any]]
+"""Makes a new env."""
 
-# Observations, each with the reward that came with it.
+# Observations with their rewards.
 _Rollout = list[tuple[Any, float]]
 
 _STEPS: Final = 50
 _SEED: Final = 7
-# A number of single precision may be a rounding beyond its limit.
+# A number of single precision may exceed its limit by rounding.
 _ROUNDING: Final = 1e-6
 
 
 class BrokenPromise(ShapechangerError, AssertionError):
-    """An env does not do what learners rely on."""
+    """An env breaks a rule that learners rely on."""
 
 
 def _require(kept: bool, sentence: str) -> None:
@@ -47,7 +47,7 @@ def passes_gymnasiums_checker(make: MakeEnv) -> None:
     """Passes Gymnasium's `check_env`."""
     env = make()
     with warnings.catch_warnings():
-        # Advice on spaces of another range than -1 to 1 is not about a broken promise.
+        # Advice on spaces with another range than -1 to 1 is no failure.
         warnings.filterwarnings("ignore", message=".*symmetric and normalized space.*")
         warnings.filterwarnings("ignore", message=".*(minimum|maximum) value is -?infinity.*")
         try:
@@ -64,7 +64,7 @@ def is_deterministic(make: MakeEnv) -> None:
 
 
 def shares_no_memory(make: MakeEnv) -> None:
-    """A learner may keep an observation: the next step does not change it."""
+    """Observations share no memory, so a learner may keep them."""
     observations = [observation for observation, _ in _rollout(make())]
     for before, after in pairwise(observations):
         for x, y in product(_arrays(before), _arrays(after)):
@@ -79,7 +79,7 @@ def names_every_number(make: MakeEnv) -> None:
         ("observation", observation, env.observation_space),
         ("action", action, env.action_space),
     ):
-        # A picture is one block of a layout, and so is what is in a Dict.
+        # A picture is one block of a layout, and so is each part of a Dict.
         kinds = (gym.spaces.Box, gym.spaces.Dict)[: 2 if side == "observation" else 1]
         _require(
             isinstance(space, kinds) and gym.spaces.flatdim(space) == layout.size,
@@ -94,23 +94,23 @@ def names_every_number(make: MakeEnv) -> None:
 
 
 def pickles(make: MakeEnv) -> None:
-    """A pickled env, and one made from the spec's JSON, is the same env."""
+    """A pickled env, and one made from the JSON of its spec, behave like the env."""
     env = make()
     try:
         again = [pickle.loads(pickle.dumps(env))]
         if env.spec is not None:
             again.append(gym.make(EnvSpec.from_json(env.spec.to_json())))
-    except Exception as error:  # Whatever the env holds may refuse in its own way.
+    except Exception as error:  # Any attribute of the env may fail in its own way.
         raise BrokenPromise(f"The env cannot be copied: {error}") from error
     played = _rollout(env)
     for other in again:
-        _require(_same(played, _rollout(other)), "A copy of the env does something else.")
+        _require(_same(played, _rollout(other)), "A copy of the env behaves differently.")
 
 
 def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
-    """The reward is the sum of the terms that `info` reports.
+    """The reward is the sum of the terms in `info`.
 
-    Those are called `reward_...`, or `..._penalty` as Gymnasium calls costs that are below zero.
+    Their names are `reward_...`, or `..._penalty` as of negative costs in Gymnasium.
     """
     env = make()
     env.reset(seed=_SEED)
@@ -121,7 +121,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
             float(value)
             for name, value in info.items()
             if (name.startswith("reward_") or name.endswith("_penalty"))
-            and not isinstance(value, Mapping)  # Such as all terms in one, or what they rest on.
+            and not isinstance(value, Mapping)  # Such as all terms together, or their sources.
         ]
         _require(bool(terms), "info reports no reward terms.")
         _require(
@@ -134,7 +134,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
 
 
 def starts_where_it_may(make: MakeEnv) -> None:
-    """Starts differ from seed to seed and lie within the ranges that the layout states."""
+    """Starts differ between seeds and are within the ranges of the layout."""
     env = make()
     observation, _ = _layouts(env)
     space = env.observation_space
@@ -166,16 +166,16 @@ PROMISES: Final[tuple[Callable[[MakeEnv], None], ...]] = (
 
 
 def examine(make: MakeEnv) -> Iterator[str]:
-    """Put an env through its exam.
+    """Check an env.
 
     Args:
-        make: Makes a fresh env; called several times.
+        make: Makes a new env; called several times.
 
     Yields:
-        Each promise, in words, when it was found kept.
+        A description of each check that the env has passed.
 
     Raises:
-        BrokenPromise: At the first that is not.
+        BrokenPromise: If the env fails a check.
     """
     for promise in PROMISES:
         promise(make)
@@ -191,7 +191,7 @@ def _layouts(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
 
 
 def _same(first: _Rollout, second: _Rollout) -> bool:
-    """Return whether two rollouts are the same to the last bit, and equally long."""
+    """Return whether two rollouts are equal to the last bit."""
     return len(first) == len(second) and all(
         all(map(np.array_equal, _arrays(x), _arrays(y))) and reward_x == reward_y
         for (x, reward_x), (y, reward_y) in zip(first, second, strict=True)
@@ -199,7 +199,7 @@ def _same(first: _Rollout, second: _Rollout) -> bool:
 
 
 def _arrays(observation: Any) -> list[Any]:
-    """The arrays of an observation, of which a Dict has several."""
+    """Return the arrays of an observation, of which a Dict has several."""
     if isinstance(observation, Mapping):
         parts = cast("Mapping[str, Any]", observation)
         return [array for name in sorted(parts) for array in _arrays(parts[name])]
@@ -207,7 +207,7 @@ def _arrays(observation: Any) -> list[Any]:
 
 
 def _rollout(env: gym.Env[Any, Any]) -> _Rollout:
-    """Observations and rewards under the same random actions; the env is closed."""
+    """Return observations and rewards under seeded random actions, and close the env."""
     observation, _ = env.reset(seed=_SEED)
     env.action_space.seed(_SEED)
     result: _Rollout = [(observation, 0.0)]

@@ -51,7 +51,7 @@ def test_an_encoding_without_the_letters_is_no_error() -> None:
         (
             ["envs", "render", "Ant", "--out", "ant.png"],
             {"MUJOCO_GL": "disable"},
-            "MUJOCO_GL=disable draws nothing here: set it to one of egl, osmesa, glfw",
+            "With MUJOCO_GL=disable nothing can be drawn: set it to one of egl, osmesa, glfw",
         ),
         (["play", "Ant", "--out", "a.mp4"], {"MUJOCO_GL": "nonsense"}, "egl, osmesa, glfw"),
         (

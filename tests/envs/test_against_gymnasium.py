@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.morphology.pose import floor_gap, trunk_lift
+from shapechanger.morphology.pose import StartRules, trunk_lift
 
 
 def _same_info(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
@@ -173,7 +173,7 @@ def test_the_others_start_like_gymnasiums(name: str) -> None:
             theirs.reset(seed=seed)
             np.testing.assert_array_equal(ours.data.qvel, theirs.data.qvel)
             pose, drawn = ours.data.qpos, theirs.data.qpos.copy()
-            raised = lift is not None and floor_gap(theirs.model, theirs.data) < 0.0
+            raised = lift is not None and StartRules(theirs.model).floor_gap(theirs.data) < 0.0
             inside = (drawn[places] >= low) & (drawn[places] <= high)
             untouched += bool(inside.all() and not raised)
             same = np.ones(drawn.size, bool)

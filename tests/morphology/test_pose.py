@@ -10,8 +10,7 @@ from shapechanger.bodies.ant import ANT
 from shapechanger.morphology import JointRange, StartHeight, Stretch
 from shapechanger.morphology.pose import (
     Lift,
-    floor_gap,
-    keep_within_limits,
+    StartRules,
     standing_height,
     start_pose,
     trunk_joint,
@@ -52,7 +51,7 @@ def _ball(floor: str, ball: str = "") -> mujoco.MjModel:
 def test_the_floor_is_what_lies_below(floor: str, gap: float) -> None:
     """Every plane and height field that is fixed to the world; the highest counts."""
     model = _ball(floor)
-    assert floor_gap(model, posed(model)) == pytest.approx(gap)
+    assert StartRules(model).floor_gap(posed(model)) == pytest.approx(gap)
     assert standing_height(model) == pytest.approx(1.0 - gap)
 
 
@@ -68,7 +67,7 @@ def test_the_floor_is_what_lies_below(floor: str, gap: float) -> None:
 def test_what_does_not_touch_is_no_floor(floor: str, ball: str) -> None:
     """Then there is nothing to stand on, and no height to stand at."""
     model = _ball(floor, ball)
-    assert floor_gap(model, posed(model)) == 1000.0
+    assert StartRules(model).floor_gap(posed(model)) == 1000.0
     assert standing_height(model) is None
     np.testing.assert_array_equal(start_pose(model), model.qpos0)
 
@@ -141,7 +140,7 @@ def test_no_foot_starts_in_the_floor(body: str, factor: float) -> None:
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
-    gap = floor_gap(model, data)
+    gap = StartRules(model).floor_gap(data)
     assert gap >= -1e-6
     assert pose[2] == model.qpos0[2] or gap == pytest.approx(0.0, abs=1e-6)
     assert pose[2] >= model.qpos0[2]
@@ -157,19 +156,21 @@ def test_a_pose_is_moved_inside_the_limits() -> None:
     """Hinges and slides to the nearest limit; what has none, and the pose given, stay."""
     model = built(leg(), JointRange("hip", -0.5, 0.5))
     pose = model.qpos0 + 7.0
-    inside = keep_within_limits(model, pose)
+    inside = StartRules(model).keep_within_limits(pose)
     np.testing.assert_array_equal(inside[:7], pose[:7])
     np.testing.assert_allclose(inside[7:], [0.5, 0.0])
     np.testing.assert_array_equal(pose, model.qpos0 + 7.0)
     free = built(gantry())
     far = np.array([5.0, -5.0, 9.0, 9.0, 5.0])
-    np.testing.assert_allclose(keep_within_limits(free, far), [2.0, -1.0, 9.0, 9.0, 2.0])
+    np.testing.assert_allclose(StartRules(free).keep_within_limits(far), [2.0, -1.0, 9.0, 9.0, 2.0])
 
 
 def test_a_body_without_joints_has_a_pose() -> None:
     """An empty one."""
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    assert start_pose(model).shape == keep_within_limits(model, np.zeros(0)).shape == (0,)
+    assert (
+        start_pose(model).shape == StartRules(model).keep_within_limits(np.zeros(0)).shape == (0,)
+    )
     assert standing_height(model) is None
 
 

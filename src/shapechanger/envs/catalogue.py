@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import gymnasium as gym
 import msgspec
@@ -109,94 +109,52 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
         return f"{NAMESPACE}/{self.name}-v1"
 
 
-_PENDULUM: Final = "shapechanger.envs.pendulum:InvertedPendulumEnv"
-_ANT: Final = "shapechanger.envs.ant:AntEnv"
-_EXTENDED_ANT: Final = "shapechanger.envs.ant:ExtendedAntEnv"
-# Gymnasium's own thresholds for InvertedPendulum-v5 and Ant-v5.
-_UP: Final = 950.0
-_RUNS: Final = 6000.0
-
-_RUNNERS: Final = "shapechanger.envs.runners"
-_DOUBLE_PENDULUM: Final = "shapechanger.envs.pendulum"
-
-# Gymnasium's other bodies, unedited: name, summary, module, learner, and the reward threshold of
-# its v5 id.
-_OTHERS: Final = (
-    ("HalfCheetah", "half a cheetah that runs in a plane", _RUNNERS, "ppo-run", 4800.0),
-    ("Hopper", "one leg that hops in a plane", _RUNNERS, "ppo-planar", 3800.0),
-    ("Walker2d", "two legs that walk in a plane", _RUNNERS, "ppo-planar", None),
-    ("Swimmer", "three links that swim", _RUNNERS, "ppo-swim", 360.0),
-    ("Humanoid", "two legs, two arms and a waist", _RUNNERS, "ppo-run", None),
-    ("InvertedDoublePendulum", "two poles on a cart", _DOUBLE_PENDULUM, "ppo-planar", 9100.0),
+# For each family the module and class of its env, the learner settings tuned on it, and the reward
+# threshold of Gymnasium's v5 id.
+_FAMILIES: Final = {
+    "InvertedPendulum": ("pendulum:InvertedPendulumEnv", "ppo-balance", 950.0),
+    "Ant": ("ant:AntEnv", "ppo-run", 6000.0),
+    "HalfCheetah": ("runners:HalfCheetahEnv", "ppo-run", 4800.0),
+    "Hopper": ("runners:HopperEnv", "ppo-planar", 3800.0),
+    "Walker2d": ("runners:Walker2dEnv", "ppo-planar", None),
+    "Swimmer": ("runners:SwimmerEnv", "ppo-swim", 360.0),
+    "Humanoid": ("runners:HumanoidEnv", "ppo-run", None),
+    "InvertedDoublePendulum": ("pendulum:InvertedDoublePendulumEnv", "ppo-planar", 9100.0),
+}
+# Name, family and summary of each body.
+_BODIES: Final = (
+    ("InvertedPendulum", "InvertedPendulum", "a pole of 0.6 m on a cart"),
+    ("SmallInvertedPendulum", "InvertedPendulum", "a pole half as long"),
+    ("BigInvertedPendulum", "InvertedPendulum", "a pole twice as long"),
+    ("Ant", "Ant", "four legs of two joints"),
+    ("AmputatedAnt", "Ant", "one back shank cut to a quarter"),
+    ("BigAnt", "Ant", "all shanks twice as long"),
+    ("ExtendedAnt", "Ant", "a third segment with a motor on each leg"),
+    ("HalfCheetah", "HalfCheetah", "half a cheetah that runs in a plane"),
+    ("Hopper", "Hopper", "one leg that hops in a plane"),
+    ("Walker2d", "Walker2d", "two legs that walk in a plane"),
+    ("Swimmer", "Swimmer", "three links that swim"),
+    ("Humanoid", "Humanoid", "two legs, two arms and a waist"),
+    ("InvertedDoublePendulum", "InvertedDoublePendulum", "two poles on a cart"),
 )
 
+
+def _entry(name: str, family: str, summary: str) -> CatalogueEntry:
+    """Return the entry of a body."""
+    entry_point, learner, threshold = _FAMILIES[family]
+    body = name
+    if name == "ExtendedAnt":  # Its class chooses between two bodies.
+        entry_point, body = "ant:ExtendedAntEnv", ""
+    entry_point = f"shapechanger.envs.{entry_point}"
+    return CatalogueEntry(name, family, summary, entry_point, learner, body, threshold)
+
+
 CATALOGUE: Final[dict[str, CatalogueEntry]] = {
-    entry.id: entry
-    for entry in (
-        CatalogueEntry(
-            "InvertedPendulum",
-            "InvertedPendulum",
-            "a pole of 0.6 m on a cart",
-            _PENDULUM,
-            "ppo-balance",
-            "InvertedPendulum",
-            _UP,
-        ),
-        CatalogueEntry(
-            "SmallInvertedPendulum",
-            "InvertedPendulum",
-            "a pole half as long",
-            _PENDULUM,
-            "ppo-balance",
-            "SmallInvertedPendulum",
-            _UP,
-        ),
-        CatalogueEntry(
-            "BigInvertedPendulum",
-            "InvertedPendulum",
-            "a pole twice as long",
-            _PENDULUM,
-            "ppo-balance",
-            "BigInvertedPendulum",
-            _UP,
-        ),
-        CatalogueEntry("Ant", "Ant", "four legs of two joints", _ANT, "ppo-run", "Ant", _RUNS),
-        CatalogueEntry(
-            "AmputatedAnt",
-            "Ant",
-            "one back shank cut to a quarter",
-            _ANT,
-            "ppo-run",
-            "AmputatedAnt",
-            _RUNS,
-        ),
-        CatalogueEntry(
-            "BigAnt", "Ant", "all shanks twice as long", _ANT, "ppo-run", "BigAnt", _RUNS
-        ),
-        CatalogueEntry(
-            "ExtendedAnt",
-            "Ant",
-            "a third segment with a motor on each leg",
-            _EXTENDED_ANT,
-            "ppo-run",
-            "",
-            _RUNS,
-        ),
-        *(
-            CatalogueEntry(
-                name,
-                name,
-                summary,
-                f"{module}:{name}Env",
-                learner,
-                name,
-                threshold,
-            )
-            for name, summary, module, learner, threshold in _OTHERS
-        ),
-    )
+    entry.id: entry for entry in (_entry(*row) for row in _BODIES)
 }
 
+# Envs whose bodies form no family, except the vehicle on the network.
+_TASK_IDS: Final = (*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS, REMOTE_FINGER)
 _EPISODE_STEPS: Final = 1000
 _RANGES_STEPS: Final = 400  # A learner meets more courses.
 # Families with a fast step of their own, which Gymnasium's wrappers would slow down.
@@ -206,49 +164,39 @@ _TUNED: Final = ("Ant", "InvertedPendulum")
 def register_all() -> None:
     """Register every env of the catalogue with Gymnasium, once."""
     for entry in CATALOGUE.values():
-        if entry.id not in gym.registry:
-            gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
-                entry.id,
-                entry.entry_point,
-                reward_threshold=entry.reward_threshold,
-                max_episode_steps=_EPISODE_STEPS,
-                vector_entry_point=f"shapechanger.envs.vector.entry_points:{entry.name}",
-                # Their own step requires a reset, and the tests check the envs.
-                order_enforce=entry.family not in _TUNED,
-                disable_env_checker=entry.family in _TUNED,
-                kwargs={"body": entry.body} if entry.body else {},
-            )
+        _register(
+            entry.id,
+            entry.entry_point,
+            _EPISODE_STEPS,
+            reward_threshold=entry.reward_threshold,
+            vector_entry_point=f"shapechanger.envs.vector.entry_points:{entry.name}",
+            # Their own step requires a reset, and the tests check the envs.
+            order_enforce=entry.family not in _TUNED,
+            disable_env_checker=entry.family in _TUNED,
+            kwargs={"body": entry.body} if entry.body else {},
+        )
     for envs, kind, limit in (
         (VEHICLE_ENVS, "VehicleEnv", _EPISODE_STEPS),
         (RANGES_ENVS, "RangesEnv", _RANGES_STEPS),
         (WAYPOINT_ENVS, "WaypointEnv", _EPISODE_STEPS),
     ):
         for env_id, (vehicle, _) in envs.items():
-            if env_id not in gym.registry:
-                gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
-                    env_id,
-                    f"shapechanger.envs.vehicle:{kind}",
-                    max_episode_steps=limit,
-                    kwargs={"vehicle": vehicle},
-                )
+            entry_point = f"shapechanger.envs.vehicle:{kind}"
+            _register(env_id, entry_point, limit, kwargs={"vehicle": vehicle})
     for env_id, task in FINGER_ENVS.items():
-        if env_id not in gym.registry:
-            gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
-                env_id, task.entry_point, max_episode_steps=task.episode_steps
-            )
-    if REMOTE_FINGER not in gym.registry:
-        gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
-            REMOTE_FINGER,
-            "shapechanger.envs.remote.finger:RemoteFingerEnv",
-            max_episode_steps=FINGER_ENVS["shapechanger/Finger-v1"].episode_steps,
-            nondeterministic=True,  # A robot.
-        )
-    if REMOTE_VEHICLE not in gym.registry:
-        gym.register(  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
-            REMOTE_VEHICLE,
-            "shapechanger.envs.remote.vehicle:RemoteVehicleEnv",
-            nondeterministic=True,  # A robot.
-        )
+        _register(env_id, task.entry_point, task.episode_steps)
+    remote, reach = "shapechanger.envs.remote", FINGER_ENVS["shapechanger/Finger-v1"]
+    for env_id, entry_point, limit in (
+        (REMOTE_FINGER, f"{remote}.finger:RemoteFingerEnv", reach.episode_steps),
+        (REMOTE_VEHICLE, f"{remote}.vehicle:RemoteVehicleEnv", None),
+    ):
+        _register(env_id, entry_point, limit, nondeterministic=True)  # A robot.
+
+
+def _register(env_id: str, entry_point: str, episode_steps: int | None, **more: Any) -> None:
+    """Register an env unless it is registered already."""
+    if env_id not in gym.registry:
+        gym.register(env_id, entry_point, max_episode_steps=episode_steps, **more)  # pyright: ignore[reportUnknownMemberType]  # Gymnasium's `**kwargs`.
 
 
 def find(env_id: str) -> CatalogueEntry:
@@ -261,18 +209,14 @@ def find(env_id: str) -> CatalogueEntry:
     entry = CATALOGUE.get(f"{NAMESPACE}/{name}-v1")
     if entry is None:
         known = [entry.name for entry in CATALOGUE.values()]
-        others = map(
-            _name, (*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS, REMOTE_FINGER)
-        )
-        raise UnknownName("environment", name, [*known, *others])
+        raise UnknownName("environment", name, [*known, *map(_name, _TASK_IDS)])
     return entry
 
 
 def find_task(env_id: str) -> str | None:
     """Return the id of an env without a family, such as `Car` or `Finger`; None for others."""
     full = f"{NAMESPACE}/{_name(env_id)}-v1"
-    known = (*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS, REMOTE_FINGER)
-    return full if full in known else None
+    return full if full in _TASK_IDS else None
 
 
 def _name(env_id: str) -> str:

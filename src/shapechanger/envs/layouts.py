@@ -76,16 +76,8 @@ def contact_features(model: mujoco.MjModel, low: float, high: float) -> list[Fea
         low: Lower clipping limit, N and N·m.
         high: Upper clipping limit, N and N·m.
     """
-    features: list[Feature] = []
-    for b in range(1, model.nbody):
-        name = model.body(b).name
-        element = Element("body", name)
-        for prefix, unit in (("t", "N·m"), ("f", "N")):
-            features += [
-                Feature(f"{name}/contact/{prefix}{axis}", unit, low, high, element)
-                for axis in "xyz"
-            ]
-    return features
+    quantities = {f"t{axis}": "N·m" for axis in "xyz"} | {f"f{axis}": "N" for axis in "xyz"}
+    return _of_each_body(model, "contact", quantities, low, high)
 
 
 def inertia_features(model: mujoco.MjModel) -> list[Feature]:
@@ -105,8 +97,8 @@ def twist_features(model: mujoco.MjModel) -> list[Feature]:
     `body/twist/wx` ... `wz`, its angular velocity, rad/s, and `vx` ... `vz`, the velocity at the
     centre of mass of the whole of a point fixed to it, m/s.
     """
-    quantities = {"wx": "rad/s", "wy": "rad/s", "wz": "rad/s"}
-    return _of_each_body(model, "twist", quantities | {"vx": "m/s", "vy": "m/s", "vz": "m/s"})
+    quantities = {f"w{axis}": "rad/s" for axis in "xyz"} | {f"v{axis}": "m/s" for axis in "xyz"}
+    return _of_each_body(model, "twist", quantities)
 
 
 def drive_features(model: mujoco.MjModel) -> list[Feature]:
@@ -147,12 +139,17 @@ def action_layout(model: mujoco.MjModel) -> Layout:
 
 
 def _body_of(model: mujoco.MjModel, joint: int) -> tuple[str, Element]:
+    """Return the name of a joint's body, and the body as an element."""
     name = model.body(model.jnt_bodyid[joint]).name
     return name, Element("body", name)
 
 
 def _of_each_body(
-    model: mujoco.MjModel, block: str, quantities: Mapping[str, str]
+    model: mujoco.MjModel,
+    block: str,
+    quantities: Mapping[str, str],
+    low: float = -math.inf,
+    high: float = math.inf,
 ) -> list[Feature]:
     """Return a feature `body/block/quantity` per quantity of each body except the world.
 
@@ -160,10 +157,12 @@ def _of_each_body(
         model: The model.
         block: Name of the block.
         quantities: Unit of each quantity by name.
+        low: Smallest value of all quantities.
+        high: Largest value of all quantities.
     """
     names = [model.body(b).name for b in range(1, model.nbody)]
     return [
-        Feature(f"{name}/{block}/{quantity}", unit, element=Element("body", name))
+        Feature(f"{name}/{block}/{quantity}", unit, low, high, Element("body", name))
         for name in names
         for quantity, unit in quantities.items()
     ]

@@ -40,14 +40,13 @@ if TYPE_CHECKING:
 
 # Distance of the camera from a body that it follows, in multiples of its reach; 3.5 m for the ant.
 _VIEW_DISTANCE_PER_REACH: Final = 3.0
-# MuJoCo's warnings of a position, velocity or acceleration that is huge or not finite.
-_DIVERGED: Final = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
+BAD_STATE: Final = slice(
+    int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1
 )
-# Arguments of every env that Gymnasium's constructors do not have.
-_OWN_ARGUMENTS: Final = {"shadows": None, "fast_model": True, "towards": None}
+"""The warnings in `data.warning` of a bad position, velocity or acceleration."""
+
+# Arguments of every env that Gymnasium's constructors do not have, with their defaults.
+_OWN_ARGUMENTS: Final[dict[str, Any]] = {"shadows": None, "fast_model": True, "towards": None}
 
 
 class Reshapable(MujocoEnv):
@@ -72,7 +71,7 @@ class Reshapable(MujocoEnv):
 
     Attributes:
         family: The bodies that the env can have.
-        body: The edits that make the present body from the family's model.
+        body: The edits of the family's model that make the present body.
         observation_layout: Name, unit and range of each number of the observation.
         action_layout: Name, unit and range of each number of the action.
         standing_height: Height of the trunk above the floor when it stands with each joint in the
@@ -102,12 +101,15 @@ class Reshapable(MujocoEnv):
             EnvArgumentError: If an argument has the wrong type.
         """
         _check_arguments(type(self), self.family.name, arguments)
-        self._shadows: bool | None = arguments.pop("shadows", None)
-        self.fast_model = arguments.pop("fast_model", True)
+        own = {name: arguments.pop(name, default) for name, default in _OWN_ARGUMENTS.items()}
+        self._own_arguments: dict[str, Any] = own
+        self.fast_model = own["fast_model"]
         self.body = self.family.body(body)
-        towards: BodyLike | None = arguments.pop("towards", None)
         # Both ends of the way on which each reset draws a body.
-        self._ends = None if towards is None else (self.body, self.family.body(towards))
+        self._ends: tuple[Body, Body] | None = None
+        if own["towards"] is not None:
+            self._ends = self.body, self.family.body(own["towards"])
+            own["towards"] = to_json(self._ends[1])
         self._body_rng = np.random.default_rng()
         mode = arguments.get("render_mode")
         self._draws = mode is not None
@@ -121,7 +123,7 @@ class Reshapable(MujocoEnv):
             "camera_id": arguments.get("camera_id"),
             "camera_name": arguments.get("camera_name"),
             "visual_options": arguments.get("visual_options"),
-            "shadows": self._shadows,
+            "shadows": own["shadows"],
         }
 
     def _finish(self, arguments: dict[str, Any]) -> None:
@@ -132,15 +134,9 @@ class Reshapable(MujocoEnv):
             shape = (self.observation_layout.size,)
             self.observation_space = gym.spaces.Box(-np.inf, np.inf, shape, np.float64)
         self._renew_renderer()
-        # Gymnasium's constructor has recorded its own arguments; these are ours.
+        # Gymnasium's constructor has recorded its own arguments only.
         self._ezpickle_args: tuple[Any, ...] = ()
-        self._ezpickle_kwargs: dict[str, Any] = {"body": to_json(self.body), **arguments}
-        if self._shadows is not None:
-            self._ezpickle_kwargs["shadows"] = self._shadows
-        if not self.fast_model:
-            self._ezpickle_kwargs["fast_model"] = False
-        if self._ends is not None:
-            self._ezpickle_kwargs["towards"] = to_json(self._ends[1])
+        self._ezpickle_kwargs = {"body": to_json(self.body), **arguments, **self._own_arguments}
 
     # `gym.make`, Minari and vector envs build the env again from its spec.
 
@@ -260,7 +256,7 @@ class Reshapable(MujocoEnv):
 
         MuJoCo then restarts from the model's own pose, unless the model forbids it.
         """
-        return any(self.data.warning[kind].number for kind in _DIVERGED)
+        return bool(cast("Any", self.data.warning).number[BAD_STATE].any())
 
     def reset_model(self) -> NDArray[np.float64]:
         """Draw a start state as Gymnasium does, and make it feasible.
@@ -276,21 +272,8 @@ class Reshapable(MujocoEnv):
 
     def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Set the pose (nq,) and the velocities (nv,)."""
-        pose = self._feasible(qpos) if self._starting else qpos
+        pose = self._start_rules().feasible(qpos, self.data) if self._starting else qpos
         cast("Any", super()).set_state(pose, qvel)
-
-    def _feasible(self, drawn: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the feasible start pose next to a drawn one."""
-        rules = self._start_rules()
-        pose = rules.keep_within_limits(drawn)
-        mujoco.mj_normalizeQuat(self.model, pose)
-        if rules.lift is not None:
-            self.data.qpos[:] = pose
-            mujoco.mj_kinematics(self.model, self.data)
-            gap = rules.floor_gap(self.model, self.data)
-            if gap < 0.0:
-                rules.lift.raise_by(pose, -gap)
-        return pose
 
     def _start_rules(self) -> StartRules:
         """Return the rules that make a start pose feasible, for the model as it is now."""

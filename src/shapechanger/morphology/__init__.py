@@ -1,4 +1,4 @@
-"""Bodies that change shape: a MuJoCo model in, edits as values, another model out.
+"""Bodies that change shape: edits as values turn one MuJoCo model into another.
 
 >>> import mujoco
 >>> from shapechanger.morphology import Cut, Stretch, compile_body, to_json
@@ -12,33 +12,36 @@ from __future__ import annotations
 from shapechanger.errors import MissingExtra
 
 try:
-    import mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]  # Said here, in words.
+    import mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
 except ImportError as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.morphology.body import EDITS, Body, as_body, from_json, interpolate, to_json
-from shapechanger.morphology.edits import (
-    AddLimb,
-    AddSegment,
-    Cut,
+from shapechanger.morphology.body import (
+    EDITS,
+    Body,
+    as_body,
+    compile_body,
+    from_json,
+    interpolate,
+    reshape,
+    to_json,
+)
+from shapechanger.morphology.edits.edit import Edit
+from shapechanger.morphology.edits.joints import JointRange, Lock
+from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
+from shapechanger.morphology.edits.values import (
     Damping,
     Density,
-    Edit,
     Friction,
     Gear,
     Gravity,
-    JointRange,
-    Lock,
     Mass,
     Radius,
-    Remove,
-    Split,
     StartHeight,
     Stiffness,
     Stretch,
 )
-from shapechanger.morphology.reshape import compile_body, reshape
-from shapechanger.morphology.spec import name_elements
+from shapechanger.morphology.spec.elements import name_elements
 
 __all__ = [
     "EDITS",

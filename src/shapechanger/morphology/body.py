@@ -1,4 +1,4 @@
-"""A body as a value: the edits that make it from its family's first body, and the same as JSON.
+"""Bodies as values: edits of a model, their JSON, the bodies between two, and their models.
 
 >>> from shapechanger.morphology import Stretch, to_json
 >>> to_json([Stretch("*shank*", 1.5)])
@@ -13,8 +13,9 @@ from collections.abc import Hashable, Iterable
 from typing import Any, Final, cast
 
 import msgspec
+import mujoco
 
-from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
 from shapechanger.morphology.edits.edit import Edit, Vector
 from shapechanger.morphology.edits.joints import JointRange, Lock
 from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
@@ -30,9 +31,10 @@ from shapechanger.morphology.edits.values import (
     Stiffness,
     Stretch,
 )
+from shapechanger.morphology.spec.explicit import make_explicit
 
-# The edits, in order, that make a body from the first body of its family.
 Body = tuple[Edit, ...]
+"""The edits, in order, that make a body from the model of its family."""
 
 EDITS: Final[tuple[type[Edit], ...]] = (
     *(Stretch, Radius, Cut, Remove, Split, AddSegment, AddLimb),
@@ -44,36 +46,37 @@ _TAGS: Final = {str(edit.__struct_config__.tag): edit for edit in EDITS}
 
 
 def to_json(body: Iterable[Edit]) -> str:
-    """The edits as a JSON list of tagged objects."""
+    """Return the edits as a JSON list of tagged objects."""
     return msgspec.json.encode(list(body)).decode()
 
 
 def from_json(text: str | bytes) -> Body:
-    """Read what `to_json` wrote; a single object is a body of one edit.
+    """Read a body from JSON as `to_json` writes it; a single object is a body of one edit.
 
     Raises:
-        UnknownName: If an edit is of no known kind, or has a field that its kind lacks.
+        UnknownName: If there is no edit of a kind, or no field of a name.
         MorphologyError: If the text is not such a list, or a number is out of its range.
     """
     try:
         parsed: Any = json.loads(text)
-    except (ValueError, RecursionError) as error:  # No JSON, no UTF-8, or nested without end.
+    except (ValueError, RecursionError) as error:  # Not JSON, not UTF-8, or nested too deeply.
         raise MorphologyError(f"A body must be a JSON list of edits: {error}.") from error
     items = cast("list[Any]", parsed if isinstance(parsed, list) else [parsed])
     return tuple(_edit(item) for item in items)
 
 
 def as_body(value: Edit | Iterable[Edit] | str) -> Body:
-    """A body from one edit, several, or their JSON.
+    """Return a body from one edit, several, or their JSON.
 
     Raises:
-        MorphologyError: If it is none of these.
+        UnknownName: As of `from_json`.
+        MorphologyError: If `value` is none of these.
     """
     if isinstance(value, str):
         return from_json(value)
     if isinstance(value, Edit):
         return (value,)
-    given: Any = value  # What a type checker knows, a notebook may not.
+    given: Any = value  # Not checked at run time.
     edits = list(cast("Iterable[Any]", given)) if isinstance(given, Iterable) else [given]
     for edit in edits:
         if not isinstance(edit, Edit):
@@ -84,7 +87,7 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
 
 
 def _edit(item: Any) -> Edit:
-    """One edit from its parsed JSON."""
+    """Return an edit from its parsed JSON."""
     if not isinstance(item, dict) or "edit" not in item:
         raise MorphologyError(f'An edit is an object with the key "edit", got {item!r}.')
     fields = cast("dict[str, Any]", item)
@@ -100,22 +103,23 @@ def _edit(item: Any) -> Edit:
         raise MorphologyError(f"{fields['edit']}: {error}") from error
 
 
-# A motor that only one of two bodies has is there in between, the weaker the farther that body is.
+# A motor that only one of two bodies has exists between them, with a gear that fades to zero.
 _ZERO_WHERE_NONE: Final = frozenset({"gear"})
 
 
 def interpolate(a: Body, b: Body, alpha: float) -> Body:
-    """The body at the part `alpha` of the way from `a` to `b`.
+    """Return a body on the way from `a` to `b`.
 
-    Both ends are exact: 0 gives `a` itself, 1 gives `b` itself. Physical quantities are continuous
-    in `alpha`, but for the inertia of a segment that is split, which jumps by what the rounded ends
-    of its parts make up. Dimensions cannot be: a limb or motor that only `b` has is there, small
-    and weak, from the first step on, and one that `b` lacks stays, ever smaller, until the last.
+    Both ends are exact: 0 returns `a` itself, 1 returns `b` itself. Physical quantities are
+    continuous in `alpha`, except the inertia of a segment that is split, which jumps by that of the
+    rounded ends of its parts. Dimensions cannot be continuous: a limb or motor that only `b` has
+    exists, small and weak, for every `alpha` above 0, and one that only `a` has, ever smaller, for
+    every `alpha` below 1.
 
     Args:
-        a: Where the path begins.
-        b: Where it ends, made from the same first body as `a`.
-        alpha: The part of the way, 0 to 1.
+        a: Body at 0.
+        b: Body at 1, made from the same model as `a`.
+        alpha: Position on the way, 0 to 1.
 
     Raises:
         MorphologyError: If `alpha` lies outside [0, 1].
@@ -137,21 +141,17 @@ def interpolate(a: Body, b: Body, alpha: float) -> Body:
 
 
 def _key(edit: Edit) -> Hashable:
-    """Return the part of an edit that is equal at different strengths: all but its numbers."""
+    """Return what two edits must share to be interpolated: everything but their numbers."""
     values: dict[str, Any] = msgspec.structs.asdict(edit)
     return type(edit), tuple(
-        (k, None if _is_number(v) else v)
-        for k, v in values.items()
-        if v is not None and k not in _ZERO_WHERE_NONE
+        (name, None if isinstance(value, int | float | tuple) else value)
+        for name, value in values.items()
+        if value is not None and name not in _ZERO_WHERE_NONE
     )
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | tuple)
-
-
 def _between(x: Edit, y: Edit, alpha: float) -> Edit:
-    """The edit between two that differ in numbers only."""
+    """Return the edit between two that differ in numbers only."""
     changes: dict[str, Any] = {}
     for field in x.__struct_fields__:
         old: Any = getattr(x, field)
@@ -166,3 +166,46 @@ def _between(x: Edit, y: Edit, alpha: float) -> Edit:
         else:
             changes[field] = old + alpha * (new - old)
     return msgspec.structs.replace(x, **changes)
+
+
+def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
+    """Return a copy of a specification with edits applied.
+
+    Args:
+        spec: The specification; not changed.
+        edits: The edits, applied in order.
+
+    Raises:
+        UnknownName: If an edit names an element that the model lacks.
+        MorphologyError: If an element cannot be changed that way.
+    """
+    result = spec.copy()
+    effective = [edit for edit in edits if edit.amount > 0.0]
+    if effective:
+        make_explicit(result)
+    for edit in effective:
+        edit.apply(result)
+    return result
+
+
+def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjModel:
+    """Compile a specification with edits applied; derived constants are computed anew.
+
+    Args:
+        spec: The specification; not changed.
+        edits: The edits, applied in order.
+
+    Raises:
+        UnknownName: If an edit names an element that the model lacks.
+        MorphologyError: If an element cannot be changed that way.
+        BrokenModel: If MuJoCo does not compile the result.
+    """
+    body = tuple(edits)
+    try:
+        return reshape(spec, body).compile()
+    except (ValueError, mujoco.FatalError) as error:
+        if isinstance(error, ShapechangerError):
+            raise
+        lines = [" ".join(line.split()) for line in str(error).splitlines()]
+        reason = "; ".join(filter(None, lines)).removeprefix("Error: ").removesuffix(".")
+        raise BrokenModel(f"MuJoCo does not compile the body {to_json(body)}: {reason}.") from error

@@ -1,4 +1,4 @@
-"""Poses that follow from a body: joints within limits, feet on the floor, how high it stands."""
+"""Poses that follow from a body: joints within limits, feet on the floor, standing height."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ _Array = NDArray[np.float64]
 _J = mujoco.mjtJoint
 _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
-# A joint starts at least this part of its range inside its limits: at the limit itself the limit's
-# spring would already push.
+# A joint starts at least this share of its range inside its limits, because the spring of a limit
+# pushes at the limit itself.
 _INSIDE: Final = 0.1
-# How far down a floor is looked for; a body that stands higher stands on nothing.
+# Distance at which a floor is looked for; a body that is higher stands on nothing.
 _FAR_M: Final = 1000.0
-# How near to 1 the vertical part of an axis is when it counts as vertical.
+# Tolerance of the vertical part of an axis that counts as vertical.
 _VERTICAL: Final = 1e-6
 
 
 class Lift(NamedTuple):
-    """The number of qpos that raises a trunk.
+    """The coordinate of a pose that raises the trunk.
 
     Attributes:
-        place: Its place in qpos.
-        up: 1 where a larger number is higher; -1 where it is lower, as on a slide that points down.
-        at_zero_m: Height of the trunk's origin in the world where the number is 0, m.
+        place: Its index in qpos.
+        up: 1 if a larger value is higher; -1 if it is lower, as of a slide that points down.
+        at_zero_m: Height of the trunk's origin in the world at the value 0, m.
     """
 
     place: int
@@ -48,78 +48,67 @@ class Lift(NamedTuple):
         return float(self.at_zero_m + self.up * pose[self.place])
 
     def number_at(self, height_m: float) -> float:
-        """The number at which the trunk's origin is this high."""
+        """Return the value at which the trunk's origin is this high."""
         return self.up * (height_m - self.at_zero_m)
 
 
 def trunk_joint(model: mujoco.MjModel) -> int | None:
-    """The number of the first free joint; None for a body that is fixed to the world."""
+    """Return the index of the first free joint; None for a body that is fixed to the world."""
     free = np.flatnonzero(model.jnt_type == _J.mjJNT_FREE)
     return int(free[0]) if free.size else None
 
 
 def travelling_body(model: mujoco.MjModel) -> int | None:
-    """Return the number of the body that can go anywhere; None for one that stays at its place.
+    """Return the index of the body that can go anywhere; None if there is none.
 
-    That of the first free joint; without one, the first body on the world that slides without
-    limits, as those that run in a plane do.
+    It is that of the first free joint or, without one, of the first slide without limits on a body
+    on the world, as of runners in a plane.
     """
     trunk = trunk_joint(model)
-    if trunk is not None:
-        return int(model.jnt_bodyid[trunk])
-    slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
-    found = np.flatnonzero(slides & (model.body_parentid[model.jnt_bodyid] == 0))
-    return int(model.jnt_bodyid[found[0]]) if found.size else None
+    joints = _unlimited_slides(model) if trunk is None else [trunk]
+    return int(model.jnt_bodyid[joints[0]]) if joints else None
 
 
 def trunk_lift(model: mujoco.MjModel) -> Lift | None:
     """Return the coordinate that raises the trunk; None for a body that cannot be raised.
 
-    That of the first free joint; without one, the first vertical slide of a body that hangs on the
-    world, unless it has limits: a hoist does not stand.
+    It is that of the first free joint or, without one, of the first vertical slide without limits
+    on a body on the world. A slide with limits is a hoist, which does not stand.
     """
     trunk = trunk_joint(model)
     if trunk is not None:
         return Lift(int(model.jnt_qposadr[trunk]) + 2, 1.0, 0.0)
-    slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
-    for joint in np.flatnonzero(slides & (model.body_parentid[model.jnt_bodyid] == 0)):
+    for joint in _unlimited_slides(model):
         body, axis = model.jnt_bodyid[joint], np.zeros(3)
         mujoco.mju_rotVecQuat(axis, model.jnt_axis[joint], model.body_quat[body])
         if abs(axis[2]) > 1.0 - _VERTICAL:
             place, up = int(model.jnt_qposadr[joint]), float(np.sign(axis[2]))
-            # `ref` is the number at which the body is where the model puts it.
+            # `ref` is the value at which the body is where the model puts it.
             return Lift(place, up, float(model.body_pos[body, 2] - up * model.qpos0[place]))
     return None
 
 
-def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
-    """Return the model's own pose, shape (nq,), moved to where it is possible.
+def _unlimited_slides(model: mujoco.MjModel) -> list[int]:
+    """Return the slides without limits of bodies on the world."""
+    slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
+    return np.flatnonzero(slides & (model.body_parentid[model.jnt_bodyid] == 0)).tolist()
 
-    Each joint is as near to the model's pose as the part `inside` of its range inside its limits
-    allows, and a trunk that can be raised stands no lower than its feet need.
+
+def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
+    """Return the model's own pose, shape (nq,), made feasible.
+
+    Each joint is moved inside its limits by at least the share `inside` of its range, and a trunk
+    that can be raised stands no lower than its feet need.
 
     Args:
         model: The model.
         inside: Share of each joint's range to keep from its limits.
     """
-    pose = model.qpos0.copy()
-    places, lower, upper = _limits(model)
-    margin = inside * (upper - lower)
-    pose[places] = np.clip(pose[places], lower + margin, upper - margin)
-    lift = trunk_lift(model)
-    if lift is not None:
-        lift.raise_by(pose, max(0.0, -_gap_at(model, pose)))
+    rules = StartRules(model)
+    pose = rules.keep_within_limits(model.qpos0, inside)
+    if rules.lift is not None:
+        rules.lift.raise_by(pose, max(0.0, -rules.floor_gap(_posed(model, pose))))
     return pose
-
-
-def keep_within_limits(model: mujoco.MjModel, pose: _Array) -> _Array:
-    """Return a pose, shape (nq,), with every hinge and slide moved inside its limits.
-
-    Args:
-        model: The model.
-        pose: Shape (nq,).
-    """
-    return _within(pose, *_limits(model))
 
 
 def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float | None:
@@ -127,91 +116,105 @@ def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float 
 
     Args:
         model: The body.
-        pose: The pose (nq,) in which it stands; None for each joint in the middle of its range and
-            the trunk upright.
+        pose: The pose (nq,) in which it stands; by default each joint is in the middle of its range
+            and the trunk upright.
 
     Returns:
         None for a body that nothing raises or that has no floor to stand on.
     """
-    lift = trunk_lift(model)
-    if lift is None:
+    rules = StartRules(model)
+    if rules.lift is None:
         return None
     if pose is None:
-        pose = model.qpos0.copy()
-        places, lower, upper = _limits(model)
-        pose[places] = 0.5 * (lower + upper)
-    gap = _gap_at(model, pose)
-    return None if gap >= _FAR_M else lift.height(pose) - gap
+        pose = rules.middle_pose()
+    gap = rules.floor_gap(_posed(model, pose))
+    return None if gap >= _FAR_M else rules.lift.height(pose) - gap
 
 
-def floor_gap(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Return the clearance of the body's lowest point above the floor, m; negative inside it.
-
-    `data` must hold the geoms' places, as after `mj_kinematics`. The floor is every plane and
-    height field that is fixed to the world and can touch the body's geoms; 1000 where there is
-    none.
-    """
-    return _gap(model, data, _floors_and_geoms(model))
-
-
-def _gap_at(model: mujoco.MjModel, pose: _Array) -> float:
+def _posed(model: mujoco.MjModel, pose: _Array) -> mujoco.MjData:
+    """Return data with the kinematics of a pose (nq,)."""
     data = mujoco.MjData(model)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
-    return floor_gap(model, data)
+    return data
 
 
 class StartRules:
-    """Rules for possible start poses, read from a model once.
+    """Rules for feasible start poses, read from a model once.
+
+    Args:
+        model: The model.
 
     Attributes:
-        lift: What raises the trunk, as of `trunk_lift`.
+        lift: The coordinate that raises the trunk; see `trunk_lift`.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.lift = trunk_lift(model)
-        self._limits = _limits(model)
-        self._pairs = _floors_and_geoms(model)
+        self._model = model
+        one_number = np.isin(model.jnt_type, (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE)))
+        joints = np.flatnonzero(one_number & (model.jnt_limited != 0))
+        self._lower, self._upper = model.jnt_range[joints].T
+        self._places = model.jnt_qposadr[joints]
+        # Each floor with each geom of the body that it can touch.
+        self._pairs: list[tuple[int, int]] = []
+        of_world = model.body_weldid[model.geom_bodyid] == 0
+        for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)).tolist():
+            touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
+                model.geom_conaffinity & model.geom_contype[floor]
+            )
+            geoms = np.flatnonzero(~of_world & (touching != 0)).tolist()
+            self._pairs += [(floor, geom) for geom in geoms]
 
-    def keep_within_limits(self, pose: _Array) -> _Array:
-        """As the function of this name."""
-        return _within(pose, *self._limits)
+    def keep_within_limits(self, pose: _Array, inside: float = 0.0) -> _Array:
+        """Return a pose, shape (nq,), with every hinge and slide moved inside its limits.
 
-    def floor_gap(self, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-        """Return the clearance above the floor; see the function of this name."""
-        return _gap(model, data, self._pairs)
+        Args:
+            pose: Shape (nq,).
+            inside: Share of each joint's range to keep from its limits.
+        """
+        result = pose.copy()
+        margin = inside * (self._upper - self._lower)
+        low, high = self._lower + margin, self._upper - margin
+        result[self._places] = np.clip(pose[self._places], low, high)
+        return result
 
+    def middle_pose(self) -> _Array:
+        """Return the model's own pose, shape (nq,), with each joint in the middle of its range."""
+        pose = self._model.qpos0.copy()
+        pose[self._places] = 0.5 * (self._lower + self._upper)
+        return pose
 
-def _within(pose: _Array, places: NDArray[np.intp], lower: _Array, upper: _Array) -> _Array:
-    """The pose with the numbers at these places between their limits."""
-    result = pose.copy()
-    result[places] = np.clip(pose[places], lower, upper)
-    return result
+    def floor_gap(self, data: mujoco.MjData) -> float:
+        """Return the clearance of the body's lowest point above the floor, m; negative inside it.
 
+        The floor is every plane and height field that is fixed to the world and can touch the
+        body's geoms; 1000 if there is none.
 
-def _floors_and_geoms(model: mujoco.MjModel) -> list[tuple[int, int]]:
-    """Each floor with each geom of the body that it can touch."""
-    of_world = model.body_weldid[model.geom_bodyid] == 0
-    pairs: list[tuple[int, int]] = []
-    for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)):
-        touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
-            model.geom_conaffinity & model.geom_contype[floor]
-        )
-        pairs += [(int(floor), int(geom)) for geom in np.flatnonzero(~of_world & (touching != 0))]
-    return pairs
+        Args:
+            data: Data of the model after `mj_kinematics`.
+        """
+        gap = _FAR_M
+        for floor, geom in self._pairs:
+            gap = min(gap, mujoco.mj_geomDistance(self._model, data, floor, geom, _FAR_M, None))
+        return gap
 
+    def feasible(self, drawn: _Array, data: mujoco.MjData) -> _Array:
+        """Return the feasible pose next to a drawn one, shape (nq,).
 
-def _gap(model: mujoco.MjModel, data: mujoco.MjData, pairs: list[tuple[int, int]]) -> float:
-    """The smallest distance between the geoms of these pairs, m."""
-    gap = _FAR_M
-    for floor, geom in pairs:
-        gap = min(gap, mujoco.mj_geomDistance(model, data, floor, geom, _FAR_M, None))
-    return gap
+        Joints are moved inside their limits, orientations normalised, and a trunk whose feet are in
+        the floor is lifted.
 
-
-def _limits(model: mujoco.MjModel) -> tuple[NDArray[np.intp], _Array, _Array]:
-    """Places in qpos and limits of the hinges and slides that have limits."""
-    one_number = np.isin(model.jnt_type, (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE)))
-    joints = np.flatnonzero(one_number & (model.jnt_limited != 0))
-    lower, upper = model.jnt_range[joints].T
-    return model.jnt_qposadr[joints].astype(np.intp), lower, upper
+        Args:
+            drawn: The drawn pose, shape (nq,).
+            data: Data of the model; its pose and kinematics are overwritten.
+        """
+        pose = self.keep_within_limits(drawn)
+        mujoco.mj_normalizeQuat(self._model, pose)
+        if self.lift is not None:
+            data.qpos[:] = pose
+            mujoco.mj_kinematics(self._model, data)
+            gap = self.floor_gap(data)
+            if gap < 0.0:
+                self.lift.raise_by(pose, -gap)
+        return pose

@@ -19,7 +19,7 @@ import pytest
 
 import shapechanger
 from shapechanger.envs.vector import ThreadVectorEnv
-from shapechanger.envs.vector.threads import ThreadPool
+from shapechanger.envs.vector.threads import EnvThreads
 
 
 class _Plain(gym.Env[Any, Any]):
@@ -166,7 +166,7 @@ def test_who_forgets_to_close_leaves_no_threads() -> None:
 
 def test_a_second_interruption_does_not_wait() -> None:
     """A thread that never ends is left behind, and nothing touches its envs."""
-    pool, hold, working = ThreadPool(2), threading.Event(), threading.Event()
+    pool, hold, working = EnvThreads(2, 2), threading.Event(), threading.Event()
     presses = 0
 
     def work() -> None:
@@ -185,7 +185,7 @@ def test_a_second_interruption_does_not_wait() -> None:
     presser = threading.Thread(target=press_on)
     presser.start()
     with pytest.raises(KeyboardInterrupt):
-        pool.run([lambda: None, work])
+        pool.share([lambda _: None, lambda _: work()])
     presser.join()
     assert presses >= 2
     assert pool.lost

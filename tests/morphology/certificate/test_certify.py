@@ -30,18 +30,18 @@ def test_a_longer_arm_is_certified() -> None:
     assert "robot: standing height 0.5 m -> 0.8 m (x1.6)" in text
     assert "Rollout:\n  100 steps from the same seed" in text
     assert certificate.source_fingerprint in text
-    assert certificate.verdict == "Swing does something else than Swing."
+    assert certificate.verdict == "Swing behaves differently from Swing."
 
 
 def test_an_empty_shift_is_refused() -> None:
-    """Source and target that do the same are no transfer."""
-    with pytest.raises(EmptyShift, match="do the same: both models have the fingerprint"):
+    """Source and target that behave alike are no transfer."""
+    with pytest.raises(EmptyShift, match="behave alike: both models have the fingerprint"):
         certify(Swing(), Swing())
 
 
 def test_an_env_without_a_model_gets_no_certificate() -> None:
     """Nothing is compared, and the env is named."""
-    with pytest.raises(MorphologyError, match="CartPole-v1 has no model that could be compared"):
+    with pytest.raises(MorphologyError, match="CartPole-v1 has no model to compare"):
         certify(gymnasium.make("CartPole-v1"), Swing())
 
 
@@ -50,7 +50,7 @@ def test_an_empty_shift_may_be_asked_for() -> None:
     certificate = certify(Swing(), Swing(), steps=5, allow_empty=True)
     assert certificate.is_empty
     assert certificate.changes == ()
-    assert "do the same" in str(certificate)
+    assert "behave alike" in str(certificate)
     assert "Changes" not in str(certificate)
 
 

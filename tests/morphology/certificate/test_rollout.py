@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from shapechanger.layout import Feature, Layout
-from shapechanger.morphology.certificate.certifiable import attribute
 from shapechanger.morphology.certificate.rollout import (
+    attribute,
     compare_rollouts,
     matched_commands,
     number_names,

@@ -282,10 +282,10 @@ def test_names_that_are_taken_are_refused(name: str) -> None:
     """By a body, a joint, a motor or a geom; the message says which."""
     spec = leg()
     spec.geom("sole").name = "thigh_of_shin_1"
-    with pytest.raises(MorphologyError, match=r"A new \w+ needs a name that is free; '\w*' is not"):
+    with pytest.raises(MorphologyError, match=r"A new \w+ needs an unused name, got '\w*'"):
         built(spec, Split("thigh", name))
     spec.geom("thigh_of_shin_1").name = "shin_1_geom"
-    with pytest.raises(MorphologyError, match=r"A new \w+ needs a name that is free; '\w*' is not"):
+    with pytest.raises(MorphologyError, match=r"A new \w+ needs an unused name, got '\w*'"):
         built(spec, AddSegment("thigh", name, (0.0, 0.0, 1.0)))
 
 
@@ -464,7 +464,7 @@ def test_a_copy_whose_names_are_taken_is_refused(kind: str) -> None:
         spec.geom("trunk").name = "sole_2"
     else:
         spec.joint("root").name = "knee_2"
-    with pytest.raises(MorphologyError, match=f"A new {kind} needs a name that is free; '"):
+    with pytest.raises(MorphologyError, match=f"A new {kind} needs an unused name, got '"):
         built(spec, AddLimb("thigh", "_2", 1.0))
 
 

@@ -144,12 +144,10 @@ def test_a_density_changes_masses_and_inertias() -> None:
 def test_a_density_that_counts_for_nothing_is_refused() -> None:
     """Where mass is written out, of a geom or of the body, the message says what would work."""
     spec = limb('<geom name="g" size=".1" mass="2"/>')
-    with pytest.raises(
-        MorphologyError, match="'g' has its mass written out, so its density counts"
-    ):
+    with pytest.raises(MorphologyError, match="'g' has its mass written out, so its density has"):
         built(spec, Density("link", scale=2.0))
     spec = limb('<inertial pos="0 0 0" mass="2" diaginertia=".1 .1 .1"/><geom size=".1"/>')
-    with pytest.raises(MorphologyError, match="'link' has its inertia written out, so a density"):
+    with pytest.raises(MorphologyError, match="'link' has its inertia written out, so its density"):
         built(spec, Density("link", scale=2.0))
 
 

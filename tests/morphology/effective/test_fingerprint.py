@@ -12,7 +12,6 @@ import pytest
 from numpy.typing import NDArray
 
 from shapechanger.morphology.effective import fingerprint
-from shapechanger.morphology.effective.model import effective_model
 from tests.morphology.scenes import EVERYTHING, asset, asset_spec, everything
 
 
@@ -44,12 +43,6 @@ def test_another_process_gives_the_same_fingerprint() -> None:
         text=True,
     )
     assert run.stdout.strip() == fingerprint(everything())
-
-
-def test_an_effective_model_has_the_fingerprint_of_its_model() -> None:
-    """Whoever has compared already need not read the model again."""
-    model = everything()
-    assert fingerprint(effective_model(model)) == fingerprint(model)
 
 
 def test_bodies_have_different_fingerprints() -> None:

@@ -6,26 +6,24 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.morphology.effective.bodies import (
-    Frames,
-    geom_frames,
-    inertial_frames,
-    site_frames,
-)
+from shapechanger.morphology.effective.bodies import frames
 from tests.morphology.scenes import asset, everything
 
 
 def _assert_where(
-    frames: Frames, bodies: np.ndarray, data: mujoco.MjData, xpos: np.ndarray, xmat: np.ndarray
+    local: tuple[np.ndarray, np.ndarray],
+    bodies: np.ndarray,
+    data: mujoco.MjData,
+    xpos: np.ndarray,
+    xmat: np.ndarray,
 ) -> None:
-    """The frames, hung on their bodies, are where the simulation puts them."""
+    """The frames, relative to their bodies, are where the simulation puts them."""
+    positions, orientations = local
     for i, body in enumerate(bodies):
         turned = data.xmat[body].reshape(3, 3)
-        np.testing.assert_allclose(
-            data.xpos[body] + turned @ frames.position[i], xpos[i], atol=1e-9
-        )
+        np.testing.assert_allclose(data.xpos[body] + turned @ positions[i], xpos[i], atol=1e-9)
         own = np.zeros(9)
-        mujoco.mju_quat2Mat(own, frames.orientation[i])
+        mujoco.mju_quat2Mat(own, orientations[i])
         np.testing.assert_allclose(turned @ own.reshape(3, 3), xmat[i].reshape(3, 3), atol=1e-9)
 
 
@@ -45,6 +43,6 @@ def test_frames_are_where_the_simulation_puts_them(name: str, written: bool) -> 
     data.qpos += random.normal(scale=0.1, size=model.nq)
     mujoco.mj_kinematics(model, data)
     every_body = np.arange(model.nbody)
-    _assert_where(inertial_frames(model), every_body, data, data.xipos, data.ximat)
-    _assert_where(geom_frames(model), model.geom_bodyid, data, data.geom_xpos, data.geom_xmat)
-    _assert_where(site_frames(model), model.site_bodyid, data, data.site_xpos, data.site_xmat)
+    _assert_where(frames(model, "inertia"), every_body, data, data.xipos, data.ximat)
+    _assert_where(frames(model, "geom"), model.geom_bodyid, data, data.geom_xpos, data.geom_xmat)
+    _assert_where(frames(model, "site"), model.site_bodyid, data, data.site_xpos, data.site_xmat)

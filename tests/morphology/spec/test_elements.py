@@ -77,7 +77,7 @@ def test_trunks_are_no_limbs() -> None:
 )
 def test_new_names_must_be_free(kind: str, name: str) -> None:
     """Two elements of one name could not be told apart, and one of none not be found."""
-    with pytest.raises(MorphologyError, match=f"A new {kind} needs a name that is free; '{name}'"):
+    with pytest.raises(MorphologyError, match=f"A new {kind} needs an unused name, got '{name}'"):
         require_free_name(leg(), kind, name)
 
 

@@ -101,7 +101,7 @@ def test_frames_that_scale_are_refused(scaling: str) -> None:
     """What they hold has other sizes than it says."""
     text = f"""<mujoco><worldbody><frame name="big" {scaling}><body name="b"><joint/>
     <geom size=".1"/></body></frame></worldbody></mujoco>"""
-    with pytest.raises(MorphologyError, match="The frame 'big' scales what it holds: write the"):
+    with pytest.raises(MorphologyError, match="The frame 'big' scales its elements: write the"):
         built(spec_of(text), Mass("b", scale=2.0))
 
 

@@ -130,16 +130,16 @@ def test_what_grows_is_what_lies_along_the_axis(
 
 
 @pytest.mark.parametrize("shape", ["capsule", "box"])
-def test_what_lies_askew_cannot_grow_along_an_axis(shape: str) -> None:
+def test_an_oblique_geom_cannot_grow_along_an_axis(shape: str) -> None:
     """It would become another shape; the message says what can be done."""
     content = f'<geom name="g" type="{shape}" size=".1 .2 .3" euler="0 30 0"/>'
     with pytest.raises(
-        MorphologyError, match="'g' lies askew to the axis 'z': stretch it along all"
+        MorphologyError, match="'g' lies oblique to the axis 'z': stretch it along all"
     ):
         _sizes(content, Stretch("link", 2.0, "z"))
 
 
-def test_ends_that_lie_askew_are_stretched_along_an_axis() -> None:
+def test_oblique_ends_are_stretched_along_an_axis() -> None:
     """As the pole is, which leans by a millimetre and keeps doing so."""
     model = built(
         limb('<geom type="capsule" size=".1" fromto="0 0 0 .3 0 .4"/>'), Stretch("link", 2.0, "z")

@@ -164,7 +164,7 @@ def test_a_copied_geom_is_as_the_original() -> None:
             first, second = getattr(model, field)
             np.testing.assert_array_equal(second, first, err_msg=field)
     np.testing.assert_array_equal(model.body("b").inertia, model.body("a").inertia)
-    with pytest.raises(MorphologyError, match="A new geom needs a name that is free"):
+    with pytest.raises(MorphologyError, match="A new geom needs an unused name"):
         copy_geom(spec, spec.geom("a"), spec.body("b"), "b")
 
 

@@ -22,14 +22,13 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from typing import Any, Final, cast
-from weakref import WeakValueDictionary
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.stepping.watch import ModelWatch
-from shapechanger.morphology.effective.contacts import colliding_pairs
+from shapechanger.envs.stepping.watch import ModelWatch, forget_steps
+from shapechanger.morphology.effective.contacts import colliding_pairs, mixed_parameters
 
 _Ints = NDArray[np.int64]
 
@@ -41,10 +40,8 @@ _NO_CONTACTS: Final = int(_BIT.mjDSBL_CONTACT)
 _UNKNOWN: Final = ("neq", "ntendon", "nflex", "nplugin", "nmocap", "nskin", "nhfield")
 # Size of the cache; fast models of envs in use stay alive without it.
 _REMEMBERED: Final = 32
-_SMALLEST_MIX: Final = float(cast("Any", mujoco).mjMINVAL)
 
 _fast_models: OrderedDict[bytes, mujoco.MjModel | None] = OrderedDict()
-_demands: WeakValueDictionary[bytes, Demand] = WeakValueDictionary()
 _lock = threading.Lock()
 
 
@@ -81,31 +78,10 @@ def find_fast_model(
 
 
 def forget_fast_models() -> None:
-    """Clear the cache and the counted demand, to measure the time of a search."""
+    """Clear the cache and the counted steps, to measure the time of a search."""
     with _lock:
         _fast_models.clear()
-        _demands.clear()
-
-
-class Demand:
-    """Demand for the fast model of a body.
-
-    Attributes:
-        steps: Steps that all envs with the body have taken without it.
-    """
-
-    def __init__(self) -> None:
-        self.steps = 0
-
-
-def demand_for(watch: ModelWatch) -> Demand:
-    """Return the demand for the fast model of a watched model, shared by all envs of its body."""
-    name = watch.digest
-    with _lock:
-        demand = _demands.get(name)
-        if demand is None:
-            demand = _demands[name] = Demand()
-        return demand
+    forget_steps()
 
 
 def known_fast_model(watch: ModelWatch) -> mujoco.MjModel | None:
@@ -181,7 +157,9 @@ def _without_search(
     result = spec.compile()
     if not _same_but_for_pairs(model, result):
         return None
-    _mix(result)
+    joined = np.stack([result.pair_geom1, result.pair_geom2], axis=1)
+    for parameter, values in mixed_parameters(result, joined).items():
+        getattr(result, f"pair_{parameter}")[:] = values
     # Leave no geom to the search, neither by itself nor by its body.
     for bits in (
         result.geom_contype,
@@ -212,46 +190,6 @@ def _on_one_floor(model: mujoco.MjModel, pairs: _Ints) -> bool:
         and not model.geom_adhesion[involved].any()
         and not model.geom_surfacevel[involved].any()
     )
-
-
-def _mix(model: mujoco.MjModel) -> None:
-    """Give each pair the parameters that the search would mix from its geoms.
-
-    Source: MuJoCo 4.0.0, `mujoco/doc/modeling.rst`, "Contact parameters"; margins and gaps are
-    summed, as measured.
-    """
-    one, other = model.pair_geom1, model.pair_geom2
-    model.pair_margin[:] = model.geom_margin[one] + model.geom_margin[other]
-    model.pair_gap[:] = model.geom_gap[one] + model.geom_gap[other]
-    model.pair_dim[:] = np.maximum(model.geom_condim[one], model.geom_condim[other])
-    friction = np.maximum(model.geom_friction[one], model.geom_friction[other])
-    model.pair_friction[:] = friction[:, [0, 0, 1, 2, 2]]
-    model.pair_solreffriction[:] = 0.0
-    for pair, (first, second) in enumerate(zip(one.tolist(), other.tolist(), strict=True)):
-        part = _part(*model.geom_solmix[[first, second]].tolist())
-        both = model.geom_solref[[first, second]]
-        model.pair_solref[pair] = (
-            part * both[0] + (1.0 - part) * both[1]
-            if (both[:, 0] > 0.0).all()
-            else both.min(axis=0)  # Direct format: stiffness and damping.
-        )
-        model.pair_solimp[pair] = (
-            part * model.geom_solimp[first] + (1.0 - part) * model.geom_solimp[second]
-        )
-
-
-def _part(one: float, other: float) -> float:
-    """Return the weight of the first geom in a mix.
-
-    Args:
-        one: `solmix` of the first geom.
-        other: `solmix` of the second geom.
-    """
-    if one >= _SMALLEST_MIX and other >= _SMALLEST_MIX:
-        return one / (one + other)
-    if one < _SMALLEST_MIX and other < _SMALLEST_MIX:
-        return 0.5
-    return 0.0 if one < _SMALLEST_MIX else 1.0
 
 
 def _same_but_for_pairs(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
@@ -329,11 +267,11 @@ def moves_equally(model: mujoco.MjModel, other: mujoco.MjModel) -> bool:
             mujoco.mj_rnePostConstraint(other, two)
             if not _same(one, two):
                 return False
-            touched.update((int(a), int(b)) for a, b in one.contact.geom)
+            touched.update(map(tuple, one.contact.geom.tolist()))
     if other.npair == model.npair:
         return True
     _, pairs = colliding_pairs(model)
-    return {(int(a), int(b)) for a, b in pairs} <= touched | {(b, a) for a, b in touched}
+    return all((a, b) in touched or (b, a) in touched for a, b in pairs.tolist())
 
 
 def _same(one: mujoco.MjData, two: mujoco.MjData) -> bool:

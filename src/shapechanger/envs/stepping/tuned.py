@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.reshapable import Reshapable
-from shapechanger.envs.stepping.fast_model import demand_for, find_fast_model, known_fast_model
+from shapechanger.envs.reshapable import BAD_STATE, Reshapable
+from shapechanger.envs.stepping.fast_model import find_fast_model, known_fast_model
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.pose import StartRules
 
@@ -66,10 +66,6 @@ def paused_timer() -> AbstractContextManager[None]:
 # Result of `step`; Gymnasium's own steps promise that they never truncate.
 StepResult = tuple[NDArray[np.float64], Any, bool, Literal[False], dict[str, Any]]
 
-# The warnings of a bad position, velocity or acceleration are neighbours in `data.warning`.
-_BAD_STATE: Final = slice(
-    int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1
-)
 NO_WARNINGS: Final = [0, 0, 0]
 """`Binding.warnings` of a simulation that has not diverged."""
 
@@ -108,7 +104,6 @@ class Binding:
         model: The public model.
         stepping: The model that steps the data: the public model or its fast model.
         has_fast_model: Whether `stepping` is a fast model; None until one has been looked for.
-        demand: How many steps envs with this body have taken without a fast model.
         timer: Context in which to step: MuJoCo's profiling timer may pause there.
         shape: Shape of an action.
         dt: Duration of a step while the model is unedited, s.
@@ -127,7 +122,6 @@ class Binding:
         self.data = data
         self.stepping = model
         self.has_fast_model: bool | None = None
-        self.demand = demand_for(watch)
         self.timer: AbstractContextManager[None] = nullcontext()
         self.shape = (int(model.nu),)
         self.frame_skip = frame_skip
@@ -135,7 +129,7 @@ class Binding:
         self.ctrl = data.ctrl
         self.qpos = data.qpos
         self.qvel = data.qvel
-        self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[_BAD_STATE]
+        self.warnings: NDArray[np.int32] = cast("Any", data.warning).number[BAD_STATE]
         self.kind: str | None = None
         self.valid = False
 
@@ -312,8 +306,8 @@ class TunedStep(Reshapable):
         if bound.has_fast_model:
             return bound if bound.unedited() else None
         if bound.has_fast_model is None and self.fast_model:
-            bound.demand.steps += 1
-            if bound.demand.steps > self.patience and bound.unedited():
+            bound.watch.snapshot.steps += 1
+            if bound.watch.snapshot.steps > self.patience and bound.unedited():
                 bound.step_with(find_fast_model(bound.watch, self.body_spec))
         # Without a fast model the public one steps; only its timestep was copied.
         return bound if bound.dt == self.dt else None

@@ -17,15 +17,32 @@ _LONGEST_HEAD: Final = 8192
 _ALIGNMENT: Final = 64
 
 
-class _Snapshot(list[bytearray]):
+class Snapshot:
     """The bytes of a model, shared by all watches of models that were compiled equal.
 
     Sharing keeps the bytes in a core's caches while many envs compare their models with them.
+
+    Args:
+        parts: The bytes of each watched region of memory.
+
+    Attributes:
+        steps: Steps that all envs with such a model have taken without a fast model.
     """
 
+    def __init__(self, parts: list[bytearray]) -> None:
+        self.parts = parts
+        self.steps = 0
 
-_snapshots: WeakValueDictionary[bytes, _Snapshot] = WeakValueDictionary()
+
+_snapshots: WeakValueDictionary[bytes, Snapshot] = WeakValueDictionary()
 _lock = threading.Lock()
+
+
+def forget_steps() -> None:
+    """Reset the counted steps of all models."""
+    with _lock:
+        for snapshot in _snapshots.values():
+            snapshot.steps = 0
 
 
 class ModelWatch:
@@ -43,6 +60,7 @@ class ModelWatch:
         sees: Whether this version of MuJoCo lays models out as expected; if not, `unedited` is
             always false.
         digest: Hash of the model as it was when the watch was created.
+        snapshot: The bytes of the model then, shared with equal models.
         timestep: Its timestep then, s.
     """
 
@@ -52,14 +70,14 @@ class ModelWatch:
         views = [(ctypes.c_char * size).from_address(start) for start, size in _regions(model)]
         self.sees = bool(views)
         # A bytearray compares itself with any buffer by memcmp; bytes would not.
-        parts = _Snapshot(bytearray(view) for view in views)
+        parts = [bytearray(view) for view in views]
         total = hashlib.blake2b(digest_size=16)
         for part in parts:
             total.update(part)
         self.digest = total.digest()
         with _lock:
-            self._snapshot = _snapshots.setdefault(self.digest, parts)
-        self._parts = list(zip(self._snapshot, views, strict=True))
+            self.snapshot = _snapshots.setdefault(self.digest, Snapshot(parts))
+        self._parts = list(zip(self.snapshot.parts, views, strict=True))
 
     def unedited(self) -> bool:
         """Return whether every number of the model is as it was, to the last bit."""

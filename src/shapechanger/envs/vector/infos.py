@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 Step = tuple[Any, Any, Any, dict[str, Any]]
 """Reward, terminated, truncated and info of one env."""
 
-# One entry per env for each key, and under `_key` a mask of the envs that have one.
-_Batch = dict[str, Any]
-
 
 class InfoColumns(NamedTuple):
     """Infos of envs that have the same keys.
@@ -47,13 +44,7 @@ def in_columns(numbers: Sequence[int], infos: Sequence[Mapping[str, Any]]) -> li
     return [
         InfoColumns(
             [numbers[place] for place in places],
-            dict(
-                zip(
-                    infos[places[0]],
-                    zip(*(infos[i].values() for i in places), strict=True),
-                    strict=True,
-                )
-            ),
+            {key: [infos[place][key] for place in places] for key in infos[places[0]]},
         )
         for places in groups.values()
     ]
@@ -71,85 +62,56 @@ def _keys(info: Mapping[str, Any]) -> tuple[Any, ...]:
     )
 
 
-def batched(parts: Iterable[InfoColumns], num_envs: int) -> _Batch:
+def batched(
+    parts: Iterable[InfoColumns], num_envs: int, batch: dict[str, Any] | None = None
+) -> dict[str, Any]:
     """Return the infos of all envs as Gymnasium's vector envs do.
 
-    Gymnasium adds one env after another, key by key. Adding envs whose infos have the same keys
-    together takes a tenth of the time.
+    For each key there is an array of one entry per env, and under `_key` a mask of the envs that
+    have one. Gymnasium adds one env after another, key by key. Adding envs whose infos have the
+    same keys together takes a tenth of the time.
 
     Args:
         parts: The infos of the envs that have any.
         num_envs: How many envs there are.
+        batch: Infos to which these are added, in place; None for new ones.
     """
-    batch: _Batch = {}
-    _extend(batch, parts, num_envs)
-    return batch
-
-
-def _extend(batch: _Batch, parts: Iterable[InfoColumns], num_envs: int) -> None:
-    """Add infos to arrays for `num_envs` envs: the lowest env first, as it sets the dtypes."""
+    batch = {} if batch is None else batch
+    # The lowest env first, as it sets the dtypes.
     for numbers, values in sorted(parts, key=lambda part: part.numbers[0]):
         where = _where(numbers, num_envs)
         masks = np.zeros((len(values), num_envs), np.bool_)
         masks[:, where] = True
         for (key, column), mask in zip(values.items(), masks, strict=True):
-            batch[key] = _added(batch.get(key), key, column, numbers, where, num_envs)
+            if isinstance(column[0], dict) and key != "final_obs":
+                nested = in_columns(numbers, cast("Sequence[Any]", column))
+                batch[key] = batched(nested, num_envs, batch.get(key))
+            else:
+                if key not in batch:
+                    batch[key] = _empty(key, column, num_envs)
+                array = batch[key]
+                if array.dtype == np.object_:  # Numbers and arrays in it stay what they are.
+                    for number, value in zip(numbers, column, strict=True):
+                        array[number] = value
+                else:
+                    array[where] = column
             name = f"_{key}"
             batch[name] = batch[name] | mask if name in batch else mask
+    return batch
 
 
-def _added(
-    before: Any,
-    key: str,
-    values: Sequence[Any] | NDArray[Any],
-    numbers: Sequence[int],
-    where: slice | NDArray[np.intp],
-    num_envs: int,
-) -> NDArray[Any] | _Batch:
-    """Return the entry of `key` after adding the values of the envs `numbers`.
-
-    Args:
-        before: The present entry, or None.
-        key: The key.
-        values: One value per env of `numbers`.
-        numbers: The envs that have a value.
-        where: Index of these envs in an array of all envs.
-        num_envs: How many envs there are.
-    """
+def _empty(key: str, values: Sequence[Any] | NDArray[Any], num_envs: int) -> NDArray[Any]:
+    """Return an array of all envs for values such as these."""
+    if isinstance(values, np.ndarray):
+        return np.zeros(num_envs, values.dtype)
     first = values[0]
-    if isinstance(first, dict) and key != "final_obs":
-        inner: _Batch = {} if before is None else before
-        _extend(inner, in_columns(numbers, cast("Sequence[Any]", values)), num_envs)
-        return inner
-    if before is None and isinstance(values, np.ndarray) and values.size == num_envs:
-        return np.array(values)
-    if before is not None:
-        array = before
-    elif isinstance(values, np.ndarray):
-        array = np.zeros(num_envs, values.dtype)
-    else:
-        array = _empty(None if key == "final_obs" else first, num_envs)
-    if array.dtype == np.object_:  # Numbers and arrays in it stay what they are.
-        for number, value in zip(numbers, values, strict=True):
-            array[number] = value
-    else:
-        array[where] = values
-    return array
-
-
-def _empty(value: Any, num_envs: int) -> NDArray[Any]:
-    """Return an array for values such as this."""
-    if _has_an_array(value):
-        return np.zeros(num_envs, np.asarray(value).dtype)
-    if isinstance(value, np.ndarray):
-        array = cast("NDArray[Any]", value)
+    # NumPy's booleans get an array of objects, as in Gymnasium.
+    if type(first) in (int, float, bool) or isinstance(first, np.number):
+        return np.zeros(num_envs, np.asarray(first).dtype)
+    if isinstance(first, np.ndarray) and key != "final_obs":
+        array = cast("NDArray[Any]", first)
         return np.zeros((num_envs, *array.shape), array.dtype)
     return np.full(num_envs, None, np.object_)
-
-
-def _has_an_array(value: object) -> bool:
-    """Return whether values of this type get an array of it; NumPy's booleans do not."""
-    return type(value) in (int, float, bool) or isinstance(value, np.number)
 
 
 def _where(numbers: Sequence[int], num_envs: int) -> slice | NDArray[np.intp]:

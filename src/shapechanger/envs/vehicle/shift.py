@@ -83,7 +83,7 @@ def certify_vehicles(
     )
     if shift.is_empty and not allow_empty:
         raise EmptyShift(
-            f"{names[0]} and {names[1]} do the same: {_STEPS} steps gave the same frames, places "
+            f"{names[0]} and {names[1]} behave alike: {_STEPS} steps gave the same frames, places "
             "and rewards, so there is nothing to transfer."
         )
     return shift

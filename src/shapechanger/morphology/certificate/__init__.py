@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from shapechanger.morphology.certificate.certifiable import Certifiable, Wrapped
 from shapechanger.morphology.certificate.certify import Certificate, certify
 from shapechanger.morphology.certificate.changes import Change, compare
 from shapechanger.morphology.certificate.consistency import inconsistencies
-from shapechanger.morphology.certificate.rollout import Rollout
+from shapechanger.morphology.certificate.rollout import Certifiable, Rollout, Wrapped
 
 __all__ = [
     "Certifiable",

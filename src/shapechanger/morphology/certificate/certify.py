@@ -1,8 +1,8 @@
-"""The certificate of a shift: what differs between two embodiments, proven, or a refusal.
+"""The certificate of a shift: the proven differences between two embodiments, or a refusal.
 
-Shifts are easily declared and not applied: a friction that the floor outvotes, a context that
-nobody reads. So two environments are compared by what their compiled models effectively do and by
-what they answer to the same commands. A shift that changes neither is refused.
+Shifts are easily declared and not applied: a friction that the floor's exceeds, a context that
+nothing reads. So two environments are compared by their effective models and by their responses to
+the same commands. A shift that changes neither is refused.
 """
 
 from __future__ import annotations
@@ -13,10 +13,15 @@ import msgspec
 import mujoco
 
 from shapechanger.errors import EmptyShift, MorphologyError
-from shapechanger.morphology.certificate.certifiable import Certifiable, Wrapped, attribute
 from shapechanger.morphology.certificate.changes import Change, compare, grouped
 from shapechanger.morphology.certificate.consistency import inconsistencies, lone_masses
-from shapechanger.morphology.certificate.rollout import Rollout, compare_rollouts
+from shapechanger.morphology.certificate.rollout import (
+    Certifiable,
+    Rollout,
+    Wrapped,
+    attribute,
+    compare_rollouts,
+)
 from shapechanger.morphology.effective import fingerprint
 
 
@@ -29,9 +34,9 @@ class Certificate(msgspec.Struct, frozen=True):
         source_fingerprint: Fingerprint of the source's effective model.
         target_fingerprint: Fingerprint of the target's.
         changes: Differences of the effective models, and of the standing heights.
-        rollout: What both answered to the same commands.
-        source_inconsistencies: What does not fit together in the source's model.
-        target_inconsistencies: What does not fit together in the target's, or between the two.
+        rollout: Responses of both to the same commands.
+        source_inconsistencies: Inconsistencies of the source's model.
+        target_inconsistencies: Inconsistencies of the target's model, or between the two.
     """
 
     source: str
@@ -60,15 +65,15 @@ class Certificate(msgspec.Struct, frozen=True):
 
     @property
     def verdict(self) -> str:
-        """The certificate in one sentence."""
+        """Verdict in one sentence."""
         if self.is_empty and self.source_fingerprint != self.target_fingerprint:
             return (
-                f"{self.source} and {self.target} do the same: their models and their first steps "
+                f"{self.source} and {self.target} behave alike: their models and their first steps "
                 "differ by rounding only."
             )
         if self.is_empty:
             return (
-                f"{self.source} and {self.target} do the same: both models have the fingerprint "
+                f"{self.source} and {self.target} behave alike: both models have the fingerprint "
                 f"{self.source_fingerprint}, and {self.rollout.steps} steps gave the same numbers."
             )
         if self.same_model:
@@ -81,10 +86,10 @@ class Certificate(msgspec.Struct, frozen=True):
                 f"The models of {self.source} and {self.target} differ, but "
                 f"{self.rollout.steps} steps did not show it."
             )
-        return f"{self.target} does something else than {self.source}."
+        return f"{self.target} behaves differently from {self.source}."
 
     def __str__(self) -> str:
-        """The whole certificate as text; changes that several elements share are told once."""
+        """Return the certificate as text; a change that several elements share is listed once."""
         lines = [
             f"{self.source} [{self.source_fingerprint}] -> "
             f"{self.target} [{self.target_fingerprint}]",
@@ -101,7 +106,7 @@ class Certificate(msgspec.Struct, frozen=True):
         return "\n".join(lines)
 
     def to_json(self) -> str:
-        """The certificate as JSON."""
+        """Return the certificate as JSON."""
         return msgspec.json.encode(self).decode()
 
     @classmethod
@@ -126,52 +131,49 @@ def certify(
     labels: tuple[str, str] | None = None,
     allow_empty: bool = False,
 ) -> Certificate:
-    """Compare two environments and certify what the shift between them is.
+    """Compare two environments and certify the shift between them.
 
-    Both are reset and stepped, and left in the midst of an episode. Wrappers count: observations
-    are those that the outermost one gives.
+    Both are reset and stepped, and left in the middle of an episode. Wrappers count: observations
+    are those of the outermost one.
 
     Args:
-        source: Where a skill is learned.
-        target: Where it moves to.
-        steps: Commands of the rollout.
+        source: The environment in which a policy is trained.
+        target: The environment that it is transferred to.
+        steps: Number of commands of the rollout.
         seed: Seed of the resets and of the commands.
-        labels: What to call the two; the environments' ids, or their classes, where None.
+        labels: Labels of the two; by default the ids of the environments, or their classes.
         allow_empty: Whether to certify a shift that changes nothing.
 
     Raises:
-        MorphologyError: If one of them has no model, such as a vehicle's.
+        MorphologyError: If one of them has no model, such as that of a vehicle.
         EmptyShift: If nothing differs and `allow_empty` is false.
     """
     for env in (source, target):
         if not hasattr(getattr(env, "unwrapped", env), "model"):
-            raise MorphologyError(f"{_label(env)} has no model that could be compared.")
-    models = cast(
-        "tuple[mujoco.MjModel, mujoco.MjModel]",
-        tuple(attribute(env, "model") for env in (source, target)),
-    )
+            raise MorphologyError(f"{_label(env)} has no model to compare.")
+    one, two = cast("list[mujoco.MjModel]", [attribute(env, "model") for env in (source, target)])
     rollout = compare_rollouts(source, target, steps=steps, seed=seed)
     names = labels or (_label(source), _label(target))
     certificate = Certificate(
         source=names[0],
         target=names[1],
-        source_fingerprint=fingerprint(models[0]),
-        target_fingerprint=fingerprint(models[1]),
-        changes=compare(*models, standing_height=(_height(source), _height(target))),
+        source_fingerprint=fingerprint(one),
+        target_fingerprint=fingerprint(two),
+        changes=compare(one, two, standing_height=(_height(source), _height(target))),
         rollout=rollout,
-        source_inconsistencies=inconsistencies(models[0]),
-        target_inconsistencies=(*inconsistencies(models[1]), *lone_masses(*models)),
+        source_inconsistencies=inconsistencies(one),
+        target_inconsistencies=(*inconsistencies(two), *lone_masses(one, two)),
     )
     if certificate.is_empty and not allow_empty:
         raise EmptyShift(
-            f"{certificate.verdict} There is nothing to transfer across. A setting may be "
-            "outvoted, such as the friction of a foot by that of the floor, or never read."
+            f"{certificate.verdict} There is nothing to transfer across. A setting may have no "
+            "effect, such as the friction of a foot below that of the floor, or may never be read."
         )
     return certificate
 
 
 def _height(env: Certifiable | Wrapped) -> float | None:
-    """The standing height, where the environment knows it."""
+    """Return the standing height, if the environment states it."""
     try:
         return attribute(env, "standing_height")
     except AttributeError:
@@ -179,7 +181,7 @@ def _height(env: Certifiable | Wrapped) -> float | None:
 
 
 def _label(env: Any) -> str:
-    """The id that Gymnasium registered the environment under, or the name of its class."""
+    """Return the registered id of an environment, or the name of its class."""
     spec = getattr(env, "spec", None)
     inner = getattr(env, "unwrapped", env)
     return str(getattr(spec, "id", None) or type(inner).__name__)

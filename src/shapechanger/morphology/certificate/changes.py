@@ -1,15 +1,15 @@
-"""One difference between two models, in numbers and in a sentence."""
+"""The differences between two models, each in numbers and in a sentence."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import msgspec
 import mujoco
 
-from shapechanger.morphology.effective.elements import names_of
+from shapechanger.morphology.effective.elements import names_of, words
 from shapechanger.morphology.effective.model import EffectiveModel, effective_model
 
 if TYPE_CHECKING:
@@ -18,22 +18,20 @@ if TYPE_CHECKING:
 Amount = float | str | tuple[float | str, ...] | None
 """A number, a word, some of them, or None for what is not there."""
 
-# A change of one of these is of the element as a whole: it is there on one side only.
-_WHOLE: Final = frozenset(
-    (
-        "body",
-        "joint",
-        "geom",
-        "site",
-        "contact",
-        "actuator",
-        "tendon",
-        "equality constraint",
-        "flex",
-        "plugin",
-    )
-)
-# Ratios of these mean nothing.
+# A change of one of these is of the element as a whole, which only one model has.
+_ONE_OF: Final = {
+    "bodies": "body",
+    "joints": "joint",
+    "geoms": "geom",
+    "sites": "site",
+    "contacts": "contact",
+    "actuators": "actuator",
+    "tendons": "tendon",
+    "equalities": "equality constraint",
+    "flexes": "flex",
+    "plugins": "plugin",
+}
+# Quantities whose ratios mean nothing.
 _WITHOUT_RATIO: Final = frozenset(("orientation", "inertia axes", "axis", "dimensions"))
 _DIGITS: Final = (4, 8, 17)
 
@@ -42,13 +40,13 @@ class Change(msgspec.Struct, frozen=True):
     """One difference between the target and the source.
 
     Attributes:
-        quantity: What changed, such as "mass", "length", "contact friction" or "gear"; the kind of
-            element, such as "body", where the element is there on one side only.
+        quantity: Name of the quantity, such as "mass", "length", "contact friction" or "gear"; the
+            kind of element, such as "body", if only one of the two has the element.
         element: Name of the element that it belongs to; names, with commas, in a group.
         before: Value in the source; None if it has none.
         after: Value in the target; None if it has none.
-        unit: Unit of both; "1" for a pure number, empty for words and for mixed units.
-        sentence: The change for a reader.
+        unit: Unit of both; "1" for a dimensionless number, empty for words and for mixed units.
+        sentence: The change in words.
     """
 
     quantity: str
@@ -82,16 +80,16 @@ def change(
 
 
 def grouped(changes: Iterable[Change]) -> tuple[Change, ...]:
-    """The changes for reading: those that say the same of several elements become one."""
+    """Merge changes that are the same for several elements."""
     groups: dict[tuple[str, str], list[Change]] = {}
     for item in changes:
-        said = item.sentence.removeprefix(f"{item.element}: ")
-        groups.setdefault((item.quantity, said), []).append(item)
+        text = item.sentence.removeprefix(f"{item.element}: ")
+        groups.setdefault((item.quantity, text), []).append(item)
     merged: list[Change] = []
-    for (_, said), members in groups.items():
+    for (_, text), members in groups.items():
         names = ", ".join(member.element for member in members)
         merged.append(
-            msgspec.structs.replace(members[0], element=names, sentence=f"{names}: {said}")
+            msgspec.structs.replace(members[0], element=names, sentence=f"{names}: {text}")
         )
     return tuple(merged)
 
@@ -109,7 +107,7 @@ def _plain(values: Sequence[float | str] | None) -> Amount:
 def _words(quantity: str, before: Amount, after: Amount, unit: str) -> str:
     """Format the part of a sentence after the name of the element."""
     suffix = f" {unit}" if unit not in ("", "1") else ""
-    if quantity in _WHOLE:
+    if quantity in _ONE_OF.values():
         there = before if after is None else after
         return (
             f"{quantity} {'removed' if after is None else 'added'} "
@@ -127,7 +125,7 @@ def _words(quantity: str, before: Amount, after: Amount, unit: str) -> str:
 
 
 def _shown(amount: Amount, digits: int) -> str:
-    """An amount with so many significant digits; equal numbers of a list are shown once."""
+    """Format an amount with so many significant digits; equal numbers of a list are shown once."""
     if amount is None:
         return "none"
     if not isinstance(amount, tuple):
@@ -139,7 +137,7 @@ def _shown(amount: Amount, digits: int) -> str:
 
 
 def _ratio(before: Amount, after: Amount) -> float | None:
-    """New over old, if it is the same for all numbers that are not zero in both."""
+    """Return new over old, if it is the same for all numbers that are not zero in both."""
     old = before if isinstance(before, tuple) else (before,)
     new = after if isinstance(after, tuple) else (after,)
     if len(old) != len(new):
@@ -155,22 +153,10 @@ def _ratio(before: Amount, after: Amount) -> float | None:
     return ratios[0] if ratios and same else None
 
 
-_Elements = dict[str, dict[str, tuple["Value", ...]]]
+_Fields = dict[str, tuple["Value", ...]]
 
-_ONE_OF: Final = {
-    "bodies": "body",
-    "joints": "joint",
-    "geoms": "geom",
-    "sites": "site",
-    "contacts": "contact",
-    "actuators": "actuator",
-    "tendons": "tendon",
-    "equalities": "equality constraint",
-    "flexes": "flex",
-    "plugins": "plugin",
-}
-# What an element that is there on one side only is told by; its type otherwise.
-_TOLD_BY: Final = {"bodies": "mass", "contacts": "contact dimension", "actuators": "target"}
+# The field that describes an element that only one model has; its type otherwise.
+_DESCRIBED_BY: Final = {"bodies": "mass", "contacts": "contact dimension", "actuators": "target"}
 _UNITS: Final = {
     "mass": "kg",
     "inertia": "kg·m²",
@@ -204,7 +190,7 @@ _JOINT_UNITS: Final = {
     "friction loss": ("N", "N·m"),
     "actuator force range": ("N", "N·m"),
 }
-_ROUND: Final = ("capsule", "cylinder")
+_ROUND: Final = frozenset(("capsule", "cylinder"))
 
 # Numbers that agree to this part of the largest of their field are equal: writing out a total mass,
 # or summing in another order, changes the last bits. Constants that MuJoCo derives lose more.
@@ -218,15 +204,15 @@ def compare(
     *,
     standing_height: tuple[float | None, float | None] = (None, None),
 ) -> tuple[Change, ...]:
-    """The differences between what two models do.
+    """Return the differences between the effective models of two models.
 
     Args:
-        source: The model that a skill was learned on.
-        target: The model that it moves to.
-        standing_height: Height in m at which the source and the target stand, where known.
+        source: The model that a policy is trained on.
+        target: The model that it is transferred to.
+        standing_height: Height at which the source and the target stand, m, if known.
 
     Returns:
-        The changes, empty for models that do the same: standing height, dimensions and total mass
+        The changes, empty for models that move equally: standing height, dimensions and total mass
         first, then element by element.
     """
     one, two = effective_model(source), effective_model(target)
@@ -238,9 +224,8 @@ def compare(
         return tuple(changes)
     changes += _totals(source, target)
     changes += _lengths(source, target, one, two)
-    first, second = dict(one.sections), dict(two.sections)
-    for section in first:
-        if section != "derived" and first[section] != second[section]:
+    for section, _ in one.sections:
+        if section != "derived":
             changes += _section(section, one[section], two[section])
     if not changes:
         old, new = one["derived"], two["derived"]
@@ -272,7 +257,7 @@ def _equal(
 
 
 def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
-    """Differences of the bodies as a whole."""
+    """Return the differences of the number of bodies and of the total mass."""
     found: list[Change] = []
     if source.nbody != target.nbody:
         sizes = (float(source.nbody),), (float(target.nbody),)
@@ -286,19 +271,27 @@ def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
     return found
 
 
-def _section(section: str, before: _Elements, after: _Elements) -> list[Change]:
-    """Differences within one section."""
+def _section(section: str, before: dict[str, _Fields], after: dict[str, _Fields]) -> list[Change]:
+    """Return the differences within one section."""
     found: list[Change] = []
-    for element in [*before, *(name for name in after if name not in before)]:
+    for element in dict.fromkeys((*before, *after)):
         old, new = before.get(element), after.get(element)
         if old is None or new is None:
-            found.append(_one_sided(section, element, old, new))
+            field = _DESCRIBED_BY.get(section, "type")
+            one, two = (
+                None if fields is None else fields.get(field, ("there",)) for fields in (old, new)
+            )
+            unit = _UNITS[field] if section == "bodies" else ""
+            found.append(change(_ONE_OF[section], element, one, two, unit))
             continue
-        for field in [*old, *(name for name in new if name not in old)]:
-            if not _equal(old.get(field), new.get(field)) and not _is_segment(
-                section, field, old, new
-            ):
-                found.append(_difference(section, element, field, old, new))
+        kinds = {*old.get("type", ()), *new.get("type", ())}
+        has_length = section == "geoms" and len(kinds) == 1 and kinds <= _ROUND
+        found += [
+            _difference(section, element, field, old, new)
+            for field in dict.fromkeys((*old, *new))
+            if not _equal(old.get(field), new.get(field))
+            and not (has_length and field == "size")  # `_lengths` reports it.
+        ]
     shared_before = [name for name in before if name in after]
     shared_after = [name for name in after if name in before]
     if shared_before != shared_after:
@@ -306,41 +299,8 @@ def _section(section: str, before: _Elements, after: _Elements) -> list[Change]:
     return found
 
 
-def _one_sided(
-    section: str,
-    element: str,
-    before: dict[str, tuple[Value, ...]] | None,
-    after: dict[str, tuple[Value, ...]] | None,
-) -> Change:
-    """An element that only the source, or only the target, has."""
-    field = _TOLD_BY.get(section, "type")
-
-    def told(fields: dict[str, tuple[Value, ...]] | None) -> tuple[Value, ...] | None:
-        return None if fields is None else fields.get(field, ("there",))
-
-    unit = _UNITS.get(field, "") if section == "bodies" else ""
-    return change(_ONE_OF[section], element, told(before), told(after), unit)
-
-
-def _is_segment(
-    section: str,
-    field: str,
-    before: dict[str, tuple[Value, ...]],
-    after: dict[str, tuple[Value, ...]],
-) -> bool:
-    """Return whether `_lengths` tells of this difference."""
-    types = {*before.get("type", ()), *after.get("type", ())}
-    return section == "geoms" and field == "size" and len(types) == 1 and types <= set(_ROUND)
-
-
-def _difference(
-    section: str,
-    element: str,
-    field: str,
-    before: dict[str, tuple[Value, ...]],
-    after: dict[str, tuple[Value, ...]],
-) -> Change:
-    """One field that differs, in the unit in which people think of it."""
+def _difference(section: str, element: str, field: str, before: _Fields, after: _Fields) -> Change:
+    """Describe one field that differs, in its usual unit."""
     old, new = before.get(field), after.get(field)
     unit = _UNITS.get(field, "")
     if section == "joints" and field in _JOINT_UNITS:
@@ -355,55 +315,65 @@ def _difference(
 
 
 def _in_degrees(angles: tuple[Value, ...] | None) -> tuple[float, ...] | None:
-    """Angles in degrees; None stays None."""
+    """Convert angles to degrees; None stays None."""
     return None if angles is None else tuple(math.degrees(float(angle)) for angle in angles)
+
+
+class _Segment(NamedTuple):
+    """A capsule or cylinder; its length is without the caps.
+
+    Attributes:
+        body: Name of its body.
+        label: Name of the body if the geom is the body's only one; else of the geom.
+        kind: "capsule" or "cylinder".
+        radius: Radius, m.
+        length: Length, m.
+    """
+
+    body: str
+    label: str
+    kind: str
+    radius: float
+    length: float
 
 
 def _lengths(
     source: mujoco.MjModel, target: mujoco.MjModel, one: EffectiveModel, two: EffectiveModel
 ) -> list[Change]:
-    """Lengths and radii of segments, in m.
+    """Return the differences of lengths and radii of segments, m.
 
-    A geom that touches nothing still tells what was done to its body: its length is told if the
-    body itself differs.
+    A geom that touches nothing is reported only if its body differs.
     """
     old_bodies, new_bodies = one["bodies"], two["bodies"]
-    old_geoms, new_geoms = one["geoms"], two["geoms"]
-    before, after = _segments(source), _segments(target)
+    touching = one["geoms"].keys() & two["geoms"].keys()
+    segments = _segments(target)
     found: list[Change] = []
-    for geom, (body, label, kind, radius, length) in before.items():
-        other = after.get(geom)
-        if other is None or other[2] != kind:
+    for geom, before in _segments(source).items():
+        after = segments.get(geom)
+        if after is None or after.kind != before.kind:
             continue
-        touches = geom in old_geoms and geom in new_geoms
-        if not touches and old_bodies.get(body) == new_bodies.get(body):
+        if geom not in touching and old_bodies.get(before.body) == new_bodies.get(before.body):
             continue
-        if length != other[4]:
-            found.append(change("length", label, (length,), (other[4],), "m"))
-        if radius != other[3]:
-            found.append(change("radius", label, (radius,), (other[3],), "m"))
+        for quantity in ("length", "radius"):
+            old, new = getattr(before, quantity), getattr(after, quantity)
+            if old != new:
+                found.append(change(quantity, before.label, (old,), (new,), "m"))
     return found
 
 
-def _segments(model: mujoco.MjModel) -> dict[str, tuple[str, str, str, float, float]]:
-    """For each capsule and cylinder its body, label, type, radius and length without the caps.
-
-    The label is the body's name where the geom is the body's only one.
-    """
+def _segments(model: mujoco.MjModel) -> dict[str, _Segment]:
+    """Return the capsules and cylinders of a model by name."""
     names = names_of(model)
-    kinds = {mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule", mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder"}
-    counts = model.body_geomnum.tolist()
-    found: dict[str, tuple[str, str, str, float, float]] = {}
-    for geom, number, owner, size in zip(
+    found: dict[str, _Segment] = {}
+    for geom, kind, owner, (radius, half_length, _) in zip(
         names.geoms,
-        model.geom_type.tolist(),
+        words(mujoco.mjtGeom, model.geom_type),
         model.geom_bodyid.tolist(),
         model.geom_size.tolist(),
         strict=True,
     ):
-        kind = kinds.get(mujoco.mjtGeom(number))
-        if kind is not None:
-            body = names.bodies[int(owner)]
-            label = body if counts[owner] == 1 else geom
-            found[geom] = (body, label, kind, size[0], 2.0 * size[1])
+        if kind in _ROUND:
+            body = names.bodies[owner]
+            label = body if model.body_geomnum[owner] == 1 else geom
+            found[geom] = _Segment(body, label, kind, radius, 2.0 * half_length)
     return found

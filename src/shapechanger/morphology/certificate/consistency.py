@@ -1,9 +1,9 @@
 """Consistency of the numbers of a compiled model.
 
-A compiled model can be written to. Mass without inertia, or either without `mujoco.mj_setConst`,
-leaves a robot that is neither the old one nor the new one: MuJoCo softens contacts and limits by
-inverse weights that no longer hold, copies frames that no longer coincide, and ignores gravity
-compensation, adhesion or an actuator's damping where there was none when the model was compiled.
+A compiled model can be written to. Writing mass without inertia, or either without calling
+`mujoco.mj_setConst`, leaves an inconsistent model: MuJoCo softens contacts and limits by inverse
+weights that no longer hold, copies frames that no longer coincide, and ignores gravity
+compensation, adhesion or an actuator's damping if there was none when the model was compiled.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import mujoco
 import numpy as np
 
-from shapechanger.morphology.effective.elements import Names, named, names_of
+from shapechanger.morphology.effective.elements import Names, names_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -93,7 +93,7 @@ def lone_masses(source: mujoco.MjModel, target: mujoco.MjModel) -> tuple[str, ..
 
 
 def _impossible_inertias(model: mujoco.MjModel, names: Names) -> list[str]:
-    """Moving bodies with mass whose principal moments no solid body has."""
+    """Find moving bodies with mass whose principal moments no solid body has."""
     found: list[str] = []
     for i in np.flatnonzero((model.body_treeid >= 0) & (model.body_mass > 0.0)).tolist():
         small, middle, large = sorted(model.body_inertia[i].tolist())
@@ -109,7 +109,7 @@ def _impossible_inertias(model: mujoco.MjModel, names: Names) -> list[str]:
 
 
 def _late_bits(model: mujoco.MjModel, names: Names) -> list[str]:
-    """Geoms whose contact bits were set after their body's were compiled."""
+    """Find geoms whose contact bits were set after their body's were compiled."""
     owner = model.geom_bodyid
     late = (model.geom_contype & ~model.body_contype[owner]) | (
         model.geom_conaffinity & ~model.body_conaffinity[owner]
@@ -122,7 +122,7 @@ def _late_bits(model: mujoco.MjModel, names: Names) -> list[str]:
 
 
 def _stale_constants(model: mujoco.MjModel, names: Names) -> list[str]:
-    """Arrays that `mj_setConst` would change, each with the element where it changes most."""
+    """Find arrays that `mj_setConst` would change, each with the element that changes most."""
     fresh = copy.deepcopy(model)
     try:
         mujoco.mj_setConst(fresh, mujoco.MjData(fresh))
@@ -130,33 +130,33 @@ def _stale_constants(model: mujoco.MjModel, names: Names) -> list[str]:
         return [f"MuJoCo cannot derive its constants from the model: {error}."]
     owners = {
         "body": names.bodies,
-        "dof": named(names.joints, model.dof_jntid),
+        "dof": [names.joints[joint] for joint in model.dof_jntid.tolist()],
         "geom": names.geoms,
         "site": names.sites,
         "joint": names.joints,
         "tendon": names.tendons,
     }
-    cure = "Call mujoco.mj_setConst after writing to a compiled model."
+    remedy = "Call mujoco.mj_setConst after writing to a compiled model."
     found: list[str] = []
     for kind, constants in _CONSTANTS.items():
         for array, consequence in constants.items():
-            told = _largest_gap(getattr(model, array), getattr(fresh, array))
-            if told is not None:
-                row, old, new = told
+            gap = _largest_gap(getattr(model, array), getattr(fresh, array))
+            if gap is not None:
+                row, old, new = gap
                 found.append(
                     f"{owners[kind][row]}: {array} is {old:.4g}, but the model makes it {new:.4g}, "
-                    f"so {consequence}. {cure}"
+                    f"so {consequence}. {remedy}"
                 )
     for flag, consequence in _FLAGS.items():
         if getattr(fresh, flag) and not getattr(model, flag):
-            found.append(f"{flag} is not set, so {consequence}. {cure}")
+            found.append(f"{flag} is not set, so {consequence}. {remedy}")
     return found
 
 
 def _largest_gap(
     old: NDArray[np.number], new: NDArray[np.number]
 ) -> tuple[int, float, float] | None:
-    """Row and values of the largest relative gap; None if there is none."""
+    """Return row and values of the largest relative gap; None if there is none."""
     if not old.size:
         return None
     one, two = (array.reshape(len(array), -1).astype(np.float64) for array in (old, new))

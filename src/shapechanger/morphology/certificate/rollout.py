@@ -1,83 +1,24 @@
-"""Two environments started from one seed and driven by the same commands: where do they part?
+"""Compare two environments that start from one seed and get the same commands.
 
-What a compiled model does not show, a rollout does: noise and delay of sensors, another start,
-another reward. Nothing here knows Gymnasium; any object with its methods will do.
+A rollout shows what a compiled model does not: noise and delay of sensors, another start, another
+reward. Any object with the methods of `Certifiable` will do; Gymnasium is not needed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, SupportsFloat, cast
 
 import msgspec
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
-
-from shapechanger.morphology.certificate.certifiable import Certifiable, Wrapped, attribute
 
 if TYPE_CHECKING:
     from shapechanger.layout import Layout
 
-Commands = NDArray[np.float32]
-"""Commands of an episode, shape (steps, motors)."""
-
-
-def matched_commands(
-    source: Layout, target: Layout, steps: int, seed: int
-) -> tuple[Commands, Commands]:
-    """Commands for two robots: the same for motors of the same name, zero for the others.
-
-    The numbers of a motor depend on the seed and its name alone. They lie where the ranges of the
-    two overlap.
-
-    Args:
-        source: What the motors of the one take.
-        target: What the motors of the other take.
-        steps: How many commands to draw.
-        seed: Seed of the draw.
-    """
-    old, new = _ranges(source), _ranges(target)
-    drawn: dict[str, NDArray[np.float64]] = {}
-    for name in old:
-        if name in new:
-            low, high = max(old[name][0], new[name][0]), min(old[name][1], new[name][1])
-            share = np.random.default_rng([seed, *name.encode()]).random(steps)
-            drawn[name] = low + (high - low) * share
-    return _as_commands(old, drawn, steps), _as_commands(new, drawn, steps)
-
-
-def _as_commands(
-    ranges: dict[str, tuple[float, float]], drawn: dict[str, NDArray[np.float64]], steps: int
-) -> Commands:
-    """Commands in single precision, which spaces of single and of double precision both take."""
-    commands = np.zeros((steps, len(ranges)), np.float32)
-    for place, (name, bounds) in enumerate(ranges.items()):
-        low, high = np.asarray(bounds, np.float32)
-        commands[:, place] = np.clip(drawn.get(name, np.zeros(steps)), low, high)
-    return commands
-
-
-def _ranges(layout: Layout) -> dict[str, tuple[float, float]]:
-    """For each number of an action a finite range: to -1 or 1, or beyond, where it has no bound."""
-    found: dict[str, tuple[float, float]] = {}
-    for name, low, high in zip(number_names(layout), layout.low, layout.high, strict=True):
-        bottom = low if np.isfinite(low) else min(-1.0, high - 1.0)
-        top = high if np.isfinite(high) else max(1.0, low + 1.0)
-        found[name] = (float(bottom), float(top))
-    return found
-
-
-def number_names(layout: Layout) -> list[str]:
-    """One name per number of a vector: `camera[0]`, `camera[1]` for a block."""
-    names: list[str] = []
-    for feature in layout:
-        blocks = [f"{feature.name}[{i}]" for i in range(feature.size)]
-        names += blocks if feature.shape else [feature.name]
-    return names
-
-
 _Floats = NDArray[np.float64]
+_Commands = NDArray[np.float32]
 
 _LARGEST: Final = float(np.finfo(np.float64).max)
 
@@ -88,10 +29,113 @@ _EARLY_STEPS: Final = 10
 _EARLY_TOLERANCE: Final = 1e-8
 
 
-class Rollout(msgspec.Struct, frozen=True):
-    """Responses of two environments to the same commands.
+class _Env(Protocol):
+    """An environment that can be reset and stepped."""
 
-    Step 0 is the reset; step n is the answer to the n-th command.
+    def reset(self, *, seed: int | None = None) -> tuple[Any, dict[str, Any]]: ...
+
+    def step(self, action: Any, /) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]: ...
+
+
+class Certifiable(_Env, Protocol):
+    """Protocol of an environment whose shifts can be certified.
+
+    Attributes:
+        model: The compiled model that it steps.
+        standing_height: Height of its trunk when it stands, m; None if it does not stand.
+        observation_layout: Meaning of each number of an observation.
+        action_layout: Meaning of each number of an action.
+    """
+
+    model: mujoco.MjModel
+    standing_height: float | None
+    observation_layout: Layout
+    action_layout: Layout
+
+
+class Wrapped(_Env, Protocol):
+    """Protocol of a wrapper around a `Certifiable`, whose observations and actions count."""
+
+    @property
+    def unwrapped(self) -> Any:
+        """The environment inside all wrappers."""
+        ...
+
+
+def attribute(env: Certifiable | Wrapped, name: str) -> Any:
+    """Return an attribute of an environment, or of the one inside its wrappers.
+
+    Args:
+        env: The environment.
+        name: Name of the attribute.
+
+    Raises:
+        AttributeError: If neither has it.
+    """
+    return getattr(env, name) if hasattr(env, name) else getattr(cast(Any, env).unwrapped, name)
+
+
+def matched_commands(
+    source: Layout, target: Layout, steps: int, seed: int
+) -> tuple[_Commands, _Commands]:
+    """Draw commands for two robots: the same for motors of the same name, zero for the others.
+
+    The numbers of a motor depend on the seed and its name alone. They lie where the ranges of the
+    two overlap.
+
+    Args:
+        source: Layout of the actions of the one.
+        target: Layout of the actions of the other.
+        steps: How many commands to draw.
+        seed: Seed of the draw.
+
+    Returns:
+        The commands of each, shape (steps, size of its layout).
+    """
+    old, new = _ranges(source), _ranges(target)
+    drawn: dict[str, _Floats] = {}
+    for name in old:
+        if name in new:
+            low, high = max(old[name][0], new[name][0]), min(old[name][1], new[name][1])
+            share = np.random.default_rng([seed, *name.encode()]).random(steps)
+            drawn[name] = low + (high - low) * share
+    return _as_commands(old, drawn, steps), _as_commands(new, drawn, steps)
+
+
+def _as_commands(
+    ranges: dict[str, tuple[float, float]], drawn: dict[str, _Floats], steps: int
+) -> _Commands:
+    """Return commands in single precision, which spaces of double precision accept too."""
+    commands = np.zeros((steps, len(ranges)), np.float32)
+    for place, (name, bounds) in enumerate(ranges.items()):
+        low, high = np.asarray(bounds, np.float32)
+        commands[:, place] = np.clip(drawn.get(name, np.zeros(steps)), low, high)
+    return commands
+
+
+def _ranges(layout: Layout) -> dict[str, tuple[float, float]]:
+    """Return a finite range for each number: to -1 or 1, or beyond, where it has no bound."""
+    found: dict[str, tuple[float, float]] = {}
+    for name, low, high in zip(number_names(layout), layout.low, layout.high, strict=True):
+        bottom = low if np.isfinite(low) else min(-1.0, high - 1.0)
+        top = high if np.isfinite(high) else max(1.0, low + 1.0)
+        found[name] = (float(bottom), float(top))
+    return found
+
+
+def number_names(layout: Layout) -> list[str]:
+    """Return one name per number of a vector: `camera[0]`, `camera[1]` for a block."""
+    names: list[str] = []
+    for feature in layout:
+        blocks = [f"{feature.name}[{i}]" for i in range(feature.size)]
+        names += blocks if feature.shape else [feature.name]
+    return names
+
+
+class Rollout(msgspec.Struct, frozen=True):
+    """Comparison of the responses of two environments to the same commands.
+
+    Step 0 is the reset; step n follows the n-th command.
 
     Attributes:
         steps: Commands given before the first of the two ended its episode.
@@ -145,143 +189,106 @@ class Rollout(msgspec.Struct, frozen=True):
         )
 
     def __str__(self) -> str:
-        """The facts, in a few sentences."""
-        told = [f"{self.steps} steps from the same seed with the same commands:"]
+        """Return the comparison in a few sentences."""
+        sentences = [f"{self.steps} steps from the same seed with the same commands:"]
         if self.first_step is None:
-            told.append(f"the {self.compared} numbers that both observe are equal throughout.")
+            sentences.append(f"the {self.compared} numbers that both observe are equal throughout.")
         else:
             when = "at the reset" if self.first_step == 0 else f"at step {self.first_step}"
-            told.append(
+            sentences.append(
                 f"observations part {when} in {self.first_feature}, and furthest at step "
                 f"{self.largest_step} in {self.largest_feature}, by {self.largest_difference:.4g}."
             )
         for whose, names in (("source", self.only_in_source), ("target", self.only_in_target)):
             if names:
-                told.append(f"Only the {whose} observes {len(names)} more, such as {names[0]}.")
+                sentences.append(
+                    f"Only the {whose} observes {len(names)} more, such as {names[0]}."
+                )
         if self.reward_difference > 0.0:
-            told.append(f"Rewards differ by up to {self.reward_difference:.4g} a step.")
+            sentences.append(f"Rewards differ by up to {self.reward_difference:.4g} a step.")
         if self.source_ended != self.target_ended:
-            told.append(
+            sentences.append(
                 f"Only the {'source' if self.source_ended else 'target'} ended its episode."
             )
-        return " ".join(told)
+        return " ".join(sentences)
 
 
 def compare_rollouts(
     source: Certifiable | Wrapped, target: Certifiable | Wrapped, *, steps: int = 100, seed: int = 0
 ) -> Rollout:
-    """Reset both with one seed, drive both with the same commands, and compare what they observe.
+    """Reset two environments with one seed, give them the same commands, and compare the responses.
 
     A command is drawn per motor name, so a motor that both have gets the same number whatever
-    stands beside it; a motor that one lacks gets zero. The source runs first and the target after
-    it, so one machine may serve as both. Each is left in the midst of an episode.
+    other motors there are; a motor that one lacks gets zero. The source runs first and the target
+    after it, so one object may be both. Each is left in the middle of an episode.
 
     Args:
-        source: Where a skill is learned.
-        target: Where it moves to.
+        source: The environment in which a policy is trained.
+        target: The environment that it is transferred to.
         steps: How many commands to give; fewer if an episode ends.
         seed: Seed of the resets and of the commands.
     """
     layouts = attribute(source, "action_layout"), attribute(target, "action_layout")
     for_source, for_target = matched_commands(*layouts, steps, seed)
     one, two = _drive(source, for_source, seed), _drive(target, for_target, seed)
-    old = _names(attribute(source, "observation_layout"), one.observations[0])
-    new = _names(attribute(target, "observation_layout"), two.observations[0])
-    if old is None or new is None:  # A wrapper made other numbers of them: go by their places.
-        old, new = _places(one.observations[0]), _places(two.observations[0])
-    tally = _Tally(old, new)
-    for step, seen in enumerate(zip(one.observations, two.observations, strict=False)):
-        tally.observe(step, *seen)
+    old, new = (number_names(attribute(env, "observation_layout")) for env in (source, target))
+    sizes = one.observations.shape[1], two.observations.shape[1]
+    if (len(old), len(new)) != sizes:  # A wrapper has changed the numbers: use their places.
+        old, new = ([f"observation[{place}]" for place in range(size)] for size in sizes)
+    in_new = frozenset(new)
+    shared = [name for name in old if name in in_new]
     done = min(len(one.rewards), len(two.rewards))
-    rewards = np.asarray(one.rewards[:done]), np.asarray(two.rewards[:done])
+    gaps = _gap(
+        one.observations[: done + 1, [old.index(name) for name in shared]],
+        two.observations[: done + 1, [new.index(name) for name in shared]],
+    )
+    rewards = _gap(one.rewards[:done], two.rewards[:done])
+    parted = np.flatnonzero(gaps.any(axis=1)).tolist()
+    first = parted[0] if parted else None
+    # The first of equal differences.
+    largest, feature = np.unravel_index(int(np.argmax(gaps)), gaps.shape) if parted else (0, 0)
+    early = gaps[: _EARLY_STEPS + 1].max(initial=0.0), rewards[:_EARLY_STEPS].max(initial=0.0)
     return Rollout(
         steps=done,
         source_ended=one.ended and len(one.rewards) == done,
         target_ended=two.ended and len(two.rewards) == done,
-        compared=len(tally.shared),
-        only_in_source=tuple(name for name in old if name not in tally.shared),
-        only_in_target=tuple(name for name in new if name not in tally.shared),
-        first_step=tally.first_step,
-        first_feature=tally.first_feature,
-        largest_difference=tally.largest,
-        largest_feature=tally.largest_feature,
-        largest_step=tally.largest_step,
-        reward_difference=float(_gap(*rewards).max(initial=0.0)),
-        early_difference=max(tally.early, float(_gap(*rewards)[:_EARLY_STEPS].max(initial=0.0))),
+        compared=len(shared),
+        only_in_source=tuple(name for name in old if name not in shared),
+        only_in_target=tuple(name for name in new if name not in shared),
+        first_step=first,
+        first_feature="" if first is None else shared[int(np.argmax(gaps[first]))],
+        largest_difference=float(gaps.max(initial=0.0)),
+        largest_feature=shared[feature] if parted else "",
+        largest_step=int(largest) if parted else None,
+        reward_difference=float(rewards.max(initial=0.0)),
+        early_difference=float(max(early)),
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Episode:
-    """Responses of one environment."""
+class _Episode(NamedTuple):
+    """Responses of one environment: observations (steps + 1, size) and rewards (steps,)."""
 
-    observations: list[_Floats]
-    rewards: list[float]
+    observations: _Floats
+    rewards: _Floats
     ended: bool
 
 
-def _drive(env: Certifiable | Wrapped, commands: Commands, seed: int) -> _Episode:
+def _drive(env: Certifiable | Wrapped, commands: _Commands, seed: int) -> _Episode:
     """Reset an environment and give it commands until they, or the episode, are over."""
     observation, _ = env.reset(seed=seed)
-    episode = _Episode([_flat(observation)], [], ended=False)
+    observations, rewards, ended = [_flat(observation)], list[float](), False
     for command in commands:
         observation, reward, terminated, truncated, _ = env.step(command)
-        episode.observations.append(_flat(observation))
-        episode.rewards.append(float(reward))
-        if terminated or truncated:
-            return replace(episode, ended=True)
-    return episode
-
-
-@dataclass(slots=True)
-class _Tally:
-    """Keeps the first and the largest difference between two streams of observations."""
-
-    old: dict[str, int]
-    new: dict[str, int]
-    shared: dict[str, None] = field(init=False)
-    first_step: int | None = None
-    first_feature: str = ""
-    largest: float = 0.0
-    largest_feature: str = ""
-    largest_step: int | None = None
-    early: float = 0.0
-
-    def __post_init__(self) -> None:
-        self.shared = dict.fromkeys(name for name in self.old if name in self.new)
-
-    def observe(self, step: int, source: _Floats, target: _Floats) -> None:
-        """Compare what both observed at a step."""
-        if not self.shared:
-            return
-        names = list(self.shared)
-        gaps = _gap(
-            source[[self.old[name] for name in names]], target[[self.new[name] for name in names]]
-        )
-        worst = int(np.argmax(gaps))
-        if gaps[worst] > 0.0 and self.first_step is None:
-            self.first_step, self.first_feature = step, names[worst]
-        if step <= _EARLY_STEPS:
-            self.early = max(self.early, float(gaps[worst]))
-        if gaps[worst] > self.largest:
-            self.largest, self.largest_feature = float(gaps[worst]), names[worst]
-            self.largest_step = step
-
-
-def _names(layout: Layout, observation: _Floats) -> dict[str, int] | None:
-    """For each name its place; None if the layout does not describe the observation."""
-    if layout.size != observation.size:
-        return None
-    return {name: place for place, name in enumerate(number_names(layout))}
-
-
-def _places(observation: _Floats) -> dict[str, int]:
-    """Names for the numbers of an observation that no layout describes."""
-    return {f"observation[{place}]": place for place in range(observation.size)}
+        observations.append(_flat(observation))
+        rewards.append(float(reward))
+        ended = bool(terminated or truncated)
+        if ended:
+            break
+    return _Episode(np.stack(observations), np.asarray(rewards), ended)
 
 
 def _flat(observation: Any) -> _Floats:
-    """An observation as one vector; the parts of a dictionary in alphabetical order."""
+    """Return an observation as one vector; the parts of a dictionary in alphabetical order."""
     if isinstance(observation, Mapping):
         parts = cast("Mapping[str, Any]", observation)
         return np.concatenate([_flat(parts[key]) for key in sorted(parts)])
@@ -289,7 +296,7 @@ def _flat(observation: Any) -> _Floats:
 
 
 def _gap(one: _Floats, two: _Floats) -> _Floats:
-    """Absolute differences; the largest number there is where one is not finite."""
+    """Return absolute differences; the largest finite number where one is not finite."""
     same = (one == two) | (np.isnan(one) & np.isnan(two))
     with np.errstate(invalid="ignore"):
         gap = np.where(same, 0.0, np.abs(one - two))

@@ -1,7 +1,7 @@
-"""A change of body is a value: frozen, printable, comparable, and the same as JSON.
+"""Base class of edits: frozen values that can be printed, compared and converted to JSON.
 
-Every edit carries an `amount`, the part of the change that is made. It is 1 except between two
-bodies, where it makes the path continuous (see `shapechanger.morphology.body`).
+Every edit has an `amount`, the share of the change that is made. It is 1 except between two
+bodies, where it makes the path continuous (see `shapechanger.morphology.body.interpolate`).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 
-# A limb a hundred times longer or shorter is a typing mistake, and MuJoCo's contacts, whose
-# softness is fixed in absolute numbers, stop meaning anything there.
+# A limb a hundred times longer or shorter is a typing mistake, and the softness of MuJoCo's
+# contacts, which is absolute, does not fit it.
 _SMALLEST_FACTOR: Final = 0.01
 _LARGEST_FACTOR: Final = 100.0
 
 
 def _tag(class_name: str) -> str:
-    """`AddSegment` becomes `add_segment`."""
+    """Return the tag of an edit in JSON: `add_segment` for `AddSegment`."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", class_name).lower()
 
 
@@ -45,7 +45,7 @@ class Edit(
     """One change to a model.
 
     Attributes:
-        amount: The part of the change that is made, from 0 (none) to 1 (all).
+        amount: Share of the change that is made, 0 (none) to 1 (all).
 
     Raises:
         MorphologyError: If the amount, or a number of the edit, is out of its range.
@@ -63,7 +63,7 @@ class Edit(
         self.check()
 
     def check(self) -> None:
-        """Refuse numbers that no model could take; overridden where there are any."""
+        """Refuse numbers out of range; subclasses override it."""
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change `spec` in place.
@@ -75,7 +75,7 @@ class Edit(
         raise NotImplementedError
 
     def partly(self, alpha: float) -> Edit:
-        """The same change, made to the part `alpha` in [0, 1] of what it was."""
+        """Return the edit with its amount scaled by `alpha`, 0 to 1."""
         return msgspec.structs.replace(self, amount=self.amount * alpha)
 
 
@@ -97,7 +97,7 @@ def part_of_the_way(old: float, new: float, amount: float) -> float:
 
 
 def require_factor(name: str, value: float) -> None:
-    """Refuse a ratio that is zero, negative, NaN or absurd.
+    """Refuse a ratio that is zero, negative, NaN or out of range.
 
     Args:
         name: Name of the ratio, for the message.
@@ -122,9 +122,9 @@ def require_vector(name: str, value: Vector, *, nonzero: bool = True) -> None:
         nonzero: Whether to refuse a vector of zeros, which has no direction.
 
     Raises:
-        MorphologyError: If so.
+        MorphologyError: If `value` is anything else.
     """
-    given: Any = value  # What a type checker knows, a notebook may not.
+    given: Any = value  # Not checked at run time.
     if not isinstance(given, tuple) or len(value) != 3 or not all(map(math.isfinite, value)):
         raise MorphologyError(f"{name} must be a tuple of three finite numbers, got {value}.")
     if nonzero and not any(value):

@@ -16,14 +16,14 @@ from shapechanger.morphology.spec.geometry import orientation, rotation
 _J = mujoco.mjtJoint
 # A joint without limits turns all the way round; a slide without limits has no such number.
 _FULL_TURN: Final = (-math.pi, math.pi)
-# MuJoCo needs a range wider than nothing; that of a joint on its way to a lock is at least this.
+# MuJoCo needs a range above zero; that of a partly locked joint is at least this.
 _NARROWEST_RAD: Final = 1e-3
 
 
 class JointRange(Edit, frozen=True):
     """Change how far hinges and slides move; a joint without limits becomes limited.
 
-    A slide without limits needs both of them. On the way there they come nearer from far away.
+    A slide without limits needs both. At a smaller amount, its limits are farther apart.
 
     Attributes:
         joint: Name or glob of the joints.
@@ -60,7 +60,7 @@ class JointRange(Edit, frozen=True):
             set_limits(joint, *new)
 
     def _far_limits(self, joint: mujoco.MjsJoint) -> tuple[float, float]:
-        """Return the starting limits for a slide without limits: the smaller the part, the wider.
+        """Return limits for a slide without limits: the smaller the amount, the wider.
 
         Raises:
             MorphologyError: If the edit gives one limit only.
@@ -72,14 +72,14 @@ class JointRange(Edit, frozen=True):
 
 
 class Lock(Edit, frozen=True):
-    """Lock hinges or slides at a position: the joint and its motors go, the limb stays.
+    """Lock hinges or slides at a position: remove the joints and their motors, keep the limbs.
 
-    Both spaces shrink, so a policy needs a body map to cross over; its rule `hold` keeps for the
-    policy the angle at which the joint is locked.
+    Both spaces shrink, so a policy needs a body map to be transferred; the rule `hold` of the map
+    presents the locked position to the policy.
 
     Attributes:
         joint: Name or glob of the joints.
-        position: Where it is locked, rad or m; None for the middle of its range.
+        position: Position at which it is locked, rad or m; None for the middle of its range.
     """
 
     joint: str
@@ -154,9 +154,9 @@ def _in_degrees(joint: mujoco.MjsJoint) -> bool:
 
 
 def _degrees(angle: float) -> float:
-    """The degrees that MuJoCo turns back into exactly `angle` (rad), where there are such.
+    """Return degrees that MuJoCo converts to exactly `angle`, rad, if possible.
 
-    There are for every angle that was written in degrees: 30° is not 29.999999999999996°.
+    It is for every angle that was written in degrees: 30° is not 29.999999999999996°.
     """
     near = math.degrees(angle)
     candidates = (round(near, 9), near, math.nextafter(near, 0.0), math.nextafter(near, 2.0 * near))
@@ -164,7 +164,7 @@ def _degrees(angle: float) -> float:
 
 
 def _weld(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, position: float) -> None:
-    """Move the joint's displacement at `position` into its body's pose, and delete the joint."""
+    """Add the joint's displacement at `position` to its body's pose, and delete the joint."""
     body = joint.parent
     axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
     reference = math.radians(joint.ref) if _in_degrees(joint) else float(joint.ref)

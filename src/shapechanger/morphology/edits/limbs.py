@@ -1,4 +1,4 @@
-"""Edits that change what a body is made of: cut, remove, split, add."""
+"""Edits of the structure of a body: cut, remove, split, add."""
 
 from __future__ import annotations
 
@@ -41,19 +41,19 @@ from shapechanger.morphology.spec.geometry import (
 from shapechanger.morphology.spec.grafting import copy_geom, graft_copy, move_limb, move_point
 
 _SPHERE: Final = mujoco.mjtGeom.mjGEOM_SPHERE
-# MuJoCo refuses bodies of almost no mass, so a limb that appears or goes is never smaller than this
-# part of its full size: a millionth of its mass.
+# MuJoCo refuses bodies of almost no mass, so a limb that exists in part is never smaller than this
+# share of its full size, which is a millionth of its mass.
 _SMALLEST_PART: Final = 0.01
 # In kg and in kg·m²: ten times what MuJoCo refuses.
 _LEAST: Final = 1e-14
 
 
 class Cut(Edit, frozen=True):
-    """Cut a limb: keep a part of a segment and lose what hung on it beyond the cut.
+    """Cut a limb: shorten a segment, and remove what is attached to it beyond the cut.
 
     Attributes:
         body: Name or glob of the segments; not a trunk.
-        keep: The part that is kept, from the joint outwards, 0.01 to 1.
+        keep: Share of the length that is kept, from the joint outwards, 0.01 to 1.
     """
 
     body: str
@@ -70,7 +70,7 @@ class Cut(Edit, frozen=True):
         for name in [body.name for body in select("body", self.body, limbs_and_trunks(spec))]:
             body = spec.body(name)
             if body is None:
-                continue  # It hung on one that was cut before it.
+                continue  # It was part of a limb that has been cut off.
             require_limb(body, "cut")
             require_geometry(spec, body)
             beyond = _children_beyond(spec, body, self.keep)
@@ -80,7 +80,7 @@ class Cut(Edit, frozen=True):
 
 
 class Remove(Edit, frozen=True):
-    """Remove a limb with all that hangs on it, its joints and motors too.
+    """Remove a limb with everything attached to it, including joints and motors.
 
     Attributes:
         body: Name or glob of the body that the limb begins with; not a trunk.
@@ -92,7 +92,7 @@ class Remove(Edit, frozen=True):
         """Remove every limb that fits."""
         for name in [body.name for body in select("body", self.body, limbs_and_trunks(spec))]:
             body = spec.body(name)
-            if body is not None:  # It may have hung on one that went before it.
+            if body is not None:  # Else it was part of a limb that has been removed.
                 require_limb(body, "removed")
                 _take_away(spec, body, self.amount)
 
@@ -100,17 +100,17 @@ class Remove(Edit, frozen=True):
 class Split(Edit, frozen=True):
     """Split a segment in two, with a hinge where it was split.
 
-    The nearer part keeps the body's name and joint; what hung on the farther part goes with it, as
-    do its sites and spheres. The new hinge has the armature, damping and stiffness of the body's
-    own joint.
+    The nearer part keeps the body's name and joint; what is attached to the farther part moves with
+    it, and so do its sites and spheres. The new hinge has the armature, damping and stiffness of
+    the body's own joint.
 
     Attributes:
         body: Name of the segment; not a trunk.
         name: Name of the farther part, of its hinge and of its motor.
-        at: Where it is split, as a part of its length from the joint, between 0 and 1.
+        at: Position of the split as a share of its length from the joint, between 0 and 1.
         lower: Lower limit of the hinge, rad.
         upper: Upper limit of the hinge, rad.
-        gear: N·m for a control of 1, of a motor with controls from -1 to 1; None for no motor.
+        gear: Torque of a motor for a control of 1, N·m; controls are -1 to 1. None for no motor.
         axis: Axis of the hinge in the body's frame; None for that of the body's own hinge.
     """
 
@@ -123,7 +123,7 @@ class Split(Edit, frozen=True):
     axis: Vector | None = None
 
     def check(self) -> None:
-        """Refuse a place outside the segment, an empty range or a gear of nothing."""
+        """Refuse a place outside the segment, and a range or gear of zero."""
         if not 0.0 < self.at < 1.0:
             raise MorphologyError(f"A segment is split between 0 and 1, got {self.at}.")
         _check_hinge(self.lower, self.upper, self.gear, self.axis)
@@ -147,7 +147,7 @@ class Split(Edit, frozen=True):
         _add_hinge(spec, body, part, self, self.amount)
 
     def _share(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, part: mujoco.MjsBody) -> None:
-        """Let every geom that has a length lie on both parts."""
+        """Split every geom that has a length between both parts."""
         held = anchor(body)
         for geom in [geom for geom in body.geoms if geom.type != _SPHERE]:
             whole = volume(spec, geom)
@@ -155,7 +155,7 @@ class Split(Edit, frozen=True):
             move_by(copy, -held)
             stretch_geom(spec, copy, np.zeros(3), 1.0 - self.at)
             stretch_geom(spec, geom, held, self.at)
-            # The rounded ends at the split overlap. Their mass comes with the amount of the split.
+            # The rounded ends at the split overlap. Their mass grows with the amount of the split.
             volumes = [volume(spec, half) for half in (geom, copy)]
             rounded_end = 0.5 * (sum(volumes) - whole)
             for half, own in zip((geom, copy), volumes, strict=True):
@@ -166,16 +166,16 @@ class Split(Edit, frozen=True):
 class AddSegment(Edit, frozen=True):
     """Add a segment, with a hinge, at the far end of another.
 
-    It is a capsule with the thickness, density, friction and looks of the segment that it grows
-    from; its hinge has the armature, damping and stiffness of that segment's joint.
+    It is a capsule with the thickness, density, friction and appearance of the segment to which it
+    is added; its hinge has the armature, damping and stiffness of that segment's joint.
 
     Attributes:
-        body: Name of the segment that it grows from.
+        body: Name of the segment to which it is added.
         name: Name of the new body, of its hinge, of its motor, and with `_geom` of its geom.
-        end: Far end of the new segment as seen from its hinge, in the frame of `body`, m.
+        end: Far end of the new segment relative to its hinge, in the frame of `body`, m.
         lower: Lower limit of the hinge, rad.
         upper: Upper limit of the hinge, rad.
-        gear: N·m for a control of 1, of a motor with controls from -1 to 1; None for no motor.
+        gear: Torque of a motor for a control of 1, N·m; controls are -1 to 1. None for no motor.
         axis: Axis of the hinge in the frame of `body`; None for that of the segment's own hinge.
         radius: Radius of the capsule, m; None for that of the segment.
     """
@@ -190,7 +190,7 @@ class AddSegment(Edit, frozen=True):
     radius: float | None = None
 
     def check(self) -> None:
-        """Refuse a segment of no length, an empty range or a gear or radius of nothing."""
+        """Refuse a length, range, gear or radius of zero."""
         require_vector("The end of a segment", self.end)
         _check_hinge(self.lower, self.upper, self.gear, self.axis)
         if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0.0):
@@ -222,8 +222,8 @@ class AddLimb(Edit, frozen=True):
 
     Attributes:
         like: Name of the body that the limb to copy begins with; not a trunk.
-        suffix: What the copied names end with, such as `_5`.
-        angle: How far the copy is turned about the z axis of the body that it hangs on, rad;
+        suffix: Suffix of the copied names, such as `_5`.
+        angle: Turn of the copy about the z axis of the body to which the limb is attached, rad;
             positive is counter-clockwise seen from above.
         size: Size of the copy over that of the limb, 0.01 to 100.
     """
@@ -256,7 +256,7 @@ class AddLimb(Edit, frozen=True):
 
 
 def _check_hinge(lower: float, upper: float, gear: float | None, axis: Vector | None) -> None:
-    """Refuse a hinge that MuJoCo would not take."""
+    """Refuse a hinge that MuJoCo would refuse."""
     if not (math.isfinite(lower) and math.isfinite(upper) and lower < upper):
         raise MorphologyError(
             f"A hinge needs a lower limit below its upper one, got {lower}, {upper}."
@@ -268,7 +268,7 @@ def _check_hinge(lower: float, upper: float, gear: float | None, axis: Vector | 
 
 
 def _beyond(spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float) -> Callable[[np.ndarray], bool]:
-    """Return whether a point lies farther out along the segment than `part` of its length."""
+    """Return a test whether a point lies farther out on the segment than `part` of its length."""
     held = anchor(body)
     along = far_end(spec, body) - held
     # A point exactly at the cut counts as within; rounding must not decide it.
@@ -279,13 +279,13 @@ def _beyond(spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float) -> Callable[
 def _children_beyond(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float
 ) -> list[mujoco.MjsBody]:
-    """The children that are held farther out along the segment than `part` of its length."""
+    """Return the children attached farther out along the segment than `part` of its length."""
     is_beyond = _beyond(spec, body, part)
     return [child for child in body.bodies if is_beyond(held_at(spec, child))]
 
 
 def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None:
-    """Remove a limb, or on the way there make it smaller and weaker."""
+    """Remove a limb; at an amount below 1, make it smaller and weaker instead."""
     if amount == 1.0:
         spec.delete(limb)
     else:
@@ -293,9 +293,9 @@ def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None
 
 
 def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
-    """Make a limb that fades as small and weak as the part of it that is there."""
+    """Scale a limb that exists only in part, in size and strength."""
     resize_limb(spec, limb, max(part, _SMALLEST_PART))
-    # A limb that fades for two reasons at once is smaller still.
+    # Of a limb that is scaled by two edits, masses can fall below what MuJoCo accepts.
     spec.compiler.boundmass = max(spec.compiler.boundmass, _LEAST)
     spec.compiler.boundinertia = max(spec.compiler.boundinertia, _LEAST)
 
@@ -303,7 +303,7 @@ def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
 def _new_segment(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, place: np.ndarray
 ) -> mujoco.MjsBody:
-    """An empty body on `body`, at `place` in its frame."""
+    """Add an empty body to `body`, at `place` in its frame."""
     require_free_name(spec, "body", name)
     require_free_name(spec, "joint", name)
     require_free_name(spec, "actuator", name)
@@ -319,7 +319,7 @@ def _long_geom(body: mujoco.MjsBody) -> mujoco.MjsGeom:
     )
 
 
-# How a joint resists, but for its range.
+# Fields of a joint's resistance.
 _HINGE_FIELDS: Final = (
     *("armature", "damping", "stiffness", "frictionloss", "margin"),
     *("solref_limit", "solimp_limit", "solref_friction", "solimp_friction"),
@@ -333,7 +333,7 @@ def _add_hinge(
     edit: Split | AddSegment,
     amount: float,
 ) -> None:
-    """Hang `part` on `body` by a hinge like the body's own, with a motor if the edit has one."""
+    """Attach `part` to `body` by a hinge like the body's own, with a motor if the edit has one."""
     own = next((j for j in body.joints if j.type == mujoco.mjtJoint.mjJNT_HINGE), None)
     axis = edit.axis if own is None or edit.axis is not None else own.axis
     if axis is None:

@@ -25,20 +25,20 @@ from shapechanger.morphology.spec.geometry import (
     require_geometry,
     scale_mass,
     stretch_segment,
-    thicken_segment,
+    thicken_geom,
 )
 
 if TYPE_CHECKING:
     import mujoco
 
-# Beyond this, in any unit here, a value is a typing mistake, and MuJoCo's numbers overflow.
+# A larger value, in any unit here, is a typing mistake, and MuJoCo's numbers overflow.
 _LARGEST_VALUE: Final = 1e6
 
 _FRICTION_PLACES: Final = {"sliding": 0, "torsional": 1, "rolling": 2}
 
 
 class ValueEdit(Edit, frozen=True, tag=None):
-    """A number that is scaled or set; the base of the edits below.
+    """Base class of edits that scale or set one number.
 
     Attributes:
         element: Name or glob of the bodies, geoms, joints or actuators.
@@ -68,7 +68,7 @@ class ValueEdit(Edit, frozen=True, tag=None):
     def changed(self, old: float) -> float:
         """The new value in place of `old`."""
         new = old * self.scale if self.scale is not None else self.to
-        assert new is not None  # `check` has seen to it.
+        assert new is not None  # `check` requires one of the two.
         return part_of_the_way(old, new, self.amount)
 
 
@@ -88,7 +88,7 @@ class Mass(ValueEdit, frozen=True):
         # Only the compiler knows the volume of every shape.
         compiled = spec.copy().compile() if self.to is not None else None
         for body in bodies:
-            # By name: an edit before this one may have changed the numbers of the bodies.
+            # By name: an earlier edit may have changed the indices of the bodies.
             old = 1.0 if compiled is None else float(compiled.body(body.name).mass[0])
             if old <= 0.0:
                 raise MorphologyError(f"{body.name!r} has no mass, so none can be set.")
@@ -104,13 +104,13 @@ class Density(ValueEdit, frozen=True):
         for body in bodies:
             if inertia_is_written_out(spec, body):
                 raise MorphologyError(
-                    f"{body.name!r} has its inertia written out, so a density counts for nothing: "
+                    f"{body.name!r} has its inertia written out, so its density has no effect: "
                     "change its mass instead."
                 )
         for geom in (geom for body in bodies for geom in body.geoms):
             if not math.isnan(geom.mass):
                 raise MorphologyError(
-                    f"{geom.name!r} has its mass written out, so its density counts for nothing: "
+                    f"{geom.name!r} has its mass written out, so its density has no effect: "
                     "change the mass of its body instead."
                 )
             geom.density = self.changed(geom.density)
@@ -158,8 +158,9 @@ class Stiffness(ValueEdit, frozen=True):
 class Friction(ValueEdit, frozen=True):
     """Change a friction coefficient of geoms, dimensionless for sliding, m for the other two.
 
-    MuJoCo takes the larger of the two geoms that touch: with the floor at 1, a foot at 0.2 slides
-    like a foot at 1, and `certify` says so. Change the floor too, or all geoms with `"*"`.
+    MuJoCo uses the larger coefficient of the two geoms that touch: on a floor of 1, a foot of 0.2
+    slides like a foot of 1, and `certify` reports no change. Change the floor too, or all geoms
+    with `"*"`.
 
     Attributes:
         component: Which coefficient.
@@ -189,9 +190,9 @@ def _first_changed(edit: ValueEdit, polynomial: np.ndarray) -> np.ndarray:
 class Stretch(Edit, frozen=True):
     """Make segments longer or shorter at the same thickness, held at their joints.
 
-    What hangs on a segment is carried outwards. Mass and inertia follow from the new geometry at
-    the same density. Of a box or ellipsoid the longest half-size is its length; along an axis it is
-    the one that lies along it.
+    What is attached to a segment moves outwards with it. Mass and inertia follow from the new
+    geometry at the same density. The length of a box or ellipsoid is its longest half-size, or the
+    one along the given axis.
 
     Attributes:
         body: Name or glob of the bodies.
@@ -204,7 +205,7 @@ class Stretch(Edit, frozen=True):
     axis: Literal["x", "y", "z"] | None = None
 
     def check(self) -> None:
-        """Refuse an absurd factor."""
+        """Refuse a factor out of range."""
         require_factor("The factor of a stretch", self.factor)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
@@ -228,7 +229,7 @@ class Radius(Edit, frozen=True):
     factor: float
 
     def check(self) -> None:
-        """Refuse an absurd factor."""
+        """Refuse a factor out of range."""
         require_factor("The factor of a radius", self.factor)
 
     def apply(self, spec: mujoco.MjSpec) -> None:
@@ -236,7 +237,8 @@ class Radius(Edit, frozen=True):
         factor = part_of_the_way(1.0, self.factor, self.amount)
         for body in select("body", self.body, limbs_and_trunks(spec)):
             require_geometry(spec, body)
-            thicken_segment(spec, body, factor)
+            for geom in body.geoms:
+                thicken_geom(spec, geom, factor)
 
 
 # Ten times that of Jupiter's cloud tops (24.8 m/s²) is a typing mistake.
@@ -248,14 +250,14 @@ class Gravity(Edit, frozen=True):
     """Change the gravity of the world.
 
     Attributes:
-        to: Acceleration of free fall along x, y and z, m/s²; (0, 0, -9.81) on Earth. A vector that
-            leans is a floor that slopes.
+        to: Acceleration of free fall along x, y and z, m/s²; (0, 0, -9.81) on Earth. A tilted
+            vector corresponds to a sloping floor.
     """
 
     to: Vector
 
     def check(self) -> None:
-        """Refuse what is not finite or absurdly strong."""
+        """Refuse a vector that is not finite or out of range."""
         require_vector("Gravity", self.to, nonzero=False)
         if math.hypot(*self.to) > _LARGEST_GRAVITY:
             raise MorphologyError(
@@ -274,7 +276,7 @@ class StartHeight(Edit, frozen=True):
     """Change the height at which a trunk starts.
 
     Attributes:
-        body: Name of a body that hangs on the world.
+        body: Name of a body on the world.
         to: Height of its origin above the world's, m.
     """
 

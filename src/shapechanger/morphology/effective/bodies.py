@@ -1,6 +1,6 @@
-"""The part of an effective model that is the body: bodies, joints, geoms and sites.
+"""The bodies, joints, geoms and sites of an effective model.
 
-Left out is what decides no motion: masses of what cannot move, sizes of planes (drawn, but infinite
+Omitted is what decides no motion: masses of what cannot move, sizes of planes (drawn, but infinite
 in a collision), geoms that neither touch nor push a fluid nor guide a tendon, and bodies that carry
 nothing but those.
 """
@@ -8,95 +8,61 @@ nothing but those.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.effective.contacts import safe_solref
-from shapechanger.morphology.effective.elements import Rows, Section, is_any, named, word
+from shapechanger.morphology.effective.elements import Rows, Section, is_any, words
 
 if TYPE_CHECKING:
     from shapechanger.morphology.effective.elements import Names
 
 _Floats = NDArray[np.float64]
+_Bools = NDArray[np.bool_]
 _SAME: Final = mujoco.mjtSameFrame
 _IDENTITY: Final = (1.0, 0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Frames:
-    """Frames relative to a body.
+def frames(
+    model: mujoco.MjModel, kind: Literal["inertia", "geom", "site"]
+) -> tuple[_Floats, _Floats]:
+    """Return the frames of elements relative to their bodies.
 
-    Attributes:
-        position: Position in m, shape (n, 3).
-        orientation: Unit quaternion, its first nonzero number above 0, shape (n, 4).
+    MuJoCo copies the frame of the body, or that of its inertia, where it found them the same when
+    the model was compiled; it then ignores the element's own numbers.
+
+    Args:
+        model: The model.
+        kind: Geoms, sites, or the inertias of the bodies.
+
+    Returns:
+        Positions, m, shape (n, 3), and orientations, shape (n, 4): unit quaternions whose first
+        nonzero number is above 0.
     """
-
-    position: _Floats
-    orientation: _Floats
-
-
-def inertial_frames(model: mujoco.MjModel) -> Frames:
-    """Centres of mass and principal axes of the bodies."""
-    same = model.body_sameframe
+    if kind == "inertia":
+        same, position, orientation = model.body_sameframe, model.body_ipos, model.body_iquat
+    else:
+        same = getattr(model, f"{kind}_sameframe")
+        owner = getattr(model, f"{kind}_bodyid")
+        inertia_position, inertia_orientation = frames(model, "inertia")
+        at_inertia = is_any(same, _SAME.mjSAMEFRAME_INERTIA)[:, None]
+        turned = is_any(same, _SAME.mjSAMEFRAME_INERTIA, _SAME.mjSAMEFRAME_INERTIAROT)[:, None]
+        position = np.where(at_inertia, inertia_position[owner], getattr(model, f"{kind}_pos"))
+        orientation = np.where(turned, inertia_orientation[owner], getattr(model, f"{kind}_quat"))
     at_body = is_any(same, _SAME.mjSAMEFRAME_BODY)[:, None]
-    turned_as_body = is_any(same, _SAME.mjSAMEFRAME_BODY, _SAME.mjSAMEFRAME_BODYROT)[:, None]
-    return Frames(
-        np.where(at_body, 0.0, model.body_ipos),
-        _canonical(np.where(turned_as_body, _IDENTITY, model.body_iquat)),
-    )
-
-
-def geom_frames(model: mujoco.MjModel) -> Frames:
-    """Frames of the geoms."""
-    return _attached(
-        model, model.geom_sameframe, model.geom_bodyid, model.geom_pos, model.geom_quat
-    )
-
-
-def site_frames(model: mujoco.MjModel) -> Frames:
-    """Frames of the sites."""
-    return _attached(
-        model, model.site_sameframe, model.site_bodyid, model.site_pos, model.site_quat
-    )
+    turned = is_any(same, _SAME.mjSAMEFRAME_BODY, _SAME.mjSAMEFRAME_BODYROT)[:, None]
+    return np.where(at_body, 0.0, position), _canonical(np.where(turned, _IDENTITY, orientation))
 
 
 def _canonical(quaternions: _Floats) -> _Floats:
-    """Of the two quaternions of each rotation the one whose first number is above 0; (n, 4)."""
+    """Return, of the two quaternions of each rotation, that whose first number is above 0."""
     leading = np.argmax(quaternions != 0.0, axis=1)[:, None]
     sign = np.sign(np.take_along_axis(quaternions, leading, axis=1))
     return np.where(sign < 0.0, -quaternions, quaternions)
 
-
-def _attached(
-    model: mujoco.MjModel,
-    same: NDArray[np.uint8],
-    bodies: NDArray[np.int32],
-    position: _Floats,
-    orientation: _Floats,
-) -> Frames:
-    """Frames that may coincide with that of their body or with its inertial frame."""
-    inertial = inertial_frames(model)
-
-    def choose(own: _Floats, of_body: _Floats, *, rotation: bool) -> _Floats:
-        body, inertia = [_SAME.mjSAMEFRAME_BODY], [_SAME.mjSAMEFRAME_INERTIA]
-        if rotation:
-            body.append(_SAME.mjSAMEFRAME_BODYROT)
-            inertia.append(_SAME.mjSAMEFRAME_INERTIAROT)
-        rest = _IDENTITY if rotation else (0.0, 0.0, 0.0)
-        chosen = np.where(is_any(same, *inertia)[:, None], of_body[bodies], own)
-        return np.where(is_any(same, *body)[:, None], rest, chosen)
-
-    return Frames(
-        choose(position, inertial.position, rotation=False),
-        _canonical(choose(orientation, inertial.orientation, rotation=True)),
-    )
-
-
-_Bools = NDArray[np.bool_]
 
 # Numbers of `qpos` and of `qvel` that a joint takes.
 _QPOS_COUNT: Final = {"free": 7, "ball": 4, "slide": 1, "hinge": 1}
@@ -118,14 +84,14 @@ def bodies(model: mujoco.MjModel, names: Names, kept: _Bools) -> Section:
     moving = model.body_treeid >= 0
     free = np.zeros(model.nbody, np.bool_)
     free[model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]] = True
-    rows.words("parent", named(names.bodies, model.body_parentid))
+    rows.words("parent", [names.bodies[body] for body in model.body_parentid.tolist()])
     rows.numbers("position", model.body_pos, ~free)  # A free body starts from its joint's qpos0.
     rows.numbers("orientation", _canonical(model.body_quat), ~free)
     rows.numbers("mass", model.body_mass, moving)
     rows.numbers("inertia", model.body_inertia, moving)
-    inertial = inertial_frames(model)
-    rows.numbers("centre of mass", inertial.position, moving)
-    rows.numbers("inertia axes", inertial.orientation, moving)
+    centres, axes = frames(model, "inertia")
+    rows.numbers("centre of mass", centres, moving)
+    rows.numbers("inertia axes", axes, moving)
     # Read only if the compiler, or mj_setConst, found a body that has some.
     rows.numbers("gravity compensation", model.body_gravcomp * model.flg_gravcomp, moving)
     mocap = model.body_mocapid >= 0
@@ -140,7 +106,7 @@ def bodies(model: mujoco.MjModel, names: Names, kept: _Bools) -> Section:
 
 
 def bodies_that_matter(model: mujoco.MjModel, carrying: _Bools) -> _Bools:
-    """Bodies that move by themselves, weigh something or carry something, shape (nbody,).
+    """Return the bodies that move by themselves, have mass or carry something, shape (nbody,).
 
     Args:
         model: The compiled model.
@@ -162,12 +128,12 @@ def joints(model: mujoco.MjModel, names: Names) -> Section:
         names: Names of its elements.
     """
     rows = Rows(names.joints)
-    kinds = [word(mujoco.mjtJoint(kind)) for kind in model.jnt_type.tolist()]
+    kinds = words(mujoco.mjtJoint, model.jnt_type)
     kind = np.asarray(kinds, np.str_)
     qpos, dof = model.jnt_qposadr.tolist(), model.jnt_dofadr.tolist()
     coordinates, dofs = [_QPOS_COUNT[name] for name in kinds], [_DOF_COUNT[name] for name in kinds]
     rows.words("type", kinds)
-    rows.words("body", named(names.bodies, model.jnt_bodyid))
+    rows.words("body", [names.bodies[body] for body in model.jnt_bodyid.tolist()])
     rows.numbers("anchor", model.jnt_pos, kind != "free")
     rows.numbers("axis", model.jnt_axis, np.isin(kind, ("slide", "hinge")))
     rows.parts("rest position", model.qpos0, qpos, coordinates)
@@ -204,17 +170,10 @@ def geoms(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
         relevant: Mask of these geoms, shape (ngeom,).
     """
     rows = Rows(names.geoms)
-    kinds = [word(mujoco.mjtGeom(kind)) for kind in model.geom_type.tolist()]
+    kinds = words(mujoco.mjtGeom, model.geom_type)
     rows.words("type", kinds)
-    rows.words("body", named(names.bodies, model.geom_bodyid))
-    frames = geom_frames(model)
-    rows.numbers("position", frames.position)
-    rows.numbers("orientation", frames.orientation)
-    sizes = [
-        tuple(size[: _SIZE_COUNT.get(kind, 0)])
-        for kind, size in zip(kinds, model.geom_size.tolist(), strict=True)
-    ]
-    rows.words("size", sizes)
+    _place(rows, model, names, "geom")
+    rows.numbers("size", model.geom_size, counts=[_SIZE_COUNT.get(kind, 0) for kind in kinds])
     rows.words(
         "shape",
         [
@@ -239,21 +198,27 @@ def sites(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
         relevant: Mask of these sites, shape (nsite,).
     """
     rows = Rows(names.sites)
-    rows.words("body", named(names.bodies, model.site_bodyid))
-    frames = site_frames(model)
-    rows.numbers("position", frames.position)
-    rows.numbers("orientation", frames.orientation)
+    _place(rows, model, names, "site")
     return rows.section(relevant)
 
 
+def _place(rows: Rows, model: mujoco.MjModel, names: Names, kind: Literal["geom", "site"]) -> None:
+    """Set the body of each element, and its frame relative to that."""
+    owners = getattr(model, f"{kind}_bodyid").tolist()
+    rows.words("body", [names.bodies[owner] for owner in owners])
+    positions, orientations = frames(model, kind)
+    rows.numbers("position", positions)
+    rows.numbers("orientation", orientations)
+
+
 def in_fluid(model: mujoco.MjModel) -> _Bools:
-    """The geoms on which a fluid pushes, shape (ngeom,), by the ellipsoid model."""
+    """Return the geoms on which a fluid pushes by the ellipsoid model, shape (ngeom,)."""
     medium = model.opt.density > 0.0 or model.opt.viscosity > 0.0
     return (model.geom_fluid[:, 0] > 0.0) & medium
 
 
 def digest(*arrays: NDArray[np.generic]) -> str:
-    """A short name for the content of arrays: equal for equal content."""
+    """Return 16 hex digits that are equal for equal types, shapes and contents of arrays."""
     total = hashlib.sha256()
     for array in arrays:
         little_endian = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
@@ -263,7 +228,7 @@ def digest(*arrays: NDArray[np.generic]) -> str:
 
 
 def _shape(model: mujoco.MjModel, kind: str, data: int) -> str:
-    """A digest of the mesh or height field that shapes a geom; empty if none does."""
+    """Return a digest of the mesh or height field that shapes a geom; empty if none does."""
     if kind == "hfield":
         start = model.hfield_adr[data]
         count = model.hfield_nrow[data] * model.hfield_ncol[data]

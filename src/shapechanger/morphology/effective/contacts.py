@@ -2,7 +2,7 @@
 
 A geom's friction alone decides nothing: the contact takes the larger of the two geoms'
 coefficients, so a slippery foot on a rough floor is a rough foot. These are the rules by which
-MuJoCo 4.0.0 combines what the two say (`mujoco/doc/modeling.rst`, "Contact parameters"). The tests
+MuJoCo 4.0.0 combines the parameters (`mujoco/doc/modeling.rst`, "Contact parameters"). The tests
 compare them with the contacts of simulated scenes.
 
 Measured, and easy to get wrong:
@@ -16,22 +16,26 @@ Measured, and easy to get wrong:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
 from typing import Final
 
-import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.morphology.effective.elements import Names, is_any, names_of
+from shapechanger.morphology.effective.elements import Names, Rows, Section, is_any
+from shapechanger.morphology.spec.elements import unique_namer
 
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]
+_Floats = NDArray[np.float64]
+
+# For each contact dimension how many of (slide, slide, spin, roll, roll) act.
+_FRICTION_COUNT: Final = {1: 0, 3: 2, 4: 3, 6: 5}
+_SLIDE_SPIN_ROLL: Final = [0, 0, 1, 2, 2]
 
 
 def colliding_pairs(model: mujoco.MjModel) -> tuple[_Ints, _Ints]:
-    """The pairs that MuJoCo tests for collision and whose contacts can move something.
+    """Return the pairs that MuJoCo tests for collision and whose contacts can move something.
 
     Returns:
         The indices of the explicit `<pair>` elements, shape (n,); and the geoms of every other
@@ -57,20 +61,20 @@ def _bits_match(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
     that are set in a compiled model later have no effect.
     """
     bodies = model.geom_bodyid[pairs]
-    of_geoms = _meet(model.geom_contype[pairs], model.geom_conaffinity[pairs])
-    return of_geoms & _meet(model.body_contype[bodies], model.body_conaffinity[bodies])
-
-
-def _meet(types: NDArray[np.int32], affinities: NDArray[np.int32]) -> _Bools:
-    """Return whether the type of one of two is among the affinities of the other, shape (n,)."""
-    return ((types[:, 0] & affinities[:, 1]) | (types[:, 1] & affinities[:, 0])) != 0
+    matches = np.ones(len(pairs), np.bool_)
+    for types, affinities in (
+        (model.geom_contype[pairs], model.geom_conaffinity[pairs]),
+        (model.body_contype[bodies], model.body_conaffinity[bodies]),
+    ):
+        matches &= (types & affinities[:, ::-1]).any(axis=1)
+    return matches
 
 
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
     """Return whether MuJoCo can collide the two shapes, and one of the two can move."""
     flat = is_any(model.geom_type[pairs], mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
     moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
-    return ~(flat[:, 0] & flat[:, 1]) & (moving[:, 0] | moving[:, 1])
+    return ~flat.all(axis=1) & moving.any(axis=1)
 
 
 def _not_related(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
@@ -80,7 +84,7 @@ def _not_related(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
         return distinct
     parent = model.body_weldid[model.body_parentid[weld]]
-    related = (weld[:, 0] == parent[:, 1]) | (weld[:, 1] == parent[:, 0])
+    related = (weld == parent[:, ::-1]).any(axis=1)
     return distinct & ~(related & (weld != 0).all(axis=1))
 
 
@@ -88,12 +92,9 @@ def _not_listed(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
     """Return whether the pair is neither excluded nor described by an explicit pair."""
     bodies = np.sort(model.geom_bodyid[pairs], axis=1)
     excluded = np.isin((bodies[:, 0] << 16) + bodies[:, 1], model.exclude_signature)
-    listed = np.sort(np.stack([model.pair_geom1, model.pair_geom2], axis=1), axis=1)
-    count = model.ngeom
-    explicit = np.isin(
-        pairs[:, 0] * count + pairs[:, 1], listed[:, 0].astype(np.int64) * count + listed[:, 1]
-    )
-    return ~excluded & ~explicit
+    listed = np.sort(geoms_of_pairs(model, np.arange(model.npair)), axis=1)
+    codes = pairs[:, 0] * model.ngeom + pairs[:, 1]
+    return ~excluded & ~np.isin(codes, listed[:, 0] * model.ngeom + listed[:, 1])
 
 
 def geoms_of_pairs(model: mujoco.MjModel, explicit: _Ints) -> _Ints:
@@ -107,105 +108,102 @@ def geoms_of_pairs(model: mujoco.MjModel, explicit: _Ints) -> _Ints:
     return both[explicit].astype(np.int64)
 
 
-_Floats = NDArray[np.float64]
+def contacts(model: mujoco.MjModel, names: Names) -> Section:
+    """Return the contacts that can move something, with the parameters that act.
 
-# For each contact dimension how many of (slide, slide, spin, roll, roll) act.
-_FRICTION_COUNT: Final = {1: 0, 3: 2, 4: 3, 6: 5}
-_SLIDE_SPIN_ROLL: Final = [0, 0, 1, 2, 2]
+    A contact is called `floor + left_foot`, its geoms in alphabetical order; a second explicit
+    `<pair>` of the same geoms is another contact, `floor + left_foot (2)`. Its fields are:
 
-
-class Contact(msgspec.Struct, frozen=True):
-    """The parameters with which two geoms touch.
-
-    Attributes:
-        dim: 1 without friction, 3 with sliding friction, 4 with torsional, 6 with rolling friction.
-        friction: The `dim` - 1 coefficients that act: slide, slide, spin, roll, roll. Sliding ones
-            are pure numbers, the others are in m.
-        solref: Time constant in s and damping ratio, or minus stiffness and minus damping.
-        solreffriction: The same for the friction directions; empty where they use `solref`.
-        solimp: Impedance: at contact, at full width, width in m, midpoint, power.
-        margin: Distance in m below which the geoms push each other.
-        gap: Distance in m beyond the margin up to which a contact is found, but does not push.
-        adhesion: Force in N with which the contact can pull.
-    """
-
-    dim: int
-    friction: tuple[float, ...]
-    solref: tuple[float, ...]
-    solreffriction: tuple[float, ...]
-    solimp: tuple[float, ...]
-    margin: float
-    gap: float
-    adhesion: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Rows:
-    """The parameters of n contacts, as columns."""
-
-    dim: _Ints
-    friction: _Floats
-    solref: _Floats
-    solreffriction: _Floats
-    solimp: _Floats
-    margin: _Floats
-    gap: _Floats
-    adhesion: _Floats
-
-
-def effective_contacts(model: mujoco.MjModel, names: Names | None = None) -> dict[str, Contact]:
-    """The contacts that a model can have and that can move something, by the names of the geoms.
+    - dimension: 1 without friction, 3 with sliding, 4 with torsional and 6 with rolling friction;
+    - friction: the coefficients that act: slide, slide, spin, roll, roll. Those of sliding are
+      dimensionless, the others are in m;
+    - solref: time constant, s, and damping ratio; or minus stiffness and minus damping;
+    - friction solref: the same for the directions of friction, where it differs;
+    - solimp: impedance at contact, at full width, width, m, midpoint, power;
+    - margin: distance below which the geoms push each other, m;
+    - gap: distance beyond the margin up to which a contact is found, but does not push, m;
+    - adhesion: force with which the contact can pull, N.
 
     Args:
-        model: The compiled model.
-        names: Names of its elements, where they are known already.
-
-    Returns:
-        For each pair of geoms, named `floor + left_foot` in alphabetical order and sorted by name,
-        its parameters. A second explicit `<pair>` of the same geoms is another contact, named
-        `floor + left_foot (2)`.
+        model: The model.
+        names: Names of its elements.
     """
-    geom_names = (names or names_of(model)).geoms
     explicit, dynamic = colliding_pairs(model)
-    rows = _overridden(model, _joined(_explicit_rows(model, explicit), _mixed(model, dynamic)))
-    solref = safe_solref(model, rows.solref)
-    solreffriction = safe_solref(model, rows.solreffriction)
+    values = {
+        name: np.concatenate([getattr(model, f"pair_{name}")[explicit], mixed])
+        for name, mixed in mixed_parameters(model, dynamic).items()
+    }
+    option = model.opt
+    if option.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
+        values["friction"][:] = option.o_friction
+        values["solref"][:] = values["solreffriction"][:] = option.o_solref
+        values["solimp"][:] = option.o_solimp
+        values["margin"][:] = option.o_margin
+    dimensions = values["dim"].astype(np.int64)
+    solref = safe_solref(model, values["solref"])
+    friction_solref = safe_solref(model, values["solreffriction"])
     # Pyramidal cones mix the normal with the friction directions, so only `solref` is used.
-    own = rows.solreffriction.any(axis=1) & (solreffriction != solref).any(axis=1)
-    own &= (rows.dim > 1) & (model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
+    own = values["solreffriction"].any(axis=1) & (friction_solref != solref).any(axis=1)
+    own &= (dimensions > 1) & (option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
+
+    free = unique_namer((), " ({})")
     pairs = np.vstack([geoms_of_pairs(model, explicit), dynamic]).tolist()
-    columns = zip(
-        pairs,
-        rows.dim.tolist(),
-        (rows.friction + 0.0).tolist(),
-        (solref + 0.0).tolist(),
-        (solreffriction + 0.0).tolist(),
-        own.tolist(),
-        (rows.solimp + 0.0).tolist(),
-        (rows.margin + 0.0).tolist(),
-        (rows.gap + 0.0).tolist(),
-        (rows.adhesion + 0.0).tolist(),
-        strict=True,
-    )
-    found: dict[str, Contact] = {}
-    for (g1, g2), dim, friction, ref, ref_friction, has_own, *numbers in columns:
-        first, second = sorted((geom_names[int(g1)], geom_names[int(g2)]))
-        name, count = f"{first} + {second}", 1
-        while name in found:
-            count += 1
-            name = f"{first} + {second} ({count})"
-        impedance, margin, gap, adhesion = numbers
-        found[name] = Contact(
-            dim=dim,
-            friction=tuple(friction[: _FRICTION_COUNT[dim]]),
-            solref=tuple(ref),
-            solreffriction=tuple(ref_friction) if has_own else (),
-            solimp=tuple(impedance),
-            margin=margin,
-            gap=gap,
-            adhesion=adhesion,
-        )
-    return dict(sorted(found.items()))
+    rows = Rows([free(" + ".join(sorted(names.geoms[geom] for geom in pair))) for pair in pairs])
+    rows.numbers("contact dimension", dimensions)
+    friction = np.maximum(values["friction"], mujoco.mjMINMU)
+    acting = [_FRICTION_COUNT[dimension] for dimension in dimensions.tolist()]
+    rows.numbers("contact friction", friction, counts=acting)
+    rows.numbers("contact solref", solref)
+    rows.numbers("contact friction solref", friction_solref, own)
+    rows.numbers("contact solimp", values["solimp"])
+    rows.numbers("contact margin", values["margin"])
+    rows.numbers("contact gap", values["gap"])
+    # Read only if the compiler, or mj_setConst, found a geom or a pair that has some.
+    rows.numbers("contact adhesion", values["adhesion"] * model.flg_adhesion)
+    return rows.section()
+
+
+def mixed_parameters(model: mujoco.MjModel, pairs: _Ints) -> dict[str, _Floats]:
+    """Return the parameters that MuJoCo mixes for pairs of geoms, by name as in `pair_*`.
+
+    Args:
+        model: The model.
+        pairs: The geoms, shape (n, 2).
+    """
+    first, second = pairs.T
+    one = model.geom_priority[first] > model.geom_priority[second]
+    two = model.geom_priority[first] < model.geom_priority[second]
+
+    def pick(values: _Floats, if_equal: _Floats) -> _Floats:
+        wide = (slice(None),) + (None,) * (values.ndim - 1)
+        chosen = np.where(two[wide], values[second], if_equal)
+        return np.where(one[wide], values[first], chosen)
+
+    share = _share_of_first(model.geom_solmix[first], model.geom_solmix[second])[:, None]
+    dims, frictions = model.geom_condim.astype(np.float64), model.geom_friction
+    refs, imps, adhesions = model.geom_solref, model.geom_solimp, model.geom_adhesion
+    mixed_ref = share * refs[first] + (1.0 - share) * refs[second]
+    both_standard = (refs[first, 0] > 0.0) & (refs[second, 0] > 0.0)
+    mixed_ref = np.where(both_standard[:, None], mixed_ref, np.minimum(refs[first], refs[second]))
+    friction = pick(frictions, np.maximum(frictions[first], frictions[second]))
+    return {
+        "dim": pick(dims, np.maximum(dims[first], dims[second])),
+        "friction": friction[:, _SLIDE_SPIN_ROLL],
+        "solref": pick(refs, mixed_ref),
+        "solreffriction": np.zeros((len(pairs), 2)),
+        "solimp": pick(imps, share * imps[first] + (1.0 - share) * imps[second]),
+        "margin": model.geom_margin[first] + model.geom_margin[second],
+        "gap": model.geom_gap[first] + model.geom_gap[second],
+        "adhesion": pick(adhesions, adhesions[first] + adhesions[second]),
+    }
+
+
+def _share_of_first(one: _Floats, two: _Floats) -> _Floats:
+    """Return the weight of the first geom's solver parameters; half if neither states one."""
+    small = mujoco.mjMINVAL
+    neither = (one < small) & (two < small)
+    one, two = np.where(one < small, 0.0, one), np.where(two < small, 0.0, two)
+    return np.where(neither, 0.5, one / np.where(neither, 1.0, one + two))
 
 
 def safe_solref(model: mujoco.MjModel, solref: _Floats) -> _Floats:
@@ -226,84 +224,3 @@ def safe_solref(model: mujoco.MjModel, solref: _Floats) -> _Floats:
         solref[:, 0] > 0.0, np.maximum(solref[:, 0], 2.0 * model.opt.timestep), solref[:, 0]
     )
     return safe
-
-
-def _explicit_rows(model: mujoco.MjModel, explicit: _Ints) -> _Rows:
-    """Return the parameters of explicit pairs."""
-    return _Rows(
-        dim=model.pair_dim[explicit].astype(np.int64),
-        friction=model.pair_friction[explicit],
-        solref=model.pair_solref[explicit],
-        solreffriction=model.pair_solreffriction[explicit],
-        solimp=model.pair_solimp[explicit],
-        margin=model.pair_margin[explicit],
-        gap=model.pair_gap[explicit],
-        adhesion=model.pair_adhesion[explicit],
-    )
-
-
-def _mixed(model: mujoco.MjModel, pairs: _Ints) -> _Rows:
-    """Return the mixed parameters of pairs of geoms."""
-    first, second = pairs[:, 0], pairs[:, 1]
-    one = model.geom_priority[first] > model.geom_priority[second]
-    two = model.geom_priority[first] < model.geom_priority[second]
-
-    def pick(values: _Floats, if_equal: _Floats) -> _Floats:
-        wide = (slice(None),) + (None,) * (values.ndim - 1)
-        chosen = np.where(two[wide], values[second], if_equal)
-        return np.where(one[wide], values[first], chosen)
-
-    share = _share_of_first(model.geom_solmix[first], model.geom_solmix[second])[:, None]
-    dims, frictions = model.geom_condim.astype(np.float64), model.geom_friction
-    refs, imps = model.geom_solref, model.geom_solimp
-    mixed_ref = share * refs[first] + (1.0 - share) * refs[second]
-    both_standard = (refs[first, 0] > 0.0) & (refs[second, 0] > 0.0)
-    mixed_ref = np.where(both_standard[:, None], mixed_ref, np.minimum(refs[first], refs[second]))
-    friction = pick(frictions, np.maximum(frictions[first], frictions[second]))
-    return _Rows(
-        dim=pick(dims, np.maximum(dims[first], dims[second])).astype(np.int64),
-        friction=friction[:, _SLIDE_SPIN_ROLL],
-        solref=pick(refs, mixed_ref),
-        solreffriction=np.zeros((len(pairs), 2)),
-        solimp=pick(imps, share * imps[first] + (1.0 - share) * imps[second]),
-        margin=model.geom_margin[first] + model.geom_margin[second],
-        gap=model.geom_gap[first] + model.geom_gap[second],
-        adhesion=pick(
-            model.geom_adhesion, model.geom_adhesion[first] + model.geom_adhesion[second]
-        ),
-    )
-
-
-def _share_of_first(one: _Floats, two: _Floats) -> _Floats:
-    """The weight of the first geom's solver parameters; half when neither geom claims one."""
-    small = mujoco.mjMINVAL
-    neither = (one < small) & (two < small)
-    one, two = np.where(one < small, 0.0, one), np.where(two < small, 0.0, two)
-    return np.where(neither, 0.5, one / np.where(neither, 1.0, one + two))
-
-
-def _joined(one: _Rows, two: _Rows) -> _Rows:
-    """Both sets of contacts."""
-    return _Rows(
-        *(np.concatenate([getattr(one, f.name), getattr(two, f.name)]) for f in fields(_Rows))
-    )
-
-
-def _overridden(model: mujoco.MjModel, rows: _Rows) -> _Rows:
-    """The contacts after the model's switches, and with friction at its floor or above."""
-    option, count = model.opt, len(rows.dim)
-    if option.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
-        rows = replace(
-            rows,
-            friction=np.tile(option.o_friction, (count, 1)),
-            solref=np.tile(option.o_solref, (count, 1)),
-            solreffriction=np.tile(option.o_solref, (count, 1)),
-            solimp=np.tile(option.o_solimp, (count, 1)),
-            margin=np.full(count, option.o_margin),
-        )
-    return replace(
-        rows,
-        friction=np.maximum(rows.friction, mujoco.mjMINMU),
-        # Read only if the compiler, or mj_setConst, found a geom or a pair that has some.
-        adhesion=rows.adhesion * model.flg_adhesion,
-    )

@@ -1,4 +1,4 @@
-"""The part of an effective model that drives and binds it: actuators, tendons, equalities."""
+"""The actuators, tendons and equality constraints of an effective model."""
 
 from __future__ import annotations
 
@@ -9,32 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.effective.contacts import safe_solref
-from shapechanger.morphology.effective.elements import Rows, Section, Value, is_any, word
+from shapechanger.morphology.effective.elements import Rows, Section, Value, is_any, words
 
 if TYPE_CHECKING:
     from shapechanger.morphology.effective.elements import Names
 
-_GAIN: Final = mujoco.mjtGain
-_BIAS: Final = mujoco.mjtBias
-_DYN: Final = mujoco.mjtDyn
-_TRN: Final = mujoco.mjtTrn
-
-# How many of the parameters the built-in types read; the others read all.
-_GAIN_COUNT: Final = {_GAIN.mjGAIN_FIXED: 1, _GAIN.mjGAIN_AFFINE: 3}
-_BIAS_COUNT: Final = {_BIAS.mjBIAS_NONE: 0, _BIAS.mjBIAS_AFFINE: 3}
-_DYN_COUNT: Final = {
-    _DYN.mjDYN_NONE: 0,
-    _DYN.mjDYN_INTEGRATOR: 0,
-    _DYN.mjDYN_FILTER: 1,
-    _DYN.mjDYN_FILTEREXACT: 1,
-}
-_EQUALITY_COUNT: Final = {
-    mujoco.mjtEq.mjEQ_CONNECT: 6,
-    mujoco.mjtEq.mjEQ_JOINT: 5,
-    mujoco.mjtEq.mjEQ_TENDON: 5,
-}
+# How many parameters the built-in types read; the others read all.
+_GAIN_COUNT: Final = {"fixed": 1, "affine": 3}
+_BIAS_COUNT: Final = {"none": 0, "affine": 3}
+_DYN_COUNT: Final = {"none": 0, "integrator": 0, "filter": 1, "filterexact": 1}
+_EQUALITY_COUNT: Final = {"connect": 6, "joint": 5, "tendon": 5}
+_MOST_EQUALITY_COUNT: Final = 11  # A weld's.
+# How many gear numbers a transmission reads; one to a joint reads as many as the joint has degrees
+# of freedom, any other all.
+_GEAR_COUNT: Final = {"tendon": 1, "slidercrank": 1, "body": 1}
+_JOINT_GEAR_COUNT: Final = {"free": 6, "ball": 3, "slide": 1, "hinge": 1}
+_TO_JOINT: Final = ("joint", "jointinparent")
+_WITH_SITES: Final = ("site", "slidercrank", "so3")
 # Types of gain for which the input signature chooses what the controls are.
-_GAINS_WITH_INPUTS: Final = (_GAIN.mjGAIN_SO3, _GAIN.mjGAIN_PID, _GAIN.mjGAIN_DCMOTOR)
+_GAINS_WITH_INPUTS: Final = (
+    mujoco.mjtGain.mjGAIN_SO3,
+    mujoco.mjtGain.mjGAIN_PID,
+    mujoco.mjtGain.mjGAIN_DCMOTOR,
+)
 
 
 def actuators(model: mujoco.MjModel, names: Names) -> Section:
@@ -45,22 +42,27 @@ def actuators(model: mujoco.MjModel, names: Names) -> Section:
         names: Names of its elements.
     """
     rows = Rows(names.actuators)
-    transmissions = [_TRN(kind) for kind in model.actuator_trntype.tolist()]
-    gains = [_GAIN(kind) for kind in model.actuator_gaintype.tolist()]
-    biases = [_BIAS(kind) for kind in model.actuator_biastype.tolist()]
-    dynamics = [_DYN(kind) for kind in model.actuator_dyntype.tolist()]
-    rows.words("transmission", map(word, transmissions))
+    transmissions = words(mujoco.mjtTrn, model.actuator_trntype)
+    gains = words(mujoco.mjtGain, model.actuator_gaintype)
+    biases = words(mujoco.mjtBias, model.actuator_biastype)
+    dynamics = words(mujoco.mjtDyn, model.actuator_dyntype)
+    rows.words("transmission", transmissions)
     rows.words("target", names.targets)
-    rows.words("second site", _second_sites(model, names, transmissions))
-    crank = model.actuator_trntype == _TRN.mjTRN_SLIDERCRANK
+    second_sites = [
+        names.sites[second] if kind in _WITH_SITES and second >= 0 else ""
+        for kind, second in zip(transmissions, model.actuator_trnid[:, 1].tolist(), strict=True)
+    ]
+    rows.words("second site", second_sites)
+    crank = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SLIDERCRANK
     rows.numbers("crank length", model.actuator_cranklength, crank)
     rows.words("gear", _gears(model, transmissions))
-    rows.words("gain type", map(word, gains))
-    rows.words("gain", _read(model.actuator_gainprm, [_GAIN_COUNT.get(g, 10) for g in gains]))
-    rows.words("bias type", map(word, biases))
-    rows.words("bias", _read(model.actuator_biasprm, [_BIAS_COUNT.get(b, 10) for b in biases]))
-    rows.words("dynamics type", map(word, dynamics))
-    rows.words("dynamics", _read(model.actuator_dynprm, [_DYN_COUNT.get(d, 10) for d in dynamics]))
+    for field, kinds, values, counts in (
+        ("gain", gains, model.actuator_gainprm, _GAIN_COUNT),
+        ("bias", biases, model.actuator_biasprm, _BIAS_COUNT),
+        ("dynamics", dynamics, model.actuator_dynprm, _DYN_COUNT),
+    ):
+        rows.words(f"{field} type", kinds)
+        rows.numbers(field, values, counts=[counts.get(kind) for kind in kinds])
     signed = is_any(model.actuator_gaintype, *_GAINS_WITH_INPUTS)
     rows.numbers("inputs", model.actuator_ctrlspec, signed)
     rows.words("control range", _control_ranges(model))
@@ -68,8 +70,9 @@ def actuators(model: mujoco.MjModel, names: Names) -> Section:
     rows.numbers("activation range", model.actuator_actrange, model.actuator_actlimited)
     stateful = model.actuator_actnum > 0
     rows.numbers("early activation", model.actuator_actearly, stateful)
-    muscle = is_any(model.actuator_gaintype, _GAIN.mjGAIN_MUSCLE)
-    rows.words("length range", _per_output(model, model.actuator_lengthrange, muscle))
+    ranges = _per_output(model, model.actuator_lengthrange)
+    muscles = [kind == "muscle" for kind in gains]
+    rows.words("length range", [r if m else () for r, m in zip(ranges, muscles, strict=True)])
     delayed = model.actuator_historyadr >= 0
     rows.numbers("delay", model.actuator_delay, delayed)
     rows.numbers("delay buffer", model.actuator_history, delayed)
@@ -122,83 +125,59 @@ def equalities(model: mujoco.MjModel, names: Names) -> Section:
         names: Names of its elements.
     """
     rows = Rows(names.equalities)
-    kinds = [mujoco.mjtEq(kind) for kind in model.eq_type.tolist()]
-    rows.words("type", map(word, kinds))
+    kinds = words(mujoco.mjtEq, model.eq_type)
+    rows.words("type", kinds)
     by_type = {
-        mujoco.mjtEq.mjEQ_JOINT: names.joints,
-        mujoco.mjtEq.mjEQ_TENDON: names.tendons,
-        mujoco.mjtEq.mjEQ_FLEX: names.flexes,
-        mujoco.mjtEq.mjEQ_FLEXSTRAIN: names.flexes,
+        "joint": names.joints,
+        "tendon": names.tendons,
+        "flex": names.flexes,
+        "flexstrain": names.flexes,
     }
-    # Only points, which may be of bodies or of sites, say what they are fixed to.
+    # Only points, which may be of bodies or of sites, state what they are fixed to.
     on_sites = is_any(model.eq_objtype, mujoco.mjtObj.mjOBJ_SITE).tolist()
     between: list[tuple[Value, ...]] = []
-    for kind, sites, one, two in zip(
+    for kind, sites, *ends in zip(
         kinds, on_sites, model.eq_obj1id.tolist(), model.eq_obj2id.tolist(), strict=True
     ):
         bound = by_type.get(kind, names.sites if sites else names.bodies)
-        between.append(tuple(bound[int(i)] for i in (one, two) if i >= 0))
+        between.append(tuple(bound[end] for end in ends if end >= 0))
     rows.words("between", between)
     rows.numbers("active", model.eq_active0)
     rows.numbers("solref", safe_solref(model, model.eq_solref))
     rows.numbers("solimp", model.eq_solimp)
-    rows.words("data", _read(model.eq_data, [_EQUALITY_COUNT.get(kind, 11) for kind in kinds]))
+    counts = [_EQUALITY_COUNT.get(kind, _MOST_EQUALITY_COUNT) for kind in kinds]
+    rows.numbers("data", model.eq_data, counts=counts)
     return rows.section()
 
 
-def _read(values: NDArray[np.float64], counts: list[int]) -> list[tuple[Value, ...]]:
-    """The first numbers of each row."""
-    rows = (values + 0.0).tolist()
-    return [tuple(row[:count]) for row, count in zip(rows, counts, strict=True)]
-
-
-def _per_output(
-    model: mujoco.MjModel, values: NDArray[np.float64], where: NDArray[np.bool_]
-) -> list[tuple[Value, ...]]:
-    """For each actuator the rows of its force outputs; empty where `where` does not hold."""
-    starts, counts = model.actuator_outadr.tolist(), model.actuator_outnum.tolist()
+def _per_output(model: mujoco.MjModel, values: NDArray[np.float64]) -> list[tuple[Value, ...]]:
+    """Return for each actuator the rows of its force outputs."""
     return [
-        tuple((values[start : start + count] + 0.0).ravel().tolist()) if wanted else ()
-        for start, count, wanted in zip(starts, counts, where.tolist(), strict=True)
+        tuple((values[start : start + count] + 0.0).ravel().tolist())
+        for start, count in zip(
+            model.actuator_outadr.tolist(), model.actuator_outnum.tolist(), strict=True
+        )
     ]
 
 
-def _gears(model: mujoco.MjModel, transmissions: list[mujoco.mjtTrn]) -> list[tuple[Value, ...]]:
-    """For each actuator the gear numbers that its transmission reads.
-
-    A hinge, a slide, a tendon and a crank have one direction; a ball has three, a free body and a
-    site six.
-    """
-    everywhere = np.ones(model.nactuator, np.bool_)
-    gears = _per_output(model, model.actuator_gear, everywhere)
-    single = {_TRN.mjTRN_TENDON, _TRN.mjTRN_SLIDERCRANK, _TRN.mjTRN_BODY}
-    on_joint = {_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT}
-    found: list[tuple[Value, ...]] = []
-    for gear, kind, target in zip(
-        gears, transmissions, model.actuator_trnid[:, 0].tolist(), strict=True
-    ):
-        count = 1 if kind in single else len(gear)
-        if kind in on_joint:
-            count = {mujoco.mjtJoint.mjJNT_FREE: 6, mujoco.mjtJoint.mjJNT_BALL: 3}.get(
-                mujoco.mjtJoint(model.jnt_type[target]), 1
-            )
-        found.append(gear[:count])
-    return found
-
-
-def _second_sites(
-    model: mujoco.MjModel, names: Names, transmissions: list[mujoco.mjtTrn]
-) -> list[str]:
-    """For each actuator its reference or slider site; empty where it has none."""
-    with_sites = {_TRN.mjTRN_SITE, _TRN.mjTRN_SLIDERCRANK, _TRN.mjTRN_SO3}
+def _gears(model: mujoco.MjModel, transmissions: list[str]) -> list[tuple[Value, ...]]:
+    """Return for each actuator the gear numbers that its transmission reads."""
+    joints = words(mujoco.mjtJoint, model.jnt_type)
     return [
-        names.sites[second] if kind in with_sites and second >= 0 else ""
-        for kind, second in zip(transmissions, model.actuator_trnid[:, 1].tolist(), strict=True)
+        gear[: _JOINT_GEAR_COUNT[joints[target]]]
+        if kind in _TO_JOINT
+        else gear[: _GEAR_COUNT.get(kind)]
+        for gear, kind, target in zip(
+            _per_output(model, model.actuator_gear),
+            transmissions,
+            model.actuator_trnid[:, 0].tolist(),
+            strict=True,
+        )
     ]
 
 
 def _control_ranges(model: mujoco.MjModel) -> list[tuple[Value, ...]]:
-    """For each actuator the ranges of its controls; "free" for one without a limit."""
+    """Return for each actuator the ranges of its controls; "free" for one without a limit."""
     limited, ranges = model.actuator_ctrllimited.tolist(), (model.actuator_ctrlrange + 0.0).tolist()
     found: list[tuple[Value, ...]] = []
     for start, count in zip(
@@ -212,27 +191,25 @@ def _control_ranges(model: mujoco.MjModel) -> list[tuple[Value, ...]]:
 
 
 def _paths(model: mujoco.MjModel, names: Names) -> list[tuple[Value, ...]]:
-    """For each tendon what it passes: kind, name, and coefficient, divisor or side site."""
-    wrap = mujoco.mjtWrap
+    """Return for each tendon what it passes: kind, name, and coefficient, divisor or side site."""
     passed = {
-        wrap.mjWRAP_JOINT: names.joints,
-        wrap.mjWRAP_SITE: names.sites,
-        wrap.mjWRAP_SPHERE: names.geoms,
-        wrap.mjWRAP_CYLINDER: names.geoms,
+        "joint": names.joints,
+        "site": names.sites,
+        "sphere": names.geoms,
+        "cylinder": names.geoms,
     }
     stops: list[tuple[Value, ...]] = []
-    for number, what, parameter in zip(
-        model.wrap_type.tolist(),
+    for kind, what, parameter in zip(
+        words(mujoco.mjtWrap, model.wrap_type),
         model.wrap_objid.tolist(),
         (model.wrap_prm + 0.0).tolist(),
         strict=True,
     ):
-        kind = wrap(number)
-        name = passed[kind][int(what)] if kind in passed else ""
+        name = passed[kind][what] if kind in passed else ""
         last: Value = parameter
-        if kind in (wrap.mjWRAP_SPHERE, wrap.mjWRAP_CYLINDER):
+        if kind in ("sphere", "cylinder"):
             last = names.sites[int(parameter)] if parameter >= 0.0 else ""
-        stops.append((word(kind), name, last))
+        stops.append((kind, name, last))
     return [
         tuple(value for stop in stops[start : start + count] for value in stop)
         for start, count in zip(model.tendon_adr.tolist(), model.tendon_num.tolist(), strict=True)

@@ -1,27 +1,22 @@
-"""Names for every element of a compiled model, those without one included.
+"""Names of the elements of a compiled model, and the rows in which their fields are collected.
 
-The rule is that of `shapechanger.morphology.spec.name_elements`, so a model compares as equal with
-a copy of it whose elements were given names by that rule.
+Elements without a name get one by the rule of `shapechanger.morphology.spec.name_elements`, so a
+model equals a copy whose elements were named by that rule.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol, SupportsInt
+from typing import Any, Final, SupportsInt
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-_TARGET: Final = {
-    mujoco.mjtTrn.mjTRN_JOINT: "joints",
-    mujoco.mjtTrn.mjTRN_JOINTINPARENT: "joints",
-    mujoco.mjtTrn.mjTRN_SLIDERCRANK: "sites",
-    mujoco.mjtTrn.mjTRN_TENDON: "tendons",
-    mujoco.mjtTrn.mjTRN_SITE: "sites",
-    mujoco.mjtTrn.mjTRN_BODY: "bodies",
-}
+from shapechanger.morphology.spec.elements import unique_namer
+
+_OBJ: Final = mujoco.mjtObj
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +31,8 @@ class Names:
         tendons: Names of the tendons.
         equalities: Names of the equality constraints.
         flexes: Names of the flexes.
-        actuators: Names of the actuators; one without a name is called after what it drives.
-        targets: For each actuator the name of what it drives.
+        actuators: Names of the actuators; by default that of the element that it drives.
+        targets: For each actuator the name of the element that it drives.
     """
 
     bodies: tuple[str, ...]
@@ -52,93 +47,67 @@ class Names:
 
 
 def names_of(model: mujoco.MjModel) -> Names:
-    """The names of a model's elements, made up where there is none."""
-    given_joints = _given(model, mujoco.mjtObj.mjOBJ_JOINT, model.njnt)
-    given_bodies = _given(model, mujoco.mjtObj.mjOBJ_BODY, model.nbody)
+    """Return the names of a model's elements, with a default for each that has none."""
+
+    def given(kind: mujoco.mjtObj, count: int) -> list[str]:
+        return [mujoco.mj_id2name(model, kind, i) or "" for i in range(count)]
+
+    bodies, joints = given(_OBJ.mjOBJ_BODY, model.nbody), given(_OBJ.mjOBJ_JOINT, model.njnt)
+    geoms, sites = given(_OBJ.mjOBJ_GEOM, model.ngeom), given(_OBJ.mjOBJ_SITE, model.nsite)
+    tendons = given(_OBJ.mjOBJ_TENDON, model.ntendon)
+    equalities = given(_OBJ.mjOBJ_EQUALITY, model.neq)
+    flexes = given(_OBJ.mjOBJ_FLEX, model.nflex)
+    actuators = given(_OBJ.mjOBJ_ACTUATOR, model.nactuator)
+
     joint_of_body: dict[int, str] = {}
-    for name, body in zip(given_joints, model.jnt_bodyid.tolist(), strict=True):
+    for name, body in zip(joints, model.jnt_bodyid.tolist(), strict=True):
         if name:
             joint_of_body.setdefault(body, name)
     parents = model.body_parentid.tolist()
-    bodies = list(given_bodies)
-    free = _namer(given_bodies)
-    for i, name in enumerate(given_bodies):
-        bodies[i] = name or free(joint_of_body.get(i, "") or f"{bodies[parents[i]]}_part")
-
-    def parts(kind: str, given: list[str], body_ids: list[int]) -> tuple[str, ...]:
-        return _filled(given, lambda i: f"{bodies[body_ids[i]]}_{kind}")
-
-    joints = parts("joint", given_joints, model.jnt_bodyid.tolist())
-    geoms = parts(
-        "geom",
-        _given(model, mujoco.mjtObj.mjOBJ_GEOM, model.ngeom),
-        model.geom_bodyid.tolist(),
-    )
-    sites = parts(
-        "site",
-        _given(model, mujoco.mjtObj.mjOBJ_SITE, model.nsite),
-        model.site_bodyid.tolist(),
-    )
-    tendons = _filled(_given(model, mujoco.mjtObj.mjOBJ_TENDON, model.ntendon), lambda _: "tendon")
-    by_kind = {"joints": joints, "sites": sites, "tendons": tendons, "bodies": tuple(bodies)}
-    targets = tuple(
-        by_kind[_kind_of_target(transmission, joint_like=second < 0)][int(first)]
+    _fill(bodies, lambda i: joint_of_body.get(i) or f"{bodies[parents[i]]}_part")
+    for kind, names, owners in (
+        ("joint", joints, model.jnt_bodyid.tolist()),
+        ("geom", geoms, model.geom_bodyid.tolist()),
+        ("site", sites, model.site_bodyid.tolist()),
+    ):
+        _fill(names, lambda i, kind=kind, owners=owners: f"{bodies[owners[i]]}_{kind}")
+    _fill(tendons, lambda _: "tendon")
+    _fill(equalities, lambda _: "equality")
+    _fill(flexes, lambda _: "flex")
+    driven = {
+        "joint": joints,
+        "jointinparent": joints,
+        "slidercrank": sites,
+        "tendon": tendons,
+        "site": sites,
+        "body": bodies,
+    }
+    targets = [
+        # `so3` drives a ball joint, or a site with its reference site.
+        driven.get(transmission, joints if second < 0 else sites)[first]
         for transmission, (first, second) in zip(
-            model.actuator_trntype.tolist(), model.actuator_trnid.tolist(), strict=True
+            words(mujoco.mjtTrn, model.actuator_trntype), model.actuator_trnid.tolist(), strict=True
+        )
+    ]
+    _fill(actuators, targets.__getitem__)
+    return Names(
+        *map(
+            tuple,
+            (bodies, joints, geoms, sites, tendons, equalities, flexes, actuators, targets),
         )
     )
-    return Names(
-        bodies=tuple(bodies),
-        joints=joints,
-        geoms=geoms,
-        sites=sites,
-        tendons=tendons,
-        equalities=_filled(
-            _given(model, mujoco.mjtObj.mjOBJ_EQUALITY, model.neq), lambda _: "equality"
-        ),
-        flexes=_filled(_given(model, mujoco.mjtObj.mjOBJ_FLEX, model.nflex), lambda _: "flex"),
-        actuators=_filled(
-            _given(model, mujoco.mjtObj.mjOBJ_ACTUATOR, model.nactuator), targets.__getitem__
-        ),
-        targets=targets,
-    )
 
 
-def _kind_of_target(transmission: int, *, joint_like: bool) -> str:
-    """Return the kind of element that an actuator with this transmission drives."""
-    so3 = "joints" if joint_like else "sites"  # A ball joint, or a site with its reference site.
-    return _TARGET.get(mujoco.mjtTrn(transmission), so3)
+def _fill(names: list[str], default: Callable[[int], str]) -> None:
+    """Replace each empty name by its default, numbered if that is taken, in place.
 
-
-def _given(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> list[str]:
-    """The names in the model, empty where there is none."""
-    return [mujoco.mj_id2name(model, kind, i) or "" for i in range(count)]
-
-
-def _filled(given: list[str], wanted: Callable[[int], str]) -> tuple[str, ...]:
-    """The given names, and for each that is empty the wanted one."""
-    free = _namer(given)
-    return tuple(name or free(wanted(i)) for i, name in enumerate(given))
-
-
-def _namer(given: list[str]) -> Callable[[str], str]:
-    """A function that gives the name asked for, or the next free one after it."""
-    taken = set(given)
-
-    def free(name: str) -> str:
-        candidate, count = name, 1
-        while candidate in taken:
-            count += 1
-            candidate = f"{name}_{count}"
-        taken.add(candidate)
-        return candidate
-
-    return free
-
-
-class _Member(Protocol):
-    @property
-    def name(self) -> str: ...
+    Args:
+        names: The names of all elements of one kind.
+        default: Takes the index of an element and returns its default name.
+    """
+    free = unique_namer(names)
+    for i, name in enumerate(names):
+        names[i] = name or free(default(i))
 
 
 def is_any(values: NDArray[np.generic], *members: SupportsInt) -> NDArray[np.bool_]:
@@ -146,18 +115,18 @@ def is_any(values: NDArray[np.generic], *members: SupportsInt) -> NDArray[np.boo
     return np.isin(values, [int(member) for member in members])
 
 
-def named(names: tuple[str, ...], indices: NDArray[np.integer]) -> list[str]:
-    """Return the names at some indices.
+def words(enumeration: Any, values: NDArray[np.integer]) -> list[str]:
+    """Return the words of values of a MuJoCo enumeration: `hinge` for `mjJNT_HINGE`.
 
     Args:
-        names: Names of all elements.
-        indices: Shape (n,).
+        enumeration: The enumeration.
+        values: Its values, shape (n,).
     """
-    return [names[int(index)] for index in indices.tolist()]
+    return [word(enumeration(value)) for value in values.tolist()]
 
 
-def word(member: _Member) -> str:
-    """Return the name of a member of a MuJoCo enumeration: `hinge` for `mjJNT_HINGE`."""
+def word(member: Any) -> str:
+    """Return the word of a member of a MuJoCo enumeration."""
     return member.name.partition("_")[2].lower()
 
 
@@ -170,28 +139,41 @@ _Bools = NDArray[np.bool_]
 
 
 class Rows:
-    """The elements of one kind, each with the fields gathered for it so far."""
+    """The elements of one kind, each with the fields collected so far.
+
+    Args:
+        names: Names of the elements.
+    """
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names
         self._rows: list[dict[str, tuple[Value, ...]]] = [{} for _ in names]
 
-    def numbers(self, field: str, values: ArrayLike, where: _Bools | None = None) -> None:
-        """Give each element, or each where `where` holds, its row of `values`.
+    def numbers(
+        self,
+        field: str,
+        values: ArrayLike,
+        where: _Bools | None = None,
+        counts: Sequence[int | None] | None = None,
+    ) -> None:
+        """Set a field of each element to its row of `values`.
 
         Args:
-            field: What the numbers are.
+            field: Name of the field.
             values: Numbers of any type, shape (n,) or (n, ...).
-            where: Which elements have the field, shape (n,); all where None.
+            where: Which elements have the field, shape (n,); all by default.
+            counts: How many numbers of its row each element has, None for all; one with 0 lacks
+                the field.
         """
         if not self._rows:
             return
-        # Adding zero turns -0.0, which nothing distinguishes from 0.0, into 0.0.
+        # Adding zero turns -0.0, which equals 0.0, into 0.0.
         flat = np.asarray(values, np.float64).reshape(len(self._rows), -1) + 0.0
         present = [True] * len(self._rows) if where is None else where.tolist()
-        for row, numbers, has in zip(self._rows, flat.tolist(), present, strict=True):
-            if has:
-                row[field] = tuple(numbers)
+        sizes = [None] * len(self._rows) if counts is None else counts
+        for row, numbers, has, size in zip(self._rows, flat.tolist(), present, sizes, strict=True):
+            if has and size != 0:
+                row[field] = tuple(numbers[:size])
 
     def words(self, field: str, words: Iterable[str | tuple[Value, ...]]) -> None:
         """Set a field of each element to one or several words.
@@ -221,10 +203,10 @@ class Rows:
                 row[field] = tuple(flat[start : start + count].ravel().tolist())
 
     def section(self, keep: _Bools | None = None, *, in_order: bool = False) -> Section:
-        """The elements with their fields.
+        """Return the elements with their fields.
 
         Args:
-            keep: Which elements to keep, shape (n,); all where None.
+            keep: Which elements to keep, shape (n,); all by default.
             in_order: Keep the model's order, because it decides what the numbers of a state or a
                 control mean; sort by name otherwise.
         """

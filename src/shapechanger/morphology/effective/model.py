@@ -1,10 +1,10 @@
 """Everything in a compiled model that decides how it moves, and nothing that does not.
 
 Two models may differ in colour, in the friction of a foot that stands on a rougher floor, or in the
-range of a joint that has no limit, and still do the same. An `EffectiveModel` holds what is left
-after all of that is taken away, as plain names and numbers: equal effective models move equally.
+range of a joint that has no limit, and still do the same. An `EffectiveModel` omits all of that and
+holds the rest as plain names and numbers: equal effective models move equally.
 
-Not in it: sensors and cameras, which decide what is seen of the motion; keyframes and custom
+It omits sensors and cameras, which decide what is seen of the motion, and keyframes and custom
 numbers, which decide nothing by themselves. What an environment makes of those shows in a rollout
 (see `shapechanger.morphology.certificate.certify`).
 """
@@ -13,23 +13,110 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.morphology.effective import bodies, drive, world
-from shapechanger.morphology.effective.contacts import (
-    Contact,
-    colliding_pairs,
-    effective_contacts,
-    geoms_of_pairs,
+from shapechanger.morphology.effective import bodies, drive
+from shapechanger.morphology.effective.contacts import colliding_pairs, contacts, geoms_of_pairs
+from shapechanger.morphology.effective.elements import (
+    Names,
+    Rows,
+    Section,
+    Value,
+    is_any,
+    names_of,
+    word,
 )
-from shapechanger.morphology.effective.elements import Section, Value, is_any, names_of
 
 _Bools = NDArray[np.bool_]
+_DISABLE: Final = mujoco.mjtDisableBit
+_ENABLE: Final = mujoco.mjtEnableBit
+# Switches that decide what is computed besides the motion, or that contacts and limits of the
+# effective model have already taken into account.
+_QUIET_SWITCHES: Final = frozenset(
+    (
+        _DISABLE.mjDSBL_SENSOR,
+        _DISABLE.mjDSBL_MIDPHASE,
+        _DISABLE.mjDSBL_CONTACT,
+        _DISABLE.mjDSBL_FILTERPARENT,
+        _DISABLE.mjDSBL_REFSAFE,
+        _ENABLE.mjENBL_ENERGY,
+        _ENABLE.mjENBL_FWDINV,
+        _ENABLE.mjENBL_OVERRIDE,
+    )
+)
+_NUMBERS: Final = (
+    "timestep",
+    "gravity",
+    "density",
+    "viscosity",
+    "impratio",
+    "tolerance",
+    "ls_tolerance",
+    "noslip_tolerance",
+    "ccd_tolerance",
+    "iterations",
+    "ls_iterations",
+    "noslip_iterations",
+    "ccd_iterations",
+    "sdf_initpoints",
+    "sdf_iterations",
+)
+_CHOICES: Final[dict[str, Any]] = {
+    "integrator": mujoco.mjtIntegrator,
+    "cone": mujoco.mjtCone,
+    "jacobian": mujoco.mjtJacobian,
+    "solver": mujoco.mjtSolver,
+}
+_OVERRIDES: Final = ("o_margin", "o_solref", "o_solimp", "o_friction")
+_SIZES: Final = ("nq", "nv", "nu", "na")
+
+# Arrays with one row per flex; the rest of a flex is compared by a digest.
+_FLEX_FIELDS: Final = (
+    "contype",
+    "conaffinity",
+    "condim",
+    "priority",
+    "solmix",
+    "solref",
+    "solimp",
+    "friction",
+    "margin",
+    "gap",
+    "selfcollide",
+    "activelayers",
+    "passive",
+    "dim",
+    "interp",
+    "radius",
+    "damping",
+    "yield",
+    "edgestiffness",
+    "edgedamping",
+    "edgeequality",
+)
+_FLEX_ARRAYS: Final = (
+    "flex_vertbodyid",
+    "flex_nodebodyid",
+    "flex_elem",
+    "flex_vert",
+    "flex_node",
+    "flex_stiffness",
+    "flex_bending",
+    "flexedge_length0",
+)
+_DERIVED: Final = (
+    "dof_invweight0",
+    "dof_M0",
+    "tendon_length0",
+    "tendon_invweight0",
+    "actuator_length0",
+    "actuator_acc0",
+)
 
 
 class EffectiveModel(msgspec.Struct, frozen=True):
@@ -45,7 +132,7 @@ class EffectiveModel(msgspec.Struct, frozen=True):
     sections: tuple[tuple[str, Section], ...]
 
     def __getitem__(self, section: str) -> dict[str, dict[str, tuple[Value, ...]]]:
-        """For each element of a section its fields.
+        """Return the fields of each element of a section.
 
         Raises:
             KeyError: If there is no such section.
@@ -62,7 +149,6 @@ def effective_model(model: mujoco.MjModel) -> EffectiveModel:
     without `mujoco.mj_setConst`.
     """
     names = names_of(model)
-    contacts = effective_contacts(model, names)
     geoms, sites = _relevant_geoms(model), _relevant_sites(model)
     carrying = np.zeros(model.nbody, np.bool_)
     carrying[model.geom_bodyid[geoms]] = True
@@ -71,40 +157,25 @@ def effective_model(model: mujoco.MjModel) -> EffectiveModel:
     kept = bodies.bodies_that_matter(model, carrying)
     return EffectiveModel(
         (
-            ("options", world.options(model)),
-            ("sizes", world.sizes(model)),
+            ("options", _options(model)),
+            ("sizes", _sizes(model)),
             ("bodies", bodies.bodies(model, names, kept)),
             ("joints", bodies.joints(model, names)),
             ("geoms", bodies.geoms(model, names, geoms)),
             ("sites", bodies.sites(model, names, sites)),
-            ("contacts", tuple((name, _fields(contact)) for name, contact in contacts.items())),
+            ("contacts", contacts(model, names)),
             ("actuators", drive.actuators(model, names)),
             ("tendons", drive.tendons(model, names)),
             ("equalities", drive.equalities(model, names)),
-            ("flexes", world.flexes(model, names)),
-            ("plugins", world.plugins(model)),
-            ("derived", world.derived(model, kept, geoms)),
+            ("flexes", _flexes(model, names)),
+            ("plugins", _plugins(model)),
+            ("derived", _derived(model, kept, geoms)),
         )
     )
 
 
-def _fields(contact: Contact) -> tuple[tuple[str, tuple[Value, ...]], ...]:
-    """A contact as named numbers; what does not act is left out."""
-    named = {
-        "contact dimension": (float(contact.dim),),
-        "contact friction": contact.friction,
-        "contact solref": contact.solref,
-        "contact friction solref": contact.solreffriction,
-        "contact solimp": contact.solimp,
-        "contact margin": (contact.margin,),
-        "contact gap": (contact.gap,),
-        "contact adhesion": (contact.adhesion,),
-    }
-    return tuple((name, values) for name, values in named.items() if values)
-
-
 def _relevant_geoms(model: mujoco.MjModel) -> _Bools:
-    """Geoms that touch, push a fluid or guide a tendon, shape (ngeom,)."""
+    """Return the geoms that touch, push a fluid or guide a tendon, shape (ngeom,)."""
     explicit, dynamic = colliding_pairs(model)
     relevant = np.zeros(model.ngeom, np.bool_)
     relevant[geoms_of_pairs(model, explicit)] = True
@@ -118,7 +189,7 @@ def _relevant_geoms(model: mujoco.MjModel) -> _Bools:
 
 
 def _relevant_sites(model: mujoco.MjModel) -> _Bools:
-    """Sites to which a tendon, an actuator or a constraint is fixed, shape (nsite,)."""
+    """Return the sites to which a tendon, an actuator or a constraint is fixed, shape (nsite,)."""
     relevant = np.zeros(model.nsite, np.bool_)
     wrap, transmission = mujoco.mjtWrap, mujoco.mjtTrn
     relevant[model.wrap_objid[model.wrap_type == wrap.mjWRAP_SITE]] = True
@@ -142,7 +213,7 @@ def _relevant_sites(model: mujoco.MjModel) -> _Bools:
 
 
 def _bound_bodies(model: mujoco.MjModel) -> NDArray[np.int64]:
-    """Bodies that an equality constraint binds or an actuator sticks to something."""
+    """Return the bodies that an equality constraint binds or an adhesion actuator drives."""
     bound = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY
     sticky = model.actuator_trntype == mujoco.mjtTrn.mjTRN_BODY
     return np.concatenate(
@@ -150,22 +221,98 @@ def _bound_bodies(model: mujoco.MjModel) -> NDArray[np.int64]:
     ).astype(np.int64)
 
 
-# 64 bits: among a million different models two agree by chance once in 37 million tries.
+def _options(model: mujoco.MjModel) -> Section:
+    """Return timestep, gravity, medium and solver options."""
+    option = model.opt
+    rows = Rows(("simulation",))
+    for name in _NUMBERS:
+        rows.numbers(name.replace("_", " "), getattr(option, name))
+    if option.density > 0.0 or option.viscosity > 0.0:
+        rows.numbers("wind", option.wind)
+    if option.enableflags & _ENABLE.mjENBL_SLEEP:
+        rows.numbers("sleep tolerance", option.sleep_tolerance)
+    for name, enumeration in _CHOICES.items():
+        rows.words(name, [word(enumeration(getattr(option, name)))])
+    quiet = _QUIET_SWITCHES if model.nflex == 0 else frozenset[object]()
+    for switches, set_bits in ((_DISABLE, option.disableflags), (_ENABLE, option.enableflags)):
+        for switch in switches.__members__.values():
+            if switch not in quiet and switch.name.startswith(("mjDSBL", "mjENBL")):
+                # A switch that is off and one that an older MuJoCo lacks are the same.
+                prefix = "without" if switches is _DISABLE else "with"
+                set_here = "yes" if set_bits & switch.value else ""
+                rows.words(f"{prefix} {word(switch)}", [set_here])
+    if model.nflex and option.enableflags & _ENABLE.mjENBL_OVERRIDE:
+        for name in _OVERRIDES:
+            rows.numbers(f"override {name[2:]}", getattr(option, name))
+    return rows.section()
+
+
+def _sizes(model: mujoco.MjModel) -> Section:
+    """Return the sizes of position, velocity, control and activation."""
+    rows = Rows(_SIZES)
+    rows.numbers("dimensions", [getattr(model, name) for name in _SIZES])
+    return rows.section(in_order=True)
+
+
+def _flexes(model: mujoco.MjModel, names: Names) -> Section:
+    """Return the soft bodies, with their own contact parameters rather than the combined ones."""
+    if not model.nflex:
+        return ()
+    rows = Rows(names.flexes)
+    for name in _FLEX_FIELDS:
+        rows.numbers(name, getattr(model, f"flex_{name}"))
+    shape = bodies.digest(*(getattr(model, name) for name in _FLEX_ARRAYS))
+    return (*rows.section(), ("all flexes", (("shape", (shape,)),)))
+
+
+def _plugins(model: mujoco.MjModel) -> Section:
+    """Return the engine plugins that the model uses, by a digest of their configuration."""
+    if not model.nplugin:
+        return ()
+    used = bodies.digest(
+        model.plugin,
+        np.frombuffer(bytes(model.plugin_attr), np.uint8),
+        model.body_plugin,
+        model.geom_plugin,
+        model.actuator_plugin,
+    )
+    return (("all plugins", (("configuration", (used,)),)),)
+
+
+def _derived(model: mujoco.MjModel, kept: _Bools, geoms: _Bools) -> Section:
+    """Return the constants of `mujoco.mj_setConst` that the solver relies on.
+
+    Args:
+        model: The compiled model.
+        kept: Bodies that matter, shape (nbody,).
+        geoms: Geoms that matter, shape (ngeom,).
+    """
+    moving = kept & (model.body_treeid >= 0)
+    arrays = {
+        name: getattr(model, name)[moving] for name in ("body_subtreemass", "body_invweight0")
+    }
+    arrays |= {name: getattr(model, name) for name in _DERIVED}
+    arrays["body_margin"] = model.body_margin[kept]
+    arrays["geom_rbound"] = model.geom_rbound[geoms]
+    arrays["meaninertia"] = np.asarray([model.stat.meaninertia])
+    return tuple(
+        (name, (("values", tuple((values + 0.0).ravel().tolist())),))
+        for name, values in arrays.items()
+    )
+
+
+# 64 bits: the chance that two of a million different models collide is 1 in 37 million.
 _HEX_DIGITS: Final = 16
 
 
-def fingerprint(model: mujoco.MjModel | EffectiveModel) -> str:
-    """The first 16 hex digits of the SHA-256 of an effective model.
+def fingerprint(model: mujoco.MjModel) -> str:
+    """Return the first 16 hex digits of the SHA-256 of the effective model of a compiled model.
 
     It is the same in every process and on every machine on which the model compiles to the same
     numbers, and does not change with colours, cameras, lights, or anything else without effect.
-
-    Args:
-        model: A compiled model, or what was already taken from one.
     """
-    effective = model if isinstance(model, EffectiveModel) else effective_model(model)
     total = hashlib.sha256()
-    for section, elements in effective.sections:
+    for section, elements in effective_model(model).sections:
         total.update(_text(section) + _count(elements))
         for element, fields in elements:
             total.update(_text(element) + _count(fields))
@@ -175,12 +322,12 @@ def fingerprint(model: mujoco.MjModel | EffectiveModel) -> str:
 
 
 def _value(value: Value) -> bytes:
-    """A number as 8 bytes, little-endian; a word with its length."""
+    """Encode a number as 8 bytes, little-endian, or a word with its length."""
     return b"w" + _text(value) if isinstance(value, str) else b"n" + struct.pack("<d", value)
 
 
 def _text(text: str) -> bytes:
-    """A text after its length, so that no two sequences of texts look alike."""
+    """Encode a text after its length, so that no two sequences of texts have the same bytes."""
     encoded = text.encode()
     return struct.pack("<I", len(encoded)) + encoded
 

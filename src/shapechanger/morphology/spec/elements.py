@@ -1,4 +1,4 @@
-"""Finding elements of a model by name or glob, and giving names to those that have none."""
+"""Find elements of a model by name or glob, and name those that have no name."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ _N = TypeVar("_N", bound=_Named)
 
 
 def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
-    """The elements whose name is `pattern` or fits it as a glob, in the model's order.
+    """Return the elements whose name is `pattern` or matches it as a glob, in the model's order.
 
     Args:
-        kind: What they are, for the message: "body", "joint".
+        kind: Kind of element for the message, such as "body".
         pattern: A name, or a glob such as `*shank*`.
-        elements: Where to look.
+        elements: The elements to select from.
 
     Raises:
-        UnknownName: If nothing fits.
+        UnknownName: If none matches.
     """
     candidates = list(elements)
     exact = [element for element in candidates if element.name == pattern]
@@ -42,7 +42,7 @@ def select(kind: str, pattern: str, elements: Iterable[_N]) -> list[_N]:
 
 
 def limbs_and_trunks(spec: mujoco.MjSpec) -> list[mujoco.MjsBody]:
-    """All bodies but the world."""
+    """Return all bodies except the world."""
     return [body for body in spec.bodies if body.parent is not None]
 
 
@@ -58,13 +58,13 @@ def require_limb(body: mujoco.MjsBody, what: str) -> None:
     """
     if body.parent.parent is None:
         raise MorphologyError(
-            f"{body.name!r} is the trunk that the rest hangs on, so it cannot be {what}; "
+            f"{body.name!r} is the trunk that carries all limbs, so it cannot be {what}; "
             f"its limbs can: {', '.join(child.name for child in body.bodies) or 'it has none'}."
         )
 
 
 def require_free_name(spec: mujoco.MjSpec, kind: str, name: str) -> None:
-    """Refuse a name that another element of the kind already has.
+    """Refuse a name that an element of the kind already has.
 
     Args:
         spec: The specification.
@@ -74,18 +74,13 @@ def require_free_name(spec: mujoco.MjSpec, kind: str, name: str) -> None:
     Raises:
         MorphologyError: If `name` is empty or taken.
     """
-    taken = {
-        "body": lambda: spec.bodies,
-        "joint": lambda: spec.joints,
-        "geom": lambda: spec.geoms,
-        "actuator": lambda: spec.actuators,
-    }[kind]()
-    if not name or any(element.name == name for element in taken):
-        raise MorphologyError(f"A new {kind} needs a name that is free; {name!r} is not.")
+    elements = getattr(spec, "bodies" if kind == "body" else f"{kind}s")
+    if not name or any(element.name == name for element in elements):
+        raise MorphologyError(f"A new {kind} needs an unused name, got {name!r}.")
 
 
 def subtree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
-    """The body and all that hangs on it, parents first."""
+    """Yield a body and its descendants, parents first."""
     yield body
     for child in body.bodies:
         yield from subtree(child)
@@ -94,15 +89,15 @@ def subtree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
 def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None = None) -> None:
     """Name every body, joint, geom, site, camera and actuator that has no name, in place.
 
-    A body is called after `bodies_by_joint`, or after its joint, or after its parent; an actuator
-    after what it drives; anything else after its body. Names change no physics.
+    A body is named after `bodies_by_joint`, or its joint, or its parent; an actuator after the
+    element that it drives; anything else after its body. Names change no physics.
 
     Args:
         spec: The model.
-        bodies_by_joint: For a joint's name the name of the unnamed body that it moves.
+        bodies_by_joint: Names for unnamed bodies by the names of their joints.
     """
     chosen = bodies_by_joint or {}
-    body_name = _namer(spec.bodies)
+    body_name = unique_namer(body.name for body in spec.bodies)
     for body in limbs_and_trunks(spec):
         if not body.name:
             joint = next((j.name for j in body.joints if j.name), "")
@@ -113,24 +108,29 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
         ("site", spec.sites),
         ("camera", spec.cameras),
     ):
-        free = _namer(elements)
+        free = unique_namer(element.name for element in elements)
         for element in elements:
             element.name = element.name or free(f"{element.parent.name}_{kind}")
-    free = _namer(spec.actuators)
+    free = unique_namer(actuator.name for actuator in spec.actuators)
     for actuator in spec.actuators:
         actuator.name = actuator.name or free(actuator.target)
 
 
-def _namer(elements: Iterable[_Named]) -> Callable[[str], str]:
-    """A function that gives the name asked for, or the next free one after it."""
-    taken = {element.name for element in elements}
+def unique_namer(taken: Iterable[str], numbered: str = "_{}") -> Callable[[str], str]:
+    """Return a function that returns the name it is given, numbered if that is taken.
+
+    Args:
+        taken: Names that are taken; so is each name that the function has returned.
+        numbered: Format of the number after the name.
+    """
+    used = set(taken)
 
     def free(name: str) -> str:
         candidate, count = name, 1
-        while candidate in taken:
+        while candidate in used:
             count += 1
-            candidate = f"{name}_{count}"
-        taken.add(candidate)
+            candidate = name + numbered.format(count)
+        used.add(candidate)
         return candidate
 
     return free
@@ -142,7 +142,7 @@ _OF_JOINTS: Final = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPAREN
 def delete_joint(spec: mujoco.MjSpec, joint: mujoco.MjsJoint) -> None:
     """Delete a joint, its motors and couplings, the sensors of these, and all keyframes.
 
-    A keyframe lists every joint, so none would fit any more.
+    A keyframe lists every joint, so none fits the new model.
 
     Args:
         spec: Specification that contains it.
@@ -157,7 +157,7 @@ def delete_joint(spec: mujoco.MjSpec, joint: mujoco.MjsJoint) -> None:
             if _does_something(spec, tendon):
                 raise MorphologyError(
                     f"{name!r} is tied to other joints by the tendon {tendon.name!r}, so it cannot "
-                    "be taken away alone."
+                    "be removed alone."
                 )
             spec.delete(tendon)
     for actuator in list(spec.actuators):
@@ -181,13 +181,13 @@ def _delete_sensors(spec: mujoco.MjSpec, kind: mujoco.mjtObj, name: str) -> None
 
 
 def _joints_of(tendon: mujoco.MjsTendon) -> set[str]:
-    """The names of the joints whose positions a fixed tendon adds up; none for a spatial one."""
+    """Return the names of the joints of a fixed tendon; none for a spatial one."""
     wraps = (tendon.path[i] for i in range(len(tendon.path)))
     return {wrap.target.name for wrap in wraps if wrap.type == mujoco.mjtWrap.mjWRAP_JOINT}
 
 
 def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
-    """Return whether a tendon acts on its joints or is read: the humanoid's do neither."""
+    """Return whether a tendon acts on its joints or is used; the humanoid's do neither."""
     lower, upper = tendon.range
     automatic = tendon.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
     acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss

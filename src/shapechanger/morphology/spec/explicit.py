@@ -1,7 +1,7 @@
 """Make implicit parts of a model explicit: names, frames and a total mass.
 
-Edits change numbers in place. A name that is missing cannot be asked for, a pose that is seen from
-a frame has other axes than its body, and a total mass that the compiler restores undoes any change.
+Edits change numbers in place. An element without a name cannot be selected, a pose relative to a
+frame has other axes than its body, and a total mass that the compiler restores undoes any change.
 """
 
 from __future__ import annotations
@@ -19,10 +19,12 @@ _UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)
 
 
 def make_explicit(spec: mujoco.MjSpec) -> None:
-    """Name every element, and write out frames and a total mass, in place; the physics stays.
+    """Name every element, and write out frames and a total mass, in place.
+
+    The physics does not change.
 
     Raises:
-        MorphologyError: If a frame scales what it holds.
+        MorphologyError: If a frame scales its elements.
     """
     name_elements(spec)
     resolve_frames(spec)
@@ -35,10 +37,10 @@ def make_explicit(spec: mujoco.MjSpec) -> None:
 
 
 def resolve_frames(spec: mujoco.MjSpec) -> None:
-    """Write every pose as seen from its body, and let the frames be where their bodies are.
+    """Express every pose relative to its body, and reset the frames.
 
     Raises:
-        MorphologyError: If a frame scales what it holds.
+        MorphologyError: If a frame scales its elements.
     """
     frames = [frame for frame in spec.frames if not _is_trivial(frame)]
     if not frames:
@@ -46,7 +48,7 @@ def resolve_frames(spec: mujoco.MjSpec) -> None:
     for frame in frames:
         if np.any(frame.scale != 1.0) or frame.massscale:
             raise MorphologyError(
-                f"The frame {frame.name!r} scales what it holds: write the sizes out instead."
+                f"The frame {frame.name!r} scales its elements: write the sizes out instead."
             )
     for body in limbs_and_trunks(spec):
         _resolve(spec, body)
@@ -83,7 +85,7 @@ def _resolve(
     spec: mujoco.MjSpec,
     element: mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera,
 ) -> None:
-    """Write an element's pose as seen from its body."""
+    """Express an element's pose relative to its body."""
     pose = _pose_of_frames(spec, element.frame)
     if pose is None:
         return
@@ -91,7 +93,7 @@ def _resolve(
         if element.type != mujoco.mjtGeom.mjGEOM_BOX:
             element.fromto = np.concatenate([_seen(e, pose) for e in element.fromto.reshape(2, 3)])
             return
-        _write_pose(element)  # How a box is turned about its axis follows from the frame.
+        _write_pose(element)  # The turn of a box about its axis follows from the frame.
     element.pos = _seen(element.pos, pose)
     turned = np.empty(4)
     mujoco.mju_mulQuat(turned, pose.turn, orientation(spec, element))
@@ -100,7 +102,7 @@ def _resolve(
 
 
 def _write_pose(element: mujoco.MjsGeom | mujoco.MjsSite) -> None:
-    """Give an element that has ends a place and an orientation instead, as MuJoCo does."""
+    """Replace the ends of an element by position and orientation, as MuJoCo does."""
     first, last = element.fromto.reshape(2, 3)
     axis = first - last
     length = float(np.linalg.norm(axis))
@@ -119,12 +121,12 @@ class _Pose(NamedTuple):
 
 
 def _seen(point: Array, pose: _Pose) -> Array:
-    """A point of a frame as seen from the body, m."""
+    """Return a point of a frame relative to the body, m."""
     return pose.shift + rotation(pose.turn) @ point
 
 
 def _pose_of_frames(spec: mujoco.MjSpec, frame: mujoco.MjsFrame | None) -> _Pose | None:
-    """The pose of a frame within those around it; None where there is no frame."""
+    """Return the pose of nested frames relative to the body; None without a frame."""
     pose = None
     while frame is not None:
         around = _Pose(orientation(spec, frame), np.array(frame.pos))

@@ -1,4 +1,4 @@
-"""One geom: where it lies, how large it is, how it grows."""
+"""Geometry of geoms and segments: pose, size, volume, and how they stretch."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _Oriented = mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera 
 _G = mujoco.mjtGeom
 _LONG: Final = (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER)
 _AXES: Final = {"x": 0, "y": 1, "z": 2}
-# How far a geom may lean from an axis and still count as lying along it: the pole of the inverted
-# pendulum leans by 1 mm on 600.
+# Cosine above which a geom lies along an axis; the pole of the inverted pendulum leans by 1 mm on
+# 600.
 _ALONG: Final = 0.999
 
 
 def rotation(quaternion: Array) -> Array:
-    """The rotation matrix, shape (3, 3), of a quaternion (w, x, y, z)."""
+    """Return the rotation matrix, shape (3, 3), of a quaternion (w, x, y, z)."""
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, quaternion)
     return matrix.reshape(3, 3)
@@ -49,7 +49,7 @@ def orientation(spec: mujoco.MjSpec, element: _Oriented) -> Array:
 
 
 def has_ends(element: mujoco.MjsGeom | mujoco.MjsSite) -> bool:
-    """Return whether an element, even a box or an ellipsoid, is given by its axis' ends."""
+    """Return whether an element is given by the ends of its axis; even a box can be."""
     return not math.isnan(element.fromto[0])
 
 
@@ -69,7 +69,7 @@ def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] 
 
 
 def place_of(element: mujoco.MjsGeom | mujoco.MjsSite) -> Array:
-    """The middle of an element in the body's frame, m."""
+    """Return the middle of an element in the body's frame, m."""
     return np.array(element.fromto.reshape(2, 3).mean(axis=0) if has_ends(element) else element.pos)
 
 
@@ -129,7 +129,7 @@ def stretched(point: Array, held: Array, factor: float, axis: str | None = None)
 def _move_outwards(
     element: mujoco.MjsGeom | mujoco.MjsSite, held: Array, factor: float, axis: str | None = None
 ) -> None:
-    """Move an element, or the ends that it has, to where stretching carries it."""
+    """Move an element, or its ends, as its segment is stretched."""
     if has_ends(element):
         ends = [stretched(end, held, factor, axis) for end in element.fromto.reshape(2, 3)]
         element.fromto = np.concatenate(ends)
@@ -145,12 +145,12 @@ def stretch_geom(
     Args:
         spec: The model that `geom` is in.
         geom: The geom.
-        held: The point of its body that stays.
+        held: The point of its body that stays, shape (3,), m.
         factor: New length over old length.
         axis: "x", "y" or "z" to stretch along that axis of the body only; None for all three.
 
     Raises:
-        MorphologyError: If the geom lies askew to the axis.
+        MorphologyError: If the geom lies oblique to the axis.
     """
     before = volume(spec, geom)
     if not has_ends(geom):
@@ -174,8 +174,14 @@ def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: 
     _keep_density(spec, geom, before)
 
 
-def _thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
-    """Scale what stretching leaves alone: a radius, or the two smaller half-sizes."""
+def thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
+    """Scale the thickness of a geom: its radius, or its two smaller half-sizes.
+
+    Args:
+        spec: Specification that contains it.
+        geom: The geom.
+        factor: New thickness over the old one.
+    """
     before = volume(spec, geom)
     size = np.array(geom.size)
     if geom.type in (*_LONG, _G.mjGEOM_SPHERE) or has_ends(geom):
@@ -189,7 +195,7 @@ def _thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> N
 def _lengthen(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
     """Scale the long half-size of a geom that is given by position and size."""
     if geom.type == _G.mjGEOM_SPHERE:
-        return  # A sphere has a place along the segment, and a thickness, but no length.
+        return  # A sphere has no length.
     size = np.array(geom.size)
     place, direction = (1, 2) if geom.type in _LONG else (int(np.argmax(size)),) * 2
     if axis is not None:
@@ -198,17 +204,18 @@ def _lengthen(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float, axis: st
         if geom.type not in _LONG:
             place = direction = int(np.argmax(along))
         if along[direction] < 1.0 - _ALONG:
-            return  # It lies across: what would grow is its thickness.
+            return  # It lies across the axis.
         if along[direction] < _ALONG:
             raise MorphologyError(
-                f"{geom.name!r} lies askew to the axis {axis!r}: stretch it along all axes instead."
+                f"{geom.name!r} lies oblique to the axis {axis!r}: stretch it along all axes "
+                "instead."
             )
     size[place] *= factor
     geom.size = size
 
 
 def _keep_density(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, volume_before: float) -> None:
-    """Let a mass that was written out follow the geom's volume, as a density does by itself."""
+    """Scale a mass that is written out with the geom's volume, to keep the density."""
     if not math.isnan(geom.mass):
         geom.mass *= volume(spec, geom) / volume_before
 
@@ -257,9 +264,7 @@ def far_end(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
     held = anchor(body)
     ends = [end for geom in body.geoms for end in axis_ends(spec, geom) or ()]
     if not ends:
-        raise MorphologyError(
-            f"{body.name!r} has no capsule or cylinder, so it has no far end to build on."
-        )
+        raise MorphologyError(f"{body.name!r} has no capsule or cylinder, so it has no far end.")
     return max(ends, key=lambda end: float(np.linalg.norm(end - held)))
 
 
@@ -275,18 +280,18 @@ def inertia_is_written_out(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> bool:
 
 
 def require_geometry(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
-    """Refuse a body whose mass does not follow from its geoms, or whose geoms are meshes.
+    """Refuse a body whose mass does not follow from its geoms, or that has meshes.
 
     Args:
         spec: Specification that contains it.
         body: The body.
 
     Raises:
-        MorphologyError: If so: an edit of its shape would leave mass and inertia behind.
+        MorphologyError: If its mass and inertia would not follow a new shape.
     """
     if inertia_is_written_out(spec, body):
         raise MorphologyError(
-            f"{body.name!r} has its inertia written out, so a new shape would leave it behind: "
+            f"{body.name!r} has its inertia written out, so it would not follow a new shape: "
             "remove its <inertial> or set inertiafromgeom."
         )
     for geom in body.geoms:
@@ -302,7 +307,7 @@ def stretch_segment(
 ) -> None:
     """Make the segment `factor` times as long, at the same thickness, held at its anchor.
 
-    What hangs on it moves outwards with it.
+    What is attached to it moves outwards with it.
 
     Args:
         spec: The model that `body` is in.
@@ -321,7 +326,7 @@ def stretch_segment(
 def _carry_outwards(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
 ) -> None:
-    """Move what hangs on a segment that is stretched: further joints, sites, bodies."""
+    """Move what is attached to a stretched segment: joints, sites and bodies."""
     for joint in body.joints:
         joint.pos = stretched(joint.pos, held, factor, axis)
     for site in body.sites:
@@ -329,18 +334,6 @@ def _carry_outwards(
     for child in body.bodies:
         held_there = held_at(spec, child)
         child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
-
-
-def thicken_segment(spec: mujoco.MjSpec, body: mujoco.MjsBody, factor: float) -> None:
-    """Scale the thickness of every geom of a body, at the same length.
-
-    Args:
-        spec: Specification that contains it.
-        body: The body.
-        factor: New thickness over the old one.
-    """
-    for geom in body.geoms:
-        _thicken_geom(spec, geom, factor)
 
 
 def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:

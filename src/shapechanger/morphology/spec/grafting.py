@@ -1,7 +1,7 @@
-"""Copying and moving whole limbs, and single geoms and sites, within a model.
+"""Copy and move limbs, geoms and sites within a model.
 
-MuJoCo attaches parts of one model to another, under a prefix. So a limb is attached from a copy of
-the model, and then renamed.
+MuJoCo attaches parts of one model to another under a prefix. So a limb is attached from a copy of
+the model and then renamed.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from shapechanger.morphology.spec.elements import require_free_name, subtree
 from shapechanger.morphology.spec.explicit import resolve_frames
 from shapechanger.morphology.spec.geometry import orientation
 
-# Begins no name that anybody writes.
+# Prefix that no name of a model has.
 _MARK: Final = "graft~"
-# What geoms and sites name that lies outside the tree of bodies.
+# Fields of geoms and sites that refer to assets.
 _ASSETS: Final = ("material", "meshname", "hfieldname")
-# What makes a site what it is, and a geom, but for the name and the place in the tree.
+# Fields of a site and of a geom, except the name and the orientation.
 _SITE_FIELDS: Final = ("type", "size", "pos", "fromto", "group", "rgba", "material")
 _GEOM_FIELDS: Final = (
     *(*_SITE_FIELDS, "density", "mass", "typeinertia", "contype", "conaffinity", "condim"),
@@ -41,7 +41,7 @@ def graft_copy(
         angle: Turn about the z axis of the limb's parent, rad.
 
     Returns:
-        The first body of the copy; each of its elements is called as the original's plus `suffix`.
+        The first body of the copy.
     """
     frame = limb.parent.add_frame(quat=[math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
     copy = _attach(spec, frame, limb.name, with_motors=True)
@@ -108,7 +108,7 @@ def move_point(
         The site or geom, which is another object now.
     """
     name = point.name
-    point.name = name + _MARK  # What refers to it does so by name.
+    point.name = name + _MARK  # References are by name.
     if isinstance(point, mujoco.MjsGeom):
         moved = copy_geom(spec, point, body, name)
     else:
@@ -122,7 +122,7 @@ def move_point(
 def _attach(
     spec: mujoco.MjSpec, frame: mujoco.MjsFrame, limb_name: str, *, with_motors: bool
 ) -> mujoco.MjsBody:
-    """Attach a copy of the limb to the frame, each of its names with the mark before it."""
+    """Attach a copy of a limb to a frame, with all of its names prefixed by the mark."""
     donor = spec.copy()
     unwanted: list[Any] = [*donor.sensors, *donor.tendons, *donor.equalities, *donor.pairs]
     unwanted += [*donor.excludes, *donor.keys, *donor.numerics, *donor.texts, *donor.tuples]
@@ -131,7 +131,7 @@ def _attach(
         unwanted += donor.actuators
     for element in unwanted:
         donor.delete(element)
-    # Assets would come along as copies; the limb is to share those that are there.
+    # Attaching would copy the assets; the limb shall share the existing ones.
     shared: dict[tuple[type, str], dict[str, str]] = {}
     for element in (*donor.geoms, *donor.sites):
         assets = {field: getattr(element, field, "") for field in _ASSETS}
@@ -150,7 +150,7 @@ def _attach(
 
 
 def _rename(limb: mujoco.MjsBody, renamed: Callable[[str], str]) -> None:
-    """Rename a limb's bodies and what they hold."""
+    """Rename a limb's bodies and their elements."""
     for body in subtree(limb):
         body.name = renamed(body.name)
         for element in (*body.joints, *body.geoms, *body.sites, *body.cameras, *body.lights):
