@@ -28,7 +28,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.envs.stepping.watch import ModelWatch, forget_steps
-from shapechanger.morphology.effective.contacts import colliding_pairs, mixed_parameters
+from shapechanger.morphology.effective.contacts import (
+    colliding_pairs,
+    geoms_of_pairs,
+    mixed_parameters,
+)
 
 _Ints = NDArray[np.int64]
 
@@ -157,7 +161,7 @@ def _without_search(
     result = spec.compile()
     if not _same_but_for_pairs(model, result):
         return None
-    joined = np.stack([result.pair_geom1, result.pair_geom2], axis=1)
+    joined = geoms_of_pairs(result, np.arange(result.npair))
     for parameter, values in mixed_parameters(result, joined).items():
         getattr(result, f"pair_{parameter}")[:] = values
     # Leave no geom to the search, neither by itself nor by its body.

@@ -104,10 +104,10 @@ def _empty(key: str, values: Sequence[Any] | NDArray[Any], num_envs: int) -> NDA
     """Return an array of all envs for values such as these."""
     if isinstance(values, np.ndarray):
         return np.zeros(num_envs, values.dtype)
-    first = values[0]
+    first: Any = values[0]
     # NumPy's booleans get an array of objects, as in Gymnasium.
     if type(first) in (int, float, bool) or isinstance(first, np.number):
-        return np.zeros(num_envs, np.asarray(first).dtype)
+        return np.zeros(num_envs, np.asarray(cast("Any", first)).dtype)
     if isinstance(first, np.ndarray) and key != "final_obs":
         array = cast("NDArray[Any]", first)
         return np.zeros((num_envs, *array.shape), array.dtype)

@@ -368,7 +368,7 @@ def _segments(model: mujoco.MjModel) -> dict[str, _Segment]:
     for geom, kind, owner, (radius, half_length, _) in zip(
         names.geoms,
         words(mujoco.mjtGeom, model.geom_type),
-        model.geom_bodyid.tolist(),
+        map(int, model.geom_bodyid),
         model.geom_size.tolist(),
         strict=True,
     ):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import mujoco
 import numpy as np
 
-from shapechanger.morphology.effective.elements import Names, names_of
+from shapechanger.morphology.effective.elements import Names, named, names_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -130,7 +130,7 @@ def _stale_constants(model: mujoco.MjModel, names: Names) -> list[str]:
         return [f"MuJoCo cannot derive its constants from the model: {error}."]
     owners = {
         "body": names.bodies,
-        "dof": [names.joints[joint] for joint in model.dof_jntid.tolist()],
+        "dof": named(names.joints, model.dof_jntid),
         "geom": names.geoms,
         "site": names.sites,
         "joint": names.joints,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.effective.contacts import safe_solref
-from shapechanger.morphology.effective.elements import Rows, Section, is_any, words
+from shapechanger.morphology.effective.elements import Rows, Section, is_any, named, words
 
 if TYPE_CHECKING:
     from shapechanger.morphology.effective.elements import Names
@@ -84,7 +84,7 @@ def bodies(model: mujoco.MjModel, names: Names, kept: _Bools) -> Section:
     moving = model.body_treeid >= 0
     free = np.zeros(model.nbody, np.bool_)
     free[model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]] = True
-    rows.words("parent", [names.bodies[body] for body in model.body_parentid.tolist()])
+    rows.words("parent", named(names.bodies, model.body_parentid))
     rows.numbers("position", model.body_pos, ~free)  # A free body starts from its joint's qpos0.
     rows.numbers("orientation", _canonical(model.body_quat), ~free)
     rows.numbers("mass", model.body_mass, moving)
@@ -133,7 +133,7 @@ def joints(model: mujoco.MjModel, names: Names) -> Section:
     qpos, dof = model.jnt_qposadr.tolist(), model.jnt_dofadr.tolist()
     coordinates, dofs = [_QPOS_COUNT[name] for name in kinds], [_DOF_COUNT[name] for name in kinds]
     rows.words("type", kinds)
-    rows.words("body", [names.bodies[body] for body in model.jnt_bodyid.tolist()])
+    rows.words("body", named(names.bodies, model.jnt_bodyid))
     rows.numbers("anchor", model.jnt_pos, kind != "free")
     rows.numbers("axis", model.jnt_axis, np.isin(kind, ("slide", "hinge")))
     rows.parts("rest position", model.qpos0, qpos, coordinates)
@@ -204,8 +204,7 @@ def sites(model: mujoco.MjModel, names: Names, relevant: _Bools) -> Section:
 
 def _place(rows: Rows, model: mujoco.MjModel, names: Names, kind: Literal["geom", "site"]) -> None:
     """Set the body of each element, and its frame relative to that."""
-    owners = getattr(model, f"{kind}_bodyid").tolist()
-    rows.words("body", [names.bodies[owner] for owner in owners])
+    rows.words("body", named(names.bodies, getattr(model, f"{kind}_bodyid")))
     positions, orientations = frames(model, kind)
     rows.numbers("position", positions)
     rows.numbers("orientation", orientations)

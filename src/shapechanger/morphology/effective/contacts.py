@@ -61,13 +61,9 @@ def _bits_match(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
     that are set in a compiled model later have no effect.
     """
     bodies = model.geom_bodyid[pairs]
-    matches = np.ones(len(pairs), np.bool_)
-    for types, affinities in (
-        (model.geom_contype[pairs], model.geom_conaffinity[pairs]),
-        (model.body_contype[bodies], model.body_conaffinity[bodies]),
-    ):
-        matches &= (types & affinities[:, ::-1]).any(axis=1)
-    return matches
+    of_geoms = model.geom_contype[pairs] & model.geom_conaffinity[pairs[:, ::-1]]
+    of_bodies = model.body_contype[bodies] & model.body_conaffinity[bodies[:, ::-1]]
+    return ((of_geoms[:, 0] | of_geoms[:, 1]) != 0) & ((of_bodies[:, 0] | of_bodies[:, 1]) != 0)
 
 
 def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
@@ -148,7 +144,9 @@ def contacts(model: mujoco.MjModel, names: Names) -> Section:
 
     free = unique_namer((), " ({})")
     pairs = np.vstack([geoms_of_pairs(model, explicit), dynamic]).tolist()
-    rows = Rows([free(" + ".join(sorted(names.geoms[geom] for geom in pair))) for pair in pairs])
+    rows = Rows(
+        [free(" + ".join(sorted(names.geoms[int(geom)] for geom in pair))) for pair in pairs]
+    )
     rows.numbers("contact dimension", dimensions)
     friction = np.maximum(values["friction"], mujoco.mjMINMU)
     acting = [_FRICTION_COUNT[dimension] for dimension in dimensions.tolist()]

@@ -49,7 +49,7 @@ def actuators(model: mujoco.MjModel, names: Names) -> Section:
     rows.words("transmission", transmissions)
     rows.words("target", names.targets)
     second_sites = [
-        names.sites[second] if kind in _WITH_SITES and second >= 0 else ""
+        names.sites[int(second)] if kind in _WITH_SITES and second >= 0 else ""
         for kind, second in zip(transmissions, model.actuator_trnid[:, 1].tolist(), strict=True)
     ]
     rows.words("second site", second_sites)
@@ -140,7 +140,7 @@ def equalities(model: mujoco.MjModel, names: Names) -> Section:
         kinds, on_sites, model.eq_obj1id.tolist(), model.eq_obj2id.tolist(), strict=True
     ):
         bound = by_type.get(kind, names.sites if sites else names.bodies)
-        between.append(tuple(bound[end] for end in ends if end >= 0))
+        between.append(tuple(bound[int(end)] for end in ends if end >= 0))
     rows.words("between", between)
     rows.numbers("active", model.eq_active0)
     rows.numbers("solref", safe_solref(model, model.eq_solref))
@@ -205,7 +205,7 @@ def _paths(model: mujoco.MjModel, names: Names) -> list[tuple[Value, ...]]:
         (model.wrap_prm + 0.0).tolist(),
         strict=True,
     ):
-        name = passed[kind][what] if kind in passed else ""
+        name = passed[kind][int(what)] if kind in passed else ""
         last: Value = parameter
         if kind in ("sphere", "cylinder"):
             last = names.sites[int(parameter)] if parameter >= 0.0 else ""

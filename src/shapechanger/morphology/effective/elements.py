@@ -84,7 +84,7 @@ def names_of(model: mujoco.MjModel) -> Names:
     }
     targets = [
         # `so3` drives a ball joint, or a site with its reference site.
-        driven.get(transmission, joints if second < 0 else sites)[first]
+        driven.get(transmission, joints if second < 0 else sites)[int(first)]
         for transmission, (first, second) in zip(
             words(mujoco.mjtTrn, model.actuator_trntype), model.actuator_trnid.tolist(), strict=True
         )
@@ -113,6 +113,16 @@ def _fill(names: list[str], default: Callable[[int], str]) -> None:
 def is_any(values: NDArray[np.generic], *members: SupportsInt) -> NDArray[np.bool_]:
     """Return which of `values` are among some members of a MuJoCo enumeration."""
     return np.isin(values, [int(member) for member in members])
+
+
+def named(names: Sequence[str], indices: NDArray[np.integer]) -> list[str]:
+    """Return the names at some indices.
+
+    Args:
+        names: Names of all elements.
+        indices: Shape (n,).
+    """
+    return [names[int(index)] for index in indices]
 
 
 def words(enumeration: Any, values: NDArray[np.integer]) -> list[str]:
