@@ -11,14 +11,20 @@ from pathlib import Path
 from typing import Final, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.row import Row
 from shapechanger.cli.suite import RunSuite
 from shapechanger.reports.numbers import estimate_text
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.metrics.intervals import estimate_difference
 from shapechanger.transfer.suite import StudyOutcome
 
 SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
+# Of the target's driving, at which fine-tuning is compared with scratch.
+_SECONDS: Final = (15, 30)
 # Of twelve.
 GOOD: Final = 8
 
@@ -44,7 +50,59 @@ def lenses() -> list[Row]:
     return [_row(crossing) for crossing in _suite("lenses")]
 
 
-def _suite(name: Literal["vehicles", "lenses"]) -> list[StudyOutcome]:
+def waypoints() -> list[Row]:
+    """Car, tank and truck with waypoints as actions, after seconds of the target's driving."""
+    rows: list[Row] = []
+    better = dict.fromkeys(_SECONDS, 0)
+    found = _suite("waypoints")
+    for crossing in found:
+        runs = Path("results", "waypoints", crossing.name, "runs")
+        scratch, tuned = _by_steps(runs, "scratch"), _by_steps(runs, "fine-tune")
+        cells: list[str] = []
+        for seconds in (0, *_SECONDS):
+            steps = round(seconds * STEPS_A_MINUTE / 60.0)
+            gain = estimate_difference(tuned[steps], scratch[steps])
+            cells.append(
+                f"{seconds} s {scratch[steps].mean():.1f} to {tuned[steps].mean():.1f} "
+                f"({estimate_text(gain, signed=True)})"
+            )
+            if seconds in better:
+                better[seconds] += gain.low is not None and gain.low > 0.0
+        rows.append(
+            Row(
+                f"{crossing.name}: return of zero-shot over what scratch learns in a minute",
+                f"{crossing.zero_shot or 0.0:.1f} to {crossing.final:.1f}",
+                f"{_seeds()} seeds, about 500 m an evaluation; scratch to fine-tuned after "
+                f"{'; '.join(cells)}",
+                "none for a single pair",
+                True,
+            )
+        )
+    for seconds, count in better.items():
+        rows.append(
+            Row(
+                f"waypoints: fine-tuning beats scratch after {seconds} s, interval above 0",
+                f"{count} of {len(found)} pairs",
+                f"{_seeds()} seeds an arm",
+                "two thirds",
+                3 * count >= 2 * len(found),
+            )
+        )
+    return rows
+
+
+def _by_steps(runs: Path, kind: str) -> dict[int, NDArray[np.float64]]:
+    """Return the returns of all runs of a kind, by number of target steps."""
+    found: dict[int, list[float]] = {}
+    for number in range(_seeds()):
+        curve = runs / f"{kind}-{number}" / "curve.jsonl"
+        for line in curve.read_bytes().splitlines():
+            evaluation = msgspec.json.decode(line, type=Evaluation)
+            found.setdefault(evaluation.steps, []).append(evaluation.mean_return)
+    return {steps: np.array(each) for steps, each in found.items()}
+
+
+def _suite(name: Literal["vehicles", "lenses", "waypoints"]) -> list[StudyOutcome]:
     out = Path("results", name)
     RunSuite(name, seeds=_seeds(), out=out).run()
     return msgspec.json.decode((out / "suite.json").read_bytes(), type=list[StudyOutcome])

@@ -148,9 +148,7 @@ def test_a_path_survives_a_csv(
     np.testing.assert_allclose(read.period_s, path.period_s, rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    "path", [*map(as_path, KINDS), recording(True, 0), recording(False, 1)], ids=repr
-)
+@pytest.mark.parametrize("path", [*map(as_path, KINDS), recording(True, 0), recording(False, 1)])
 def test_paths_cross_between_processes(path: FingertipPath) -> None:
     """A vector env sends its arguments to its workers."""
     copy = pickle.loads(pickle.dumps(path))
