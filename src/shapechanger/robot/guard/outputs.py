@@ -291,7 +291,7 @@ _STOPS_ITSELF: Final = ("dynamixel",)
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
-    """Put every output to rest by opening and closing it, independently of the deviating.
+    """Put every output to rest by opening and closing it, independently of the others.
 
     No other process may have the outputs open.
 
