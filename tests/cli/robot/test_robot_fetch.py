@@ -186,7 +186,7 @@ def test_what_is_being_recorded_comes_later(
     with RobotClient.connect(recall("car"), role="person") as person:
         began = person.record()
         main(["robot", "fetch", "car", "--out", str(tmp_path / "here")])
-        assert f"{began.episode} is being recorded" in capsys.readouterr().out
+        assert f"{began.episode} is still being recorded" in capsys.readouterr().out
 
 
 def _fails(arguments: list[str], run: Callable[[list[str]], None] = main) -> None:
