@@ -330,3 +330,11 @@ def test_a_spec_of_another_model_gives_no_pairs() -> None:
     watch = ModelWatch(model)
     fast = find_fast_model(watch, lambda: heavier)
     assert fast is None or not _knows_its_pairs(fast)
+
+
+def test_forgetting_resets_the_counted_steps() -> None:
+    """The steps of a model that is still watched start at 0 again."""
+    watch = ModelWatch(mujoco.MjModel.from_xml_string("<mujoco/>"))
+    watch.snapshot.steps = 3
+    twin.forget_fast_models()
+    assert watch.snapshot.steps == 0
