@@ -68,13 +68,12 @@ class Train:
         require_seed(self.seed)
         env = driven(env_ref(self.env, self.body))
         out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
-        # The policy is written last; check first that it can be.
         steps, training = (
             self._by_learner(env, out)
             if self.teacher is None
             else self._by_teacher(env, out, self.teacher)
         )
-        require_file(out)
+        require_file(out)  # The policy is written last; check first that it can be.
         use_one_thread()
         try:
             with StudyProgress({env.id: steps}) as progress:
@@ -104,10 +103,10 @@ class Train:
             except ImportError as error:
                 raise MissingExtra("tensorboard", "learn") from error
             make_folder(self.tensorboard)
-        say(f"{learner}: {tuning_text(learner, env.id)}")
         whole = settings.whole_updates(steps)
 
         def training(on_steps: Callable[[int], None]) -> None:
+            say(f"{learner}: {tuning_text(learner, env.id)}")
             if isinstance(settings, Sb3Settings):
                 policy = Sb3Learner(
                     learner, settings, tensorboard=self.tensorboard, threads=None

@@ -59,7 +59,7 @@ def test_a_person_lets_a_policy_drive_and_corrects_it(
 def test_what_was_recorded_stays_where_driving_fails(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """And it is said which command brings it; otherwise it is here, closed and whole."""
+    """The error names the command that downloads it; otherwise it is here, closed and complete."""
     with (
         run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
         robot.client(role="person") as person,
@@ -68,7 +68,7 @@ def test_what_was_recorded_stays_where_driving_fails(
         with pytest.raises(KeyboardInterrupt), recorded(person, "car", tmp_path / "lost"):
             raise KeyboardInterrupt
         said = " ".join(capsys.readouterr().err.split())
-        assert f"`shapechanger robot fetch car --out {tmp_path / 'lost'}` brings it" in said
+        assert f"`shapechanger robot fetch car --out {tmp_path / 'lost'}` downloads it" in said
         assert not (tmp_path / "lost").exists()
         person.record(on=False)
 

@@ -331,7 +331,7 @@ def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
             person.press("\r")
         assert person.end() == 2
         assert "must lie between" in person.text
-        assert "What was found before" in person.text
+        assert "Results so far" in person.text
     told = tomllib.loads(profile.path.read_text())
     assert told["output"]["drive"]["start"] == pytest.approx(4 * 0.05 * 0.8)
     assert told["output"]["steer"]["left_us"] == 1150
