@@ -70,7 +70,7 @@ def _can_matter(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
     """Return whether MuJoCo can collide the two shapes, and one of the two can move."""
     flat = is_any(model.geom_type[pairs], mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
     moving = model.body_treeid[model.geom_bodyid[pairs]] >= 0
-    return ~flat.all(axis=1) & moving.any(axis=1)
+    return ~(flat[:, 0] & flat[:, 1]) & (moving[:, 0] | moving[:, 1])
 
 
 def _not_related(model: mujoco.MjModel, pairs: _Ints) -> _Bools:
