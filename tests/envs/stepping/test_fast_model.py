@@ -285,10 +285,10 @@ def test_a_fast_model_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch
 def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """What one finds serves all, so their steps count together."""
     monkeypatch.setattr(AntEnv, "patience", 6)
-    twin.forget_fast_models()
     envs = [AntEnv(), AntEnv(), AntEnv()]
     for env in envs:
         env.reset(seed=0)
+    twin.forget_fast_models()
     for step in range(4):
         for env in envs:
             env.step(np.zeros(8))

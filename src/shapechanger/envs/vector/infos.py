@@ -86,6 +86,8 @@ def batched(
             if isinstance(column[0], dict) and key != "final_obs":
                 nested = in_columns(numbers, cast("Sequence[Any]", column))
                 batch[key] = batched(nested, num_envs, batch.get(key))
+            elif key not in batch and isinstance(column, np.ndarray) and column.size == num_envs:
+                batch[key] = column.copy()
             else:
                 if key not in batch:
                     batch[key] = _empty(key, column, num_envs)
