@@ -93,7 +93,12 @@ class Buffer:
 
 
 def pixel_format(width: int, height: int) -> bytearray:
-    """Return a request for JPEG frames of a size."""
+    """Return a request for JPEG frames of a size.
+
+    Args:
+        width: Width, pixels.
+        height: Height, pixels.
+    """
     return bytearray(_FORMAT.pack(CAPTURE, width, height, MJPEG, _FIELD_NONE))
 
 

@@ -171,7 +171,12 @@ class Freshness:
 
 
 def aimed(action: ActionPlan, value: float) -> float:
-    """Return the target of a command's value: clipped to the caps and rounded to a level."""
+    """Return the target of a command's value: clipped to the caps and rounded to a level.
+
+    Args:
+        action: The action.
+        value: Value in the command, dimensionless.
+    """
     if action.levels == "three":
         if value >= action.threshold:
             return action.high
@@ -180,7 +185,12 @@ def aimed(action: ActionPlan, value: float) -> float:
 
 
 def clipped(action: ActionPlan, value: float) -> bool:
-    """Return whether a command's value lies outside the caps."""
+    """Return whether a command's value lies outside the caps.
+
+    Args:
+        action: The action; with three levels no value is clipped.
+        value: Value in the command, dimensionless.
+    """
     is_inside = action.low - _SAME <= value <= action.high + _SAME
     return action.levels == "any" and not is_inside
 
