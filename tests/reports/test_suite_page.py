@@ -131,3 +131,12 @@ def test_pairs_that_are_missing() -> None:
     words = Reader(suite_html("ants", studies, seeds=5)).words
     assert words.count("not run") == 1
     assert words.count("same body") == 3
+
+
+def test_flags_are_not_part_of_a_name() -> None:
+    """An argument such as `put_back` is the same for all envs."""
+    source, target = (EnvRef(env.id, {"put_back": True}) for env in ANTS[:2])
+    page = suite_html("ants", {"Ant-to-BigAnt": make_study(source=source, target=target)}, seeds=5)
+    words = Reader(page).words
+    assert "BigAnt" in words
+    assert "BigAnt True" not in words

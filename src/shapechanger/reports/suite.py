@@ -275,5 +275,10 @@ def _name(env: EnvRef) -> str:
     """The env's name with its arguments, without namespace and version."""
     short = env.id.rpartition("/")[2].removesuffix("-v1")
     lenses = env.kwargs.get("lenses") or ""
-    extra = ", ".join(str(value) for key, value in env.kwargs.items() if key != "lenses")
+    extra = ", ".join(
+        # A flag, such as `put_back`, holds for all envs of a suite and names none of them.
+        str(value)
+        for key, value in env.kwargs.items()
+        if key != "lenses" and not isinstance(value, bool)
+    )
     return " ".join(filter(None, (short, str(lenses) if lenses else "", extra)))
