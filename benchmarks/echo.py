@@ -36,6 +36,7 @@ _HZ = 100.0
 # A robot takes 500 messages a second from a client, and ends the connection of one that says more.
 _PAUSE_S = 0.0025
 _PICTURE_S = 0.002
+_DESCRIPTOR = socket.CMSG_SPACE(4)  # An ancillary message with one descriptor.
 
 
 class EchoRobot:
@@ -126,9 +127,11 @@ def main(guard_fd: int, fifo: Path) -> None:
         order = wire.Order("disarm")
         while True:
             with contextlib.suppress(TimeoutError):
-                data = daemon.recv(wire.MAX_DATAGRAM)
+                data, descriptors, _, _ = daemon.recvmsg(wire.MAX_DATAGRAM, _DESCRIPTOR)
                 if not data:
                     return
+                if descriptors:  # The daemon's lifeline, which needs no answer.
+                    continue
                 order = wire.decode_order(data)
             now_ns = time.monotonic_ns()
             state = wire.GuardState(

@@ -23,6 +23,12 @@ HOME: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Default world of each vehicle."""
 
+FLOODED: Final = "flooded-corridor"
+"""The corridor with water for a floor, on which a boat drives the courses of land vehicles."""
+
+WATER: Final = frozenset({"harbour", FLOODED})
+"""Worlds for vehicles that float."""
+
 Surface = Literal[
     "plaster", "door", "window", "brick", "board", "glass", "hedge", "fence", "quay", "shed", "rock"
 ]
@@ -105,7 +111,7 @@ class Course:
     """A closed lane between walls, with obstacles in it.
 
     Attributes:
-        world: Kind of course: "corridor", "yard" or "harbour".
+        world: Kind of course: "corridor", "yard", "harbour" or "flooded-corridor".
         seed: Seed; world and seed determine the course.
         route: Middle of the lane in driving direction, m, (N, 2): a closed line of points that are
             `spacing` apart. The last point is one `spacing` before the first.
@@ -152,6 +158,6 @@ def require_element(vehicle: str, *, floats: bool, world: str) -> None:
     Raises:
         WorldError: If the vehicle cannot drive there.
     """
-    if floats != (world == HOME["boat"]):
+    if floats != (world in WATER):
         reason = "floats" if floats else "does not float"
         raise WorldError(f"A {vehicle} {reason}: it cannot drive in a {world}.")

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from shapechanger.errors import UnknownName
+from shapechanger.worlds.course import FLOODED
 
 Colour = tuple[float, float, float]
 """Red, green and blue, each a share from 0 to 1."""
@@ -99,6 +100,7 @@ LOOKS: Final[Mapping[str, Look]] = MappingProxyType(
         "corridor": Look(light=0.72, warmth=0.9, contrast=0.75, gloss=0.42),
         "yard": Look(light=0.95, warmth=0.15, contrast=0.35, gloss=0.0),
         "harbour": Look(light=0.9, warmth=0.05, contrast=0.3, gloss=0.5),
+        FLOODED: Look(light=0.72, warmth=0.9, contrast=0.75, gloss=0.5),
     }
 )
 """Usual look of each world."""

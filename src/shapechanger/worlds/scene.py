@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.worlds.course import Course
+from shapechanger.worlds.course import FLOODED, Course
 from shapechanger.worlds.look import Colour, Look
 from shapechanger.worlds.paint import texture
 from shapechanger.worlds.surfaces import Patches, Surfaces
@@ -94,7 +94,7 @@ def _add_solid(
 
 
 # Texture of the ground in each world.
-_GROUND: Final = {"corridor": "floor", "yard": "asphalt", "harbour": "water"}
+_GROUND: Final = {"corridor": "floor", "yard": "asphalt", "harbour": "water", FLOODED: "water"}
 _DEFAULT_GROUND: Final = "asphalt"
 # Clipping planes, m. The nearest object that a camera sees is the vehicle's own bonnet.
 _NEAR: Final = 0.02

@@ -83,7 +83,7 @@ def test_who_follows_true_waypoints_hits_nothing(env_id: str, vehicle: str) -> N
             *_, info = env.step(waypoint)
         assert info["collisions"] == 0, env_id
         assert info["progress"] > 2.0
-        assert env.world.course.world == ("corridor" if HOME[vehicle] != "harbour" else "harbour")
+        assert env.world.course.world == ("flooded-corridor" if vehicle == "boat" else "corridor")
 
 
 @pytest.mark.gl

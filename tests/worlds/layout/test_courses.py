@@ -10,8 +10,8 @@ import pytest
 from scipy import ndimage
 
 from shapechanger.errors import UnknownName, WorldError
-from shapechanger.worlds.course import HELD_OUT, Course, Obstacle
-from shapechanger.worlds.layout import WORLDS, lay_out
+from shapechanger.worlds.course import FLOODED, HELD_OUT, Course, Obstacle
+from shapechanger.worlds.layout import lay_out
 from shapechanger.worlds.layout.geometry import (
     any_crossing,
     distances_from_obstacle,
@@ -26,7 +26,7 @@ _WIDTHS = {"corridor": (1.8, 2.4), "yard": (3.0, 5.0), "harbour": (4.0, 7.0)}
 _GAPS = {"corridor": 0.9, "yard": 1.2, "harbour": 1.6}
 _RADII = {"corridor": 0.85, "yard": 1.8, "harbour": 2.5}
 
-each_world = pytest.mark.parametrize("world", WORLDS)
+each_world = pytest.mark.parametrize("world", tuple(_WIDTHS))
 
 
 @cache
@@ -63,6 +63,14 @@ def test_a_seed_is_a_course(world: str) -> None:
     courses = _courses(world)
     assert not any(_same(a, b) for i, a in enumerate(courses) for b in courses[:i])
     assert {(c.world, c.seed) for c in courses} == {(world, seed) for seed in _SEEDS}
+
+
+@pytest.mark.parametrize("seed", [0, HELD_OUT[0]])
+def test_a_flooded_corridor_has_the_courses_of_the_corridor(seed: int) -> None:
+    """Only the name of the world differs, so that a boat and a car drive the same lanes."""
+    flooded = lay_out(FLOODED, seed)
+    assert _same(flooded, _laid("corridor", seed))
+    assert flooded.world == FLOODED
 
 
 @each_world

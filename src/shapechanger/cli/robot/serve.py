@@ -65,8 +65,8 @@ class Serve:
     seed: int = 0
     """With --twin: seed of the world."""
     world: str = ""
-    """With --twin: corridor, yard or harbour, or room for a plain room that needs no MuJoCo; the
-    vehicle's default if not given."""
+    """With --twin: corridor, yard, harbour or flooded-corridor, or room for a plain room that needs
+    no MuJoCo; the vehicle's default if not given."""
     lens: tuple[str, ...] = ()
     """With --twin: disturbances of the camera, such as night or dirt."""
     gap: str = ""

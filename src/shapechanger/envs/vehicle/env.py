@@ -79,7 +79,8 @@ class VehicleEnv(DrivingEnv):
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
-        world: "corridor", "yard" or "harbour"; None for the vehicle's usual place.
+        world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the vehicle's
+            usual place.
         robot: Path or name of a profile; None for `lab-` followed by the vehicle.
         steering: Replaces the profile's steering; None to keep it.
         size: Width and height of frames in pixels.

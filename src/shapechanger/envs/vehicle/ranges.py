@@ -124,7 +124,8 @@ class RangesEnv(DrivingEnv):
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
-        world: "corridor", "yard" or "harbour"; None for the vehicle's usual place.
+        world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the vehicle's
+            usual place.
         robot: Path or name of a profile; None for `lab-` followed by the vehicle.
         reward: Weights by name that replace the default ones; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default

@@ -28,6 +28,7 @@ from shapechanger.envs.vehicle.shift import certify_vehicles
 from shapechanger.errors import ProfileError, SpaceMismatch, StudyError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.profile.profile import Profile
+from shapechanger.worlds.course import FLOODED
 from shapechanger.worlds.rectify import CANONICAL_SIZE, CameraGeometry, Rectifier
 from shapechanger.worlds.simulation import MujocoWorld
 
@@ -174,8 +175,8 @@ class WaypointEnv(DrivingEnv):
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
-        world: "corridor", "yard" or "harbour"; None for the corridor, or the harbour for a boat, so
-            that land vehicles differ in their bodies alone.
+        world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
+            for a boat, so that vehicles differ in their bodies alone.
         robot: Path or name of a profile; None for `lab-` followed by the vehicle.
         full_robot: Whether the robot is emulated, as in `VehicleEnv`.
         courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
@@ -209,7 +210,7 @@ class WaypointEnv(DrivingEnv):
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
         body = vehicle_model(vehicle)
-        world = world or ("harbour" if body.floats else "corridor")
+        world = world or (FLOODED if body.floats else "corridor")
         common: dict[str, Any] = {
             "world": world, "robot": robot, "courses": courses, "put_back": put_back,
         }  # fmt: skip

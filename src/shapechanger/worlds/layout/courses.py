@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import zlib
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import UnknownName, WorldError
-from shapechanger.worlds.course import Course
+from shapechanger.worlds.course import FLOODED, Course
 from shapechanger.worlds.layout.channel import HARBOUR, YARD, open_course
 from shapechanger.worlds.layout.corridor import corridor
 from shapechanger.worlds.layout.geometry import distances_from_obstacle, turn_angles
@@ -28,7 +29,7 @@ _MAKERS: Final[Mapping[str, Callable[[np.random.Generator, int], Course | None]]
     )
 )
 
-WORLDS: Final = tuple(_MAKERS)
+WORLDS: Final = (*_MAKERS, FLOODED)
 """Kinds of course."""
 
 _ATTEMPTS: Final = 500
@@ -45,6 +46,8 @@ def lay_out(world: str, seed: int) -> Course:
         UnknownName: If the world is unknown.
         WorldError: If the seed is negative, or no random layout fits.
     """
+    if world == FLOODED:
+        return dataclasses.replace(lay_out("corridor", seed), world=world)
     if world not in _MAKERS:
         raise UnknownName("world", world, WORLDS)
     if seed < 0:

@@ -1,0 +1,15 @@
+"""The benchmark of the link still runs against today's daemon."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.echo import EchoRobot
+
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
+
+def test_every_command_is_answered_with_a_picture() -> None:
+    """A client that drives the echo gets as many round trips as it asks for."""
+    with EchoRobot() as echo:
+        assert len(echo.round_trips(20)) == 20
