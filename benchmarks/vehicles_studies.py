@@ -51,51 +51,52 @@ def lenses() -> list[Row]:
 
 
 def waypoints() -> list[Row]:
-    """Car, tank and truck with waypoints as actions, after seconds of the target's driving."""
+    """All vehicles with waypoints as actions, after seconds of the target's driving."""
+    _suite("waypoints")
+    return waypoint_rows(Path("results", "waypoints"))
+
+
+def waypoint_rows(folder: Path) -> list[Row]:
+    """Return what the studies of a suite have found so far, at 15 and at 30 s of driving."""
     rows: list[Row] = []
-    better = dict.fromkeys(_SECONDS, 0)
-    found = _suite("waypoints")
-    for crossing in found:
-        runs = Path("results", "waypoints", crossing.name, "runs")
-        scratch, tuned = _by_steps(runs, "scratch"), _by_steps(runs, "fine-tune")
-        cells: list[str] = []
-        for seconds in (0, *_SECONDS):
-            steps = round(seconds * STEPS_A_MINUTE / 60.0)
-            gain = estimate_difference(tuned[steps], scratch[steps])
-            cells.append(
-                f"{seconds} s {scratch[steps].mean():.1f} to {tuned[steps].mean():.1f} "
-                f"({estimate_text(gain, signed=True)})"
-            )
-            if seconds in better:
+    pairs = [path.parent for path in sorted(folder.glob("*-to-*/study.json"))]
+    for arm in ("fine-tune", "rehearsal"):
+        better = dict.fromkeys(_SECONDS, 0)
+        with_arm = [pair for pair in pairs if (pair / "runs" / f"{arm}-0").exists()]
+        for pair in with_arm:
+            scratch, tuned = _by_steps(pair / "runs", "scratch"), _by_steps(pair / "runs", arm)
+            for seconds in _SECONDS:
+                steps = round(seconds * STEPS_A_MINUTE / 60.0)
+                gain = estimate_difference(tuned[steps], scratch[steps])
                 better[seconds] += gain.low is not None and gain.low > 0.0
-        rows.append(
-            Row(
-                f"{crossing.name}: return of zero-shot over what scratch learns in a minute",
-                f"{crossing.zero_shot or 0.0:.1f} to {crossing.final:.1f}",
-                f"{_seeds()} seeds, about 500 m an evaluation; scratch to fine-tuned after "
-                f"{'; '.join(cells)}",
-                "none for a single pair",
-                True,
-            )
-        )
-    for seconds, count in better.items():
-        rows.append(
-            Row(
-                f"waypoints: fine-tuning beats scratch after {seconds} s, interval above 0",
-                f"{count} of {len(found)} pairs",
-                f"{_seeds()} seeds an arm",
-                "two thirds",
-                3 * count >= 2 * len(found),
-            )
-        )
+                rows.append(
+                    Row(
+                        f"{pair.name}: return of {arm} over scratch after {seconds} s",
+                        f"{tuned[steps].mean():.1f} to {scratch[steps].mean():.1f}",
+                        f"{estimate_text(gain, signed=True)}; zero-shot {tuned[0].mean():.1f}; "
+                        f"{len(tuned[steps])} seeds, about 500 m an evaluation",
+                        "none for a single pair",
+                        True,
+                    )
+                )
+        for seconds, count in better.items():
+            if with_arm:
+                rows.append(
+                    Row(
+                        f"waypoints: {arm} beats scratch after {seconds} s, interval above 0",
+                        f"{count} of {len(with_arm)} pairs",
+                        f"{_seeds()} seeds an arm",
+                        "two thirds",
+                        3 * count >= 2 * len(with_arm),
+                    )
+                )
     return rows
 
 
 def _by_steps(runs: Path, kind: str) -> dict[int, NDArray[np.float64]]:
     """Return the returns of all runs of a kind, by number of target steps."""
     found: dict[int, list[float]] = {}
-    for number in range(_seeds()):
-        curve = runs / f"{kind}-{number}" / "curve.jsonl"
+    for curve in sorted(runs.glob(f"{kind}-*/curve.jsonl")):
         for line in curve.read_bytes().splitlines():
             evaluation = msgspec.json.decode(line, type=Evaluation)
             found.setdefault(evaluation.steps, []).append(evaluation.mean_return)

@@ -22,7 +22,7 @@ from shapechanger.transfer.learners.cloning import (
 )
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluation_envs
 from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings, learner_settings
-from shapechanger.transfer.plan import Plan, TransferTask
+from shapechanger.transfer.plan import ARMS, Plan, TransferTask
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
 from tests.transfer.studies import BIG
@@ -40,8 +40,9 @@ def one_thread() -> Iterator[None]:
     torch.set_num_threads(threads)
 
 
-def _plan() -> Plan:
-    return make_plan(TransferTask(LANE, SLIPPERY), "cloning", TINY_CLONING, seeds=2)
+def _plan(*more: str) -> Plan:
+    task = TransferTask(LANE, SLIPPERY)
+    return make_plan(task, "cloning", TINY_CLONING, seeds=2, arms=(*ARMS, *more))
 
 
 def _curves(study: Study) -> dict[str, list[tuple[int, float]]]:
@@ -127,6 +128,22 @@ def test_a_clone_goes_on_from_another(tmp_path: Path) -> None:
     _, tuned = _cloned(tmp_path, 30, start=policy)
     assert tuned[0].mean_return == found[-1].mean_return
     assert _LEARNER.evaluate(LANE, policy).mean_return == found[-1].mean_return
+
+
+def test_rehearsal_starts_from_the_source_and_learns_from_both(
+    finished: tuple[Study, Path], tmp_path: Path
+) -> None:
+    """It differs from fine-tuning only by the source's demonstrations, which exist already."""
+    folder = tmp_path / "study"
+    shutil.copytree(finished[1], folder)
+    (folder / STUDY_FILE).unlink()
+    study = run_study(_plan("rehearsal"), folder, executor=Serial())
+    for tuned, rehearsed in zip(study.of("fine-tune"), study.of("rehearsal"), strict=True):
+        assert [e.steps for e in rehearsed.curve] == [0, 30, 60, 120]
+        assert rehearsed.curve[0] == tuned.curve[0]
+        assert rehearsed.curve[1:] != tuned.curve[1:]
+    names = sorted(path.name for path in (folder / "demonstrations").iterdir())
+    assert names == ["scratch-0.npz", "scratch-1.npz", "source-0.npz", "source-1.npz"]
 
 
 def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -229,3 +229,10 @@ def test_a_training_that_diverges_is_refused() -> None:
     """Weights of NaN raise a StudyError."""
     with pytest.raises(StudyError, match="diverged after"):
         trained(f"{HERE}:Unstable")
+
+
+def test_learners_by_trial_rehearse_nothing() -> None:
+    """Demonstrations of the source are refused before anything is trained."""
+    learner = Sb3Learner("sac", settings_of("sac"))
+    with pytest.raises(StudyError, match="sac learns by trial and rehearses no demonstrations"):
+        learner.train(SMALL, 32, 0, rehearsal=object(), on_evaluation=_ignore)

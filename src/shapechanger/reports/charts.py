@@ -82,6 +82,7 @@ _LINE_STYLES: Final[dict[str, _LineStyle]] = {
     "randomised": _LineStyle(_PINK, "-.", ""),
     "identified": _LineStyle(_PURPLE, (0, (6, 2)), ""),
     "frozen-trunk": _LineStyle(_SKY, "-.", "^"),
+    "rehearsal": _LineStyle(_SKY, "-", "P"),
     "kickstart": _LineStyle(_YELLOW, "-", "v"),
     "evolution": _LineStyle(_BLACK, "-", "d"),
     "random": _LineStyle(_GREY, ":", ""),

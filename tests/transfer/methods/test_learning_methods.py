@@ -172,6 +172,12 @@ def test_clones_are_refused(arm: str, needs: str) -> None:
         tiny_plan(learner_settings("cloning"), task=cars, arms=("scratch", arm))  # type: ignore[arg-type]
 
 
+def test_learners_by_trial_are_refused() -> None:
+    """Rehearsal needs demonstrations."""
+    with pytest.raises(StudyError, match="rehearsal needs a learner that clones demonstrations"):
+        tiny_plan(TINY, arms=("scratch", "rehearsal"))
+
+
 def test_a_network_without_a_trunk_is_refused() -> None:
     """frozen-trunk needs two hidden layers."""
     with pytest.raises(StudyError, match="at least 2 hidden layers"):

@@ -66,6 +66,7 @@ class Learner(Protocol):
         body_map: BodyMap | None = None,
         only_last: bool = False,
         callback: Any = None,
+        rehearsal: Any = None,
         on_evaluation: Callable[[Evaluation], None],
         on_steps: Callable[[int], None],
     ) -> Any:
@@ -80,11 +81,13 @@ class Learner(Protocol):
             body_map: Map between the bodies of `start` and `env`.
             only_last: Whether only the final evaluation is needed.
             callback: A callback of Stable-Baselines3 for the training; None for none.
+            rehearsal: Demonstrations that `start` was cloned from, to mix in; None for none.
             on_evaluation: Called with each evaluation.
             on_steps: Called with the number of steps done.
 
         Raises:
-            StudyError: If the learner takes no callback and one is given, or the training diverges.
+            StudyError: If a callback or a rehearsal is given to a learner that takes none, or the
+                training diverges.
         """
         ...
 

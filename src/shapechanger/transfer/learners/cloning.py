@@ -188,6 +188,7 @@ class CloneLearner:
         body_map: BodyMap | None = None,
         only_last: bool = False,
         callback: Any = None,
+        rehearsal: Demonstrations | None = None,
         on_evaluation: Callable[[Evaluation], None],
         on_steps: Callable[[int], None] = lambda steps: None,
     ) -> CameraPolicy:
@@ -214,6 +215,7 @@ class CloneLearner:
                 seed=seed % 2**31,
                 episodes=part.episodes,
                 start=start,
+                rehearsal=None if rehearsal is None else (rehearsal.pictures, rehearsal.actions),
             )
             on_evaluation(msgspec.structs.replace(self.evaluate(env, policy), steps=budget))
             on_steps(budget)

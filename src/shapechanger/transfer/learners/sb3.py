@@ -91,6 +91,7 @@ class Sb3Learner:
         body_map: BodyMap | None = None,
         only_last: bool = False,
         callback: BaseCallback | None = None,
+        rehearsal: Any = None,
         on_evaluation: OnEvaluation,
         on_steps: OnSteps = lambda steps: None,
     ) -> TrainedPolicy:
@@ -100,10 +101,13 @@ class Sb3Learner:
         and `demonstrations` and `only_last` are not used.
 
         Raises:
-            StudyError: If `steps` is smaller than one evaluation, or the training diverges.
+            StudyError: If `steps` is smaller than one evaluation, a rehearsal is given, or the
+                training diverges.
             TransplantError: If the source policy is of a kind that cannot be transplanted.
         """
         del demonstrations, only_last
+        if rehearsal is not None:
+            raise StudyError(f"{self._name} learns by trial and rehearses no demonstrations.")
         settings = self._settings
         require_budget(steps, settings)
         # These import the module of the id, if it names one.

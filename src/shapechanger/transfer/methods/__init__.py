@@ -38,6 +38,7 @@ _SHIPPED: Final = {
     "zero-shot": f"{_HERE}.basic:ZeroShot",
     "fine-tune": f"{_HERE}.basic:FineTune",
     "frozen-trunk": f"{_HERE}.frozen_trunk:FrozenTrunk",
+    "rehearsal": f"{_HERE}.rehearsal:Rehearsal",
     "kickstart": f"{_HERE}.kickstart:Kickstart",
     "evolution": f"{_HERE}.evolution:Evolution",
     "prefilled-replay": f"{_HERE}.replay:PrefilledReplay",
@@ -115,6 +116,7 @@ class MethodRun:
         start: Any = None,
         body_map: BodyMap | None = None,
         callback: Any = None,
+        rehearsal: Any = None,
         on_evaluation: Callable[[Evaluation], None] = lambda evaluation: None,
     ) -> Any:
         """Train a policy with the study's learner.
@@ -126,28 +128,37 @@ class MethodRun:
             body_map: Map from that body to that of `env`.
             callback: A callback of Stable-Baselines3 for the training; learners that are not of
                 Stable-Baselines3 refuse one.
+            rehearsal: Demonstrations that `start` was cloned from, to mix in; learners that do not
+                clone refuse them.
             on_evaluation: Called with each evaluation in `env`.
         """
-        run, before = self._run, self._done
-        if env == self.target:
-            # All arms share the demonstrations of a target: they differ only in where they start.
-            run = msgspec.structs.replace(run, kind="scratch")
+        before = self._done
+        # All arms share the demonstrations of a target: they differ only in where they start.
+        kind = "scratch" if env == self.target else self._run.kind
         policy = self.learner.train(
             env,
             steps,
             self.seed,
-            demonstrations=DemonstrationFile(
-                self._study / "demonstrations" / f"{run.name}.npz", self._plan.seed_of(run)
-            ),
+            demonstrations=self._demonstrations(kind),
             start=start,
             body_map=body_map,
             only_last=env != self.target,
             callback=callback,
+            rehearsal=rehearsal,
             on_evaluation=on_evaluation,
             on_steps=lambda now: self._on_steps(before + now),
         )
         self._done += steps
         return policy
+
+    def source_demonstrations(self) -> DemonstrationFile:
+        """Return the file of the demonstrations that the source policy is cloned from."""
+        return self._demonstrations("source")
+
+    def _demonstrations(self, kind: str) -> DemonstrationFile:
+        run = msgspec.structs.replace(self._run, kind=kind)
+        path = self._study / "demonstrations" / f"{run.name}.npz"
+        return DemonstrationFile(path, self._plan.seed_of(run))
 
     def evaluate(self, policy: Any, body_map: BodyMap | None = None) -> Evaluation:
         """Evaluate a policy on the target, without training it.
