@@ -38,7 +38,7 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
         "pendulums": 6,
         "shank": 9,
         "vehicles": 12,
-        "waypoints": 6,
+        "waypoints": 12,
     }
     for _, task in suite_tasks(load_suite("vehicles")):
         assert task.source.kwargs == task.target.kwargs == {"put_back": True}
