@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
+from shapechanger.envs.remote.waypoints import RemoteWaypointEnv
 from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveResult
 from shapechanger.twin.robot import Operator
 
 
 def drive_remote(
-    env: RemoteVehicleEnv,
+    env: RemoteVehicleEnv | RemoteWaypointEnv,
     operator: Operator,
     act: Act,
     *,

@@ -173,6 +173,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "vehicles-pairs": vehicles_studies.pairs,
     "vehicles-lenses": vehicles_studies.lenses,
     "vehicles-waypoints": waypoints.pairs,
+    "vehicles-waypoints-remote": waypoints.remote,
     "vehicles-waypoint-studies": vehicles_studies.waypoints,
 }
 

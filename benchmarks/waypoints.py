@@ -16,17 +16,21 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Final, cast
 
+from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted
 from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.envs.remote.waypoints import RemoteWaypointEnv
 from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
 from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
+from shapechanger.robot.profile.load import find_profile
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
 from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings
+from shapechanger.twin.robot import run_robot
 from shapechanger.worlds.course import HELD_OUT
 
 VEHICLES: Final = ("car", "tank", "truck")
@@ -87,6 +91,42 @@ def pairs() -> list[Row]:
             )
         )
     return rows
+
+
+def remote() -> list[Row]:
+    """A clone of the tank drives a car behind guard, daemon and link, on the twin's clock."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    policy = _source("tank", 0)
+    drives = [_served("car", policy, course) for course in COURSES[:10]]
+    score = DriveScore.of(drives)
+    return [
+        Row(
+            "waypoints, tank to a car on the network: collisions per 100 m, zero-shot",
+            f"{score.per_100_m:.1f}",
+            f"{counted(score)}; {score.speed:.2f} m/s; the car measures its response before each "
+            "drive",
+            f"<= {FEW:g}",
+            score.per_100_m <= FEW,
+        )
+    ]
+
+
+def _served(vehicle: str, policy: CameraPolicy, course: int) -> DriveResult:
+    """Drive a robot that was started on this course."""
+    profile = find_profile(f"lab-{vehicle}")
+    with run_robot(profile, clock="twin", seed=course, arguments=("--world", "corridor")) as robot:
+        known = robot.known
+        with robot.operator() as operator:
+            env = RemoteWaypointEnv(
+                known.address,
+                key=known.key,
+                fingerprint=known.fingerprint,
+                pace="lockstep",
+                reward={"collision_ends_episode": 0.0},
+                on_reset=lambda seed: operator.place(course if seed is None else seed),
+            )
+            with closing(env):
+                return drive_remote(env, operator, policy.predict, course=course)
 
 
 def _steered(pair: tuple[str, str]) -> list[DriveResult]:

@@ -10,7 +10,13 @@ import pytest
 
 import shapechanger
 from shapechanger.envs import CATALOGUE, register_all
-from shapechanger.envs.catalogue import FINGER_ENVS, REMOTE_FINGER, REMOTE_VEHICLE, VEHICLE_ENVS
+from shapechanger.envs.catalogue import (
+    FINGER_ENVS,
+    REMOTE_FINGER,
+    REMOTE_VEHICLE,
+    REMOTE_WAYPOINT,
+    VEHICLE_ENVS,
+)
 
 _IDS = (
     "shapechanger/InvertedPendulum-v1",
@@ -82,7 +88,8 @@ def test_importing_registers_the_ids_and_loads_no_simulator() -> None:
     loaded, ids = _run(script).splitlines()
     assert loaded == ""
     vehicles = (*_VEHICLES, *_MORE_VEHICLES)
-    assert tuple(ids.split()) == (*_IDS, *vehicles, *_FINGERS, REMOTE_FINGER, REMOTE_VEHICLE)
+    remote = (REMOTE_FINGER, REMOTE_VEHICLE, REMOTE_WAYPOINT)
+    assert tuple(ids.split()) == (*_IDS, *vehicles, *_FINGERS, *remote)
     assert (tuple(VEHICLE_ENVS), tuple(FINGER_ENVS)) == (_VEHICLES, _FINGERS)
 
 

@@ -106,6 +106,8 @@ robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
         clock=st.sampled_from(("real", "twin")),
         session=_counts,
         can_record=st.booleans(),
+        camera_pitch_deg=st.none() | _numbers,
+        camera_fovy_deg=st.none() | _numbers,
     ),
     st.builds(Refused, reason=_texts, seq=st.none() | _counts, fatal=st.booleans()),
     st.builds(

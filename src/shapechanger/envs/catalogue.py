@@ -19,6 +19,9 @@ REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
 """Id of the env of a robot on the network, whose body is unknown until the robot answers."""
 
+REMOTE_WAYPOINT: Final = "shapechanger/RemoteWaypoint-v1"
+"""Id of the env of a vehicle on the network with the camera and the action of all vehicles."""
+
 
 VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {
@@ -189,6 +192,7 @@ def register_all() -> None:
     for env_id, entry_point, limit in (
         (REMOTE_FINGER, f"{remote}.finger:RemoteFingerEnv", reach.episode_steps),
         (REMOTE_VEHICLE, f"{remote}.vehicle:RemoteVehicleEnv", None),
+        (REMOTE_WAYPOINT, f"{remote}.waypoints:RemoteWaypointEnv", None),
     ):
         _register(env_id, entry_point, limit, nondeterministic=True)  # A robot.
 

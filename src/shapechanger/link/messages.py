@@ -298,6 +298,9 @@ class Welcome(_Message, frozen=True):
         action_layout: JSON of the `Layout` of `Command.values`.
         state_layout: JSON of the `Layout` of `Observation.state`.
         image_size: Width and height of the frames, pixels; None without a camera.
+        camera_pitch_deg: Angle of the camera's optical axis below the horizon, degrees; None if the
+            profile does not state it.
+        camera_fovy_deg: Vertical field of view of the camera, degrees; None likewise.
         control_hz: Commands per second that the robot expects.
         deadline_ms: Longest time that a command acts, ms.
         max_observation_age_ms: Oldest observation that a command may answer, ms.
@@ -324,6 +327,8 @@ class Welcome(_Message, frozen=True):
     clock: Literal["real", "twin"]
     session: int
     can_record: bool = False
+    camera_pitch_deg: float | None = None
+    camera_fovy_deg: float | None = None
 
 
 class Refused(_Message, frozen=True):

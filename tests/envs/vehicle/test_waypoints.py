@@ -12,7 +12,7 @@ import pytest
 from shapechanger.bodies.vehicles import vehicle_model
 from shapechanger.envs.catalogue import WAYPOINT_ENVS
 from shapechanger.envs.vehicle import RangesEnv, WaypointEnv
-from shapechanger.envs.vehicle.waypoints import AHEAD_M, SteeringResponse, measure_response
+from shapechanger.envs.waypoints import AHEAD_M, SteeringResponse, measure_response
 from shapechanger.errors import ProfileError, SpaceMismatch, StudyError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.worlds.course import HOME

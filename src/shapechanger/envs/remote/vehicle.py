@@ -77,7 +77,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         key: The robot's key, for an address.
         fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
         size: Width and height of the pictures, pixels, such as (128, 128) in 2017; see
-            `resize_picture`.
+            `resize_picture`. None for those of the camera.
         state: Whether observations have the state besides the picture.
         image: Whether observations have a picture; None if the robot has a camera.
         pace: "realtime": a step lasts one control period of the robot; "lockstep": the robot waits
@@ -112,7 +112,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         *,
         key: str = "",
         fingerprint: str = "",
-        size: Sequence[int] = (160, 120),
+        size: Sequence[int] | None = (160, 120),
         state: bool = False,
         image: bool | None = None,
         pace: Pace = "realtime",
@@ -146,7 +146,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._client = self._connect()
         try:
             welcome = self._client.welcome
-            wide, high = size
+            wide, high = size or welcome.image_size or (160, 120)
             self._spaces = RobotSpaces(welcome, (int(wide), int(high)), image, state)
             weights = DriveReward.from_weights({**welcome.reward, **(reward or {})})
             self._scorer = StepScorer(self._spaces, weights)

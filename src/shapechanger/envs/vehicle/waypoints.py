@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-import gymnasium as gym
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from shapechanger.bodies.vehicles import vehicle_model
 from shapechanger.envs.vehicle.base import Courses, DrivingEnv, resolve_profile
@@ -25,101 +22,26 @@ from shapechanger.envs.vehicle.drivers import Demonstrator, course_expert
 from shapechanger.envs.vehicle.env import VehicleEnv
 from shapechanger.envs.vehicle.ranges import RangesEnv
 from shapechanger.envs.vehicle.shift import certify_vehicles
-from shapechanger.errors import ProfileError, SpaceMismatch, StudyError
-from shapechanger.layout import Element, Feature, Layout
+from shapechanger.envs.waypoints import (
+    ACTION_LAYOUT,
+    AHEAD_M,
+    OBSERVATION_LAYOUT,
+    WIDEST_RAD,
+    SteeringResponse,
+    action_space,
+    command,
+    measure_response,
+    observation_space,
+)
+from shapechanger.errors import ProfileError
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.worlds.course import FLOODED
-from shapechanger.worlds.rectify import CANONICAL_SIZE, CameraGeometry, Rectifier
+from shapechanger.worlds.rectify import CameraGeometry, Rectifier
 from shapechanger.worlds.simulation import MujocoWorld
 
-AHEAD_M: Final = 0.8
-"""Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
-
-WIDEST_RAD: Final = 1.0
-"""Bearing of the waypoint at an action of -1 or 1, rad."""
-
 _SIZE: Final = (160, 120)
-_SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
-_LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
 # Standard deviation of the bearing's disturbance: the effect of steering by 0.25 in the car.
 _SWAY: Final = 0.18
-
-# Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
-# is left out because the vehicle is still changing its motion.
-_SECONDS: Final = 5.0
-_HOLD: Final = 6
-
-
-@dataclass(frozen=True, slots=True)
-class SteeringResponse:
-    """How fast a vehicle turns when it steers.
-
-    rate of turn to the right = steering * (per_metre * speed + per_second). Wheels turn the vehicle
-    the more, the faster it rolls; tracks turn it where it stands.
-
-    Attributes:
-        per_metre: Turn for each metre at full steering, rad/m.
-        per_second: Turn for each second at full steering, rad/s.
-
-    Raises:
-        StudyError: If the vehicle does not turn, or a number is negative.
-    """
-
-    per_metre: float
-    per_second: float
-
-    def __post_init__(self) -> None:
-        if not (min(self.per_metre, self.per_second) >= 0.0 < self.per_metre + self.per_second):
-            raise StudyError(
-                "A vehicle must turn to the right when it steers to the right: the turn was "
-                f"{self.per_metre:.2f} rad/m and {self.per_second:.2f} rad/s."
-            )
-
-    def steering(self, bearing: float, speed: float) -> float:
-        """Return the steering, from -1 to 1, that leads to a waypoint `AHEAD_M` ahead.
-
-        Pure pursuit: the circle through a point at the distance L and the bearing b has the
-        curvature 2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992).
-
-        Args:
-            bearing: Bearing of the waypoint, rad, positive to the right.
-            speed: Speed along the heading, m/s.
-        """
-        speed = max(speed, _SLOWEST_MPS)
-        rate = 2.0 * math.sin(bearing) / AHEAD_M * speed
-        return max(-1.0, min(1.0, rate / (self.per_metre * speed + self.per_second)))
-
-
-def measure_response(
-    env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int, seed: int = 0
-) -> SteeringResponse:
-    """Measure how a vehicle turns, from 5 s of its own motion at random commands.
-
-    Args:
-        env: A vehicle that observes numbers, with steering and throttle as its action. It is reset.
-        speed_at: Place of the speed, m/s, in its observation.
-        yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
-        seed: Seed of the start and the commands.
-
-    Raises:
-        StudyError: If it does not turn as it steers.
-    """
-    rng = np.random.default_rng(seed)
-    env.reset(seed=seed)
-    command = np.zeros(2, np.float32)
-    turning: list[tuple[float, float]] = []
-    rates: list[float] = []
-    for step in range(round(_SECONDS * env.metadata["render_fps"])):
-        if step % _HOLD == 0:
-            command = np.array((rng.uniform(-0.5, 0.5), rng.uniform(0.4, 0.8)), np.float32)
-        seen, _, terminated, truncated, _ = env.step(command)
-        if step % _HOLD >= _HOLD // 2:
-            turning.append((float(command[0] * seen[speed_at]), float(command[0])))
-            rates.append(-float(seen[yaw_rate_at]))
-        if terminated or truncated:
-            env.reset()
-    per_metre, per_second = nnls(np.array(turning), np.array(rates))[0]
-    return SteeringResponse(float(per_metre), float(per_second))
 
 
 def _geometry(profile: Profile) -> CameraGeometry:
@@ -224,19 +146,8 @@ class WaypointEnv(DrivingEnv):
         self.render_mode = render_mode
         self._turns_on_the_spot = body.turning_radius_m == 0.0
         self._rectifier = Rectifier(_geometry(resolve_profile(vehicle, robot, _SIZE)), _SIZE)
-        columns, rows = CANONICAL_SIZE
-        self.observation_space = gym.spaces.Box(0, 255, (rows, columns, 3), np.uint8)
-        self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
-        camera = Element("camera", "front")
-        self.observation_layout = Layout(
-            (Feature("camera/canonical", "1", 0.0, 255.0, camera, (rows, columns, 3)),)
-        )
-        self.action_layout = Layout(
-            (
-                Feature("waypoint/bearing", "1", -1.0, 1.0, gain=WIDEST_RAD, gain_unit="rad"),
-                Feature("waypoint/speed", "1", -1.0, 1.0),
-            )
-        )
+        self.observation_space, self.action_space = observation_space(), action_space()
+        self.observation_layout, self.action_layout = OBSERVATION_LAYOUT, ACTION_LAYOUT
         self.metadata = {**self.metadata, "render_fps": self._env.metadata["render_fps"]}
         self._speed = 0.0
         places = self._env.observation_layout.slices
@@ -261,18 +172,8 @@ class WaypointEnv(DrivingEnv):
             SpaceMismatch: If the action is not two finite numbers.
             ResetNeeded: If `reset` was never called.
         """
-        values = np.asarray(action, np.float64)
-        if values.shape != (2,) or not np.isfinite(values).all():
-            raise SpaceMismatch(
-                f"A waypoint is a bearing and a speed, each from -1 to 1, got {values.tolist()}."
-            )
-        bearing, speed = np.clip(values, -1.0, 1.0).tolist()
-        steering = self.response.steering(bearing * WIDEST_RAD, self._speed)
-        throttle = max(_LEAST_THROTTLE, 0.5 * (speed + 1.0))
-        if self._turns_on_the_spot:  # Saturating one track would prevent the turn.
-            throttle = min(throttle, max(_LEAST_THROTTLE, 1.0 - abs(steering)))
-        command = np.array((steering, throttle), np.float32)
-        seen, reward, terminated, truncated, info = self._env.step(command)
+        steering = command(action, self.response, self._speed, on_the_spot=self._turns_on_the_spot)
+        seen, reward, terminated, truncated, info = self._env.step(steering)
         return self._observe(seen), reward, terminated, truncated, info
 
     def demonstrator(self, seed: int) -> WaypointDemonstrator:

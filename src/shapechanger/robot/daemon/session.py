@@ -506,6 +506,8 @@ class Session:
             action_layout=plan.action_layout,
             state_layout=plan.state_layout,
             image_size=None if plan.camera is None else plan.camera.size,
+            camera_pitch_deg=None if plan.camera is None else plan.camera.pitch_deg,
+            camera_fovy_deg=None if plan.camera is None else plan.camera.fovy_deg,
             control_hz=plan.control_hz,
             deadline_ms=plan.deadline_ms,
             max_observation_age_ms=plan.max_observation_age_ms,

@@ -1,0 +1,159 @@
+"""What the envs with waypoints share: the action, and how a body turns it into steering."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from shapechanger.errors import SpaceMismatch, StudyError
+from shapechanger.layout import Element, Feature, Layout
+from shapechanger.worlds.rectify import CANONICAL_SIZE
+
+AHEAD_M: Final = 0.8
+"""Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
+
+WIDEST_RAD: Final = 1.0
+"""Bearing of the waypoint at an action of -1 or 1, rad."""
+
+_SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
+_LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
+
+# Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
+# is left out because the vehicle is still changing its motion.
+_SECONDS: Final = 5.0
+_HOLD: Final = 6
+
+
+@dataclass(frozen=True, slots=True)
+class SteeringResponse:
+    """How fast a vehicle turns when it steers.
+
+    rate of turn to the right = steering * (per_metre * speed + per_second). Wheels turn the vehicle
+    the more, the faster it rolls; tracks turn it where it stands.
+
+    Attributes:
+        per_metre: Turn for each metre at full steering, rad/m.
+        per_second: Turn for each second at full steering, rad/s.
+
+    Raises:
+        StudyError: If the vehicle does not turn, or a number is negative.
+    """
+
+    per_metre: float
+    per_second: float
+
+    def __post_init__(self) -> None:
+        if not (min(self.per_metre, self.per_second) >= 0.0 < self.per_metre + self.per_second):
+            raise StudyError(
+                "A vehicle must turn to the right when it steers to the right: the turn was "
+                f"{self.per_metre:.2f} rad/m and {self.per_second:.2f} rad/s."
+            )
+
+    def steering(self, bearing: float, speed: float) -> float:
+        """Return the steering, from -1 to 1, that leads to a waypoint `AHEAD_M` ahead.
+
+        Pure pursuit: the circle through a point at the distance L and the bearing b has the
+        curvature 2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992).
+
+        Args:
+            bearing: Bearing of the waypoint, rad, positive to the right.
+            speed: Speed along the heading, m/s.
+        """
+        speed = max(speed, _SLOWEST_MPS)
+        rate = 2.0 * math.sin(bearing) / AHEAD_M * speed
+        return max(-1.0, min(1.0, rate / (self.per_metre * speed + self.per_second)))
+
+
+def measure_response(
+    env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int, seed: int = 0
+) -> SteeringResponse:
+    """Measure how a vehicle turns, from 5 s of its own motion at random commands.
+
+    Args:
+        env: A vehicle that observes numbers, with steering and throttle as its action. It is reset.
+        speed_at: Place of the speed, m/s, in its observation.
+        yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
+        seed: Seed of the start and the commands.
+
+    Raises:
+        StudyError: If it does not turn as it steers.
+    """
+    rng = np.random.default_rng(seed)
+    env.reset(seed=seed)
+    command = np.zeros(2, np.float32)
+    turning: list[tuple[float, float]] = []
+    rates: list[float] = []
+    for step in range(round(_SECONDS * env.metadata["render_fps"])):
+        if step % _HOLD == 0:
+            command = np.array((rng.uniform(-0.5, 0.5), rng.uniform(0.4, 0.8)), np.float32)
+        seen, _, terminated, truncated, _ = env.step(command)
+        if step % _HOLD >= _HOLD // 2:
+            turning.append((float(command[0] * seen[speed_at]), float(command[0])))
+            rates.append(-float(seen[yaw_rate_at]))
+        if terminated or truncated:
+            env.reset()
+    per_metre, per_second = nnls(np.array(turning), np.array(rates))[0]
+    return SteeringResponse(float(per_metre), float(per_second))
+
+
+_COLUMNS, _ROWS = CANONICAL_SIZE
+
+OBSERVATION_LAYOUT: Final = Layout(
+    (
+        Feature(
+            "camera/canonical", "1", 0.0, 255.0, Element("camera", "front"), (_ROWS, _COLUMNS, 3)
+        ),
+    )
+)
+"""Layout of a rectified frame."""
+
+ACTION_LAYOUT: Final = Layout(
+    (
+        Feature("waypoint/bearing", "1", -1.0, 1.0, gain=WIDEST_RAD, gain_unit="rad"),
+        Feature("waypoint/speed", "1", -1.0, 1.0),
+    )
+)
+"""Layout of a waypoint."""
+
+
+def observation_space() -> gym.Space[Any]:
+    """Return the space of rectified frames."""
+    return gym.spaces.Box(0, 255, (_ROWS, _COLUMNS, 3), np.uint8)
+
+
+def action_space() -> gym.Space[Any]:
+    """Return the space of waypoints."""
+    return gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+def command(
+    action: NDArray[np.float32], response: SteeringResponse, speed: float, *, on_the_spot: bool
+) -> NDArray[np.float32]:
+    """Return the steering and throttle that lead a vehicle to a waypoint.
+
+    Args:
+        action: Bearing and speed, each from -1 to 1; values beyond are clipped.
+        response: How the vehicle turns.
+        speed: Its speed along the heading, m/s.
+        on_the_spot: Whether it turns by its tracks, of which full throttle would saturate one.
+
+    Raises:
+        SpaceMismatch: If the action is not two finite numbers.
+    """
+    values = np.asarray(action, np.float64)
+    if values.shape != (2,) or not np.isfinite(values).all():
+        raise SpaceMismatch(
+            f"A waypoint is a bearing and a speed, each from -1 to 1, got {values.tolist()}."
+        )
+    bearing, share = np.clip(values, -1.0, 1.0).tolist()
+    steering = response.steering(bearing * WIDEST_RAD, speed)
+    throttle = max(_LEAST_THROTTLE, 0.5 * (share + 1.0))
+    if on_the_spot:
+        throttle = min(throttle, max(_LEAST_THROTTLE, 1.0 - abs(steering)))
+    return np.array((steering, throttle), np.float32)

@@ -1,0 +1,73 @@
+"""`RemoteWaypoint-v1` over the real thing: link, daemon, guard, drivers, and a simulated car."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.envs.vehicle import WaypointEnv
+from shapechanger.errors import RobotRefused
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.twin.robot import RunningRobot, run_robot
+from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
+
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
+Serve = Callable[..., RunningRobot]
+AHEAD = np.zeros(2, np.float32)
+
+
+@pytest.fixture
+def serve() -> Iterator[Serve]:
+    """Serve a robot on the twin's clock; it ends with the test."""
+    with ExitStack() as stack:
+        yield lambda profile, *arguments: stack.enter_context(
+            run_robot(profile, clock="twin", arguments=arguments or IN_A_ROOM)
+        )
+
+
+def _env_of(robot: RunningRobot, **options: Any) -> gym.Env[Any, Any]:
+    known = robot.known
+    access = {"robot": known.address, "key": known.key, "fingerprint": known.fingerprint}
+    return gym.make("shapechanger/RemoteWaypoint-v1", pace="lockstep", **access, **options)
+
+
+def _lab_car() -> Profile:
+    return load_profile(find_profile("lab-car"))
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve) -> None:
+    """Its response is that of the same car in simulation; frames and actions are those of all."""
+    with closing(WaypointEnv("car")) as simulated:
+        expected = simulated.response
+        robot = serve(_lab_car(), "--seed", "3")
+        with closing(_env_of(robot)) as env, robot.operator() as operator:
+            env.reset(seed=0)
+            response = env.unwrapped.response  # pyright: ignore[reportAttributeAccessIssue]
+            found = response.per_metre + response.per_second
+            assert found == pytest.approx(expected.per_metre + expected.per_second, rel=0.2)
+            assert env.observation_space == simulated.observation_space
+            assert env.action_space == simulated.action_space
+            operator.place(0)  # It has driven at random.
+            seen, _ = env.reset(seed=0)
+            assert env.observation_space.contains(seen)
+            rewards = [env.step(AHEAD)[1] for _ in range(40)]  # Its reflex ends after 0.75 s.
+            assert sum(rewards) > 0.05
+
+
+def test_what_a_robot_lacks_is_named(serve: Serve, tmp_path: Any) -> None:
+    """A robot without a camera, or whose camera was not measured, is refused in a sentence."""
+    blind = write_profile(tmp_path, BLIND_CAR)
+    with pytest.raises(RobotRefused, match="has no camera"):
+        _env_of(serve(blind))
+    unmeasured = write_profile(tmp_path)
+    with pytest.raises(RobotRefused, match="does not state pitch_deg and fovy_deg"):
+        _env_of(serve(unmeasured))
