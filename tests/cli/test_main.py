@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from shapechanger.cli import main
 from tests.drawing import run_python
 
 COMMAND = "from shapechanger.cli import main; main({arguments!r})"
@@ -95,6 +96,24 @@ def test_an_env_of_others_that_cannot_draw_is_one_sentence(tmp_path: os.PathLike
     assert done.returncode == 2
     assert done.stderr.startswith("error: pygame is not installed")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        (["polices"], "No command of `shapechanger` matches 'polices'. Did you mean 'policies'?"),
+        (["policies", "shw"], "`shapechanger policies` matches 'shw'. Did you mean 'show'?"),
+        (["robot", "safe-pin"], "Did you mean 'safe-pins'?"),
+    ],
+)
+def test_a_misspelt_command_has_a_nearest_spelling(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], hint: str
+) -> None:
+    """Commands and subcommands alike are refused in one sentence."""
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+    assert hint in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Here no disk is always full.")

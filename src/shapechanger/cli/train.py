@@ -98,6 +98,8 @@ class Train:
         with opened(env) as made:
             learner_of(learner, settings).require(env, env_traits(made))
         if self.tensorboard is not None:
+            if not isinstance(settings, Sb3Settings):
+                raise StudyError(f"{learner} has no TensorBoard logs: leave out --tensorboard.")
             try:
                 import_module("torch.utils.tensorboard")
             except ImportError as error:

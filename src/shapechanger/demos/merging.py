@@ -7,12 +7,10 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
+from shapechanger.demos.episodes.files import free_path
 from shapechanger.errors import DemosError, OutputError
-
-_MAX_EPISODES: Final = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +92,10 @@ def _layouts(episode: Episode) -> tuple[str, str]:
 def _copied(source: Path, out: Path) -> Path:
     """Copy an episode atomically."""
     part = out / f".{source.name}.{os.getpid()}.part"
+    target = free_path(out, source.name)
     try:
         out.mkdir(parents=True, exist_ok=True)
         shutil.copytree(source, part)
-        target = _free(out, source.name)
         part.rename(target)
     except OSError as error:
         shutil.rmtree(part, ignore_errors=True)
@@ -105,16 +103,3 @@ def _copied(source: Path, out: Path) -> Path:
         reason = error.strerror or "not all of its files could be copied"
         raise OutputError(f"Cannot copy {source} to {out}: {reason}.") from error
     return target
-
-
-def _free(out: Path, name: str) -> Path:
-    """Return the path with this name, or with the next free number."""
-    if not (out / name).exists():
-        return out / name
-    stem, dash, number = name.rpartition("-")
-    begun, start = (stem, int(number)) if dash and number.isdigit() else (name, 0)
-    for following in range(start + 1, _MAX_EPISODES):
-        path = out / f"{begun}-{following:04d}"
-        if not path.exists():
-            return path
-    raise OutputError(f"{out} has too many episodes with names like {name}.")

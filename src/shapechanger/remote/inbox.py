@@ -65,7 +65,7 @@ class Request(Generic[_Answer]):
 
 
 class Inbox:
-    """What a robot has sent, for any number of calling threads.
+    """Messages of a robot, for any number of calling threads.
 
     The newest observation is in one slot, so that a slow reader never gets an old one. A robot
     sends each frame once, so an observation that replaces an unread one takes over its frame.

@@ -51,7 +51,7 @@ def _environment() -> Environment:
 
 def png_uri(picture: NDArray[np.uint8]) -> str:
     """Lossless data URI of a picture, shape (height, width, 3)."""
-    from PIL import Image  # Installed with matplotlib.
+    from PIL import Image
 
     file = io.BytesIO()
     Image.fromarray(picture).save(file, "png", optimize=True)

@@ -13,7 +13,6 @@ from functools import partial
 from typing import Final, Literal, Protocol, runtime_checkable
 
 from shapechanger.errors import UnknownName
-from shapechanger.robot.drivers.settings import texts, whole, wholes
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.twin.signals import Pulse
 from shapechanger.worlds.world import Readings, World
@@ -397,14 +396,14 @@ def _joint_chips(plan: SensorPlan, world: World) -> dict[tuple[int, int], Chip]:
         RobotError: If the world has other joints.
     """
     measured = world.measured_angle if isinstance(world, JointWorld) else _at_zero
-    columns = (wholes(plan.settings, key) for key in ("channels", "zeros", "directions"))
+    columns = (plan.settings[key] for key in ("channels", "zeros", "directions"))
     behind: dict[int, Chip] = {}
-    for joint, *row in zip(texts(plan.settings, "joints"), *columns, strict=True):
+    for joint, *row in zip(plan.settings["joints"], *columns, strict=True):
         measured(joint)  # Raises for an unknown joint.
         channel, zero, direction = row
         behind[channel] = SimulatedAs5600(joint, partial(measured, joint), zero, direction)
-    bus, mux = whole(plan.settings, "bus"), Tca9548a(behind)
-    return {(bus, whole(plan.settings, "mux")): mux, (bus, _AS5600): ChannelsBehind(mux)}
+    bus, mux = plan.settings["bus"], Tca9548a(behind)
+    return {(bus, plan.settings["mux"]): mux, (bus, _AS5600): ChannelsBehind(mux)}
 
 
 def _at_zero(joint: str) -> float:
@@ -425,11 +424,11 @@ def chips_of(plan: GuardPlan, world: World) -> dict[tuple[int, int], Chip]:
     chips: dict[tuple[int, int], Chip] = {}
     for output in plan.outputs:
         if output.settings.get("over") == "pca9685":
-            at = whole(output.settings, "bus"), whole(output.settings, "address")
+            at = output.settings["bus"], output.settings["address"]
             chips.setdefault(at, SimulatedPca9685())
     for sensor in plan.sensors:
         if sensor.driver in ("mpu6050", "ina219"):
-            at = whole(sensor.settings, "bus"), whole(sensor.settings, "address")
+            at = sensor.settings["bus"], sensor.settings["address"]
             chips[at] = (
                 SimulatedMpu6050(readings)
                 if sensor.driver == "mpu6050"

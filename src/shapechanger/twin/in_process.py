@@ -19,7 +19,6 @@ from shapechanger.errors import RobotError
 from shapechanger.link.messages import Observation, Welcome
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
-from shapechanger.robot.drivers.settings import number
 from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
@@ -304,7 +303,7 @@ class InProcessRobot:
     def _arm(self) -> None:
         """Arm the robot, once its speed controllers have seen neutral for long enough."""
         settings = (output.settings for output in self._plan.outputs)
-        patience_s = max((number(one, "arm_s") for one in settings if "arm_s" in one), default=0.0)
+        patience_s = max((one["arm_s"] for one in settings if "arm_s" in one), default=0.0)
         self._advance(round(patience_s * 1e9))
         self.arm()
 

@@ -6,7 +6,6 @@ import heapq
 import math
 from typing import Final
 
-from shapechanger.robot.drivers.settings import number, text, whole, wholes
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.twin.messages import Edge
 from shapechanger.twin.servos.rig import Rig
@@ -27,9 +26,9 @@ class _Encoder:
     """A wheel encoder; forward, channel a leads."""
 
     def __init__(self, plan: SensorPlan, travelled_m: float) -> None:
-        self._pins = (whole(plan.settings, "a"), whole(plan.settings, "b"))
+        self._pins = (plan.settings["a"], plan.settings["b"])
         self._states = ((0, 0), (1, 0), (1, 1), (0, 1)) if self._pins[1] >= 0 else ((0,), (1,))
-        count_m = number(plan.settings, "wheel_m") / number(plan.settings, "counts_per_turn")
+        count_m: float = plan.settings["wheel_m"] / plan.settings["counts_per_turn"]
         self._edge_m = count_m / len(self._states)
         # The distance rolled before power-on makes no edges.
         self._travelled = travelled_m
@@ -61,8 +60,8 @@ class _Bumper:
     """Bumper switches to ground (pull "up") or to 3.3 V, all pressed at once."""
 
     def __init__(self, plan: SensorPlan) -> None:
-        self._pins = wholes(plan.settings, "pins")
-        self._open = int(text(plan.settings, "pull") == "up")
+        self._pins: list[int] = plan.settings["pins"]
+        self._open = int(plan.settings["pull"] == "up")
         self._pressed = False
         self.held = False
 
@@ -81,8 +80,8 @@ class _Distance:
     """An HC-SR04."""
 
     def __init__(self, plan: SensorPlan, world: World) -> None:
-        self.trigger = whole(plan.settings, "trigger")
-        self._echo = whole(plan.settings, "echo")
+        self.trigger = plan.settings["trigger"]
+        self._echo = plan.settings["echo"]
         self._world = world
         self._busy_until_ns = 0
         self.override_m: float | None = None
@@ -204,8 +203,8 @@ class SpeedController:
     """
 
     def __init__(self, plan: OutputPlan) -> None:
-        self._reverse = text(plan.settings, "reverse")
-        self._arm_ns = number(plan.settings, "arm_s") * 1e9 * _ARM_SHARE
+        self._reverse = plan.settings["reverse"]
+        self._arm_ns = plan.settings["arm_s"] * 1e9 * _ARM_SHARE
         self._neutral_since_ns: int | None = None
         self._armed = False
         self._braked = False

@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.duty import Duty
-from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
 from shapechanger.twin.signals import Levels, Pulse, PwmChannel
 
@@ -127,7 +126,7 @@ class TwinWiring:
 
     def _hbridge(self, plan: OutputPlan, rest: float) -> Callable[[Levels], WiredOutput]:
         keys = ("forward", "backward", "enable")
-        forward, backward, enable = (whole(plan.settings, key) for key in keys)
+        forward, backward, enable = (plan.settings[key] for key in keys)
         duty = _duty_of(plan)
 
         def state(levels: Levels) -> WiredOutput:
@@ -137,7 +136,7 @@ class TwinWiring:
         return state
 
     def _phase_enable(self, plan: OutputPlan, rest: float) -> Callable[[Levels], WiredOutput]:
-        enable, phase = (whole(plan.settings, key) for key in ("enable", "phase"))
+        enable, phase = (plan.settings[key] for key in ("enable", "phase"))
         duty = _duty_of(plan)
 
         def state(levels: Levels) -> WiredOutput:
@@ -149,15 +148,13 @@ class TwinWiring:
 
     def _pulse(self, plan: OutputPlan) -> Callable[[Levels], float]:
         settings = plan.settings
-        match text(settings, "over"):
+        match settings["over"]:
             case "lgpio":
-                pin = whole(settings, "pin")
+                pin = settings["pin"]
                 return lambda levels: levels.pulses.get(pin, Pulse(0.0, 0.0)).us
             case "pca9685":
                 enable = _output_enable(plan)
-                channel = PwmChannel(
-                    *(whole(settings, key) for key in ("bus", "address", "channel"))
-                )
+                channel = PwmChannel(*(settings[key] for key in ("bus", "address", "channel")))
 
                 def pulse_us(levels: Levels) -> float:
                     if enable >= 0 and self._duty(levels, enable) > 0.0:
@@ -177,7 +174,7 @@ class TwinWiring:
 
 
 def _duty_of(plan: OutputPlan) -> Duty:
-    return Duty(number(plan.settings, "start"), number(plan.settings, "full"))
+    return Duty(plan.settings["start"], plan.settings["full"])
 
 
 def _motor(duty: Duty, drive: float, rest: float) -> WiredOutput:
@@ -219,7 +216,7 @@ def _output_enable(plan: OutputPlan) -> int:
 
 
 def _points(plan: OutputPlan, *keys: str) -> tuple[float, ...]:
-    return tuple(number(plan.settings, key) for key in keys)
+    return tuple(plan.settings[key] for key in keys)
 
 
 def _between(us: float, low: float, middle: float, high: float) -> float:

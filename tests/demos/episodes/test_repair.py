@@ -67,6 +67,17 @@ def test_a_picture_without_a_step_is_set_aside(tmp_path: Path) -> None:
     assert (path / "lost" / "000005.jpg").read_bytes() == picture(5)[:20]
 
 
+def test_lost_pictures_with_one_name_are_all_kept(tmp_path: Path) -> None:
+    """The second one gets the next free number."""
+    path = recorded(tmp_path, close=False)
+    for size in (20, 30):
+        (path / "frames" / "000005.jpg").write_bytes(picture(5)[:size])
+        assert repair(path).pictures == 1
+    lost = path / "lost"
+    assert (lost / "000005.jpg").read_bytes() == picture(5)[:20]
+    assert (lost / "000005-0001.jpg").read_bytes() == picture(5)[:30]
+
+
 def test_a_step_without_its_picture_does_not_count(tmp_path: Path) -> None:
     """The other steps survive, and marks and drops keep their step numbers."""
     path = recorded(tmp_path)

@@ -100,6 +100,12 @@ def test_tags_are_the_names_of_the_kinds() -> None:
     ]
 
 
+def test_several_numbers_for_one_are_refused() -> None:
+    """An array where a number belongs gets a sentence, not a TypeError."""
+    with pytest.raises(MorphologyError, match=r"wrong type in Mass\(element='thigh'"):
+        Mass("thigh", scale=np.array([1.0, 2.0]))  # type: ignore[arg-type]
+
+
 def test_numpy_numbers_are_values() -> None:
     """Scalars and arrays of NumPy become plain numbers and tuples, which JSON can hold."""
     stretch = Stretch("thigh", np.linspace(0.5, 2.0, 2)[0])

@@ -133,6 +133,16 @@ def test_wind_counts_only_in_a_medium() -> None:
     assert effective_model(model) == still
 
 
+@pytest.mark.parametrize(("density", "viscosity"), [(1.2, 0.0), (0.0, 0.1)])
+def test_density_or_viscosity_makes_a_medium(density: float, viscosity: float) -> None:
+    """Each alone pushes shapes by the ellipsoid model."""
+    model = everything()
+    model.opt.density, model.opt.viscosity = density, viscosity
+    still = effective_model(model)
+    model.geom_fluid[:, 3] = 7.0
+    assert effective_model(model) != still
+
+
 def test_empty_bodies_are_left_out() -> None:
     """A frame that holds only a camera moves nothing; one that carries a shape stays."""
     xml = (

@@ -35,6 +35,29 @@ def test_a_profile_of_this_folder_has_a_name_too(
         find_profile("folder")
 
 
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("my-cra.toml", r"There is no file .*my-cra\.toml; did you mean .*my-car\.toml\?$"),
+        ("trcuk.toml", "did you mean truck, which comes with Shapechanger"),
+        ("zzz.toml", r"zzz\.toml; its folder has my-car\.toml\.$"),
+    ],
+)
+def test_a_missing_profile_has_a_nearest_spelling(tmp_path: Path, name: str, hint: str) -> None:
+    """Files beside it come first, then shipped profiles."""
+    (tmp_path / "my-car.toml").touch()
+    with pytest.raises(ProfileError, match=hint):
+        load_profile(tmp_path / name)
+
+
+def test_a_misspelt_name_finds_files_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Names of files in the current folder are suggested like shipped ones."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my-car.toml").touch()
+    with pytest.raises(UnknownName, match="Did you mean 'my-car'"):
+        find_profile("my-cra")
+
+
 def test_a_mark_and_windows_lines_are_read(tmp_path: Path) -> None:
     """What an editor of Windows adds is no part of a profile."""
     path = tmp_path / "car.toml"

@@ -15,10 +15,34 @@ STEPS: Final = "steps.jsonl"
 FRAMES: Final = "frames"
 LOST: Final = "lost"
 
+_MOST_OF_A_NAME: Final = 9999
+
 
 def is_episode(folder: Path) -> bool:
     """Return whether `folder` contains an episode."""
     return (folder / HEADER).is_file() or (folder / STEPS).is_file()
+
+
+def free_path(folder: Path, stem: str, ending: str = "") -> Path:
+    """Return a path in `folder` that does not exist, with the next free number where needed.
+
+    Args:
+        folder: The folder.
+        stem: Wanted name without its ending, such as "steps"; if it ends with a number after a
+            dash, such as "20261124-0001", counting goes on there.
+        ending: Ending of the name, such as ".jsonl".
+
+    Raises:
+        OutputError: If all numbers are taken.
+    """
+    path = folder / f"{stem}{ending}"
+    begun, dash, digits = stem.rpartition("-")
+    begun, number = (begun, int(digits)) if dash and digits.isdigit() else (stem, 0)
+    while path.exists():
+        if (number := number + 1) > _MOST_OF_A_NAME:
+            raise OutputError(f"{folder} has too many files with names like {stem}{ending}.")
+        path = folder / f"{begun}-{number:04d}{ending}"
+    return path
 
 
 def lock(path: Path, busy: str) -> int:

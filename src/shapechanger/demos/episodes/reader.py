@@ -17,6 +17,7 @@ from shapechanger.demos.episodes.files import (
     LOST,
     STEPS,
     cannot_write,
+    free_path,
     is_episode,
     lock,
     write_all,
@@ -339,11 +340,11 @@ def repair(path: Path) -> Repair:
             if bad or strays:
                 (path / LOST).mkdir(exist_ok=True)
             if bad:
-                lost = _free_name(path / LOST, STEPS)
+                lost = free_path(path / LOST, Path(STEPS).stem, Path(STEPS).suffix)
                 write_atomic(lost, b"".join(line.raw for line in bad))
                 write_atomic(path / STEPS, b"".join(line.raw for line in good))
             for stray in strays:
-                stray.rename(_free_name(path / LOST, stray.name))
+                stray.rename(free_path(path / LOST, stray.stem, stray.suffix))
         except OutputError:  # Already worded, and a subclass of OSError.
             raise
         except OSError as error:
@@ -355,16 +356,6 @@ def repair(path: Path) -> Repair:
     finally:
         os.close(fd)
     return Repair(kept, tuple(line.wrong for line in bad), len(strays), closed is not None)
-
-
-def _free_name(folder: Path, name: str) -> Path:
-    """Return a path in `folder` that does not exist yet, with a number appended where needed."""
-    stem, dot, ending = name.partition(".")
-    path, number = folder / name, 1
-    while path.exists():
-        number += 1
-        path = folder / f"{stem}-{number}{dot}{ending}"
-    return path
 
 
 def drop(path: Path, first: int, last: int, why: str) -> None:

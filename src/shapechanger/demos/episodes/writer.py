@@ -17,6 +17,7 @@ from shapechanger.demos.episodes.files import (
     FRAMES,
     STEPS,
     cannot_write,
+    free_path,
     lock,
     write_all,
     write_header,
@@ -82,7 +83,6 @@ _LOCK: Final = ".recording"
 _JPEG: Final = b"\xff\xd8"
 _MAX_PICTURE_BYTES: Final = 16 << 20
 _SPACE_CHECK_STEPS: Final = 20  # Free space changes slowly.
-_MAX_EPISODES_PER_SECOND: Final = 10_000
 _NS_PER_S: Final = 1e9
 
 
@@ -317,15 +317,11 @@ def _new_folder(recording: Path, header: EpisodeHeader, began: str) -> Path:
         (part / FRAMES).mkdir(parents=True, exist_ok=True)
         (part / STEPS).touch()
         write_header(part, header.to_json() | {"closed": None})
-        for number in range(1, _MAX_EPISODES_PER_SECOND):
-            path = recording / f"{began}-{number:04d}"
-            if not path.exists():  # No race: the recording is locked.
-                return part.rename(path)
+        return part.rename(free_path(recording, f"{began}-0001"))  # No race: it is locked.
     except OutputError:  # Already worded, and a subclass of OSError.
         raise
     except OSError as error:
         raise cannot_write(part, error) from error
-    raise OutputError(f"{recording} has too many episodes that began at {began}.")
 
 
 def _require_space(folder: Path, spare_bytes: int) -> None:

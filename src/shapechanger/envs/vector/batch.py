@@ -71,7 +71,12 @@ class SubEnv:
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> dict[str, Any]:
-        """Start an episode, and return its info."""
+        """Start an episode, and return its info.
+
+        Args:
+            seed: Seed of the env; None to go on with its generator.
+            options: Options of the env's reset.
+        """
         observation, info = self.env.reset(seed=seed, options=options)
         self.row[...] = observation
         if self._step_into is None:
@@ -101,7 +106,12 @@ class SubEnv:
         return clock._elapsed_steps >= self._limit
 
     def diverged(self, truncated: Any, info: dict[str, Any]) -> Step:
-        """Return the result of a step whose simulation has diverged."""
+        """Return the result of a step whose simulation has diverged.
+
+        Args:
+            truncated: Whether the step was truncated.
+            info: Info of the step.
+        """
         self.row[~np.isfinite(self.row)] = 0.0
         return 0.0, True, truncated, {**info, "diverged": True}
 

@@ -157,7 +157,12 @@ class StepResults:
         self._columns: list[InfoColumns] = []
 
     def put(self, number: int, step: Step) -> None:
-        """Set the result of one env."""
+        """Set the result of one env.
+
+        Args:
+            number: Index of the env.
+            step: Its result.
+        """
         reward, terminated, truncated, info = step
         self.rewards[number] = reward
         self.terminated[number] = terminated

@@ -1,4 +1,4 @@
-"""What the vehicle envs share: their arguments, and the sampling of courses, starts and looks."""
+"""Base of the vehicle envs: their arguments, and sampling of courses, starts and looks."""
 
 from __future__ import annotations
 

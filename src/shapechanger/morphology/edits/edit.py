@@ -58,9 +58,12 @@ class Edit(
             value: Any = getattr(self, name)
             if isinstance(value, np.generic | np.ndarray):
                 force_setattr(self, name, _as_python(value))
-        if not 0.0 <= self.amount <= 1.0:  # Also refuses NaN.
-            raise MorphologyError(f"amount must be between 0 and 1, got {self.amount}.")
-        self.check()
+        try:
+            if not 0.0 <= self.amount <= 1.0:  # Also refuses NaN.
+                raise MorphologyError(f"amount must be between 0 and 1, got {self.amount}.")
+            self.check()
+        except TypeError as error:
+            raise MorphologyError(f"A value has the wrong type in {self}.") from error
 
     def check(self) -> None:
         """Refuse numbers out of range; subclasses override it."""

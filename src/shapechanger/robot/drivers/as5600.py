@@ -173,7 +173,12 @@ def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
 
 
 def open_driver(plan: SensorPlan, hardware: Hardware) -> As5600:
-    """Open the sensor and read each encoder once; see `connect_encoders`."""
+    """Open the sensor and read each encoder once; see `connect_encoders`.
+
+    Args:
+        plan: The sensor.
+        hardware: Hardware of its bus.
+    """
     sensor = connect_encoders(plan, hardware)
     try:
         for encoder in sensor.encoders:

@@ -148,7 +148,12 @@ class Freshness:
         self._newest = (-1, -1)
 
     def refusal(self, order: Order, now_ns: int) -> str:
-        """Return why a command that arrives now is refused, or an empty string."""
+        """Return why a command that arrives now is refused, or an empty string.
+
+        Args:
+            order: The command; its sequence number counts as seen.
+            now_ns: Robot's time, ns.
+        """
         if (order.session, order.seq) <= self._newest:
             session, seq = self._newest
             return (
@@ -165,7 +170,12 @@ class Freshness:
         return ""
 
     def expiry_ns(self, order: Order, arrived_ns: int) -> int:
-        """Return the time at which a command expires, ns."""
+        """Return the time at which a command expires, ns.
+
+        Args:
+            order: The command.
+            arrived_ns: Robot's time at which it arrived, ns.
+        """
         start_ns = min(order.issued_ns, arrived_ns)
         return start_ns + min(self._deadline_ms, order.ttl_ms) * _NS_PER_MS
 
@@ -225,7 +235,7 @@ class OutputDecision:
     Attributes:
         actions: One number for each action.
         release: Whether the outputs are released instead.
-        stop_reason: Why the robot does not do what it was told, in words; empty when it does.
+        stop_reason: Why the robot does not follow its command; empty when it does.
         session: Session of the underlying command.
         seq: Its sequence number; None while the robot is at rest without a command.
     """

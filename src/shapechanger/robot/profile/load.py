@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import os
 import re
@@ -16,6 +17,7 @@ from shapechanger.robot.profile.read import read_profile
 _SHIPPED: Final = Path(__file__).parent / "shipped"
 _SUFFIX: Final = ".toml"
 _LARGEST: Final = 1024 * 1024  # Size of the largest profile, bytes.
+_MOST_LISTED: Final = 10
 
 
 def shipped_profiles() -> dict[str, Path]:
@@ -42,7 +44,8 @@ def find_profile(name_or_path: str | os.PathLike[str]) -> Path:
         here = Path(f"{text}{_SUFFIX}")
         if here.is_file():
             return here
-        raise UnknownName("profile", text, shipped)
+        stems = [file.stem for file in Path().glob(f"*{_SUFFIX}") if file.is_file()]
+        raise UnknownName("profile", text, [*shipped, *difflib.get_close_matches(text, stems)])
     return shipped[text]
 
 
@@ -65,7 +68,7 @@ def profile_text(path: str | os.PathLike[str]) -> str:
         with Path(path).open("rb") as file:
             data = file.read(_LARGEST + 1)
     except FileNotFoundError:
-        raise ProfileError(f"There is no file {os.fspath(path)}.") from None
+        raise ProfileError(f"There is no file {os.fspath(path)}{_nearest(Path(path))}") from None
     except IsADirectoryError:
         raise ProfileError(f"{os.fspath(path)} is a folder, not a profile.") from None
     except (OSError, ValueError) as error:  # ValueError: NUL in the path.
@@ -79,6 +82,16 @@ def profile_text(path: str | os.PathLike[str]) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise ProfileError(f"{os.fspath(path)}, line {line}: this is not UTF-8 text.") from None
+
+
+def _nearest(path: Path) -> str:
+    """Return the end of a sentence about a missing profile: the nearest one, or those beside it."""
+    there = sorted(file.name for file in path.parent.glob(f"*{_SUFFIX}"))
+    if close := difflib.get_close_matches(path.name, there, n=1):
+        return f"; did you mean {path.with_name(close[0])}?"
+    if close := difflib.get_close_matches(path.stem, shipped_profiles(), n=1):
+        return f"; did you mean {close[0]}, which comes with Shapechanger?"
+    return f"; its folder has {', '.join(there[:_MOST_LISTED])}." if there else "."
 
 
 _NAME_LINE: Final = re.compile(r"^name = .*$", re.MULTILINE)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.motor import EndStops, Load, Tendon
@@ -73,17 +72,17 @@ class Rig:
     def __init__(self, plan: GuardPlan, world: World) -> None:
         outputs = [output for output in plan.outputs if output.driver == "dynamixel"]
         settings = [output.settings for output in outputs]
-        self._device = text(settings[0], "device")
+        self._device = settings[0]["device"]
         self._names = tuple(output.name for output in outputs)
         self._world = world if isinstance(world, TendonWorld) else None
         stiffness = Tendon().stiffness if self._world is None else self._world.cable_stiffness
         plans = [
             ServoPlan(
-                id=whole(one, "id"),
-                model=text(one, "model"),
-                tendon=Tendon(number(one, "spool_radius_m"), whole(one, "direction"), stiffness),
+                id=one["id"],
+                model=one["model"],
+                tendon=Tendon(one["spool_radius_m"], one["direction"], stiffness),
                 # In the middle of a count, as it stands while the finger is straight.
-                angle=(whole(one, "zero") + 0.5) / _COUNTS_PER_RAD,
+                angle=(one["zero"] + 0.5) / _COUNTS_PER_RAD,
             )
             for one in settings
         ]

@@ -7,7 +7,7 @@ tensions, which are sent in one packet when all of them are staged.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.dynamixel.bus import ServoBus
@@ -17,7 +17,6 @@ from shapechanger.robot.drivers.dynamixel.settings import (
     bus_settings,
     servo_settings,
 )
-from shapechanger.robot.drivers.settings import text, whole
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -30,8 +29,8 @@ class SharedBus:
         settings: Settings of any output on it, which include those of the bus.
     """
 
-    def __init__(self, hardware: Hardware, settings: Mapping[str, object]) -> None:
-        self.device = text(settings, "device")
+    def __init__(self, hardware: Hardware, settings: Mapping[str, Any]) -> None:
+        self.device: str = settings["device"]
         self._hardware = hardware
         self._settings = settings
         self._servos: dict[str, ServoSettings] = {}
@@ -49,7 +48,7 @@ class SharedBus:
             raise RobotError(f"The bus at {self.device} is in use: {plan.name} comes too late.")
         servo = servo_settings(plan)
         self._servos[plan.name] = servo
-        self._zeros[plan.name] = whole(plan.settings, "zero")
+        self._zeros[plan.name] = plan.settings["zero"]
         self._tensions[plan.name] = servo.pretension_n
         return servo
 
@@ -140,7 +139,8 @@ def _join_bus(plan: OutputPlan, hardware: Hardware) -> tuple[SharedBus, ServoSet
     Raises:
         RobotError: If a setting is out of range.
     """
-    key = (id(hardware), text(plan.settings, "device"))
+    device: str = plan.settings["device"]
+    key = (id(hardware), device)
     _, bus = _OPEN.get(key, (hardware, None))
     if bus is None:
         bus = SharedBus(hardware, plan.settings)
@@ -209,5 +209,10 @@ class TendonOutput:
 
 
 def open_driver(plan: OutputPlan, hardware: Hardware) -> TendonOutput:
-    """Join the bus, without sending anything yet."""
+    """Join the bus, without sending anything yet.
+
+    Args:
+        plan: The output; outputs with the same device share a bus.
+        hardware: Hardware of the bus.
+    """
     return TendonOutput(plan, hardware)

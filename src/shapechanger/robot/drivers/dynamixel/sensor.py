@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.dynamixel.output import bus_at
-from shapechanger.robot.drivers.settings import text
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
@@ -21,7 +20,7 @@ class TendonSensor:
     """
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
-        self._bus = bus_at(text(plan.settings, "device"), hardware)
+        self._bus = bus_at(plan.settings["device"], hardware)
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
         """Run a cycle and return its readings, without servos that did not answer.
@@ -53,5 +52,10 @@ class TendonSensor:
 
 
 def open_driver(plan: SensorPlan, hardware: Hardware) -> TendonSensor:
-    """Open the tendons of a bus whose outputs are open."""
+    """Open the tendons of a bus whose outputs are open.
+
+    Args:
+        plan: The sensor.
+        hardware: Hardware of the bus, the same as that of the outputs.
+    """
     return TendonSensor(plan, hardware)

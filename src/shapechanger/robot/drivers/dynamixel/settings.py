@@ -7,10 +7,9 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.settings import number, text, whole
 from shapechanger.robot.guard.plan import OutputPlan
 
 COUNTS_PER_TURN: Final = 4096
@@ -285,17 +284,17 @@ def servo_settings(plan: OutputPlan) -> ServoSettings:
     settings = plan.settings
     return ServoSettings(
         name=plan.name,
-        id=whole(settings, "id"),
-        model=text(settings, "model"),
-        spool_radius_m=number(settings, "spool_radius_m"),
-        most_tension_n=number(settings, "most_tension_n"),
-        pretension_n=number(settings, "pretension_n"),
-        direction=whole(settings, "direction"),
-        homing_n=number(settings, "homing_n"),
+        id=settings["id"],
+        model=settings["model"],
+        spool_radius_m=settings["spool_radius_m"],
+        most_tension_n=settings["most_tension_n"],
+        pretension_n=settings["pretension_n"],
+        direction=settings["direction"],
+        homing_n=settings["homing_n"],
     )
 
 
-def bus_settings(settings: Mapping[str, object], servos: tuple[ServoSettings, ...]) -> BusSettings:
+def bus_settings(settings: Mapping[str, Any], servos: tuple[ServoSettings, ...]) -> BusSettings:
     """Return a bus with these servos.
 
     Args:
@@ -306,10 +305,10 @@ def bus_settings(settings: Mapping[str, object], servos: tuple[ServoSettings, ..
         RobotError: If a setting is out of range, or two servos have the same id or name.
     """
     return BusSettings(
-        device=text(settings, "device"),
+        device=settings["device"],
         servos=servos,
-        baud=whole(settings, "baud"),
-        answer_ms=number(settings, "answer_ms"),
-        watchdog_ms=whole(settings, "watchdog_ms"),
-        ramp_ms=whole(settings, "ramp_ms"),
+        baud=settings["baud"],
+        answer_ms=settings["answer_ms"],
+        watchdog_ms=settings["watchdog_ms"],
+        ramp_ms=settings["ramp_ms"],
     )
