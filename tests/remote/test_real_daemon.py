@@ -73,7 +73,7 @@ class Served:
         """Let the guard report sensor values."""
         sensed = SENSED | quantities
         state = {"quantities": sensed, "sources": dict.fromkeys(sensed, "wheel")}
-        self._loop.call_soon_threadsafe(lambda: self.running.guard.say(**state))
+        self._loop.call_soon_threadsafe(lambda: self.running.guard.send(**state))
 
     async def _serve(self) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
@@ -82,7 +82,7 @@ class Served:
             self._ready.set()
             while not self._stop.is_set():
                 robot.show()
-                robot.guard.say()
+                robot.guard.send()
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(1.0 / HZ):
                         await self._stop.wait()
