@@ -1,1 +1,1 @@
-"""Measurements of every number that Shapechanger promises."""
+"""Benchmarks of every number that Shapechanger states."""

@@ -1,8 +1,8 @@
-"""The atlas: when does one body help another? Suites of studies, with intervals.
+"""Transfer between bodies: suites of studies with intervals.
 
-These are studies of hours: they go on from what lies in `results/`, `SEEDS` says how many runs each
-arm has, and `ONLY` names the studies to run, separated by spaces. The numbers of every run are
-written beside the rows, and the pictures of the README.
+The studies take hours and resume from `results/`. `SEEDS` sets the number of runs per arm, and
+`ONLY` names the studies to run, separated by spaces. The values of every run and the pictures of
+the README are written next to the rows.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ from shapechanger.transfer.study import STUDY_FILE, Study
 
 RESULTS: Final = Path(__file__).parent / "results"
 PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
-# The study whose films stand in the README, and the arms that they show.
+# Study shown as film strips in the README, and its arms.
 SHOWN: Final = "Ant-to-BigAnt"
 SHOWN_ARMS: Final = ("source", "zero-shot", "fine-tune", "scratch")
-# Index of the Amputated Ant's cut limb, number 4.
+# Index of the limb that is shortened in the Amputated Ant.
 _DAMAGED: Final = 3
 
 
 def ants() -> list[Row]:
-    """The twelve directed pairs of the four ants."""
+    """Measure the twelve ordered pairs of the four ants."""
     studies = _suite("ants")
     if len(studies) > 1:
         _matrix_picture(studies, PICTURES / "ants-matrix.png")
@@ -58,12 +58,12 @@ def ants() -> list[Row]:
 
 
 def pendulums() -> list[Row]:
-    """The six directed pairs of the three pendulums."""
+    """Measure the six ordered pairs of the three pendulums."""
     return _rows(_suite("pendulums"))
 
 
 def methods() -> list[Row]:
-    """Every method on one pair of ants: its forward speed on the way and at the end."""
+    """Measure each method on one pair of ants: forward speed during and after training."""
     rows: list[Row] = []
     for name, study in _suite("methods").items():
         plan = study.plan
@@ -90,7 +90,7 @@ def methods() -> list[Row]:
 
 
 def shank() -> list[Row]:
-    """One ant's policy in ants with shanks of half to two and a half times the length."""
+    """Measure the transfer to ants with shanks of 0.5 to 2.5 times the length."""
     studies = _suite("shank")
     suite = load_suite("shank")
     if suite.sweep is not None:
@@ -104,11 +104,11 @@ def shank() -> list[Row]:
 
 
 def controls() -> list[Row]:
-    """Scratch against scratch: how often an interval shows an effect that is not there."""
+    """Compare scratch with scratch: how often an interval shows a false effect."""
     rows: list[Row] = []
     by_target = {name.partition("-to-")[2]: s for name, s in _finished("pendulums").items()}
     for target, study in by_target.items():
-        heights = study.curves("scratch").auc()  # What total reward gain compares.
+        heights = study.curves("scratch").auc()  # The statistic that total reward gain compares.
         half = heights.size // 2
         shown = total = 0
         for chosen in combinations(range(heights.size), half):
@@ -129,7 +129,7 @@ def controls() -> list[Row]:
 
 
 def claims() -> list[Row]:
-    """The three claims of the 2017 paper, in numbers."""
+    """Measure the three claims of the 2017 paper."""
     pendulum = _finished("pendulums")["InvertedPendulum-to-BigInvertedPendulum"]
     balanced = [_first_reaching(run, 950.0) for run in pendulum.of("scratch")]
     learned = [seconds for seconds in balanced if seconds is not None]
@@ -169,7 +169,7 @@ def claims() -> list[Row]:
 
 
 def _first_reaching(run: RunResult, level: float) -> float | None:
-    """Seconds of a run until its first evaluation at a return; None if it never gets there."""
+    """Return the seconds until a run first evaluates at `level`; None if it never does."""
     for evaluation in run.curve:
         if evaluation.mean_return >= level:
             return run.wall_s * evaluation.steps / run.curve[-1].steps
@@ -177,7 +177,7 @@ def _first_reaching(run: RunResult, level: float) -> float | None:
 
 
 def _power_shares(study: Study, folder: Path) -> NDArray[np.float64]:
-    """Share of each limb in the mechanical power of the source policies, shape (seeds, 4)."""
+    """Return the share of mechanical power per limb of the source policies, shape (seeds, 4)."""
     plan = study.plan
     learner = learner_of(plan.learner, plan.settings)
     shares: list[NDArray[np.float64]] = []
@@ -200,7 +200,7 @@ def _power_shares(study: Study, folder: Path) -> NDArray[np.float64]:
 
 
 def _suite(name: str) -> dict[str, Study]:
-    """Run a suite, or what is missing of it, and write the numbers of its runs."""
+    """Run the missing studies of a suite and write the values of its runs."""
     suite, out = load_suite(name), Path("results", name)
     seeds = int(os.environ.get("SEEDS", suite.seeds))
     RunSuite(name, seeds=seeds, out=out, only=tuple(os.environ.get("ONLY", "").split())).run()
@@ -210,7 +210,7 @@ def _suite(name: str) -> dict[str, Study]:
 
 
 def _finished(name: str) -> dict[str, Study]:
-    """Return the studies of a suite that have ended, in its order."""
+    """Return the finished studies of a suite, in its order."""
     out = Path("results", name)
     studies = {
         one: read_json(out / one / STUDY_FILE, Study, f"delete {out / one}")
@@ -223,7 +223,7 @@ def _finished(name: str) -> dict[str, Study]:
 
 
 def _runs(study: Study) -> dict[str, Any]:
-    """The measure of every run at every evaluation."""
+    """Return the measure of every run at every evaluation."""
     kinds = dict.fromkeys(run.run.kind for run in study.runs)
     found: dict[str, Any] = {"measure": study.plan.measure, "unit": study.plan.unit}
     for kind in kinds:
@@ -269,7 +269,7 @@ def _rows(studies: dict[str, Study]) -> list[Row]:
 
 
 def _method_rows(studies: dict[str, Study]) -> list[Row]:
-    """How often each method ends above fine-tuning, over all pairs."""
+    """Return how often each method ends above fine-tuning, over all pairs."""
     baseline = [finals(study, "fine-tune") for study in studies.values()]
     rows: list[Row] = []
     for arm in next(iter(studies.values())).plan.arms:
@@ -329,7 +329,7 @@ def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
 
 
 def _strip_picture(study: Study, folder: Path, path: Path) -> None:
-    """Put the film strips of a study below one another, with their captions."""
+    """Stack the film strips of a study, with their captions."""
     strips = [s for s in film_study(study, folder) if s.caption.startswith(SHOWN_ARMS)]
     figure = Figure(figsize=(9.0, 1.25 * len(strips)), layout="constrained")
     for axes, strip in zip(np.ravel(figure.subplots(len(strips), 1)), strips, strict=True):

@@ -1,4 +1,4 @@
-"""The policies that come with the package, as drivers."""
+"""Shipped camera policies as drivers."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ _SIZE: Final = (120, 160, 3)
 
 
 def find_clone(vehicle: str) -> CameraPolicy | None:
-    """The policy that drives a vehicle; None while there is none."""
+    """Return the shipped policy of a vehicle; None if there is none."""
     path = CLONES.get(vehicle)
     return None if path is None or not path.exists() else CameraPolicy.load(path)
 
 
 def sighted(policy: CameraPolicy) -> Callable[[Any], NDArray[np.float32]]:
-    """Drives by the pictures of the env."""
+    """Return a driver that acts on the pictures of the env."""
     return policy.predict
 
 
 def blind(policy: CameraPolicy) -> Callable[[Any], NDArray[np.float32]]:
-    """Drives by black pictures, whatever the env sees."""
-    always = policy.predict(np.zeros(_SIZE, np.uint8))  # What it does knows no yesterday.
+    """Return a driver that acts on black pictures, regardless of the env's."""
+    always = policy.predict(np.zeros(_SIZE, np.uint8))  # The policy has no memory.
     return lambda _: always

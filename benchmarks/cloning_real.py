@@ -1,29 +1,29 @@
-"""Clones on the frames of a real car: learned from them, and learned in simulation.
+"""Camera policies on frames of a real car: trained on them, and trained in simulation.
 
-The frames are those of the folder in the environment variable REAL_FRAMES: 430 in the order of
-time, with the key that was held, from the beginning of a drive of 2017.
+The frames are in the folder of the environment variable REAL_FRAMES: 430 in time order, each with
+the key that was held, from the start of a drive of 2017.
 
-**Learned from them.** Five splits learn from an earlier stretch and are judged on the next one,
-with five seeds each (SEEDS for another number): ours, and a plain network. Both see the same steps,
-and only those: ours holds out the steps for its early stopping from what it may learn from. The
-settings of ours (`shapechanger.demos.cloning.learn.DEMOS`) were chosen on these very splits, so the
-rows flatter them a little. Chosen by accuracy, with one to three seeds each:
+**Trained on them.** Five splits train on the earlier frames and test on the next segment, with five
+seeds each (SEEDS overrides the number): our clone and a plain network. Both train on the same
+frames; our clone takes its held-out steps for early stopping from them. Its settings
+(`shapechanger.demos.cloning.learn.DEMOS`) were chosen on these splits, so the rows are slightly
+optimistic. They were chosen by accuracy, with one to three seeds each:
 
 - Inputs, with kernel ridge regression in place of a network: pixels (grey or coloured, 8 to 32
   rows), histograms of edges, and the features of the shipped clones of car and tank. Edges were
-  best by far, in whatever cells and directions (9 variants): 0.73 to 0.78, where pixels gave up to
-  0.70 and the clones' features up to 0.72.
-- Mirroring as many pictures as not: 0.72 instead of 0.76, because this drive turns left only. So a
-  clone mirrors as far as its driver went to both sides.
+  best for all cells and directions tried (9 variants): 0.73 to 0.78, against at most 0.70 for
+  pixels and 0.72 for the clones' features.
+- Mirroring half of the pictures: 0.72 instead of 0.76, because this drive turns left only. The
+  clone therefore mirrors in proportion to how far its driver steered to both sides.
 - Networks: four convolutions on colours with augmentation, label smoothing and averaged weights
   (0.62), five on edges (0.74 to 0.77), one to four networks averaged (0.75 and 0.76).
 - The plain network: pictures of 32, 64 and 128 pixels, with and without normalising each, with and
   without a hidden layer (nine variants): 0.60 to 0.65.
 
-**Learned in simulation.** The area under the curve (AUC) tells how often the clone steers farther
-left on a frame where the driver steered left than on one where he drove straight: 1 is perfect, 0.5
-is chance. Judged as they are, and after training on the first frames, beside clones that learn from
-those frames only.
+**Trained in simulation.** The area under the curve (AUC) is the probability that the clone steers
+farther left on a frame where the driver steered left than on one where the driver went straight: 1
+is perfect, 0.5 is chance. The policies are tested as they are and after training on the first
+frames, and compared with clones trained on those frames only.
 """
 
 from __future__ import annotations
@@ -62,20 +62,20 @@ _BATCH: Final = 32
 _CHANNELS: Final = (16, 32, 64)
 _HIDDEN: Final = 64
 _RATE: Final = 1e-3
-# Real frames that clones from simulation learn from, half a minute of the drive.
+# Real frames that clones from simulation are trained on: half a minute of the drive.
 FEW: Final = 72
 FEW_FRAMES: Final = CloneSettings(
     held_out=0.0, fewest_steps=300, most_steps=300, augmentation=Augmentation(mirror=0.0)
 )
-# Steps of the demonstrations in randomised corridors: ten minutes, as those of the shipped clone.
+# Steps recorded in randomised corridors: ten minutes, as for the shipped clone.
 STEPS: Final = 12_000
 KEPT: Final = Path("results", "real-frames", "randomised.safetensors")
-# Square, as the frames are; squeezed to what ours sees, it was a little worse.
+# Square like the frames; the framing of our clone gave a slightly lower accuracy.
 _PLAIN_SEES: Final = Framing(height=64, width=64, top=0.0)
 
 
 class Scores(NamedTuple):
-    """How good one training was on the stretch that it was judged on."""
+    """Scores of one training on its test segment."""
 
     accuracy: float
     macro_f1: float
@@ -83,18 +83,18 @@ class Scores(NamedTuple):
 
 
 def forward_chain(n: int, splits: int = SPLITS) -> list[tuple[slice, slice]]:
-    """What is learned from and what is judged: each stretch is judged by all that is before it."""
+    """Return training and test slices; each segment is tested after training on all before it."""
     size = n // (splits + 1)
     starts = [n - (splits - i) * size for i in range(splits)]
     return [(slice(0, start), slice(start, start + size)) for start in starts]
 
 
 def paired_interval(differences: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Mean of paired differences, and its 95 % interval.
+    """Return the mean of paired differences and its 95 % interval.
 
-    Seeds of one split are judged on the same frames, so they are no independent trials: the mean
-    over the seeds of each split is one, and Student's t has one degree of freedom less than there
-    are splits.
+    Seeds of one split are tested on the same frames, so they are not independent: each split
+    contributes its mean over the seeds, and Student's t has one degree of freedom less than the
+    number of splits.
 
     Args:
         differences: Shape (splits, seeds).
@@ -120,16 +120,16 @@ class _Plain(nn.Sequential):
 def plain(
     pictures: NDArray[np.uint8], targets: NDArray[np.int64], seed: int, epochs: int = _EPOCHS
 ) -> Callable[[NDArray[np.uint8]], NDArray[np.int64]]:
-    """A plain small network: cross-entropy and Adam, twenty times over all frames.
+    """Train a small plain network with cross-entropy and Adam.
 
     Args:
         pictures: Shape (n, height, width, 3).
-        targets: Class of each, shape (n,).
+        targets: Class of each picture, shape (n,).
         seed: Seed of weights and order.
-        epochs: How often each picture is learned from.
+        epochs: Passes over the data.
 
     Returns:
-        What it says of pictures.
+        Function that predicts the classes of pictures.
     """
     torch.manual_seed(seed)
     seen = _tensor(pictures)
@@ -143,11 +143,11 @@ def plain(
             loss.backward()
             optimizer.step()
 
-    def says(pictures: NDArray[np.uint8]) -> NDArray[np.int64]:
+    def predict(pictures: NDArray[np.uint8]) -> NDArray[np.int64]:
         with torch.inference_mode():
             return network(_tensor(pictures)).argmax(dim=1).numpy()
 
-    return says
+    return predict
 
 
 def _tensor(pictures: NDArray[np.uint8]) -> torch.Tensor:
@@ -155,7 +155,7 @@ def _tensor(pictures: NDArray[np.uint8]) -> torch.Tensor:
 
 
 def real() -> list[Row]:
-    """Both on all splits and seeds."""
+    """Compare both methods on all splits and seeds."""
     frames = os.environ.get("REAL_FRAMES")
     if frames is None:
         return [Row("real frames", "skipped", "REAL_FRAMES names no folder", "none", True)]
@@ -168,7 +168,7 @@ def real() -> list[Row]:
 def scores(
     data: Dataset, seeds: int = SEEDS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Accuracy, macro-F1 and seconds of ours and of the plain network, each (splits, seeds, 3)."""
+    """Return accuracy, macro-F1 and seconds of both methods, each of shape (splits, seeds, 3)."""
     classes = output_fields(data.actions, data.action_layout, "class")["classes"]
     truth = class_numbers(data.actions, classes)
     pictures = prepare(_pictures(data), DEMOS.framing)
@@ -181,13 +181,13 @@ def scores(
         learned[past] = True
         for seed in range(seeds):
             began = time.monotonic()
-            says = plain(squares[past], truth[past], seed)
-            theirs[i, seed] = _scored(says(squares[future]), truth[future], began)
+            predict = plain(squares[past], truth[past], seed)
+            theirs[i, seed] = _scored(predict(squares[future]), truth[future], began)
             began = time.monotonic()
             policy, _ = learn(data, learned, head="class", seed=seed)
             done = class_numbers(policy.predict_many(pictures[future]), classes)
             ours[i, seed] = _scored(done, truth[future], began)
-    # Always the key that was held most; over the stretches that are judged.
+    # Accuracy of always predicting the most frequent key, on the test segments.
     judged = np.concatenate([truth[future] for _, future in splits])
     return ours, theirs, float((judged == 0).mean())
 
@@ -198,7 +198,7 @@ def _scored(done: NDArray[np.int64], truth: NDArray[np.int64], began: float) -> 
 
 
 def rows(ours: NDArray[np.float64], theirs: NDArray[np.float64], straight: float) -> list[Row]:
-    """What came out, beside what was promised."""
+    """Return the results next to their targets."""
     found: list[Row] = []
     pairs = ours.shape[0] * ours.shape[1]
     for place, name in enumerate(("accuracy", "macro-F1")):
@@ -247,7 +247,7 @@ def rows(ours: NDArray[np.float64], theirs: NDArray[np.float64], straight: float
 
 
 def _from_simulation(data: Dataset) -> list[Row]:
-    """What clones of the simulated expert are worth on the real frames."""
+    """Test clones of the simulated expert on the real frames."""
     pictures = _pictures(data)
     fields = output_fields(data.actions, data.action_layout, "class")
     truth, names = class_numbers(data.actions, fields["classes"]), fields["class_names"]
@@ -290,7 +290,7 @@ def _from_simulation(data: Dataset) -> list[Row]:
 
 
 def _randomised() -> CameraPolicy:
-    """A clone of the expert in corridors of random light, colours, textures and camera poses."""
+    """Return a clone of the expert in corridors with random light, colours and camera poses."""
     if KEPT.exists():
         return CameraPolicy.load(KEPT)
     settings = CloneSettings(held_out=0.0)

@@ -1,9 +1,8 @@
-"""How old the console's pictures are when they are on its canvas, and whether it slows the robot.
+"""Age of the console's pictures on its canvas, and its effect on the robot's control loop.
 
-The twin's camera draws the time at which it takes a picture into its first rows. A script in the
-page reads it back from the canvas at each frame that the browser draws. The page's clock is set
-beside the robot's by a ping and its answer on loopback, and the fastest of many counts, so that the
-error is at most half of its round trip.
+The camera of the twin draws the capture time into the first rows of each picture. A script in the
+page reads it back from the canvas at each animation frame. The page's clock is compared with the
+robot's by pings on loopback; the fastest round trip counts, so the error is at most half of it.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from tests.robots import CAR, IN_A_ROOM
 SECONDS: Final = 35.0
 _MOST_MS: Final = 100.0
 
-# Times of two clocks at the same moment, and how far they may be off: page ms, robot ns, ms.
+# Simultaneous times of both clocks and their uncertainty: page ms, robot ns, ms.
 _CALIBRATE: Final = """async ([key, times]) => {
   const { Link } = await import("/console/link.js");
   const link = new Link({ frames: false });
@@ -48,7 +47,7 @@ _CALIBRATE: Final = """async ([key, times]) => {
   return best;
 }"""
 
-# Reads the 64 cells of the time code at each frame: 48 bits of nanoseconds, and 16 of a check.
+# Reads the 64 cells of the time code at each frame: 48 bits of nanoseconds and a 16-bit CRC.
 _WATCH: Final = """() => {
   const canvas = document.getElementById("picture");
   const context = canvas.getContext("2d");
@@ -73,7 +72,7 @@ _WATCH: Final = """() => {
 }"""
 
 
-# Hangs four fifths of the time.
+# Blocks the page 80 % of the time.
 _HANG: Final = """setInterval(() => {
   const end = performance.now() + 400;
   while (performance.now() < end);
@@ -81,14 +80,14 @@ _HANG: Final = """setInterval(() => {
 
 
 def console(seconds: float = SECONDS) -> list[Row]:
-    """Picture from the camera to the page, and the robot's control loop beside a slow page."""
+    """Measure the age of pictures on the page, and the control loop next to a slow page."""
     with _robot() as robot, _browser() as browser:
         ages, error_ms = _ages_ms(browser, robot, seconds)
         alone = _commands_ms(robot, seconds / 2)
         with _page(browser, robot) as page:
             page.evaluate(_HANG)
             beside = _commands_ms(robot, seconds / 2)
-        # The browser takes a core from the robot here, whatever it shows. This tells that apart.
+        # On this machine any browser page takes CPU time from the robot. This is the control.
         with browser.new_context() as context:
             context.new_page().evaluate(_HANG)
             stranger = _commands_ms(robot, seconds / 2)
@@ -161,32 +160,32 @@ def _page(browser: Browser, robot: RunningRobot) -> Generator[Page]:
 
 
 def _ages_ms(browser: Browser, robot: RunningRobot, seconds: float) -> tuple[list[float], float]:
-    """The age of each picture when it is on the canvas, and how well the clocks agree."""
+    """Return the age of each picture on the canvas, and the error of the clocks, ms."""
     with _page(browser, robot) as page:
         page_ms, robot_ns, error_ms = page.evaluate(_CALIBRATE, [robot.known.key, 50])
         page.evaluate(_WATCH)
         page.wait_for_timeout(1e3 * seconds)
         seen: list[tuple[int, float, str]] = page.evaluate("globalThis.seen")
     if len(seen) < 10.0 * seconds:
-        # The robot started afresh, as on a machine that is too busy for its guard: no measurement.
+        # The robot restarted, as on a machine that is too busy for its guard.
         raise RuntimeError(f"Only {len(seen)} pictures came in {seconds:.0f} s: {robot.log_text()}")
     ages: list[float] = []
     for number, at_ms, bits in seen[1:]:
-        if not _is_whole(bits):
+        if not _crc_matches(bits):
             continue
         now_ns = robot_ns + 1e6 * (at_ms - page_ms)
         ages.append(((now_ns - number) % 2**48) / 1e6)
     return ages, error_ms
 
 
-def _is_whole(bits: str) -> bool:
-    """Whether the check of a time code fits, as in `read_barcode`."""
+def _crc_matches(bits: str) -> bool:
+    """Return whether the CRC of a time code matches, as in `read_barcode`."""
     data = int(bits, 2).to_bytes(8, "big")
     return binascii.crc_hqx(data[:6], 0xFFFF) == int.from_bytes(data[6:], "big")
 
 
 def _commands_ms(robot: RunningRobot, seconds: float) -> list[float]:
-    """Times between the commands of a program that reached the outputs, by the robot's clock."""
+    """Return the times between a client's commands at the outputs, by the robot's clock."""
     applied: list[int] = []
     with robot.client(name="program", frames=True) as client, robot.operator() as operator:
         operator.place(0)

@@ -1,9 +1,8 @@
-"""What one round of corrections is worth: record, train, drive, correct, train again.
+"""Value of one round of corrections: record, train, drive, correct, train again.
 
-Everything is done by the commands that a user would type, one after another, in
-`results/corrections`; what lies there already is not done again. Ten minutes of the expert leave
-little to correct, so there is a round that begins with two as well, beside one that goes on with
-the expert's driving in place of corrections.
+All steps run the commands that a user would type, in `results/corrections`; finished steps are not
+repeated. After ten minutes of the expert there is little to correct, so another round starts from
+two minutes and is compared with recording more of the expert instead of corrections.
 """
 
 from __future__ import annotations
@@ -30,23 +29,23 @@ from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 
 LAYOUTS: Final = 100
 MINUTES: Final = 10
-# A clone of ten minutes collides so rarely that it takes a long way to tell two of them apart.
+# A clone of ten minutes rarely collides, so comparing two of them takes long drives.
 LONG_LAYOUTS: Final = 300
 FEW_MINUTES: Final = 2
 FEW_SEEDS: Final = 3
-# Seeds of courses that nobody was recorded on before; each seed of the study has its own.
+# Offset of the seeds of later recordings, and of those of each seed of the study.
 LATER: Final = 100_000
 APART: Final = 1_000
 
 
 class _Round:
-    """One round: so many minutes of the expert, and as many again of corrections.
+    """One round: minutes of the expert, then as many minutes of corrections.
 
     Args:
-        vehicle: Which.
-        minutes: How many.
-        courses: How many are driven to judge it.
-        seed: Of the courses that are recorded, and of the training.
+        vehicle: Name of the vehicle.
+        minutes: Length of each recording, min.
+        courses: Number of courses in the evaluation.
+        seed: Seed of the recorded courses and of the training.
     """
 
     def __init__(self, vehicle: str, minutes: int, courses: int, seed: int = 0) -> None:
@@ -58,17 +57,17 @@ class _Round:
         self._shown = self._folder / "shown"
 
     def first(self) -> list[DriveResult]:
-        """How the clone of the expert drives."""
+        """Drive with the clone of the expert."""
         return self._driven(self._first())
 
     def corrected(self) -> list[DriveResult]:
-        """How it drives after the expert has taken over wherever it went wrong."""
+        """Drive with the clone that was also trained on the expert's corrections."""
         by_expert = ["--driver", str(self._first()), "--corrected-by", "expert"]
         corrected = self._recorded("corrected", LATER, by_expert)
         return self._driven(self._trained("both", self._merged("both", corrected)))
 
     def continued(self) -> list[DriveResult]:
-        """How it drives after as many minutes more of the expert in place of that."""
+        """Drive with the clone that was trained on more of the expert instead of corrections."""
         more = self._recorded("more", LATER)
         return self._driven(self._trained("longer", self._merged("longer", more)))
 
@@ -79,7 +78,7 @@ class _Round:
         out = self._folder / name
         command = ["record", self._vehicle.capitalize(), "--out", str(out)]
         command += ["--minutes", str(self._minutes), "--seed", str(later + APART * self._seed)]
-        # Short episodes, so that there are many courses; and whoever runs into something goes on.
+        # Short episodes give many courses; a collision does not end an episode.
         _once(out, [*command, "--episode-s", "10", "--put-back", *by])
         return out
 
@@ -95,7 +94,7 @@ class _Round:
         return out
 
     def _driven(self, policy: Path) -> list[DriveResult]:
-        """Drives on courses that nobody was recorded on, kept in a file beside the policy."""
+        """Drive on held-out courses and cache the results next to the policy."""
         kept = policy.with_suffix(f".{len(self._courses)}.drives")
         if not kept.exists():
             act = sighted(CameraPolicy.load(policy))
@@ -106,7 +105,7 @@ class _Round:
 
 
 def corrections() -> list[Row]:
-    """Ten minutes of the expert and of corrections once; two of each with several seeds."""
+    """Measure one round of ten minutes, and rounds of two minutes with several seeds."""
     vehicle = os.environ.get("VEHICLE", "car")
     knows = _expert(vehicle)
     long = _Round(vehicle, MINUTES, LONG_LAYOUTS)
@@ -133,11 +132,11 @@ def corrections() -> list[Row]:
 
 
 def _once(made: Path, command: list[str]) -> None:
-    """Do what makes a file or folder, unless it was done to its end."""
+    """Run a command that makes a file or folder, unless it has completed before."""
     done = made.with_name(f"{made.name}.done")
     if not done.exists():
         if made.is_dir():
-            shutil.rmtree(made)  # What was cut off would come on top.
+            shutil.rmtree(made)  # An interrupted recording would be appended to.
         main(["demos", *command])
         done.touch()
 
@@ -155,7 +154,7 @@ def _together(seeds: Sequence[list[DriveResult]]) -> DriveScore:
 def _row(
     name: str, score: DriveScore, knows: DriveScore, seeds: Sequence[list[DriveResult]] = ()
 ) -> Row:
-    """Only ten minutes of the expert have a number to reach."""
+    """Return the row of a score; only the rounds of ten minutes have a target."""
     share = score.speed / knows.speed
     each = ", ".join(f"{DriveScore.of(drives).per_100_m:.2f}" for drives in seeds)
     spread = f"{counted(score)}; at {100 * share:.0f} % of the expert's speed"
@@ -170,9 +169,9 @@ def _row(
 
 
 def _ratio_row(name: str, before: DriveScore, after: DriveScore, *, asked: bool = True) -> Row:
-    """How many collisions are left, with the interval of a ratio of two counts.
+    """Return the ratio of two collision rates with its interval.
 
-    Given how many there are together, the later ones are binomial: J. Przyborowski and
+    Given the sum of both counts, the second is binomial: J. Przyborowski and
     H. Wilenski, "Homogeneity of results in testing samples from Poisson series", Biometrika 1940.
     """
     together = before.collisions + after.collisions
@@ -190,5 +189,5 @@ def _ratio_row(name: str, before: DriveScore, after: DriveScore, *, asked: bool 
 
 
 def _ratio(share: float, fair: float) -> float:
-    """The ratio of two rates from the share of the second in their sum."""
+    """Return the ratio of two rates from the share of the second in their sum."""
     return float("inf") if share >= 1.0 else share / (1.0 - share) * (1.0 - fair) / fair

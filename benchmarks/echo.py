@@ -1,7 +1,7 @@
-"""A daemon with a guard and a camera that cost nothing: what is left is the link itself.
+"""Daemon with a fake guard and camera of negligible cost, to measure the link alone.
 
-There is always a newer picture, so that each command is answered at once with an observation that
-carries one, as the daemon does on a robot whenever its camera has been faster than the client.
+A new picture is always available, so each command is answered at once with an observation that
+carries one, as on a robot whose camera is faster than its client.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from shapechanger.twin.camera import with_capture_time
 
 _HZ = 100.0
-# A robot takes 500 messages a second from a client, and ends the connection of one that says more.
+# A robot accepts 500 messages per second and closes the connection of a client that sends more.
 _PAUSE_S = 0.0025
 _PICTURE_S = 0.002
 _DESCRIPTOR = socket.CMSG_SPACE(4)  # An ancillary message with one descriptor.
 
 
 class EchoRobot:
-    """The daemon in one process, its guard and camera in a second, the client in this one."""
+    """Robot whose daemon is one process and whose guard and camera are another."""
 
     def __init__(self) -> None:
         self._folder = tempfile.TemporaryDirectory()
@@ -85,18 +85,18 @@ class EchoRobot:
         self._known = KnownRobot("echo", f"127.0.0.1:{port}", key, credentials.fingerprint.hex())
 
     def __enter__(self) -> Self:
-        """The robot itself."""
+        """Return the robot."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End it."""
+        """End both processes."""
         for process in (self._daemon, self._echo):
             process.kill()
             process.wait()
         self._folder.cleanup()
 
     def round_trips(self, count: int) -> NDArray[np.float64]:
-        """Seconds from handing over a command to having the picture that answers it."""
+        """Return the seconds from sending a command to receiving the picture that answers it."""
         times: list[float] = []
         with RobotClient.connect(self._known) as client:
             client.take()
@@ -112,7 +112,7 @@ class EchoRobot:
 
 
 def main(guard_fd: int, fifo: Path) -> None:
-    """Be the guard and the camera: a state and a new picture every 2 ms, and after each order."""
+    """Run guard and camera: a state and a picture every 2 ms and after each order."""
     rng = np.random.default_rng(0)
     small = rng.integers(0, 256, (15, 20, 3), dtype=np.uint8)
     pictures = [

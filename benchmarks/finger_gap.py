@@ -1,9 +1,9 @@
-"""What is left of a policy of the nominal finger in fingers that are not like it, and on rigs.
+"""Transfer of a policy of the nominal finger to other fingers and to rigs.
 
-The study is that of `shapechanger transfer Finger Finger --target-options '{"gap": "real-like"}'
---source-policy ...`, with the policy that ships: each seed meets another finger. It lies in
-`results/finger-gap`, and what has ended there is not done again. The same to `RemoteFinger-v1`, on
-twins of a rig that the env serves for itself, lies in `results/finger-rig`.
+The study equals `shapechanger transfer Finger Finger --target-options '{"gap": "real-like"}'
+--source-policy ...` with the shipped policy; each seed has another finger. It is kept in
+`results/finger-gap`, and finished runs are not repeated. The study with `RemoteFinger-v1`, on twins
+of a rig that the env serves itself, is kept in `results/finger-rig`.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from shapechanger.transfer.plan import ARMS, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
 
 SEEDS: Final = 3
-# What a finger on a bench moves for ten minutes.
+# Ten minutes on a bench.
 STEPS: Final = 30_720
 RIGS: Final = 2
 RIG_STEPS: Final = 6144
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
-# Fewer of what is left is a gap; more of it is one that nobody needs to cross.
+# Zero-shot success below this counts as a gap.
 _MILD: Final = 0.5
 _RECOVERED: Final = 0.8
 
 
 def gap() -> list[Row]:
-    """Success of each arm, on fingers of the gap "real-like"."""
+    """Measure the success of each arm on fingers of the gap "real-like"."""
     target = _FINGER.having({"gap": "real-like"})
     study = _study(
         target,
@@ -51,7 +51,7 @@ def gap() -> list[Row]:
 
 
 def rig() -> list[Row]:
-    """The same through link, daemon, guard and servo bus, on two minutes of each rig."""
+    """Measure the same through link, daemon, guard and servo bus, with two minutes per rig."""
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
     arms: tuple[str, ...] = ("scratch", "zero-shot", "randomised", "identified")
     study = _study(target, "ppo-rig", arms, RIGS, RIG_STEPS, Path("results", "finger-rig"))
@@ -61,7 +61,7 @@ def rig() -> list[Row]:
 def _study(
     target: EnvRef, learner: str, arms: tuple[str, ...], seeds: int, steps: int, out: Path
 ) -> Study:
-    """A study of what ships, and its report."""
+    """Run a study of the shipped policy and write its report."""
     plan = make_plan(
         TransferTask(_FINGER, target),
         learner,
@@ -83,7 +83,7 @@ def _study(
 
 
 def rows_of(study: Study, where: str) -> list[Row]:
-    """What each arm reaches, beside what was asked; the nominal finger reaches all."""
+    """Return the success of each arm next to its target; the nominal finger reaches all."""
     shares = {arm: successes(study, arm) for arm in study.plan.arms}
     best = max(("randomised", "identified"), key=lambda arm: float(shares[arm].mean()))
     limits = {"zero-shot": ("< 50 %", float(shares["zero-shot"].mean()) < _MILD)}

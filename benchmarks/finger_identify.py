@@ -1,4 +1,4 @@
-"""How near the arms of fingers come out that are identified from ten seconds of noisy babble."""
+"""Accuracy of moment arms identified from ten seconds of noisy babble."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SMALL_M = 2e-3
 
 
 def identified() -> list[Row]:
-    """Fingers of the gap "real-like", which stretch, rub, play and come late."""
+    """Identify fingers of the gap "real-like", with stretch, friction, play and delay."""
     many = int(os.environ.get("FINGERS", "20"))
     errors: list[float] = []
     worst: list[float] = []
@@ -97,7 +97,7 @@ def identified() -> list[Row]:
 
 
 def with_arms() -> list[Row]:
-    """Whether arms get better when the motion is fitted with them as well."""
+    """Compare arms fitted to lengths with arms also fitted to the motion."""
     many = min(4, int(os.environ.get("FINGERS", "4")))
     by_lengths: list[float] = []
     by_motion: list[float] = []
@@ -120,7 +120,7 @@ def with_arms() -> list[Row]:
 
 
 def _recorded(seed: int) -> tuple[FingerLog, FingerParameters]:
-    """The log of a drawn finger, and the truth about it."""
+    """Return the log of a random finger and its true parameters."""
     env = gym.make(
         "shapechanger/Finger-v1", gap="real-like", finger_seed=seed, max_episode_steps=-1
     )
@@ -131,13 +131,13 @@ def _recorded(seed: int) -> tuple[FingerLog, FingerParameters]:
 
 
 def _off(found: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Errors of the arms above 2 mm, as shares of them."""
+    """Return the relative errors of the arms above 2 mm."""
     large = np.abs(arms) > _SMALL_M
     return np.abs(found - arms)[large] / np.abs(arms[large])
 
 
 def _factors(found: IdentifiedFinger, truth: FingerParameters) -> dict[str, float]:
-    """Of other parameters, what was found over what is."""
+    """Return the ratio of identified to true value for the other parameters."""
     mine = found.parameters
     over = {
         f"{name} of {joint}": getattr(mine, name)[j] / getattr(truth, name)[j]

@@ -1,7 +1,7 @@
-"""How well the finger learns to reach and to follow: five seeds each, with their learning curves.
+"""Success of learned reaching and following: five seeds each, with learning curves.
 
-Each training is done once; policies and curves lie in `results/finger`, and what is there already
-is not trained again. The curves are published with the rows, in `finger-curves.json`.
+Policies and curves are kept in `results/finger`; finished trainings are not repeated. The curves
+are published with the rows, in `finger-curves.json`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _CIRCLE: Final = {"kind": "circle", "radius": 0.012, "hz": 0.5}
 
 @dataclass(frozen=True)
 class Task:
-    """What is learned.
+    """Task to learn.
 
     Attributes:
         env: The env.
@@ -52,13 +52,13 @@ class Task:
 
 TASKS: Final = {
     "reach": Task(EnvRef("shapechanger/Finger-v1"), "ppo-finger", 307_200),
-    # On many paths, so that what is learned follows others too.
+    # Trained on random paths, so that the policy generalises to others.
     "track": Task(EnvRef("shapechanger/FingerTrack-v1", {"path": "random"}), "ppo-finger", 307_200),
 }
 
 
 def learned() -> list[Row]:
-    """Train what is not there yet, and judge it on targets that nothing was tried on."""
+    """Train the missing policies and evaluate them on unseen targets."""
     seeds = range(int(os.environ.get("SEEDS", SEEDS)))
     wanted = [(name, seed) for name in TASKS for seed in seeds]
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -70,7 +70,7 @@ def learned() -> list[Row]:
 
 
 def trained(name: str, seed: int) -> Path:
-    """Train a policy, unless it was; its file."""
+    """Return the file of a policy; train it if it does not exist."""
     out = FOLDER / f"{name}-{seed}.safetensors"
     if out.exists():
         return out
@@ -132,7 +132,7 @@ def _tracker(seed: int) -> TrainedPolicy:
 
 
 def _played(policy: TrainedPolicy, env: EnvRef, episodes: int) -> list[dict[str, Any]]:
-    """The last info of each episode."""
+    """Return the last info of each episode."""
     infos: list[dict[str, Any]] = []
     with gym.make(env.id, **env.kwargs) as made:
         for i in range(episodes):

@@ -1,4 +1,4 @@
-"""How well the controller that knows the finger reaches points and follows a circle."""
+"""Accuracy of the controller with a model of the finger: reaching points and following a circle."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from shapechanger.bodies.finger import DRIVES
 from shapechanger.envs.finger.oracle import FingerOracle
 
 TARGETS: Final = 1000
-# Far from the seeds that anything was tried on.
+# Beyond all seeds used for tuning.
 FIRST_SEED: Final = 1_000_000
 _TRACKS: Final = 5
 
 
 def oracle() -> list[Row]:
-    """Reaching in each mode of action, and following a circle of 12 mm."""
+    """Measure reaching in each action mode, and following a circle of 12 mm."""
     targets = int(os.environ.get("TRIALS", TARGETS))
     rows: list[Row] = []
     for mode in DRIVES:
@@ -50,7 +50,7 @@ def oracle() -> list[Row]:
 
 
 def reached(mode: str, targets: int, **arguments: Any) -> tuple[list[bool], list[float]]:
-    """Whether each target was reached, and how far the fingertip ended from it, m."""
+    """Return whether each target was reached, and the final distance of the fingertip, m."""
     successes: list[bool] = []
     distances: list[float] = []
     with gym.make("shapechanger/Finger-v1", actions=mode, **arguments) as env:
@@ -69,7 +69,7 @@ def reached(mode: str, targets: int, **arguments: Any) -> tuple[list[bool], list
 
 
 def tracked_mm(hz: float, seed: int) -> float:
-    """Root mean square error on a circle of 12 mm, mm."""
+    """Return the root mean square error on a circle of 12 mm, mm."""
     path = {"kind": "circle", "radius": 0.012, "hz": hz}
     with gym.make("shapechanger/FingerTrack-v1", path=path) as env:
         inner: Any = env.unwrapped

@@ -1,8 +1,8 @@
-"""A finger in a process of its own, stepped on demand: `finger_peer.py KIND`.
+"""Finger env in a process of its own, stepped on demand: `finger_peer.py KIND`.
 
-KIND is `ours` or `myosuite`. It says `ready`, its version and how long a step is, s; then for each
-number of steps that it reads it answers with the seconds of CPU that they took, resets included. It
-imports nothing else of ours, so that the peer may live in another environment.
+KIND is `ours` or `myosuite`. The process prints `ready`, its version and the duration of a step, s.
+For each number of steps that it reads, it prints the CPU seconds they took, resets included. It
+imports none of our other modules, so that the peer can live in another environment.
 """
 
 from __future__ import annotations

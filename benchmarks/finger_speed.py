@@ -1,6 +1,6 @@
-"""How many seconds of a finger's life a core simulates in one, against MyoSuite's finger.
+"""Simulated seconds of a finger per core-second, compared with MyoSuite's finger.
 
-Rounds are paired, in an order that alternates; each gives one ratio.
+Rounds are paired in alternating order; each gives one ratio.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from benchmarks.peer import Peer
 from benchmarks.row import Row
 
 ROUNDS: Final = 15
-# Of simulated time in a round.
+# Simulated time per round.
 SECONDS: Final = 20.0
-# An interpreter that has MyoSuite, if it is not this one.
+# Interpreter with MyoSuite installed.
 MYOSUITE_PYTHON: Final = os.environ.get("SHAPECHANGER_MYOSUITE_PYTHON", sys.executable)
 PEER: Final = Path(__file__).with_name("finger_peer.py")
 
 
 def against_myosuite() -> list[Row]:
-    """Whole steps of the envs, with what they sense and earn, and resets."""
+    """Compare whole env steps: observations, rewards and resets included."""
     name = "finger: simulated seconds per core-second, ours over MyoSuite's"
     theirs = Peer([MYOSUITE_PYTHON, str(PEER), "myosuite"])
     try:

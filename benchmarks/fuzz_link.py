@@ -1,10 +1,10 @@
-"""Throw mutated messages at a robot: no crash, no accepted command, and memory stays flat.
+"""Send mutated messages to a robot: no crash, no accepted command, constant memory.
 
 `python -m benchmarks.fuzz_link --count 1000000` mutates messages of every kind (flipped bits, cuts,
-splices, lengths that lie, deep nesting, huge numbers) and hands them to a session of the daemon, as
-its WebSocket would. The robot has a driver, so an order can go through; the fuzzer's own client has
-no right to any but an emergency stop. A few thousand go through a real socket in
-`tests/robot/daemon/test_fuzz.py`.
+splices, wrong lengths, deep nesting, huge numbers) and hands them to a session of the daemon, as
+its WebSocket would. The robot has a driver, so orders can go through; the fuzzing client has no
+right to any but an emergency stop. `tests/robot/daemon/test_fuzz.py` sends a few thousand through a
+real socket.
 """
 
 from __future__ import annotations
@@ -72,8 +72,8 @@ SEEDS = [
     )
 ]
 
-# Beginnings of msgpack values that say more than follows, and values at the edge of what is one.
-LIES = [
+# Headers of msgpack values longer than their data, and extreme values.
+FRAGMENTS = [
     b"\xdd\xff\xff\xff\xff",
     b"\xdf\xff\xff\xff\xff",
     b"\xc6\xff\xff\xff\xff",
@@ -89,7 +89,7 @@ LIES = [
 
 
 def mutated(rng: random.Random) -> bytes:
-    """One message that was valid once, mostly."""
+    """Return a mutated valid message; a few remain valid."""
     data = bytearray(rng.choice(SEEDS))
     for _ in range(rng.choice((1, 1, 1, 2, 4, 8))):
         where = rng.randrange(len(data) + 1)
@@ -103,7 +103,7 @@ def mutated(rng: random.Random) -> bytes:
                 other = rng.choice(SEEDS)
                 data[where:] = other[rng.randrange(len(other)) :]
             case 3:
-                data[where : where + rng.randrange(9)] = rng.choice(LIES)
+                data[where : where + rng.randrange(9)] = rng.choice(FRAGMENTS)
             case 4:
                 data[where:where] = rng.choice((b"\x91", b"\x81\xa1x")) * rng.randrange(2_000)
             case 5:
@@ -114,7 +114,7 @@ def mutated(rng: random.Random) -> bytes:
 
 
 def resident_kb() -> int:
-    """Memory of this process that is in use, kB."""
+    """Return the resident memory of this process, kB."""
     status = Path("/proc/self/status").read_text()
     return int(status.split("VmRSS:")[1].split()[0])
 
@@ -127,14 +127,14 @@ def _drained(session: Session) -> None:
 def fuzz(
     count: int, seed: int = 0, progress: Callable[[int], None] = lambda _: None
 ) -> collections.Counter[str]:
-    """Hand so many messages to sessions that are strangers, or known and not in command.
+    """Send mutated messages to unauthenticated sessions and to sessions without the lease.
 
     Returns:
-        How many ended the connection, how many were understood, and how many orders of each kind
-        the guard got.
+        Number of messages that ended the connection, of decoded messages, and of orders that
+        reached the guard by kind.
 
     Raises:
-        AssertionError: If a command came through, or a stranger was let in.
+        AssertionError: If a command was accepted, or a session authenticated.
     """
     rng = random.Random(seed)
     counts: collections.Counter[str] = collections.Counter()
@@ -148,7 +148,7 @@ def fuzz(
     for number in range(1, count + 1):
         now_ns += 1_000_000
         data = mutated(rng)
-        if number % 4 == 0:  # A stranger at a door with a key.
+        if number % 4 == 0:  # An unauthenticated connection to a robot with a key.
             stranger = Session(number, hub, Authenticator(KEY))
             try:
                 stranger.introduce(data)
@@ -184,12 +184,12 @@ def fuzz(
 
 
 def main() -> None:
-    """Fuzz, and print what came of it."""
+    """Fuzz and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
-    fuzz(5_000, asked.seed + 1)  # So that what is loaded once is loaded.
+    fuzz(5_000, asked.seed + 1)  # Warm up: load modules and caches.
     began, before_kb, most_kb = time.perf_counter(), resident_kb(), 0
 
     def watch(_: int) -> None:

@@ -1,4 +1,4 @@
-"""Something that is measured in a process of its own, maybe of another environment."""
+"""Process to measure, possibly of another environment."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 
 class Peer:
-    """A process that says that it is ready, and then how long what it is asked for took.
+    """Process that prints `ready`, then the duration of each request.
 
     Args:
-        command: How to start it.
+        command: Command that starts the process.
     """
 
     def __init__(self, command: Sequence[str]) -> None:
@@ -23,32 +23,32 @@ class Peer:
         )
 
     def ready(self) -> list[str]:
-        """What it says of itself once it is under way, its version first.
+        """Wait for the process and return its description, version first.
 
         Raises:
-            RuntimeError: If it does not start: the last that it said.
+            RuntimeError: If it does not start, with its last line of output.
         """
         assert self._process.stdout is not None
         assert self._process.stderr is not None
-        for line in self._process.stdout:  # Others say a word of greeting first.
-            said = line.split()
-            if said[:1] == ["ready"]:
-                return said[1:]
+        for line in self._process.stdout:  # Some libraries print a banner first.
+            words = line.split()
+            if words[:1] == ["ready"]:
+                return words[1:]
         lines = self._process.stderr.read().strip().splitlines()
         raise RuntimeError(lines[-1] if lines else "it ended without a word")
 
     def begin(self, steps: int) -> None:
-        """Let it step."""
+        """Request a number of steps."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{steps}\n")
         self._process.stdin.flush()
 
     def seconds(self) -> float:
-        """How long that took."""
+        """Return the duration of the last request."""
         assert self._process.stdout is not None
         return float(self._process.stdout.readline())
 
     def close(self) -> None:
-        """End it."""
+        """Kill the process."""
         self._process.kill()
         self._process.communicate()

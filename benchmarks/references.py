@@ -1,9 +1,8 @@
-"""Reference policies: each env learned from scratch with its own settings, and its floor.
+"""Reference policies: each env trained from scratch with its own settings, and its floor.
 
-Each training is done once. Policies and curves lie in `results/references`; what is there already
-is not trained again and always counts, and so do the sources of the suite of ants. `ONLY` names
-envs, `SEEDS` says how many trainings each has at least. The values and the best policy of each env
-are written into the package.
+Policies and curves are kept in `results/references`; finished trainings are not repeated and always
+count, as do the sources of the suite of ants. `ONLY` names envs, `SEEDS` sets the least number of
+trainings of each. The values and the best policy of each env are written into the package.
 """
 
 from __future__ import annotations
@@ -39,18 +38,18 @@ from shapechanger.transfer.runs import RunResult
 
 RESULTS: Final = Path("results", "references")
 COMMAND: Final = "python -m benchmarks.run references"
-# Evaluations at the end of a training that count, and episodes of the floor and of the policy.
+# Final evaluations that are averaged, and episodes for floor and policy.
 LAST: Final = 3
 EPISODES: Final = 20
 
 
 class Target(NamedTuple):
-    """What an env is trained for.
+    """Training budget and target of an env.
 
     Attributes:
         steps: Env steps.
-        measure: What counts.
-        wanted: What a reference policy should reach; None for whatever comes out.
+        measure: Name of the measure.
+        wanted: Value that a reference policy should reach; None for no target.
         seeds: Number of trainings.
     """
 
@@ -78,7 +77,7 @@ TARGETS: Final = {
 
 
 def references() -> list[Row]:
-    """Train what is not there yet, and write what ships."""
+    """Train the missing policies and write the shipped files."""
     names = os.environ.get("ONLY", "").split() or list(TARGETS)
     most = int(os.environ.get("SEEDS", "10"))
     wanted = [(name, seed) for name in names for seed in range(_seeds(name, most))]
@@ -100,7 +99,7 @@ def references() -> list[Row]:
 
 
 def _seeds(name: str, most: int) -> int:
-    """Number of trainings of an env: as many as asked for, or as there are."""
+    """Return the number of trainings of an env: as many as requested, or as exist if more."""
     done = 0
     while (RESULTS / f"{name}-{done}.json").exists():
         done += 1
@@ -112,7 +111,7 @@ def _env(name: str) -> EnvRef:
 
 
 def _trained(name: str, seed: int) -> tuple[Evaluation, ...]:
-    """The curve of a training, which is done unless it was."""
+    """Return the curve of a training; train if it does not exist."""
     place = RESULTS / f"{name}-{seed}.json"
     if place.exists():
         return read_json(place, tuple[Evaluation, ...], f"delete {place}")
@@ -133,7 +132,7 @@ def _trained(name: str, seed: int) -> tuple[Evaluation, ...]:
 
 
 def _taken_from_atlas(name: str, seed: int, place: Path) -> bool:
-    """Copy a source of the suite of ants, which is the same training if its budget is the same."""
+    """Copy a source of the suite of ants if its budget is the same; return whether one exists."""
     for run in Path("results", "ants").glob(f"{name}-to-*/runs/source-{seed}"):
         policy = run / "policy.safetensors"
         if policy.exists() and load_policy(policy).card.steps == TARGETS[name].steps:
@@ -145,7 +144,7 @@ def _taken_from_atlas(name: str, seed: int, place: Path) -> bool:
 
 
 def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, EnvReference]) -> Row:
-    """Copy the best policy of an env into the package, with its numbers."""
+    """Copy the best policy of an env into the package, with its values."""
     env, target = _env(name), TARGETS[name]
     floor, measures = _floor(env)
     ends = {
@@ -195,7 +194,7 @@ def _played(env: EnvRef, policy: Path) -> Evaluation:
 
 
 def _floor(env: EnvRef) -> tuple[dict[str, dict[str, float]], list[str]]:
-    """The value of each measure without skill, and the names of the measures."""
+    """Return the values of each measure without skill, and the names of the measures."""
     settings = learner_settings(default_learner(env))
     envs = evaluation_envs(env, settings)
     try:

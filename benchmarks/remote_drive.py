@@ -1,4 +1,4 @@
-"""A drive of a robot behind a link, judged by somebody who stands beside its twin."""
+"""Drive of a robot behind a link, scored by an operator of its twin."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ def drive_remote(
     metres: float = METRES,
     limit_s: float = LIMIT_S,
 ) -> DriveResult:
-    """As `shapechanger.envs.vehicle.evaluation.drive`, on a twin that is served.
+    """Drive a served twin, as `shapechanger.envs.vehicle.evaluation.drive` does an env.
 
     Args:
-        env: The robot, made with `on_reset=operator.place`; a collision ends no episode.
-        operator: Who puts it at the start, and back after a collision.
-        act: Who drives.
-        course: Seed of the course, which is laid out already.
+        env: The robot, made with `on_reset=operator.place`; a collision must not end the episode.
+        operator: Operator that puts the robot at the start, and back after a collision.
+        act: Driver.
+        course: Seed of the course, which must be laid out already.
         start: Seed of the start on it; None for that of the course.
-        metres: How far to drive, net along the course, m.
-        limit_s: When to give up, s.
+        metres: Distance to drive, net along the course, m.
+        limit_s: Time limit, s.
 
     Raises:
-        RuntimeError: If the episode ends before.
+        RuntimeError: If the episode ends early.
     """
     seen: Any
     seen, _ = env.reset(seed=course if start is None else start)

@@ -1,7 +1,7 @@
-"""The time to stop after each fault, a hundred times each.
+"""Time to stop after each fault, a hundred trials each.
 
-This takes an hour on a quiet machine, so each trial is written down as it ends, below
-`results/robot-faults`; what was tried on the same code is not tried again.
+This takes an hour on a quiet machine, so each trial is written to `results/robot-faults` as it
+ends; trials on the same code are not repeated.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from tests.robots import CAR
 TRIALS: Final = 100
 KEPT: Final = Path("results", "robot-faults")
 BARE: Final = "guard and supervisor killed"
-# What the time to stop depends on.
+# Code that the time to stop depends on.
 _CODE: Final = ("cli/robot", "link", "remote", "robot", "twin")
 
 
@@ -37,9 +37,9 @@ class _Tried(msgspec.Struct, frozen=True):
 
     Attributes:
         stopped_ms: See `TrialResult`; None for never.
-        limit_ms: What is promised.
-        drove: Whether it was driving when the fault came; otherwise the trial says nothing.
-        unauthorised_ms: How long something propelled without a fresh command; None for for ever.
+        limit_ms: Limit of the fault.
+        drove: Whether the robot was driving at the fault; other trials do not count.
+        unauthorised_ms: Durations of motion without a fresh command; None for unlimited.
     """
 
     stopped_ms: float | None
@@ -49,19 +49,19 @@ class _Tried(msgspec.Struct, frozen=True):
 
     @property
     def kept(self) -> bool:
-        """Whether the promise was kept."""
+        """Return whether the robot stopped in time and never moved without a command."""
         stopped = self.stopped_ms is not None and self.stopped_ms <= self.limit_ms
         return stopped and not self.unauthorised_ms
 
 
 def faults(trials: int = int(os.environ.get("TRIALS", TRIALS))) -> list[Row]:
-    """Every fault, on as many robots at a time as there are cores."""
+    """Measure every fault, on as many robots at a time as there are cores."""
     folder = KEPT / _digest()
     folder.mkdir(parents=True, exist_ok=True)
     with (
         tempfile.TemporaryDirectory() as place,
-        # No threads: what lies between driver and robot, and when a fault is said to have happened,
-        # would wait for ever so long while another thread starts a process.
+        # Processes, not threads: starting a process in one thread would delay the network between
+        # driver and robot, and the time of the fault, in the others.
         ProcessPoolExecutor(os.cpu_count() or 1, multiprocessing.get_context("spawn")) as robots,
     ):
         profile = Path(place, "car.toml")
@@ -73,7 +73,7 @@ def faults(trials: int = int(os.environ.get("TRIALS", TRIALS))) -> list[Row]:
 
 
 def _tried(profile: Path, name: str, one_shot: bool, trials: int, folder: Path) -> list[_Tried]:
-    """So many trials in which the robot drove, and those in between in which it did not."""
+    """Run trials until enough of them drove, and return all."""
     fault = FAULTS[name]
     path = folder / f"{fault.name}{'' if one_shot else ', no one-shot'}.jsonl".replace(" ", "-")
     found: list[_Tried] = []
@@ -86,7 +86,7 @@ def _tried(profile: Path, name: str, one_shot: bool, trials: int, folder: Path) 
                 trial = opened.enter_context(Trial(load_profile(profile), one_shot=one_shot))
             try:
                 tried = _as_tried(trial, fault)
-            except RobotError:  # Its driver lost the link, or never drove: begin with another.
+            except RobotError:  # The driver lost the link or never drove: start another robot.
                 opened.close()
                 trial, tried = None, _Tried(None, 0.0, False, ())
             found.append(tried)
@@ -106,7 +106,7 @@ def _as_tried(trial: Trial, fault: Fault) -> _Tried:
 
 
 def _finite(number: float) -> float | None:
-    """A number as JSON can hold it."""
+    """Return a number that JSON can hold; None for infinity."""
     return None if np.isinf(number) else number
 
 
@@ -126,7 +126,7 @@ def _row(fault: Fault, found: list[_Tried]) -> Row:
 
 
 def _without_one_shot(fault: Fault, found: list[_Tried]) -> Row:
-    """What is left to the pull-downs and to chance: a pin keeps the level of that moment."""
+    """Return how often a pin keeps its level when nothing cuts its power."""
     drove = [one for one in found if one.drove]
     never = sum(one.stopped_ms is None for one in drove)
     return Row(
@@ -139,7 +139,7 @@ def _without_one_shot(fault: Fault, found: list[_Tried]) -> Row:
 
 
 def _digest() -> str:
-    """Of the code that stops a robot."""
+    """Return a digest of the code that stops a robot."""
     root = Path(shapechanger.__file__).parent
     whole = hashlib.sha256()
     for part in _CODE:

@@ -1,7 +1,7 @@
-"""How fast a robot stops, how fast its link answers, and what its processes cost.
+"""Round trips of the link, resources of the processes, and steps at 50 Hz.
 
-Everything runs on a twin, through the same programs as on a Raspberry Pi; only what lies below the
-pins is simulated. Stop times come from the twin's ledger alone.
+All suites run on a twin, with the same programs as on a Raspberry Pi; only the hardware below the
+pins is simulated.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ ROUND_TRIPS: Final = 3_000
 HOLD_S: Final = 600.0
 COST_S: Final = 20.0
 FUZZED: Final = 1_000_000
-# What each process may keep in memory, MB.
+# Limits of resident memory, MB.
 _PROCESSES: Final[dict[Literal["guard", "daemon"], int]] = {"guard": 25, "daemon": 80}
 
 
 def link(round_trips: int = ROUND_TRIPS) -> list[Row]:
-    """The round trip of a command and a picture, and what the processes cost at 20 Hz."""
+    """Measure the round trip of command and picture, and the resources used at 20 Hz."""
     with EchoRobot() as echo:
         times = np.sort(echo.round_trips(round_trips)) * 1e3
     p50, p99 = np.percentile(times, [50, 99])
@@ -77,7 +77,7 @@ def link(round_trips: int = ROUND_TRIPS) -> list[Row]:
 
 
 def hold(seconds: float = HOLD_S) -> list[Row]:
-    """Driving at 50 Hz for a long time."""
+    """Drive at 50 Hz for a long time and count late steps."""
     with _driven("control_hz = 50", "fps = 50", seconds) as (_, drive):
         steps, late, stopped = drive()
     return [
@@ -92,7 +92,7 @@ def hold(seconds: float = HOLD_S) -> list[Row]:
 
 
 def fuzz(count: int = FUZZED) -> list[Row]:
-    """Mutated messages at the door of the daemon, in memory."""
+    """Send mutated messages to sessions of the daemon, in memory."""
     command = [sys.executable, "-m", "benchmarks.fuzz_link", "--count", str(count)]
     done = subprocess.run(command, capture_output=True, text=True)
     before_kb, most_kb = 0, 0
@@ -116,7 +116,10 @@ def fuzz(count: int = FUZZED) -> list[Row]:
 def _driven(
     control_hz: str, fps: str, seconds: float
 ) -> Generator[tuple[RunningRobot, Callable[[], tuple[int, int, int]]]]:
-    """A robot on its twin, and what drives it for so long: steps, late ones, stopped ones."""
+    """Run a robot on its twin; yield it and a function that drives it.
+
+    The function returns the numbers of all steps, late steps and steps stopped by the deadline.
+    """
     with tempfile.TemporaryDirectory() as folder:
         text = CAR.replace("control_hz = 20", control_hz).replace("fps = 20", fps)
         profile = _written(text, Path(folder) / "car.toml")
@@ -137,7 +140,7 @@ def _driven(
                 with env:
                     env.reset(seed=0)
                     steps = late = stopped = 0
-                    # In circles, so that it meets no wall.
+                    # Circles, so that the robot hits no wall.
                     action = np.array([1.0, 0.3], np.float32)
                     until_s = time.monotonic() + seconds
                     while time.monotonic() < until_s:
@@ -158,13 +161,13 @@ def _written(text: str, path: Path) -> Profile:
 
 
 def _cpu_s(pid: int) -> float:
-    """Seconds of processor time that a process has used."""
+    """Return the CPU time of a process, s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _resident_mb(pid: int) -> float:
-    """Resident memory of a process, MB of 10^6 bytes."""
+    """Return the resident memory of a process, MB of 10^6 bytes."""
     status = Path(f"/proc/{pid}/status").read_text()
     (line,) = (line for line in status.splitlines() if line.startswith("VmRSS"))
     return int(line.split()[1]) * 1024 / 1e6

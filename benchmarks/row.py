@@ -1,4 +1,4 @@
-"""One number beside what was promised."""
+"""Row of a table of results."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """One number beside what was promised.
+    """One result next to its target.
 
     Attributes:
-        name: What was measured.
-        value: What came out.
-        spread: How far the rounds lay apart, or what else the number needs to be read.
-        target: What was promised.
-        met: Whether it was kept.
+        name: Quantity that was measured.
+        value: Result.
+        spread: Spread of the rounds, or other context.
+        target: Target, or "none".
+        met: Whether the target was met.
     """
 
     name: str

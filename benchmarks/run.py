@@ -1,8 +1,8 @@
-"""Measure every number that Shapechanger promises, beside what it promised.
+"""Run benchmarks and print their results next to their targets.
 
 `make bench` prints a table and writes `benchmarks/results/*.json` with the machine's facts. Times
-of the machine are the median of several rounds, with the spread; compare ratios, not milliseconds,
-between machines.
+are the median of several rounds, with their spread; compare ratios, not milliseconds, between
+machines.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ ROUNDS = 30
 
 
 def times_ms(work: Callable[[], object]) -> list[float]:
-    """Milliseconds of each round, sorted."""
+    """Return the milliseconds of each round, sorted."""
     work()
     times: list[float] = []
     for _ in range(ROUNDS):
@@ -67,7 +67,7 @@ def times_ms(work: Callable[[], object]) -> list[float]:
 
 
 def timed_row(name: str, work: Callable[[], object], limit_ms: float) -> Row:
-    """A row for something that may take so many milliseconds."""
+    """Return the row of a function with a time limit."""
     times = times_ms(work)
     median = times[len(times) // 2]
     spread = f"{times[0]:.2f} to {times[-1]:.2f} ms in {ROUNDS} rounds"
@@ -75,7 +75,7 @@ def timed_row(name: str, work: Callable[[], object], limit_ms: float) -> Row:
 
 
 def bodies() -> list[Row]:
-    """Edits and compilation."""
+    """Time edits and compilation."""
     ant_xml = expand_model_path("ant.xml")
     spec = ANT.load(ant_xml)
     rows = [
@@ -104,7 +104,7 @@ def bodies() -> list[Row]:
 
 
 def demo() -> list[Row]:
-    """The demo as a user runs it."""
+    """Run the demo as a user does."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "demo"
         command = ["shapechanger", "transfer", "InvertedPendulum", "BigInvertedPendulum"]
@@ -179,7 +179,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
 
 
 def _asked() -> str:
-    """What was asked for besides, as a shell takes it."""
+    """Return the environment variables that were set, as shell assignments."""
     names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "ONLY", "VEHICLE", "LP_NUM_THREADS")
     return "".join(
         f"{name}={shlex.quote(os.environ[name])} " for name in names if name in os.environ
@@ -187,7 +187,7 @@ def _asked() -> str:
 
 
 def _processor() -> str:
-    """The name of the processor, as the system tells it; else its kind."""
+    """Return the name of the processor from the system, or its architecture."""
     facts = Path("/proc/cpuinfo")
     lines = facts.read_text().splitlines() if facts.exists() else []
     names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))

@@ -1,7 +1,7 @@
-"""How fast one env steps and draws, against Gymnasium's own.
+"""Speed of steps and frames of one env, compared with Gymnasium's.
 
-Rounds are paired: in each both envs take the same actions from the same state, one after the other
-in an order that alternates, and give one ratio of CPU times. Resets are not timed.
+Rounds are paired: in each, both envs take the same actions from the same state, in alternating
+order, and give one ratio of CPU times. Resets are not included.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from shapechanger.envs.stepping import fast_model
 from shapechanger.envs.stepping.tuned import paused_timer
 
 ROUNDS: Final = 41
-# Env steps in a round: about 30 ms of either.
+# Env steps per round: about 30 ms for either env.
 ANT_STEPS: Final = 100
 PENDULUM_STEPS: Final = 1000
-# More than the steps after which an env looks for a faster model.
+# More than the steps after which an env searches for a faster model.
 WARM_UP: Final = 600
 FRAMES: Final = 60
 SLOW_FRAMES: Final = 8
 SIZE: Final[dict[str, Any]] = {"width": 128, "height": 128}
 _ANT_FRAME_SKIP: Final = 5
-# Pushes so small that the pole stays up for a while.
+# Scale of actions small enough for the pole to stay up for a while.
 _GENTLE: Final = 0.05
 
 
 def single() -> list[Row]:
-    """One env at a time: steps, resets, the search for a fast model, frames."""
+    """Compare single envs: steps, resets, frames and the search for a fast model."""
     ant, ant_reset = _compared("Ant", ANT_STEPS, 1.0)
     pole, pole_reset = _compared("InvertedPendulum", PENDULUM_STEPS, _GENTLE)
     stock, _ = _compared("Ant", ANT_STEPS, 1.0, fast_model=False)
@@ -56,7 +56,7 @@ def single() -> list[Row]:
 def _compared(
     name: str, steps: int, reach: float, **arguments: Any
 ) -> tuple[list[float], list[float]]:
-    """Of each round Gymnasium's time over ours, sorted: of steps and of resets."""
+    """Return the ratios of Gymnasium's time to ours, sorted: for steps and for resets."""
     ours = gym.make(f"shapechanger/{name}-v1", **arguments)
     theirs = gym.make(f"{name}-v5")
     rng = np.random.default_rng(0)
@@ -90,7 +90,7 @@ def _step_s(
     actions: list[NDArray[np.float32]],
     start: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> float:
-    """CPU time of these steps, s; where an episode ends the next begins from the same state."""
+    """Return the CPU time of the steps, s; each new episode starts from the same state."""
     inner: Any = env.unwrapped
     env.reset()
     inner.set_state(*start)
@@ -124,7 +124,7 @@ def _ratio_row(name: str, ratios: list[float], target: float | None) -> Row:
 
 
 def _stopwatch_row() -> Row:
-    """What MuJoCo's stopwatch costs where it does not rest, in steps of the physics alone."""
+    """Return the cost of MuJoCo's timers in physics steps alone."""
     ant: Any = gym.make("Ant-v5").unwrapped
     model = ant.model
     rng = np.random.default_rng(0)
@@ -150,7 +150,7 @@ def _stopwatch_row() -> Row:
 
 
 def _readings(model: Any) -> int:
-    """How often a step reads the stopwatch."""
+    """Return how often a step reads the timer."""
     readings = 0
 
     def clock() -> float:
@@ -159,7 +159,7 @@ def _readings(model: Any) -> int:
         return float(readings)
 
     data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, ANT_STEPS)  # Down to the floor.
+    mujoco.mj_step(model, data, ANT_STEPS)  # Let the body fall to the floor.
     mujoco.set_mjcb_time(clock)
     try:
         mujoco.mj_step(model, data, _ANT_FRAME_SKIP)
@@ -169,7 +169,7 @@ def _readings(model: Any) -> int:
 
 
 def _search_row() -> Row:
-    """What it costs to find the fast model of a body that has not been seen."""
+    """Return the time to find the fast model of a new body."""
     times: list[float] = []
     with gym.make("shapechanger/Ant-v1") as env:
         inner: Any = env.unwrapped
@@ -188,7 +188,7 @@ def _search_row() -> Row:
 
 
 def _frame_rows() -> list[Row]:
-    """Frames a second of one core: CPU time of all threads, so that a driver's help counts."""
+    """Return frames per second, from the CPU time of all threads including the driver's."""
     plain = _frame_ms(gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **SIZE), FRAMES)
     theirs = _frame_ms(gym.make("Ant-v5", render_mode="rgb_array", **SIZE), SLOW_FRAMES)
     median = statistics.median(plain)
@@ -211,7 +211,7 @@ def _frame_rows() -> list[Row]:
 
 
 def _frame_ms(env: gym.Env[Any, Any], frames: int) -> list[float]:
-    """CPU time of each frame, ms, sorted; the body moves in between."""
+    """Return the CPU time of each frame, ms, sorted; the body moves in between."""
     times: list[float] = []
     with env:
         env.reset(seed=0)

@@ -1,8 +1,7 @@
-"""How fast many ants are stepped together, against the bare physics and against others.
+"""Speed of many ants stepped together, compared with bare physics and other libraries.
 
-Rounds are paired: each runs both sides, one right after the other, in an order that alternates, and
-gives one ratio. A round begins with all envs of both sides in the same states where both are ours
-to set.
+Rounds are paired: each runs both sides one after the other, in alternating order, and gives one
+ratio. Where the states of both sides can be set, a round starts all envs from the same states.
 """
 
 from __future__ import annotations
@@ -29,20 +28,20 @@ from shapechanger.envs.stepping.tuned import paused_timer
 from shapechanger.envs.stepping.watch import ModelWatch
 
 ROUNDS = 31
-# By the wall clock rounds differ more: whatever else runs on the cores counts.
+# More rounds for wall-clock times, which vary more: other processes count too.
 WALL_ROUNDS = 93
 STEPS = 8
 WARM_UP = 150
-# An interpreter that has EnvPool, if it is not this one.
+# Interpreter with EnvPool installed.
 ENVPOOL_PYTHON = os.environ.get("SHAPECHANGER_ENVPOOL_PYTHON", sys.executable)
 PEER = Path(__file__).with_name("vector_peer.py")
 
-# What an integration starts from, the solver's first guess too.
+# State that an integration starts from, warm start of the solver included.
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 class _Fleet:
-    """A vector env of ants under way, and the same ants elsewhere."""
+    """Vector env of ants that have been moving for a while."""
 
     def __init__(self, num_envs: int, threads: int = 1) -> None:
         self.num_envs = num_envs
@@ -53,15 +52,15 @@ class _Fleet:
             self.envs.step(action)
 
     def actions(self, steps: int) -> NDArray[np.float32]:
-        """Random actions for so many steps."""
+        """Return random actions for a number of steps."""
         return self._rng.uniform(-1.0, 1.0, (steps, self.num_envs, 8)).astype(np.float32)
 
     def bodies(self) -> list[tuple[Any, Any]]:
-        """Model and data of each ant."""
+        """Return model and data of each ant."""
         return [(env.model, env.data) for env in _unwrapped(self.envs)]
 
     def put_into(self, others: list[tuple[Any, Any]]) -> None:
-        """Bring other ants into the states of these."""
+        """Copy the states of these ants into others."""
         for (model, data), (other_model, other_data) in zip(self.bodies(), others, strict=True):
             state = np.empty(mujoco.mj_stateSize(model, _STATE))
             mujoco.mj_getState(model, data, state, _STATE)
@@ -69,7 +68,7 @@ class _Fleet:
 
 
 def _unwrapped(envs: Any) -> list[Any]:
-    """The MuJoCo envs of a vector env."""
+    """Return the MuJoCo envs of a vector env."""
     return [env.unwrapped for env in envs.envs]
 
 
@@ -80,7 +79,7 @@ def _timed(work: Callable[[], object], clock: Callable[[], float]) -> float:
 
 
 def _paired(theirs: Callable[[], float], ours: Callable[[], float], rounds: int) -> list[float]:
-    """Their time over ours, of each round, sorted."""
+    """Return the ratio of their time to ours of each round, sorted."""
     ratios: list[float] = []
     for number in range(rounds):
         if number % 2:
@@ -104,10 +103,10 @@ def _missing(name: str, why: str, target: float) -> Row:
 
 
 def against_physics(num_envs: int, *, fast: bool = False) -> Row:
-    """CPU time of `mj_step(nstep=5)` alone, called from Python, over that of a step of ours.
+    """Compare the CPU time of `mj_step(nstep=5)`, called from Python, with that of our step.
 
-    MuJoCo's stopwatch rests, as it does in C, where there is none. With `fast` the loop steps the
-    fast model too: what is left to save beside the physics.
+    MuJoCo's timers are paused, as C has none. With `fast` the loop also steps the fast model, and
+    the ratio shows the overhead beyond the physics.
     """
     fleet = _Fleet(num_envs)
     ant: Any = gym.make("Ant-v5").unwrapped
@@ -136,7 +135,7 @@ def against_physics(num_envs: int, *, fast: bool = False) -> Row:
         return _timed(lambda: [fleet.envs.step(row) for row in actions], time.process_time)
 
     ratios: list[float] = []
-    for _ in range(ROUNDS):  # Physics first: it starts where ours will start.
+    for _ in range(ROUNDS):  # Physics first: it copies the states that our steps start from.
         actions = fleet.actions(STEPS)
         ratios.append(physics() / ours())
     fleet.envs.close()
@@ -149,7 +148,7 @@ def against_physics(num_envs: int, *, fast: bool = False) -> Row:
 
 
 def against_sync(num_envs: int) -> Row:
-    """CPU time of Gymnasium's `SyncVectorEnv` over its own Ant-v5, over that of ours."""
+    """Compare the CPU time of Gymnasium's `SyncVectorEnv` of Ant-v5 with ours."""
     fleet = _Fleet(num_envs)
     sync = gym.make_vec("Ant-v5", num_envs=num_envs, vectorization_mode="sync")
     sync.reset(seed=0)
@@ -169,13 +168,13 @@ def against_sync(num_envs: int) -> Row:
 
 
 def _peer(kind: str, num_envs: int, threads: int) -> Peer:
-    """A vector env in another process."""
+    """Start a vector env in another process."""
     python = ENVPOOL_PYTHON if kind == "envpool" else sys.executable
     return Peer([python, str(PEER), kind, str(num_envs), str(threads)])
 
 
 def against_envpool() -> Row:
-    """Wall-clock time of EnvPool over ours, two threads each."""
+    """Compare the wall-clock time of EnvPool with ours, two threads each."""
     name = "Ant, N=128, 2 threads: EnvPool over ours, wall clock"
     peer = _peer("envpool", 128, 2)
     try:
@@ -200,8 +199,8 @@ def against_envpool() -> Row:
 
 
 def against_processes() -> Row:
-    """Wall-clock time of two processes of 64 envs and one thread, over 128 envs and two threads."""
-    # Each in a process of its own, so that nothing else lies in the way of either.
+    """Compare two processes of 64 envs with one process of 128 envs and two threads."""
+    # Both sides run in processes of their own, so that neither is disturbed.
     peers = [_peer("ours", 64, 1) for _ in range(2)]
     threads = _peer("ours", 128, 2)
     for peer in (*peers, threads):
@@ -223,7 +222,7 @@ def against_processes() -> Row:
 
 
 def memory() -> Row:
-    """Resident memory per env, of 1,024 of them."""
+    """Measure the resident memory per env, of 1,024 envs."""
     command = [sys.executable, str(PEER), "memory", "1024", "1"]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     megabytes = float(run.stdout) / 1e6
@@ -237,7 +236,7 @@ def memory() -> Row:
 
 
 def vector() -> list[Row]:
-    """All of it."""
+    """Run all comparisons."""
     return [
         against_physics(32),
         against_physics(128),

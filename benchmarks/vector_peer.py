@@ -1,9 +1,9 @@
-"""A vector env in a process of its own, stepped on demand: `vector_peer.py KIND N THREADS`.
+"""Vector env in a process of its own, stepped on demand: `vector_peer.py KIND N THREADS`.
 
-KIND is `ours`, `envpool` or `memory`. It says `ready` and its version; then for each number of
-steps that it reads it answers with the seconds that they took. `memory` answers once with the
-resident memory per env, in bytes. It imports nothing else of ours, so that the peer may live in
-another environment.
+KIND is `ours`, `envpool` or `memory`. The process prints `ready` and its version; for each number
+of steps that it reads, it prints the seconds they took. `memory` prints the resident memory per
+env, in bytes, once. It imports none of our other modules, so that the peer can live in another
+environment.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ WARM_UP = 150
 
 
 def _resident() -> int:
-    """Bytes of this process in memory."""
+    """Return the resident memory of this process, bytes."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize()
 
@@ -40,7 +40,7 @@ def _make(kind: str, num_envs: int, threads: int) -> Any:
 
 
 def _stepping(envs: Any, num_envs: int) -> Callable[[int], float]:
-    """Steps so many times with random actions; the seconds that took."""
+    """Return a function that takes random steps and returns the seconds they took."""
     rng = np.random.default_rng(0)
 
     def step(count: int) -> float:
@@ -59,7 +59,9 @@ def main() -> None:
     if kind == "memory":
         import shapechanger
 
-        shapechanger.make_vec("Ant", 1).reset()  # So that what all envs share is not counted.
+        shapechanger.make_vec(
+            "Ant", 1
+        ).reset()  # Load what all envs share, so that it is not counted.
     before = _resident()
     envs = _make(kind, num_envs, threads)
     if kind == "envpool":

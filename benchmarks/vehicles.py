@@ -1,6 +1,6 @@
-"""How fast the vehicles' envs step, and how well the expert and the clones drive in them.
+"""Speed of the vehicles' envs, and driving of the expert and of the clones.
 
-Everything is driven on courses that nothing was learned or tuned on.
+All drives are on held-out courses.
 """
 
 from __future__ import annotations
@@ -30,30 +30,30 @@ CLONE_LAYOUTS: Final = 20
 STUDENT_LAYOUTS: Final = 17  # 510 m.
 STUDENT_SEEDS: Final = 3
 EXPERT_MPS: Final = 1.88  # In benchmarks/results/vehicles-expert.json.
-# A blind vehicle gets nowhere: it need not be waited for as long as for one that drives.
+# A shorter time limit for blind vehicles, which get nowhere.
 BLIND_S: Final = 60.0
 
 ROUNDS: Final = 15
-STEPS: Final = 60  # Of a round.
+STEPS: Final = 60  # Per round.
 
 
 def layouts(usual: int) -> range:
-    """The courses that are driven: `LAYOUTS` of them where the environment says so."""
+    """Return the courses to drive: `usual` of them, or `LAYOUTS` if set."""
     return HELD_OUT[: int(os.environ.get("LAYOUTS", usual))]
 
 
 def frames() -> list[Row]:
-    """Steps a second of each vehicle, with a picture each."""
+    """Measure steps per second of each vehicle, with a picture each."""
     return [_frames_row(vehicle) for vehicle in ("car", *sorted(set(VEHICLES) - {"car"}))]
 
 
 def _frames_row(vehicle: str) -> Row:
-    """CPU time of all threads, so that a driver's help counts; the expert's is not counted."""
+    """Measure the CPU time of all threads, the driver's included and the expert's excluded."""
     rates: list[float] = []
     with gym.make(f"shapechanger/{vehicle.capitalize()}-v1", put_back=True) as env:
         inner: Any = env.unwrapped
         pilot = ExpertDriver(inner.world)
-        # Long drives on one course: a reset is not what is measured.
+        # Long drives on one course, so that resets do not count.
         seen, _ = env.reset(seed=0, options={"course": HELD_OUT[0], "start": 0})
         spent = _spent_s(env, pilot, seen)  # The first round warms up.
         for _ in range(ROUNDS):
@@ -83,7 +83,7 @@ def _spent_s(env: gym.Env[Any, Any], act: Act, seen: Any) -> float:
 
 
 def fast() -> list[Row]:
-    """Steps of the env on distances for each step of the whole robot, both without pictures."""
+    """Compare steps of the ranges env with steps of the full env, without pictures."""
     rows: list[Row] = []
     for vehicle in ("car", *sorted(set(VEHICLES) - {"car"})):
         with (
@@ -121,7 +121,7 @@ def _round_s(env: VehicleEnv | RangesEnv, start: int) -> float:
 
 
 def expert() -> list[Row]:
-    """The expert, which knows where everything is."""
+    """Score the expert, which knows the course."""
     rows: list[Row] = []
     for vehicle, model in VEHICLES.items():
         score = _expert_score(vehicle, layouts(EXPERT_LAYOUTS))
@@ -142,7 +142,7 @@ def expert() -> list[Row]:
 
 
 def clone() -> list[Row]:
-    """The policies that come with the package, which see pictures alone."""
+    """Score the shipped policies, which see only pictures."""
     rows: list[Row] = []
     for vehicle in VEHICLES:
         policy = find_clone(vehicle)
@@ -153,7 +153,7 @@ def clone() -> list[Row]:
         knows = _expert_score(vehicle, courses)
         with closing(_env(vehicle, image=True)) as env:
             score = _score(env, sighted(policy), courses)
-        with closing(_env(vehicle, image=False)) as env:  # Black pictures need not be drawn.
+        with closing(_env(vehicle, image=False)) as env:  # No rendering needed for black pictures.
             dark = _score(env, blind(policy), courses, BLIND_S)
         share = score.speed / knows.speed
         rows += [
@@ -179,9 +179,9 @@ def clone() -> list[Row]:
 
 
 def students() -> list[Row]:
-    """Cars that learned by trial on distances, and their students, which see pictures alone.
+    """Score cars trained by RL on distances, and their students, which see only pictures.
 
-    `SEEDS` of each are trained by the command line, from nothing.
+    `SEEDS` of each are trained from scratch by the command line.
     """
     rows: list[Row] = []
     for seed in range(int(os.environ.get("SEEDS", STUDENT_SEEDS))):
@@ -212,7 +212,7 @@ def students() -> list[Row]:
 
 
 def _alone(policy: TrainedPolicy) -> Act:
-    """A policy for one observation at a time."""
+    """Return a driver that takes one observation at a time."""
     many = policy.act
     return lambda seen: many(seen[None])[0]
 
@@ -243,7 +243,7 @@ def _collision_row(name: str, score: DriveScore, most: float | None) -> Row:
 
 
 def counted(score: DriveScore) -> str:
-    """What a rate of collisions rests on."""
+    """Return the interval and the counts of a rate of collisions."""
     return (
         f"{score.low:.2f} to {score.high:.2f}, 95 % (Garwood); "
         f"{score.collisions} in {score.metres:.0f} m"

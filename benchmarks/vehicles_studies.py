@@ -1,7 +1,6 @@
-"""What driving in one body is worth in another, with intervals.
+"""Transfer of driving between vehicles, with intervals.
 
-These are studies of hours: they go on from what lies in `results/`, and `SEEDS` says how many runs
-each arm has.
+The studies take hours and resume from `results/`; `SEEDS` sets the number of runs per arm.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from shapechanger.transfer.suite import StudyOutcome
 
 SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
-# Of the target's driving, at which fine-tuning is compared with scratch.
+# Target time at which fine-tuning is compared with scratch.
 _SECONDS: Final = (15, 30)
-# Of twelve.
+# Out of twelve.
 GOOD: Final = 8
 
 
 def pairs() -> list[Row]:
-    """The twelve ordered pairs of vehicles."""
+    """Measure the twelve ordered pairs of vehicles."""
     found = _suite("vehicles")
     halves = sum(crossing.halves for crossing in found)
     return [
@@ -46,7 +45,7 @@ def pairs() -> list[Row]:
 
 
 def lenses() -> list[Row]:
-    """A car, and the same car with something wrong with its camera."""
+    """Measure a car and the same car with a degraded camera."""
     return [_row(crossing) for crossing in _suite("lenses")]
 
 

@@ -1,4 +1,4 @@
-"""The same driver in one process and behind guard, daemon and link: it should drive alike."""
+"""One driver in process and behind guard, daemon and link: results should agree."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _CLEAR_M: Final = 2.5
 
 
 class _Turner:
-    """Drives by the distance ahead alone: turns to one side until the way is free.
+    """Driver that turns to one side until the distance ahead is free.
 
     Args:
-        layout: Of the state.
+        layout: Layout of the state.
     """
 
     def __init__(self, layout: Layout) -> None:
@@ -51,7 +51,7 @@ class _Turner:
 
 
 def twin(vehicle: str = "car") -> list[Row]:
-    """Mean speed and collisions in process, on the twin's clock and in real time."""
+    """Measure mean speed and collisions in process, on the twin's clock and in real time."""
     policy = find_clone(vehicle)
     courses = layouts(LAYOUTS)
 
@@ -110,9 +110,10 @@ def _served(
     image: bool,
     driver: Callable[[Layout], Act],
 ) -> DriveResult:
-    """A drive of a robot that was started on this course.
+    """Drive a robot that was started on this course.
 
-    To lay another out takes a tenth of a second, for which no guard in real time should wait.
+    Each course gets a new robot: laying out a course takes 0.1 s, which would stall a guard in real
+    time.
     """
     profile = find_profile(f"lab-{vehicle}")
     with run_robot(profile, clock=clock, seed=course) as robot, robot.operator() as operator:

@@ -1,7 +1,7 @@
-"""What a clone that points out the free way is worth in another vehicle, never seen by it.
+"""Zero-shot transfer of a waypoint policy to other vehicles.
 
-The sources are trained once for each seed and lie in `results/waypoints`; `SEEDS` says how many.
-Nothing is learned or tuned on the courses that are driven.
+The sources are trained once per seed and kept in `results/waypoints`; `SEEDS` sets the number of
+seeds. All drives are on held-out courses.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3
 COURSES: Final = HELD_OUT[:17]  # Of 30 m: 510 m for each drive.
 OUT: Final = Path("results", "waypoints")
-# Both clones learned in the corridor.
+# Both clones were trained in the corridor.
 STEERED: Final = (("car", "tank"), ("tank", "car"))
 STEERED_COURSES: Final = COURSES[:6]
-# Collisions per 100 m, on so many of the six pairs.
+# Limit of collisions per 100 m, and number of the six pairs that should stay below it.
 FEW: Final = 4.0
 GOOD: Final = 4
 
 
 def pairs() -> list[Row]:
-    """The six directed pairs of land vehicles, all in the corridor."""
+    """Measure the six ordered pairs of land vehicles, all in the corridor."""
     OUT.mkdir(parents=True, exist_ok=True)
     seeds = range(int(os.environ.get("SEEDS", SEEDS)))
     jobs = [(vehicle, seed) for seed in seeds for vehicle in VEHICLES]
@@ -144,7 +144,7 @@ def _steered(pair: tuple[str, str]) -> list[DriveResult]:
 
 
 def _driven(job: tuple[str, int]) -> dict[str, list[DriveResult]]:
-    """Train a source, drive it in all vehicles, and keep both."""
+    """Train a source and drive it in all vehicles; cache both."""
     vehicle, seed = job
     use_one_thread()
     kept = OUT / f"{vehicle}-{seed}.json"

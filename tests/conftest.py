@@ -13,8 +13,8 @@ from hypothesis import settings
 
 from tests.drawing import draws, missing
 
-# Background processes, such as those of `nohup`, ignore Ctrl-C, and so do their children; some
-# tests interrupt theirs.
+# Processes started in the background, such as by `nohup`, ignore SIGINT, and so do their children;
+# some tests interrupt theirs.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -25,9 +25,10 @@ settings.load_profile("shapechanger")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Retry `realtime` tests once: a pause of the machine can fail a correct one.
+    """Retry `realtime` tests once, since a pause of the machine can fail a correct one.
 
-    They start processes, open sockets or kill something. The summary lists each retry as `RERUN`.
+    These tests start processes, open sockets or kill something. The summary lists each retry as
+    `RERUN`.
     """
     for item in items:
         if item.get_closest_marker("realtime"):

@@ -1,4 +1,4 @@
-"""What is there to draw with, and what a test does without it."""
+"""Detection of OpenGL libraries, and skipping of tests without them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Final, NoReturn
 
 import pytest
 
-# The variables that decide what draws.
+# Environment variables that select the OpenGL library.
 CHOICE: Final = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
 
 
 def missing(reason: str) -> NoReturn:
-    """Skip the test; but where CI is set everything must be there, so fail."""
+    """Skip the test, or fail it on CI, where nothing may be missing."""
     if os.environ.get("CI") == "true":
         pytest.fail(f"{reason}, and on CI nothing may be missing.")
     pytest.skip(reason)
@@ -23,14 +23,14 @@ def missing(reason: str) -> NoReturn:
 
 @functools.cache
 def draws(library: str) -> bool:
-    """Whether a context of `egl`, `osmesa` or `glfw` opens here."""
+    """Return whether a context of `egl`, `osmesa` or `glfw` opens."""
     script = f"from mujoco.{library} import GLContext; GLContext(16, 16).make_current()"
     screen = {name: os.environ[name] for name in CHOICE[:2] if name in os.environ}
     return run_python(script, **screen).returncode == 0
 
 
 def run_python(script: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    """Run a script in an interpreter of its own, in which nobody has chosen what draws."""
+    """Run a script in a new interpreter without the variables of `CHOICE`."""
     kept = {name: value for name, value in os.environ.items() if name not in CHOICE}
     return subprocess.run(
         [sys.executable, "-c", script],

@@ -1,4 +1,4 @@
-"""Profiles of robots that tests serve on a twin."""
+"""Profiles of robots for tests on a twin."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 
 IN_A_ROOM = ("--world", "room")
-"""For who serves a twin and does not care where it is: the room is there at once."""
+"""Arguments for a twin in the room, which starts fastest."""
 
 CAR = """\
-# The car of 2017, with everything that can protect it.
+# The car of 2017, with all protective sensors.
 
 [robot]
 name = "test-car"
@@ -84,21 +84,20 @@ pin = 21
 
 
 def changed(old: str, new: str, text: str = CAR) -> str:
-    """A text with its only `old` replaced."""
+    """Return the text with the only occurrence of `old` replaced."""
     assert text.count(old) == 1, old
     return text.replace(old, new)
 
 
 PATIENT_CAR = changed("deadline_ms = 250", "deadline_ms = 1000")
-"""The same for who drives in real time and asks nothing of deadlines.
+"""The car with a long deadline, for tests in real time that do not check deadlines.
 
-A guard that shows no life for the deadline is killed, which is right; a busy machine does hold one
-up for a quarter of a second.
+A guard that is silent for the deadline is killed, and a busy machine can delay it by 250 ms.
 """
 
 
 def write_profile(folder: Path, text: str = CAR) -> Profile:
-    """The profile, in a file of its own."""
+    """Write a profile to a file of its own and load it."""
     name = next(line for line in text.splitlines() if line.startswith("name = "))
     path = folder / f"{name.split(chr(34))[1]}.toml"
     path.write_text(text)

@@ -1,4 +1,4 @@
-"""A robot that is served on its twin, and somebody who drives it command by command."""
+"""A robot served on its twin, with a client that drives it command by command."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Clock = Literal["twin", "real"]
 
 
 class Served:
-    """A robot on its twin, armed, with a driver in lockstep.
+    """An armed robot on its twin, with a client in lockstep.
 
     Attributes:
-        robot: Its processes.
-        client: Who drives.
-        operator: Who stands beside it.
+        robot: The processes of the robot.
+        client: The client that drives.
+        operator: The operator of the twin.
         seen: The newest observation.
     """
 
@@ -40,13 +40,13 @@ class Served:
         self.seen: Observation = client.ask().message
 
     def step(self, *values: float) -> Observation:
-        """Command once, and look."""
+        """Send a command and wait for the observation after it."""
         self.client.command(values, answers=self.seen.seq)
         self.seen = self.client.observation(self.seen.seq).message
         return self.seen
 
     def drive(self, *values: float, steps: int) -> Observation:
-        """Command the same again and again."""
+        """Repeat a command."""
         for _ in range(steps):
             self.step(*values)
         return self.seen
@@ -54,25 +54,25 @@ class Served:
     def drive_until(
         self, done: Callable[[Observation], bool], *values: float, at_most: int = 60
     ) -> int:
-        """Command the same until something is seen.
+        """Repeat a command until an observation satisfies `done`.
 
         Returns:
-            How many commands it took.
+            The number of commands.
         """
         for count in range(1, at_most + 1):
             if done(self.step(*values)):
                 return count
-        raise AssertionError(f"It was not seen in {at_most} commands, but {self.seen}")
+        raise AssertionError(f"not seen within {at_most} commands; last observation: {self.seen}")
 
     def state(self, name: str) -> float:
-        """What a sensor says."""
+        """Return the value of a state feature."""
         return self.seen.state[self._places[name]]
 
     def rest_ns(self, wiring: TwinWiring) -> int:
-        """Wait for all that propels to rest, without any command; when it did, by the ledger."""
+        """Wait until the robot stops without commands; return the ledger's time of the stop."""
         if self._clock == "twin":
             self.operator.advance(1.0)
-            # The daemon learns what time it is by letting some go by.
+            # The daemon reads the new time when a step advances it.
             self.step(*self.seen.action_applied)
         ends: list[float] = []
 
@@ -86,7 +86,7 @@ class Served:
 
 @contextmanager
 def driving(robot: RunningRobot, clock: Clock, **options: Any) -> Generator[Served]:
-    """Put a robot at its start and arm it."""
+    """Place a robot at its start and arm it."""
     with (
         robot.operator() as operator,
         robot.client(role="person", pace="lockstep", **options) as client,

@@ -1,4 +1,4 @@
-"""The direction of imports: who may know whom, and what loads what."""
+"""Rules for imports between packages, and for modules."""
 
 import ast
 import importlib
@@ -22,12 +22,12 @@ _NEED_LGPIO = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """What one package may import, at the top of a file or inside a function.
+    """Imports that a package is allowed, at the top of a file or inside a function.
 
     Attributes:
         ours: Packages of Shapechanger besides itself.
-        theirs: Packages of others besides the standard library; None for any.
-        never: Packages of others, or of the standard library, that it must not know.
+        theirs: External packages besides the standard library; None for any.
+        never: Forbidden packages, external or of the standard library.
     """
 
     ours: frozenset[str]
@@ -45,7 +45,7 @@ _RULES = {
     "layout": _Rule(_names("errors link"), _names("numpy msgspec")),
     "link": _Rule(_names("errors layout"), _names("numpy msgspec")),
     "tensor_file": _Rule(_names("errors"), _names("numpy msgspec safetensors")),
-    # The OpenGL library to draw with.
+    # Selection of the OpenGL library.
     "rendering": _Rule(_names("errors")),
     # Models and edits: no environment, no reward, no robot.
     "morphology": _Rule(_names("errors layout"), _names("numpy msgspec mujoco")),
@@ -61,7 +61,7 @@ _RULES = {
         | _names("link robot remote twin worlds identify"),
         never=_HARDWARE | {"torch"},
     ),
-    # Transfer cannot tell a simulator from a robot. Cloning is one of its learners.
+    # Transfer does not distinguish simulators from robots. Cloning is one of its learners.
     "transfer": _Rule(
         _names("errors layout tasks demos shapechanger tensor_file"),
         never=_HARDWARE | _SIMULATORS,
@@ -71,7 +71,7 @@ _RULES = {
     ),
     # The exam for third-party envs.
     "testing": _Rule(_names("errors layout transfer"), never=_HARDWARE | _SIMULATORS),
-    # Runs on the robot: of `demos` it uses the writer of episodes, which needs no other package.
+    # Runs on the robot. From `demos` it uses the writer of episodes, which needs no other package.
     "robot": _Rule(_names("errors layout link demos"), never=_HEAVY | {"gymnasium"}),
     "remote": _Rule(_names("errors layout link tasks"), never=_HEAVY),
     "twin": _Rule(_names("errors layout link robot remote morphology bodies tasks worlds")),
@@ -96,7 +96,7 @@ _RULES = {
 
 
 def _modules() -> Iterator[tuple[str, Path]]:
-    """The dotted name of every module below src, with its file."""
+    """Yield the dotted name of every module below src, with its file."""
     for path in sorted(_SRC.rglob("*.py")):
         parts = path.relative_to(_SRC).with_suffix("").parts
         yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
@@ -106,7 +106,7 @@ _MODULES = dict(_modules())
 
 
 def _package(module: str) -> str:
-    """The key of the rule for a module: `shapechanger.envs.ant` obeys that of `envs`."""
+    """Return the key of the rule for a module, such as `envs` for `shapechanger.envs.ant`."""
     parts = module.split(".")
     if len(parts) == 1:
         return parts[0]
@@ -114,7 +114,7 @@ def _package(module: str) -> str:
 
 
 def _imported(module: str, path: Path) -> Iterator[str]:
-    """The dotted name of everything that a file imports, wherever in the file."""
+    """Yield the dotted name of everything that a file imports, anywhere in the file."""
     is_package = path.name == "__init__.py"
     for node in ast.walk(ast.parse(path.read_text(), str(path))):
         if isinstance(node, ast.Import):
@@ -216,7 +216,7 @@ def test_public_classes_have_distinct_names() -> None:
 
 
 def test_no_file_is_longer_than_600_lines() -> None:
-    """A file holds one topic."""
+    """No module has more than 600 lines."""
     lengths = {module: path.read_text().count("\n") for module, path in _MODULES.items()}
     assert {module: count for module, count in lengths.items() if count > 600} == {}
 
@@ -230,8 +230,8 @@ def test_no_file_is_longer_than_600_lines() -> None:
         ("shapechanger.robot", _HEAVY | _SIMULATORS),
     ],
 )
-def test_import_stays_light(package: str, forbidden: frozenset[str]) -> None:
-    """Who wants a layout, a metric or two motors must not wait for a simulator."""
+def test_import_loads_no_heavy_packages(package: str, forbidden: frozenset[str]) -> None:
+    """Importing a package loads no simulator and no other heavy package."""
     if package not in _MODULES:
         pytest.skip(f"{package} does not exist yet.")
     script = f"import sys, {package}; print(*sys.modules)"
@@ -241,31 +241,31 @@ def test_import_stays_light(package: str, forbidden: frozenset[str]) -> None:
     assert not forbidden & set(run.stdout.split())
 
 
-def test_modules_export_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Packages list what they export, once; what a module exports has no underscore."""
-    monkeypatch.chdir(tmp_path)  # lgpio makes a named pipe in the working directory.
+def test_exported_names_exist_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only packages have `__all__`, and its names exist and are unique."""
+    monkeypatch.chdir(tmp_path)  # lgpio creates a named pipe in the working directory.
     wrong: list[str] = []
     for module in _MODULES:
         if any(part.startswith("_") for part in module.split(".")):
             continue
         if module in _NEED_LGPIO and importlib.util.find_spec("lgpio") is None:
-            continue  # It has no wheel for this Python or system.
+            continue  # lgpio has no wheel for this Python or system.
         imported = importlib.import_module(module)
         exported: list[str] = getattr(imported, "__all__", [])
         if exported and _MODULES[module].name != "__init__.py":
-            wrong.append(f"{module}: `__all__` belongs into packages")
+            wrong.append(f"{module}: `__all__` belongs in packages")
         wrong += [f"{module}.{name}" for name in exported if not hasattr(imported, name)]
         wrong += [f"{module}: {name} twice" for name in set(exported) if exported.count(name) > 1]
     assert wrong == []
 
 
 def test_every_folder_is_a_package() -> None:
-    """A folder without an `__init__.py` would be left out of every check here."""
+    """Every folder has an `__init__.py`; others would escape these checks."""
     folders = {path.parent for path in _MODULES.values()}
     assert [folder for folder in folders if not (folder / "__init__.py").exists()] == []
 
 
 def test_nothing_is_called_utils() -> None:
-    """A module is named after the one idea it holds."""
+    """No module has a name without meaning, such as `utils`."""
     names = {part for module in _MODULES for part in module.split(".")}
     assert not names & {"common", "helpers", "misc", "util", "utils"}

@@ -1,4 +1,4 @@
-"""What the documents show works as they show it."""
+"""Examples and links of the documentation."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(page: Path, language: str) -> list[str]:
-    """The code blocks of a page."""
+    """Return the code blocks of a page."""
     return re.findall(rf"```{language}\n(.*?)```", page.read_text(), re.DOTALL)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_examples_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The Python blocks of a page run, one after another."""
-    # A whole study takes hours: plan it, and stop there.
+    # A study takes hours: only plan it.
     planned: list[Plan] = []
     monkeypatch.setattr(study, "run_study", lambda plan, out: planned.append(plan))
     names: dict[str, Any] = {"__name__": "__main__"}
@@ -36,14 +36,14 @@ def test_examples_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_links_lead_somewhere(page: Path) -> None:
-    """Every link to a file of the project leads to a file."""
+def test_links_to_files_exist(page: Path) -> None:
+    """Relative links lead to files of the project."""
     for target in re.findall(r"\]\((?!http)([^)#]+)\)", page.read_text()):
         assert (page.parent / target).exists(), target
 
 
-def test_the_map_of_the_guide_is_a_map() -> None:
-    """The TOML of docs/body-maps.md fits Ant and ExtendedAnt."""
+def test_the_map_of_the_guide_is_valid() -> None:
+    """The TOML of docs/body-maps.md is valid for Ant and ExtendedAnt."""
     (text,) = blocks(ROOT / "docs" / "body-maps.md", "toml")
     source, target = (env_ref(name).make() for name in ("Ant", "ExtendedAnt"))
     (so, sa), (to, ta) = layouts_of(source), layouts_of(target)

@@ -1,4 +1,4 @@
-"""What can go wrong: the tree of exceptions, and messages that say what exists instead."""
+"""The exception hierarchy and its messages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _CLASSES = [
 
 
 def _printed_tree() -> dict[str, tuple[str, str | None]]:
-    """For each class in the module's docstring its parent and the builtin in brackets."""
+    """Return parent and builtin base of each class in the module's docstring."""
     lines = re.findall(
         r"^((?:[│ ]   |[├└]── )*)(\w+)(?: \((\w+)\))?(?:  .*)?$", errors.__doc__ or "", re.M
     )
@@ -34,8 +34,8 @@ def _printed_tree() -> dict[str, tuple[str, str | None]]:
     return tree
 
 
-def test_the_tree_in_the_docstring_is_the_tree() -> None:
-    """Each class has the parent and the builtin that the module says it has."""
+def test_the_docstring_shows_the_hierarchy() -> None:
+    """Each class has the bases that the module's docstring shows."""
     tree = _printed_tree()
     assert sorted(tree) == sorted(_CLASSES)
     for name, (parent, builtin) in tree.items():
@@ -44,8 +44,8 @@ def test_the_tree_in_the_docstring_is_the_tree() -> None:
         assert builtin is None or hasattr(builtins, builtin)
 
 
-def test_one_except_catches_all() -> None:
-    """Whoever catches the base catches everything that the package refuses to do."""
+def test_all_errors_share_a_base() -> None:
+    """All errors derive from ShapechangerError."""
     assert all(issubclass(getattr(errors, name), ShapechangerError) for name in _CLASSES)
 
 
@@ -61,15 +61,15 @@ def test_one_except_catches_all() -> None:
         ("wheel", [], "No body matches 'wheel'. There are: none."),
     ],
 )
-def test_unknown_names_come_with_the_nearest(name: str, known: list[str], message: str) -> None:
-    """The message names what exists, and what was probably meant."""
+def test_unknown_names_suggest_the_nearest(name: str, known: list[str], message: str) -> None:
+    """The message lists the known names and suggests the nearest."""
     error = UnknownName("body", name, iter(known))
     assert str(error) == message
     assert (error.kind, error.name, error.known) == ("body", name, tuple(known))
 
 
 def test_long_lists_of_names_are_cut() -> None:
-    """A list that hides the sentence helps nobody; the error itself keeps it."""
+    """The message lists at most 40 names; the error keeps all."""
     error = UnknownName("joint", "x", [f"j{i}" for i in range(43)])
     assert str(error).endswith("j38, j39 and 3 more.")
     assert len(error.known) == 43
@@ -77,7 +77,7 @@ def test_long_lists_of_names_are_cut() -> None:
 
 
 def test_missing_extras_name_the_command() -> None:
-    """The message is the line to type."""
+    """The message has the command that installs the extra."""
     error = MissingExtra("mujoco", "sim")
     assert "run `pip install 'shapechanger[sim]'`" in str(error)
     assert (error.package, error.extra) == ("mujoco", "sim")
@@ -86,7 +86,7 @@ def test_missing_extras_name_the_command() -> None:
 @pytest.mark.parametrize(
     "error", [UnknownName("body", "thgih", ["thigh"]), MissingExtra("mujoco", "sim")]
 )
-def test_errors_cross_between_processes(error: ShapechangerError) -> None:
-    """A worker's error arrives with its message and its fields."""
+def test_errors_can_be_pickled(error: ShapechangerError) -> None:
+    """A pickled error keeps its message and its fields."""
     copy = pickle.loads(pickle.dumps(error))
     assert (type(copy), str(copy), vars(copy)) == (type(error), str(error), vars(error))

@@ -1,4 +1,4 @@
-"""Importing the package: what it loads, what it registers, what it says without a simulator."""
+"""Importing the package: loaded modules, registered ids, and missing extras."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ _VEHICLES = (
     "shapechanger/Truck-v1",
     "shapechanger/Boat-v1",
 )
-# Each of them on distances, and with waypoints.
+# Variants with distances and with waypoints.
 _MORE_VEHICLES = tuple(
     name.replace("-v1", f"{kind}-v1") for kind in ("Ranges", "Waypoint") for name in _VEHICLES
 )
 
 _FINGERS = ("shapechanger/Finger-v1", "shapechanger/FingerTrack-v1")
 
-# Every import of a blocked package fails, as where it is not installed.
+# Imports of a blocked package fail, as if it were not installed.
 _BLOCK = """
 import sys
 
@@ -78,8 +78,8 @@ def _run(script: str) -> str:
     return run.stdout
 
 
-def test_importing_registers_the_ids_and_loads_no_simulator() -> None:
-    """Who lists envs must not wait for MuJoCo or Torch."""
+def test_import_registers_ids_without_a_simulator() -> None:
+    """Importing registers all ids and loads neither MuJoCo nor PyTorch."""
     script = (
         "import sys, gymnasium as gym, shapechanger\n"
         "print(*[name for name in ('mujoco', 'torch', 'glfw', 'OpenGL') if name in sys.modules])\n"
@@ -93,41 +93,41 @@ def test_importing_registers_the_ids_and_loads_no_simulator() -> None:
     assert (tuple(VEHICLE_ENVS), tuple(FINGER_ENVS)) == (_VEHICLES, _FINGERS)
 
 
-def test_without_the_simulator_the_message_says_what_to_install() -> None:
-    """A user who installed the bare package is one command away."""
+def test_missing_mujoco_names_the_extra() -> None:
+    """Without MuJoCo, making an env raises an error with the command that installs it."""
     plain = (*_IDS, *_FINGERS)
-    said = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=plain)).splitlines()
+    lines = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=plain)).splitlines()
     sentence = "This needs mujoco, which is not installed: run `pip install 'shapechanger[sim]'`."
-    assert said == [sentence] * len(plain)
+    assert lines == [sentence] * len(plain)
 
 
-def test_without_the_simulator_a_vehicle_says_what_to_install() -> None:
-    """It is a simulated world and a robot, and wants what both want."""
-    said = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=_VEHICLES)).splitlines()
+def test_missing_mujoco_names_both_extras_for_vehicles() -> None:
+    """Vehicles need the extras `sim` and `robot`."""
+    lines = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=_VEHICLES)).splitlines()
     sentence = "This needs mujoco, which is not installed: "
     sentence += "run `pip install 'shapechanger[sim,robot]'`."
-    assert said == [sentence] * len(_VEHICLES)
+    assert lines == [sentence] * len(_VEHICLES)
 
 
 @pytest.mark.parametrize("blocked", ["glfw", "imageio"])
-def test_what_the_simulator_needs_comes_with_the_same_command(blocked: str) -> None:
-    """MuJoCo alone does not make an env: Gymnasium's parts for it import more."""
-    said = _run(_BLOCK.format(blocked=blocked) + _MAKE.format(ids=_IDS)).splitlines()
-    assert len(said) == len(_IDS)
-    for sentence in said:
+def test_missing_dependencies_of_mujoco_envs_name_the_extra(blocked: str) -> None:
+    """Without a dependency of Gymnasium's MuJoCo envs, the error names the extra `sim`."""
+    lines = _run(_BLOCK.format(blocked=blocked) + _MAKE.format(ids=_IDS)).splitlines()
+    assert len(lines) == len(_IDS)
+    for sentence in lines:
         assert sentence.endswith("run `pip install 'shapechanger[sim]'`.")
 
 
 def test_registering_again_changes_nothing() -> None:
-    """A module that is imported twice, or a user who makes sure, does no harm."""
+    """`register_all` is idempotent."""
     before = {env_id: gym.registry[env_id] for env_id in CATALOGUE}
     register_all()
     assert {env_id: gym.registry[env_id] for env_id in CATALOGUE} == before
     assert all(gym.registry[env_id] is spec for env_id, spec in before.items())
 
 
-def test_importing_again_does_no_harm() -> None:
-    """The registry outlives the module."""
+def test_importing_again_keeps_the_registry() -> None:
+    """Reloading or re-importing the package leaves the registry unchanged."""
     script = (
         "import sys, importlib, gymnasium as gym, shapechanger\n"
         "before = dict(gym.registry)\n"
@@ -140,8 +140,8 @@ def test_importing_again_does_no_harm() -> None:
     assert _run(script) == "True\n"
 
 
-def test_every_public_name_is_imported_on_first_use() -> None:
-    """`import shapechanger` documents itself: `dir` lists what can be imported from it."""
+def test_public_names_are_imported_lazily() -> None:
+    """Public names are listed by `dir` and imported on first use; others raise AttributeError."""
     for name in shapechanger.__all__:
         assert name in dir(shapechanger)
         assert getattr(shapechanger, name) is not None

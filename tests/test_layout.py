@@ -1,4 +1,4 @@
-"""What each number of an observation or an action means."""
+"""Layouts and features."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ MOTOR = Feature("hinge/motor", "1", -1.0, 1.0, gain=150.0, gain_unit="N·m")
 LAYOUT = Layout((HINGE, EYE, SPEED, MOTOR))
 
 
-def test_a_block_takes_as_many_places_as_it_has_numbers() -> None:
-    """Sizes and slices count numbers, the length counts features."""
+def test_a_block_has_a_slice() -> None:
+    """Sizes and slices count numbers; the length counts features."""
     assert [feature.size for feature in LAYOUT] == [1, 6, 1, 1]
     assert (len(LAYOUT), LAYOUT.size) == (4, 9)
     assert LAYOUT.slices == {
@@ -30,15 +30,15 @@ def test_a_block_takes_as_many_places_as_it_has_numbers() -> None:
     }
 
 
-def test_bounds_are_given_per_number() -> None:
-    """A block's bound stands at each of its places."""
+def test_bounds_are_expanded() -> None:
+    """The bounds of a block apply to each of its numbers."""
     np.testing.assert_array_equal(LAYOUT.low, [-1.5, *[0.0] * 6, -np.inf, -1.0])
     np.testing.assert_array_equal(LAYOUT.high, [1.0, *[255.0] * 6, np.inf, 1.0])
     assert LAYOUT.low.dtype == LAYOUT.high.dtype == np.float64
 
 
 def test_features_are_found_by_name() -> None:
-    """A layout is read like a dictionary."""
+    """A layout can be indexed by name."""
     assert LAYOUT["eye/image"] is EYE
     assert "eye/image" in LAYOUT
     assert "nose" not in LAYOUT
@@ -48,7 +48,7 @@ def test_features_are_found_by_name() -> None:
 
 
 def test_features_are_found_by_glob() -> None:
-    """A glob finds some or complains, a name finds one or complains."""
+    """A glob or a name that matches nothing raises UnknownName."""
     assert LAYOUT.matching("hinge/*") == (HINGE, SPEED, MOTOR)
     assert LAYOUT.matching("hinge/angle") == (HINGE,)
     for pattern in ("knee/*", "knee/angle"):
@@ -68,12 +68,12 @@ def test_features_are_found_by_glob() -> None:
     ],
 )
 def test_the_middle_lies_in_the_range(low: float, high: float, middle: float) -> None:
-    """Where a range has no middle it is what is nearest to zero."""
+    """The middle of an unbounded range is its value nearest to zero."""
     assert Feature("x", "m", low, high).middle == middle
 
 
 def test_features_print_with_their_unit() -> None:
-    """As a table's heading would have it."""
+    """`str` gives name and unit."""
     assert str(HINGE) == "hinge/angle [rad]"
 
 
@@ -93,20 +93,20 @@ def test_features_print_with_their_unit() -> None:
         ({"shape": (2, 0)}, r"shape \(2, 0\) has a number below one"),
     ],
 )
-def test_impossible_features_are_refused(wrong: dict[str, Any], message: str) -> None:
-    """What no number could be is refused when it is written down."""
+def test_invalid_features_are_refused(wrong: dict[str, Any], message: str) -> None:
+    """Empty names, empty or NaN ranges and invalid gains and shapes raise LayoutError."""
     with pytest.raises(LayoutError, match=message):
         Feature(**{"name": "x", "unit": "m", **wrong})
 
 
-def test_names_are_unique() -> None:
-    """A name that stands for two numbers stands for none."""
+def test_names_must_be_unique() -> None:
+    """Two features of one name raise LayoutError."""
     with pytest.raises(LayoutError, match="Two features have the name 'eye/image'"):
         Layout((HINGE, EYE, SPEED, EYE))
 
 
-def test_json_gives_back_the_layout() -> None:
-    """Also with blocks, elements, gains and bounds that JSON cannot write."""
+def test_a_layout_round_trips_through_json() -> None:
+    """Blocks, elements, gains and infinite bounds are kept."""
     text = LAYOUT.to_json()
     assert Layout.from_json(text) == Layout.from_json(text.encode()) == LAYOUT
     assert "Infinity" not in text
@@ -123,14 +123,14 @@ def test_json_gives_back_the_layout() -> None:
         '{"features":[{"name":"x","unit":"m"},{"name":"x","unit":"m"}]}',
     ],
 )
-def test_other_json_is_no_layout(text: str | bytes) -> None:
-    """Whatever is wrong with the text, the error is one of ours."""
+def test_invalid_json_is_refused(text: str | bytes) -> None:
+    """Invalid text raises LayoutError."""
     with pytest.raises(LayoutError, match="This is not a layout: "):
         Layout.from_json(text)
 
 
-def test_infinite_bounds_go_round_whichever_way_they_were_computed() -> None:
-    """An infinity that was computed is left out of the JSON as the default is."""
+def test_infinite_bounds_are_omitted_from_json() -> None:
+    """Infinite bounds round trip and are left out of the JSON."""
     for infinity in (math.inf, float("inf"), 1e308 * 10):
         layout = Layout((Feature("a", "m", -infinity, infinity),))
         assert Layout.from_json(layout.to_json()) == layout

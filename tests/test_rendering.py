@@ -1,4 +1,4 @@
-"""Choosing what draws where there is no screen, each time in an interpreter of its own."""
+"""Selection of the OpenGL library, each in a new interpreter."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from tests.drawing import run_python
 
 pytestmark = pytest.mark.skipif(
-    sys.platform != "linux", reason="Elsewhere there is always a screen."
+    sys.platform != "linux", reason="other systems always have a screen"
 )
 
 _CHOOSE = """
@@ -18,12 +18,12 @@ from shapechanger.rendering import choose_gl
 choose_gl()
 print(os.environ.get("MUJOCO_GL"))
 """
-# What is installed is what can be found.
+# Fake the installed libraries.
 _INSTALLED = """
 import ctypes.util
 ctypes.util.find_library = lambda name: {libraries!r}.get(name, None)
 """
-# A library of EGL that knows so many devices, of which each has a driver or not.
+# Fake EGL library with devices, with and without drivers.
 _EGL = """
 import ctypes
 
@@ -60,7 +60,7 @@ ctypes.CDLL = lambda name, *arguments, **more: Library()
 
 
 def _egl(*, devices: int = 0, drivers: tuple[int, ...] = (), extensions: bool = True) -> str:
-    """EGL with so many devices, of which those of these numbers, from 1, have a driver."""
+    """Return a fake EGL; `drivers` are the numbers, from 1, of the devices with a driver."""
     displays = tuple(10 + driver for driver in drivers)
     return _EGL.format(devices=devices, drivers=displays, extensions=extensions)
 
@@ -72,7 +72,7 @@ def _installed(**libraries: str) -> str:
     return _INSTALLED.format(libraries=libraries)
 
 
-def _says(script: str, **variables: str) -> str:
+def _output(script: str, **variables: str) -> str:
     run = run_python(script, **variables)
     assert run.returncode == 0, run.stderr
     return run.stdout.strip()
@@ -81,13 +81,13 @@ def _says(script: str, **variables: str) -> str:
 @pytest.mark.gl
 @pytest.mark.usefixtures("egl")
 def test_egl_is_chosen() -> None:
-    """It draws on the graphics card, or on the processor where there is none."""
-    assert _says(_CHOOSE) == "egl"
+    """EGL is preferred; it renders on the GPU, or on the CPU without one."""
+    assert _output(_CHOOSE) == "egl"
 
 
 def test_osmesa_is_chosen_where_egl_is_missing() -> None:
-    """It draws on the processor."""
-    assert _says(_installed(OSMesa="libOSMesa.so.8") + _CHOOSE) == "osmesa"
+    """OSMesa is used without EGL."""
+    assert _output(_installed(OSMesa="libOSMesa.so.8") + _CHOOSE) == "osmesa"
 
 
 @pytest.mark.parametrize(
@@ -101,14 +101,14 @@ def test_osmesa_is_chosen_where_egl_is_missing() -> None:
     ids=["no extensions", "no device", "no driver", "a driver for the second device"],
 )
 def test_egl_is_chosen_where_a_device_opens(egl: str, chosen: str) -> None:
-    """A container may have the library but no device, and a machine a device without driver."""
+    """EGL is used only if one of its devices opens."""
     installed = _installed(EGL="libEGL.so.1", OSMesa="libOSMesa.so.8")
-    assert _says(installed + egl + _CHOOSE) == chosen
+    assert _output(installed + egl + _CHOOSE) == chosen
 
 
 @pytest.mark.parametrize("broken", ["", _NO_DRIVER], ids=["nothing", "EGL without a driver"])
-def test_a_sentence_says_what_to_install(broken: str) -> None:
-    """Where neither works, one command helps."""
+def test_missing_libraries_are_reported(broken: str) -> None:
+    """Without EGL and OSMesa, the error has the command that installs them."""
     libraries = {"EGL": "libEGL.so.1"} if broken else {}
     run = run_python(_installed(**libraries) + broken + _CHOOSE)
     assert run.returncode == 1
@@ -120,14 +120,14 @@ def test_a_sentence_says_what_to_install(broken: str) -> None:
 
 
 @pytest.mark.parametrize("choice", ["egl", "osmesa", "glfw"])
-def test_the_choice_of_the_user_stands(choice: str) -> None:
-    """Whoever sets `MUJOCO_GL` knows better."""
-    assert _says(_installed() + _CHOOSE, MUJOCO_GL=choice) == choice
+def test_mujoco_gl_takes_precedence(choice: str) -> None:
+    """A valid `MUJOCO_GL` is kept."""
+    assert _output(_installed() + _CHOOSE, MUJOCO_GL=choice) == choice
 
 
 @pytest.mark.parametrize("choice", ["whatever", "disable", "EGL"])
-def test_a_choice_that_does_not_draw_is_refused(choice: str) -> None:
-    """The sentence names those that do."""
+def test_an_invalid_mujoco_gl_is_refused(choice: str) -> None:
+    """The error lists the valid values."""
     run = run_python(_CHOOSE, MUJOCO_GL=choice)
     assert run.stderr.splitlines()[-1] == (
         f"shapechanger.errors.RenderError: With MUJOCO_GL={choice} nothing can be drawn: set it to "
@@ -137,9 +137,9 @@ def test_a_choice_that_does_not_draw_is_refused(choice: str) -> None:
 
 @pytest.mark.parametrize("name", ["DISPLAY", "WAYLAND_DISPLAY"])
 def test_nothing_is_chosen_where_there_is_a_screen(name: str) -> None:
-    """MuJoCo then draws with GLFW, or finds something itself."""
-    assert _says(_installed() + _CHOOSE, **{name: ":0"}) == "None"
-    assert _says(_installed(OSMesa="libOSMesa.so.8") + _CHOOSE, **{name: ""}) == "osmesa"
+    """With a display, the choice is left to MuJoCo."""
+    assert _output(_installed() + _CHOOSE, **{name: ":0"}) == "None"
+    assert _output(_installed(OSMesa="libOSMesa.so.8") + _CHOOSE, **{name: ""}) == "osmesa"
 
 
 _MAKE = """
@@ -158,34 +158,34 @@ except RenderError as error:
 
 
 def test_an_env_that_cannot_draw_is_refused_when_it_is_made() -> None:
-    """Not at the first frame, an hour into a training; without pictures it can be made."""
+    """`gym.make` with a render mode raises at once; without rendering it works."""
     script = (
         _installed()
         + _MAKE.format(asks="gym.make('shapechanger/Ant-v1').reset(seed=0)")
         + _REFUSED.format(statement="gym.make('shapechanger/Ant-v1', render_mode='rgb_array')")
         + _REFUSED.format(statement="gym.make('shapechanger/Ant-v1').unwrapped.picture()")
     )
-    made, drawn = _says(script).splitlines()
+    made, drawn = _output(script).splitlines()
     assert made == drawn
     assert made.startswith("There is no screen, and neither EGL nor OSMesa")
 
 
-def test_a_window_without_a_screen_is_refused_in_a_sentence() -> None:
-    """GLFW would end the process."""
+def test_a_window_without_a_display_is_refused() -> None:
+    """`render_mode="human"` without a display raises; GLFW would abort the process."""
     script = _MAKE.format(asks="") + _REFUSED.format(
         statement="gym.make('shapechanger/Ant-v1', render_mode='human')"
     )
     for variables in ({}, {"MUJOCO_GL": "egl"}):
-        assert _says(script, **variables) == (
+        assert _output(script, **variables) == (
             "There is no screen to open a window on: make the env with render_mode='rgb_array', "
             "or run the program under `xvfb-run`."
         )
 
 
-def test_a_display_that_does_not_open_is_refused_in_a_sentence() -> None:
-    """GLFW would end the process at the first window, and MuJoCo speak of its platform library."""
+def test_a_display_that_does_not_open_is_refused() -> None:
+    """A broken `DISPLAY` raises; GLFW would abort the process."""
     window, picture = (
-        _says(_MAKE.format(asks="") + _REFUSED.format(statement=statement), DISPLAY=":77")
+        _output(_MAKE.format(asks="") + _REFUSED.format(statement=statement), DISPLAY=":77")
         for statement in (
             "gym.make('shapechanger/Ant-v1', render_mode='human')",
             "gym.make('shapechanger/Ant-v1').unwrapped.picture()",
@@ -196,10 +196,10 @@ def test_a_display_that_does_not_open_is_refused_in_a_sentence() -> None:
 
 
 @pytest.mark.parametrize(("width", "height"), [(-5, 48), (64, 0), (100_000_000, 48)])
-def test_a_picture_of_no_size_is_refused(width: int, height: int) -> None:
-    """Before anything is made that large."""
+def test_invalid_image_sizes_are_refused(width: int, height: int) -> None:
+    """The size is checked before memory is allocated."""
     statement = f"gym.make('shapechanger/Ant-v1').unwrapped.picture({width}, {height})"
-    assert _says(_MAKE.format(asks="") + _REFUSED.format(statement=statement)) == (
+    assert _output(_MAKE.format(asks="") + _REFUSED.format(statement=statement)) == (
         f"An image must be 1 to 8192 pixels wide and high, got {width} x {height}."
     )
 
@@ -220,17 +220,17 @@ with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", width=64, height=4
 @pytest.mark.gl
 @pytest.mark.usefixtures("osmesa")
 def test_osmesa_draws() -> None:
-    """A frame is drawn where EGL is not found, by whoever is chosen then."""
+    """A frame is rendered with OSMesa when EGL is missing."""
     without_egl = (
         "import ctypes.util\n"
         "found = ctypes.util.find_library\n"
         "ctypes.util.find_library = lambda name: None if name == 'EGL' else found(name)\n"
     )
-    assert _says(without_egl + _DRAW).splitlines() == ["osmesa (48, 64, 3) True", "True"]
+    assert _output(without_egl + _DRAW).splitlines() == ["osmesa (48, 64, 3) True", "True"]
 
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("egl")
 def test_egl_draws() -> None:
-    """A frame is drawn without anybody's choice."""
-    assert _says(_DRAW).splitlines() == ["egl (48, 64, 3) True", "True"]
+    """A frame is rendered with EGL by default."""
+    assert _output(_DRAW).splitlines() == ["egl (48, 64, 3) True", "True"]

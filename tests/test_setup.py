@@ -1,4 +1,4 @@
-"""Set-up of a fresh clone: pyproject.toml, constraints.txt, typings."""
+"""Consistency of pyproject.toml, constraints.txt and typings."""
 
 import tomllib
 from collections.abc import Iterator
@@ -42,23 +42,23 @@ def test_every_requirement_is_pinned_inside_its_range() -> None:
 
 
 def test_pins_fit_every_platform() -> None:
-    """A local version, such as torch's +cpu, exists for some machines only."""
+    """No pin has a local version such as torch's +cpu, which only some platforms have."""
     assert {name: v for name, v in _pins().items() if Version(v).local is not None} == {}
 
 
 def test_all_is_the_sum_of_the_extras_for_users() -> None:
-    """`all` has every extra but the developers' tools, and Ray: 80 MB that a cluster needs."""
+    """`all` has every extra except `dev` and `ray`, which is 80 MB and needs a cluster."""
     (everything,) = map(Requirement, _EXTRAS["all"])
     assert everything.extras == set(_EXTRAS) - {"all", "dev", "ray"}
 
 
 def test_stubs_describe_the_pinned_mujoco() -> None:
-    """A new MuJoCo needs new stubs, or pyright checks against the old one."""
+    """The stubs were generated from the pinned version of MuJoCo."""
     header = (_ROOT / "typings/mujoco/__init__.pyi").read_text().splitlines()[0]
     assert f"Generated from mujoco {_pins()['mujoco']} " in header
 
 
 def test_coverage_gate_finds_its_files() -> None:
-    """A module that is renamed must not slip past the gate."""
+    """Every pattern of the coverage configuration matches a file."""
     patterns: list[str] = _PYPROJECT["tool"]["coverage"]["run"]["include"]
     assert [pattern for pattern in patterns if not list(_ROOT.glob(pattern))] == []

@@ -1,4 +1,4 @@
-"""The exam for envs can be failed: each promise has an env that breaks it."""
+"""The exam of envs: each promise has an env that breaks it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _Info = dict[str, Any]
 
 
 class Walk(gym.Env[np.ndarray, np.ndarray]):
-    """A point on a line that keeps every promise."""
+    """Point mass on a line that keeps every promise."""
 
     observation_layout = Layout((Feature("point/x", "m", -1.0, 1.0), Feature("point/vx", "m/s")))
     action_layout = Layout((Feature("point/motor", "1", -1.0, 1.0),))
@@ -49,15 +49,15 @@ class Walk(gym.Env[np.ndarray, np.ndarray]):
         return self.seen(), {}
 
     def start(self) -> float:
-        """Where to start: somewhere near the middle."""
+        """Return a random start near the middle."""
         return self.np_random.uniform(-0.1, 0.1)
 
     def seen(self) -> np.ndarray:
-        """The observation."""
+        """Return the observation."""
         return self.state.copy()
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
-        """Push the point for a tenth of a second."""
+        """Push the point for 0.1 s."""
         x, speed = self.state
         speed += 0.1 * float(action[0])
         self.state = np.array([x + 0.1 * speed, speed])
@@ -69,15 +69,15 @@ _count = itertools.count()
 
 
 class Unseeded(Walk):
-    """Starts somewhere else each time, whatever the seed."""
+    """Env whose start ignores the seed."""
 
     def start(self) -> float:
-        """Start where no start was."""
+        """Return a new start at each call."""
         return 1e-3 * next(_count)
 
 
 class Forgetful(Walk):
-    """Ends its second episode sooner than its first, which the numbers until then do not show."""
+    """Env whose second instance ends episodes sooner, with equal numbers until then."""
 
     made = 0
 
@@ -94,20 +94,20 @@ class Forgetful(Walk):
 
 
 class Moody(Walk):
-    """Gives another reward for the same step."""
+    """Env with an unpredictable reward."""
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
-        """Add a reward that nobody can foresee."""
+        """Add a term from a global counter."""
         observation, reward, terminated, truncated, info = super().step(action)
         info["reward_mood"] = float(next(_count))
         return observation, reward + info["reward_mood"], terminated, truncated, info
 
 
 class Shared(Walk):
-    """Hands out its own memory."""
+    """Env that returns its own memory."""
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
-        """Write the new state over the old one."""
+        """Overwrite the array that was returned before."""
         memory = self.state
         _, reward, terminated, truncated, info = super().step(action)
         memory[:] = self.state
@@ -116,25 +116,25 @@ class Shared(Walk):
 
 
 class Nameless(Walk):
-    """Does not say what its numbers mean."""
+    """Env without an observation layout."""
 
     observation_layout = None
 
 
 class Short(Walk):
-    """Names one number of two."""
+    """Env whose layout names one number of two."""
 
     observation_layout = Layout((Feature("point/x", "m", -1.0, 1.0),))
 
 
 class Strong(Walk):
-    """States bounds of its motor that are not those of the space."""
+    """Env whose action layout has other bounds than its space."""
 
     action_layout = Layout((Feature("point/motor", "1", -2.0, 2.0),))
 
 
 class Chooser(Walk):
-    """Has actions that are no numbers."""
+    """Env with a discrete action space."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -142,7 +142,7 @@ class Chooser(Walk):
 
 
 class Holding(Walk):
-    """Holds what no pickle can."""
+    """Env that cannot be pickled."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -150,82 +150,82 @@ class Holding(Walk):
 
 
 class Changed(Walk):
-    """Is another env after it was pickled."""
+    """Env whose copies have stronger motors."""
 
     power = 1.0
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Come back stronger."""
+        """Restore with more power."""
         self.__dict__.update(state, power=2.0)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
-        """Push with the power that there is."""
+        """Scale the action by the power."""
         return super().step(self.power * action)
 
 
 class Richer(Changed):
-    """Moves as before when it was pickled, for twice the reward."""
+    """Env whose copies move alike and pay twice the reward."""
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
-        """Reward with the power that there is."""
+        """Scale the reward by the power."""
         observation, reward, terminated, truncated, info = Walk.step(self, action)
         info = {name: self.power * value for name, value in info.items()}
         return observation, self.power * reward, terminated, truncated, info
 
 
 class Brief(Changed):
-    """Ends sooner when it was pickled."""
+    """Env whose copies end at once."""
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
-        """End at once if this is a copy."""
+        """Terminate if this is a copy."""
         observation, reward, _, _, info = Walk.step(self, action)
         return observation, reward, self.power > 1.0, False, info
 
 
 class Vague(Walk):
-    """Does not say what the reward is made of."""
+    """Env that reports no reward terms."""
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
-        """Keep the terms."""
+        """Drop the terms from the info."""
         observation, reward, terminated, truncated, _ = super().step(action)
         return observation, reward, terminated, truncated, {}
 
 
 class Generous(Walk):
-    """Gives more than it says."""
+    """Env whose reward exceeds the sum of its terms."""
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
-        """Add a gift."""
+        """Add a constant."""
         observation, reward, terminated, truncated, info = super().step(action)
         return observation, reward + 1e-3, terminated, truncated, info
 
 
 class Still(Walk):
-    """Always starts at the same place."""
+    """Env with a constant start."""
 
     def start(self) -> float:
-        """Start at the middle."""
+        """Return the middle."""
         return 0.0
 
 
 class Outside(Walk):
-    """Starts where its layout says that it cannot be."""
+    """Env that starts outside the range of its layout."""
 
     def start(self) -> float:
-        """Start too far to the right."""
+        """Return a start beyond the upper bound."""
         return 1.0 + self.np_random.random()
 
 
 class Liar(Walk):
-    """Returns observations that are not in its space."""
+    """Env whose observations are not in its space."""
 
     def seen(self) -> np.ndarray:
-        """See a number too many."""
+        """Append a number."""
         return np.append(self.state, 0.0)
 
 
 class Single(Walk):
-    """Starts in one of two places at the ends of its range, in single precision."""
+    """Env in single precision that starts at the ends of its range."""
 
     observation_layout = Layout((Feature("point/x", "m", -0.1, 0.1), Feature("point/vx", "m/s")))
 
@@ -234,15 +234,15 @@ class Single(Walk):
         self.observation_space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float32)
 
     def start(self) -> float:
-        """Start at an end; the number of single precision next to 0.1 lies above it."""
+        """Return an end of the range; 0.1 in single precision is above 0.1."""
         return self.np_random.choice([-0.1, 0.1])
 
     def seen(self) -> np.ndarray:
-        """Round."""
+        """Convert to single precision."""
         return self.state.astype(np.float32)
 
 
-# Each env with the promise that it breaks, and what the exam says of it.
+# Each env with the promise that it breaks, and the message of the exam.
 _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
     (Liar, passes_gymnasiums_checker, "Gymnasium's checker says: .*not within the observ"),
     (Unseeded, is_deterministic, "same seed and actions differ"),
@@ -268,7 +268,7 @@ _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
 @pytest.mark.filterwarnings("ignore:.*value is -?infinity:UserWarning")
 @pytest.mark.parametrize("make", [Walk, Single])
 def test_an_env_that_keeps_its_promises_passes(make: MakeEnv) -> None:
-    """The exam asks nothing that a small env of somebody else cannot do."""
+    """Envs that keep all promises pass, also in single precision."""
     sentences = list(examine(make))
     assert len(sentences) == len(PROMISES)
     assert all(sentence.endswith(".") for sentence in sentences)
@@ -278,32 +278,32 @@ def test_an_env_that_keeps_its_promises_passes(make: MakeEnv) -> None:
 def test_a_broken_promise_is_found(
     make: MakeEnv, promise: Callable[[MakeEnv], None], sentence: str
 ) -> None:
-    """An exam that everybody passes examines nothing."""
+    """A broken promise raises BrokenPromise."""
     with pytest.raises(BrokenPromise, match=sentence):
         promise(make)
 
 
 def test_every_promise_is_broken_by_some_env() -> None:
-    """A promise that is added needs an env that breaks it."""
+    """Every promise is covered by an env that breaks it."""
     assert {promise for _, promise, _ in _BROKEN} == set(PROMISES)
 
 
 def test_the_exam_ends_at_the_first_broken_promise() -> None:
-    """What was kept until then has been said."""
+    """`examine` yields the kept promises before the first broken one."""
     kept: list[str] = []
     with pytest.raises(BrokenPromise, match="Every start is the same"):
         kept.extend(examine(Still))
     assert len(kept) == PROMISES.index(starts_where_it_may)
 
 
-def test_a_broken_promise_is_an_assertion_that_failed() -> None:
-    """Test runners show it as one, and ours is caught with all the others."""
+def test_broken_promise_is_an_assertion_error() -> None:
+    """BrokenPromise is an AssertionError and a ShapechangerError."""
     assert issubclass(BrokenPromise, AssertionError)
     assert issubclass(BrokenPromise, ShapechangerError)
 
 
 def test_a_spec_that_makes_another_env_is_found() -> None:
-    """What a study writes down must make the same env again."""
+    """A spec that makes another env raises BrokenPromise."""
     gym.register("testing_test/Walk-v0", f"{__name__}:Walk")
     try:
 

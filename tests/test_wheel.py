@@ -1,4 +1,4 @@
-"""The package as its users get it: built, installed, imported from somewhere else."""
+"""The built wheel, installed and imported outside the source tree."""
 
 import os
 import subprocess
@@ -35,7 +35,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
-    """Model files and py.typed are as needed as code, and are easily left out."""
+    """The wheel has every file of the package, model files and py.typed included."""
     on_disk = {
         path.relative_to(_SRC).as_posix()
         for path in (_SRC / "shapechanger").rglob("*")
@@ -46,7 +46,7 @@ def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
 
 
 def test_wheel_holds_the_clones_and_the_profiles_of_the_vehicles(wheel: Path) -> None:
-    """Each vehicle has its policy, and its robot; the policies have a model card."""
+    """Each vehicle has a policy and a profile; the policies have a model card."""
     inside = set(zipfile.ZipFile(wheel).namelist())
     for vehicle in ("boat", "car", "tank", "truck"):
         assert CLONES[vehicle].relative_to(_SRC).as_posix() in inside
@@ -57,7 +57,7 @@ def test_wheel_holds_the_clones_and_the_profiles_of_the_vehicles(wheel: Path) ->
 
 
 def test_wheel_works_away_from_the_source(wheel: Path, tmp_path: Path) -> None:
-    """What is imported is the installed package, and a body can be built from its files."""
+    """The installed package is imported and makes an env from its files."""
     target = tmp_path / "site"
     options = ["--quiet", "--no-deps", "--no-index", "--target", str(target)]
     subprocess.run([sys.executable, "-m", "pip", "install", *options, str(wheel)], check=True)

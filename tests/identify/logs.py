@@ -1,4 +1,4 @@
-"""Logs to identify fingers from."""
+"""Logs for the identification of fingers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shapechanger.identify import FingerLog
 
 
 def recorded(seconds: float, seed: int = 0, **arguments: Any) -> tuple[FingerLog, FingerParameters]:
-    """A log of a simulated finger, and its true parameters."""
+    """Return a log of a simulated finger and its true parameters."""
     env = gym.make("shapechanger/Finger-v1", max_episode_steps=-1, **arguments)
     actions = arguments.get("actions", "impedance")
     log = record_babble(env, seconds, seed, actions)
@@ -25,7 +25,7 @@ def recorded(seconds: float, seed: int = 0, **arguments: Any) -> tuple[FingerLog
 
 
 def made_up(rows: int = 300) -> FingerLog:
-    """A log without forces: joints swing, each at its own rate."""
+    """Return a log without forces, in which each joint swings at its own rate."""
     t = 0.02 * np.arange(rows, dtype=np.float64)
     angles = np.sin(np.outer(t, [2.0, 3.1, 4.3, 5.7]))
     nothing = np.zeros((rows, 7))
@@ -33,12 +33,12 @@ def made_up(rows: int = 300) -> FingerLog:
 
 
 def changed(log: FingerLog, **changes: Any) -> FingerLog:
-    """The same log with some fields replaced."""
+    """Return the log with some fields replaced."""
     return dataclasses.replace(log, **changes)
 
 
 def swings(t: np.ndarray) -> np.ndarray:
-    """True angles of `synthetic` at times in s, rad, (n, 4)."""
+    """Return the true angles of `synthetic` at times `t` in s: rad, shape (n, 4)."""
     phases = np.array([0.0, 1.0, 2.0, 3.0])
     return 0.5 * np.sin(np.outer(t, [2.0, 3.1, 4.3, 5.7]) + phases)
 
@@ -46,7 +46,7 @@ def swings(t: np.ndarray) -> np.ndarray:
 def synthetic(
     arms: np.ndarray, compliance: float, joint_noise: float, length_noise: float, rows: int = 400
 ) -> FingerLog:
-    """A log whose lengths follow from noisy angles by the kinematic model, without friction.
+    """Return a log whose lengths follow from the kinematic model, with noisy angles.
 
     Args:
         arms: Moment arms, m, (7, 4).

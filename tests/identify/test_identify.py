@@ -1,4 +1,4 @@
-"""A finger from a log, as a whole."""
+"""Identification of a finger from a log."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.identify.logs import made_up, recorded
 
 @functools.cache
 def quick() -> tuple[FingerLog, FingerParameters, IdentifiedFinger, tuple[str, ...]]:
-    """A log of four seconds, the true finger, and the identified one."""
+    """Return a log of four seconds, the true and the identified finger, and the progress."""
     parameters = NOMINAL.replace(
         moment_arms=tuple(tuple(1.08 * arm for arm in row) for row in NOMINAL.moment_arms),
         joint_stiffness=tuple(1.3 * v for v in NOMINAL.joint_stiffness),
@@ -37,7 +37,7 @@ def quick() -> tuple[FingerLog, FingerParameters, IdentifiedFinger, tuple[str, .
 
 
 def test_a_finger_is_identified() -> None:
-    """Arms, joints, friction and motors of a finger without noise, and its motion."""
+    """Arms, joints, friction, motors and motion of a finger without noise are found."""
     log, truth, found, steps = quick()
     np.testing.assert_allclose(found.parameters.arms, truth.arms, rtol=0.01)
     assert found.parameters.tendon_stiffness is None
@@ -61,8 +61,8 @@ def test_a_finger_is_identified() -> None:
     )
 
 
-def test_intervals_of_an_identified_finger_hold_the_truth() -> None:
-    """Those of joints, friction and motors; each arm has one, and the nominal arm is outside."""
+def test_intervals_contain_the_truth() -> None:
+    """Intervals contain the true values; those of arms exclude the nominal ones."""
     _, truth, found, _ = quick()
     by_name = {e.name: e for e in found.estimates}
     for j, joint in enumerate(JOINTS):
@@ -80,7 +80,7 @@ def test_intervals_of_an_identified_finger_hold_the_truth() -> None:
 
 
 def kinematics(compliance: float, compliance_sd: float, noise: float = 1e-6) -> Kinematics:
-    """Nominal arms known to a tenth of a millimetre."""
+    """Return kinematics with nominal arms and a standard error of 0.1 mm."""
     return Kinematics(
         arms=NOMINAL.arms,
         arms_covariance=1e-8 * np.eye(int(ARMS.sum())),
@@ -103,19 +103,19 @@ DYNAMICS = Dynamics(
 def estimates(
     compliance: float = 1e-4, compliance_sd: float = 1e-5, motors: Motors = MOTORS
 ) -> dict[str, ParameterEstimate]:
-    """Estimates of a made-up fit over a log of 300 rows, by name."""
+    """Return the estimates of a synthetic fit over a log of 300 rows, by name."""
     log = made_up()
     found = result._estimates(kinematics(compliance, compliance_sd), motors, DYNAMICS, log)
     return {e.name: e for e in found}
 
 
 def half(e: ParameterEstimate) -> float:
-    """Half the width of an interval."""
+    """Return half the width of an interval."""
     return 0.5 * (e.high - e.low)
 
 
-def test_intervals_are_as_wide_as_the_errors_say() -> None:
-    """Standard errors, those of the model and of the clock, times the quantile."""
+def test_intervals_follow_from_standard_errors() -> None:
+    """Half-widths are the standard errors, model and clock errors included, times the quantile."""
     found, reach = estimates(), interval_quantile(300, 0.02)
     for i, j in np.argwhere(ARMS):
         e = found[f"moment_arms/{TENDONS[i]}/{JOINTS[j]}"]
@@ -131,7 +131,7 @@ def test_intervals_are_as_wide_as_the_errors_say() -> None:
         assert (e.low, e.high) == pytest.approx((e.value / by, e.value * by))
     assert half(found["motor_lag"]) == pytest.approx(reach * math.hypot(0.001, 0.0005))
     delay = found["command_delay"]
-    assert (delay.low, delay.value) == (0.0, 0.001)  # Never below zero.
+    assert (delay.low, delay.value) == (0.0, 0.001)  # Clipped at zero.
     assert delay.high == pytest.approx(0.001 + reach * math.hypot(0.002, 0.002))
     assert half(found["strength"]) == pytest.approx(reach * 0.01)
     assert found["strength"].nominal == 1.0
@@ -140,7 +140,7 @@ def test_intervals_are_as_wide_as_the_errors_say() -> None:
 
 
 def test_stiffness_has_the_interval_of_its_inverse() -> None:
-    """Open to infinity where the tendons may as well be stiff."""
+    """The upper end is infinite where the compliance is not clearly above zero."""
     reach = interval_quantile(300, 0.02)
     e = estimates()["tendon_stiffness"]
     assert e.value == pytest.approx(1e4)
@@ -157,20 +157,22 @@ def test_stiffness_has_the_interval_of_its_inverse() -> None:
     ("compliance", "sd", "stiffness"),
     [
         (1e-4, 0.5e-4, 1e4),  # Two standard errors.
-        (1e-4, 0.52e-4, None),  # 1.92 of them.
+        (1e-4, 0.52e-4, None),  # 1.92 standard errors.
         (4.1e-6, 1e-9, 1.0 / 4.1e-6),
         (3.9e-6, 1e-9, None),  # Stiffer than 250 kN/m.
         (-1e-4, 1e-6, None),
     ],
 )
-def test_tendons_stretch_if_it_shows(compliance: float, sd: float, stiffness: float | None) -> None:
-    """Beyond its error and beyond the smallest stretch that matters."""
+def test_compliance_counts_only_if_significant(
+    compliance: float, sd: float, stiffness: float | None
+) -> None:
+    """Stiffness is finite if the compliance exceeds its error and the least relevant stretch."""
     found = result._parameters(kinematics(compliance, sd), MOTORS, DYNAMICS, None)
     assert found.tendon_stiffness == pytest.approx(stiffness)
 
 
-def test_parameters_are_those_that_were_fitted() -> None:
-    """Joints, friction, motors and noise; the rest is nominal, or as known."""
+def test_fitted_values_become_parameters() -> None:
+    """Joints, friction, motors and noise are set; other parameters stay nominal or as known."""
     found = result._parameters(kinematics(0.0, 1e-6, 0.02), MOTORS, DYNAMICS, None)
     assert found.moment_arms == NOMINAL.moment_arms
     assert found.joint_stiffness == tuple(2.0 * v for v in NOMINAL.joint_stiffness)
@@ -183,8 +185,8 @@ def test_parameters_are_those_that_were_fitted() -> None:
     assert result._parameters(kinematics(0.0, 1e-6), MOTORS, DYNAMICS, None).joint_noise == 0.0
 
 
-def test_parameters_that_no_log_determines_are_listed() -> None:
-    """With the value assumed; the strength unless it is known or a motor saturated."""
+def test_undetermined_parameters_are_listed() -> None:
+    """Undetermined parameters are listed with their assumed values."""
     still = dataclasses.replace(MOTORS, saturates=False)
     always = ["joint_friction", "tendon_damping", "motor_kg", "backlash"]
     assert [name for name, _ in result._undetermined(still, None)] == [*always, "most_tension"]
@@ -197,7 +199,7 @@ def test_parameters_that_no_log_determines_are_listed() -> None:
 
 
 def window_of(log: FingerLog, parameters: FingerParameters) -> Window:
-    """The first second of a log after 0.3 s, with exact angles."""
+    """Return the first second of a log after 0.3 s, with exact angles."""
     exact = dataclasses.replace(kinematics(0.0, 1e-6), angles=log.angles)
     motors = Motors(
         parameters.motor_lag, parameters.command_delay, 1.0, (0.0, 0.0, 0.0), False, 0.0
@@ -206,8 +208,8 @@ def window_of(log: FingerLog, parameters: FingerParameters) -> Window:
 
 
 @pytest.mark.parametrize("stiffness", [None, 2e4])
-def test_the_true_finger_repeats_its_motion(stiffness: float | None) -> None:
-    """To a degree within a second, with stiff tendons and with tendons that stretch."""
+def test_replay_of_the_true_finger_repeats_its_motion(stiffness: float | None) -> None:
+    """A replay of one second stays within a degree, with stiff and with elastic tendons."""
     true = NOMINAL.replace(tendon_stiffness=stiffness, command_delay=0.02)
     log, _ = recorded(2.0, parameters=true)
     window = window_of(log, true)
@@ -221,15 +223,15 @@ def test_the_true_finger_repeats_its_motion(stiffness: float | None) -> None:
 
 
 def test_errors_are_root_mean_squares() -> None:
-    """Of the identified finger first."""
+    """`off` holds the errors of the identified and of the nominal finger, in this order."""
     zero, t = np.zeros((4, 4)), np.arange(4.0)
     found = HeldOut(t, measured=zero + 1.0, identified=zero + 1.5, nominal=zero)
     assert found.off == (0.5, 1.0)
 
 
 @pytest.mark.slow
-def test_without_noise_everything_that_can_be_told_is_found() -> None:
-    """Arms to a hundredth, stiff tendons, joints and motors; and the finger moves alike."""
+def test_without_noise_all_parameters_are_found() -> None:
+    """Arms to 1 %, joints and motors are found, and the motion is repeated."""
     changes = {"joint_stiffness": 1.3, "joint_damping": 0.8}
     parameters = NOMINAL.replace(
         moment_arms=tuple(tuple(1.08 * arm for arm in row) for row in NOMINAL.moment_arms),
@@ -281,8 +283,8 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
 
 
 @pytest.mark.slow
-def test_motors_that_are_known_hide_no_joint() -> None:
-    """With gears, and with a current limit that is not in the proportion of muscles."""
+def test_known_motors_do_not_bias_the_joints() -> None:
+    """Joints are found with geared motors and individual current limits."""
     weak = (15.0, 15.0, 7.0, 15.0, 6.4, 15.0, 15.0)
     drawn = GAPS["real-like"].draw(np.random.default_rng(3))
     log, truth = recorded(8.0, parameters=with_gears(drawn.replace(most_tension=weak)))

@@ -1,4 +1,4 @@
-"""Moment arms and stretch, from lengths, angles and tensions."""
+"""Moment arms and compliance from lengths, angles and tensions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LARGE_M = 2e-3
 
 
 def test_without_noise_the_arms_are_exact() -> None:
-    """The error is below a hundredth for a finger whose arms are not the nominal ones."""
+    """Arms of a finger that is not nominal are found to 1 %."""
     rng = np.random.default_rng(5)
     arms = NOMINAL.arms * (1.0 + rng.uniform(-0.1, 0.1, NOMINAL.arms.shape))
     parameters = NOMINAL.replace(moment_arms=tuple(map(tuple, arms.tolist())))
@@ -28,8 +28,8 @@ def test_without_noise_the_arms_are_exact() -> None:
     assert abs(found.compliance) < 1e-7
 
 
-def test_arms_stretch_and_noise_come_out_of_a_synthetic_log() -> None:
-    """Noise of angles does not bias the arms; every number has its scale and its sign."""
+def test_synthetic_logs_give_their_parameters() -> None:
+    """Arms, compliance and noise are found, and noise of the angles does not bias the arms."""
     arms, noise = 1.15 * NOMINAL.arms, np.radians(1.5)
     log = synthetic(arms, compliance=5e-5, joint_noise=noise, length_noise=2e-5)
     found = fit_kinematics(log)
@@ -40,14 +40,14 @@ def test_arms_stretch_and_noise_come_out_of_a_synthetic_log() -> None:
     assert 1e-7 < found.compliance_sd < 2.5e-6
     np.testing.assert_allclose(found.joint_noise, noise, rtol=0.1)
     assert found.length_noise == pytest.approx(2e-5, rel=0.2)
-    # The lengths say where the joints were: most of the noise of the angles is gone.
+    # The lengths give the angles too, which removes most of their noise.
     assert np.std(found.angles - swings(log.t)) < 0.5 * noise
 
 
-def test_slack_tendons_and_the_start_of_a_log_weigh_little() -> None:
-    """Neither 5 mm of slack for half a second nor the first 0.2 s spoil the arms.
+def test_slack_and_the_start_of_a_log_are_outliers() -> None:
+    """5 mm of slack for 0.5 s and errors in the first 0.2 s do not bias the arms.
 
-    The remaining errors are as large as their standard errors say, to a factor of 1.5 in the mean.
+    The remaining errors agree with their standard errors to a factor of 1.5.
     """
     log = synthetic(NOMINAL.arms, 0.0, np.radians(1.0), 2e-5)
     lengths = log.lengths.copy()
@@ -63,8 +63,8 @@ def test_slack_tendons_and_the_start_of_a_log_weigh_little() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("finger_seed", [0, 3])
-def test_noisy_fingers_with_stretch_and_friction_are_found(finger_seed: int) -> None:
-    """Arms above 2 mm to 5 %; nine of ten intervals hold the truth; stretch to 5 %."""
+def test_noisy_fingers_are_identified(finger_seed: int) -> None:
+    """Arms above 2 mm and compliance are found to 5 %, and 90 % of the intervals hold."""
     log, truth = recorded(10.0, seed=1, gap="real-like", finger_seed=finger_seed)
     found = fit_kinematics(log)
     off = np.abs(found.arms - truth.arms)
@@ -78,7 +78,7 @@ def test_noisy_fingers_with_stretch_and_friction_are_found(finger_seed: int) -> 
 
 
 def test_standard_errors_grow_with_correlated_errors() -> None:
-    """Errors that each repeat ten times say as little about a mean as a tenth as many."""
+    """Errors that repeat ten times count as a tenth as many samples."""
     rng = np.random.default_rng(0)
     ones = np.ones((2000, 1, 1))
     fresh = rng.standard_normal((2000, 1))
@@ -88,16 +88,16 @@ def test_standard_errors_grow_with_correlated_errors() -> None:
     assert 4.0 < unknown / known < 16.0
 
 
-def test_the_covariance_has_newey_and_wests_weights() -> None:
-    """A lag of k of L + 1 steps weighs 1 - k / (L + 1), with L half a second."""
+def test_the_covariance_has_newey_west_weights() -> None:
+    """Lag k of L steps has the weight 1 - k / (L + 1), with L half a second."""
     residual = np.array([[1.0], [2.0], [-1.0], [3.0]])
     # Two lags of 0.25 s: 1 + 4 + 1 + 9, + 2 (2/3) (2 - 2 - 3), + 2 (1/3) (-1 + 6); over 4 squared.
     expected = (15.0 - 2.0 * (2.0 / 3.0) * 3.0 + 2.0 * (1.0 / 3.0) * 5.0) / 16.0
     assert robust_covariance(np.ones((4, 1, 1)), residual, 0.25)[0, 0] == pytest.approx(expected)
 
 
-def test_intervals_reach_further_in_short_logs() -> None:
-    """Kiefer and Vogelsang's cubic in the share of the log over which errors are correlated."""
+def test_intervals_are_wider_for_short_logs() -> None:
+    """The quantile is Kiefer and Vogelsang's cubic in the bandwidth."""
     assert interval_quantile(10**9, 0.02) == pytest.approx(1.96, abs=1e-4)
     assert interval_quantile(250, 0.02) == pytest.approx(1.96 + 0.29694 + 0.00416 - 0.0005324)
     assert interval_quantile(5, 0.02) == pytest.approx(1.96 + 2.9694 + 0.4160 - 0.5324)

@@ -1,4 +1,4 @@
-"""Logs of fingers: their contents, their files, and the messages about bad ones."""
+"""Finger logs: validation and files."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from shapechanger.identify.log import SIGNALS, require_informative
 from tests.identify.logs import changed, made_up
 
 
-def test_a_log_comes_back_as_it_was(tmp_path: Path) -> None:
-    """Every number and every name."""
+def test_a_log_round_trips(tmp_path: Path) -> None:
+    """All signals and names are kept."""
     log = changed(made_up(), source="finger of the third shelf", actions="tension")
     save_log(log, tmp_path / "log")
     back = load_log(tmp_path / "log")
@@ -29,14 +29,14 @@ def test_a_log_comes_back_as_it_was(tmp_path: Path) -> None:
 
 
 def test_a_log_knows_its_length() -> None:
-    """In rows, and in seconds from the first to the last."""
+    """`len` counts rows, and `seconds` lasts from the first to the last."""
     assert len(made_up(151)) == 151
     assert made_up(151).seconds == pytest.approx(3.0)
     assert made_up(0).seconds == 0.0
 
 
 def with_row(name: str, row: int, value: float) -> dict[str, Any]:
-    """A signal of the made-up log with another value in one row."""
+    """Return a signal of the synthetic log with one value changed."""
     values = getattr(made_up(), name).copy()
     values[row] = value
     return {name: values}
@@ -55,14 +55,14 @@ def with_row(name: str, row: int, value: float) -> dict[str, Any]:
         ({"control_dt": math.inf}, "control_dt must be above 0 s and finite, got inf"),
     ],
 )
-def test_bad_logs_are_rejected(changes: dict[str, Any], sentence: str) -> None:
-    """The message says what is wrong, and where."""
+def test_invalid_logs_are_rejected(changes: dict[str, Any], sentence: str) -> None:
+    """The message names the signal and the row."""
     with pytest.raises(FingerError, match=sentence):
         changed(made_up(), **changes)
 
 
 def test_clocks_may_jitter_by_half_a_period() -> None:
-    """A step of 1.5 periods passes, a longer one is a gap."""
+    """Steps of up to 1.5 periods are accepted; longer ones are gaps."""
     t = made_up().t
     changed(made_up(), t=np.where(t > 1.0, t + 0.0099, t))
     with pytest.raises(FingerError, match="has a gap"):
@@ -70,19 +70,19 @@ def test_clocks_may_jitter_by_half_a_period() -> None:
 
 
 def test_an_unknown_mode_is_rejected() -> None:
-    """With the nearest spelling."""
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'tension'"):
         changed(made_up(), actions="tensions")
 
 
 def only(joint: int, factor: float) -> FingerLog:
-    """The made-up log in which one joint moves less."""
+    """Return the synthetic log with the motion of one joint scaled."""
     log = made_up()
     return changed(log, angles=log.angles * np.where(np.arange(4) == joint, factor, 1.0))
 
 
 def test_uninformative_logs_are_rejected() -> None:
-    """Too short, or a joint that stands still or moves only with others: the message names it."""
+    """Short logs, and joints that do not move on their own, raise an error."""
     with pytest.raises(FingerError, match=r"3\.0 s long; identification needs at least 4 s"):
         identify(made_up(151))
     with pytest.raises(FingerError, match=r"MCP_abduction moved by 1\.\d degrees only"):
@@ -94,8 +94,8 @@ def test_uninformative_logs_are_rejected() -> None:
         identify(changed(log, angles=coupled))
 
 
-def test_a_log_is_informative_from_four_seconds_and_ten_degrees_on() -> None:
-    """Half a period short of 4 s passes; a range of 9.9 degrees does not, one of 10.1 does."""
+def test_limits_of_informative_logs() -> None:
+    """A log needs 4 s, to half a period, and a range of 10 degrees per joint."""
     require_informative(made_up(201))
     with pytest.raises(FingerError, match="at least 4 s"):
         require_informative(made_up(200))
@@ -107,8 +107,8 @@ def test_a_log_is_informative_from_four_seconds_and_ten_degrees_on() -> None:
 
 
 @pytest.mark.parametrize(("own", "passes"), [(2.1, True), (1.9, False)])
-def test_a_joint_moves_on_its_own_from_two_degrees_on(own: float, passes: bool) -> None:
-    """As a standard deviation, beyond its share of the other joints' motion."""
+def test_a_joint_must_move_on_its_own_by_two_degrees(own: float, passes: bool) -> None:
+    """The standard deviation that other joints do not explain must be 2 degrees."""
     log = made_up()
     others, fresh = log.angles[:, :3] - log.angles[:, :3].mean(axis=0), log.angles[:, 3]
     fresh = fresh - fresh.mean()
@@ -123,7 +123,7 @@ def test_a_joint_moves_on_its_own_from_two_degrees_on(own: float, passes: bool) 
 
 
 def test_other_files_are_rejected(tmp_path: Path) -> None:
-    """A missing file, other files, a damaged log, and one without a header."""
+    """Missing, foreign, truncated and incomplete files raise an error."""
     path = tmp_path / "log.npz"
     with pytest.raises(FingerError, match="There is no file"):
         load_log(path)
@@ -150,8 +150,8 @@ def test_other_files_are_rejected(tmp_path: Path) -> None:
     "header",
     [b"{}", b'{"format": "cake", "version": 1', b'{"format": "cake", "version": 1}'],
 )
-def test_bad_headers_are_rejected(tmp_path: Path, header: bytes) -> None:
-    """The message says what is missing in them."""
+def test_invalid_headers_are_rejected(tmp_path: Path, header: bytes) -> None:
+    """Headers that are incomplete or not JSON raise an error."""
     np.savez(tmp_path / "log.npz", header=np.frombuffer(header, np.uint8))
     with pytest.raises(FingerError, match="its header is invalid"):
         load_log(tmp_path / "log.npz")
@@ -173,7 +173,7 @@ FINGER_LOG = '"format": "shapechanger finger log", "version": 1'
 def test_other_archives_are_rejected(
     tmp_path: Path, kind: str, arrays: dict[str, np.ndarray], sentence: str
 ) -> None:
-    """Another format, a later version, and arrays that are missing or of another kind."""
+    """Other formats, later versions, and missing or invalid arrays raise an error."""
     names = {"actions": "tension", "control_dt": 0.02, "joints": JOINTS, "tendons": TENDONS}
     rest = json.dumps(names).removeprefix("{")
     header = np.frombuffer(f"{{{kind}, {rest}".encode(), np.uint8)
@@ -192,7 +192,7 @@ def test_other_archives_are_rejected(
 def test_logs_of_other_fingers_are_rejected(
     tmp_path: Path, joints: list[str], tendons: list[str], sentence: str
 ) -> None:
-    """Other joints or tendons than those of the model."""
+    """Logs with other joints or tendons raise an error."""
     names = {"actions": "tension", "control_dt": 0.02, "joints": joints, "tendons": tendons}
     whole = {"format": "shapechanger finger log", "version": 1, **names}
     header = np.frombuffer(json.dumps(whole).encode(), np.uint8)
@@ -201,7 +201,7 @@ def test_logs_of_other_fingers_are_rejected(
         load_log(tmp_path / "log.npz")
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    """A folder cannot be replaced by a file."""
+def test_an_unwritable_path_is_refused(tmp_path: Path) -> None:
+    """Saving to a folder raises OutputError."""
     with pytest.raises(OutputError, match="cannot be written"):
         save_log(made_up(), tmp_path)

@@ -1,4 +1,4 @@
-"""Joint and friction parameters, from simulated and measured motion."""
+"""Joint and friction parameters from motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ARM_SD_M = 2e-4
 
 @functools.cache
 def short() -> tuple[FingerLog, FingerParameters]:
-    """Two windows of a finger that is stiffer and less damped than the nominal one, and rubs."""
+    """Return a log of two windows of a stiff, lightly damped finger with friction."""
     parameters = NOMINAL.replace(
         joint_stiffness=tuple(1.3 * v for v in NOMINAL.joint_stiffness),
         joint_damping=tuple(0.8 * v for v in NOMINAL.joint_damping),
@@ -39,7 +39,7 @@ def short() -> tuple[FingerLog, FingerParameters]:
 
 
 def exact(arms: np.ndarray = NOMINAL.arms) -> Kinematics:
-    """Kinematics as they would come out of the log without noise, or with other arms."""
+    """Return kinematics without noise, with the given arms."""
     log, _ = short()
     count = int(ARMS.sum())
     return Kinematics(
@@ -54,13 +54,13 @@ def exact(arms: np.ndarray = NOMINAL.arms) -> Kinematics:
 
 
 def motors(**changes: float) -> Motors:
-    """Motors as they would come out of the log."""
+    """Return motors that match the log, with changes."""
     found = Motors(0.020, 0.022, 1.0, (1e-4, 1e-4, 0.0), saturates=False, tension_noise=0.0)
     return dataclasses.replace(found, **changes)  # pyright: ignore[reportArgumentType]
 
 
 def test_joints_and_friction_are_found() -> None:
-    """Each parameter to 5 %, friction to 15 %."""
+    """Joint parameters are found to 5 %, friction to 15 %."""
     log, truth = short()
     found = fit_dynamics(log, exact(), motors())
     for name in ("joint_stiffness", "joint_damping"):
@@ -73,7 +73,7 @@ def test_joints_and_friction_are_found() -> None:
 
 
 def test_arms_can_be_fitted_with_the_motion() -> None:
-    """Arms that are a standard error off come closer to the truth."""
+    """Fitting the motion reduces errors of the arms."""
     log, _ = short()
     rng = np.random.default_rng(1)
     wrong = NOMINAL.arms.copy()
@@ -86,7 +86,7 @@ def test_arms_can_be_fitted_with_the_motion() -> None:
 
 
 def test_windows_begin_in_the_measured_state() -> None:
-    """One second each, from 0.3 s on, with velocities and activations of their first row."""
+    """Windows last 1 s from 0.3 s on, and start with measured velocities and activations."""
     log, _ = short()
     dt = log.control_dt
     windows = cut_windows(log, exact(), motors())
@@ -97,7 +97,7 @@ def test_windows_begin_in_the_measured_state() -> None:
         ahead, back = log.angles[row + 1], log.angles[row - 1]
         np.testing.assert_allclose(window.velocities, (ahead - back) / (2 * dt), atol=0.5)
         assert np.corrcoef(window.velocities, (ahead - back) / (2 * dt))[0, 1] > 0.99
-        # Between the commands of the last rows, which act late and with a lag.
+        # Within the recent commands, because of delay and lag.
         acting = log.commands[max(row - 4, 0) : row + 1]
         assert (acting.min(axis=0) - 1e-3 <= window.activations).all()
         assert (window.activations <= acting.max(axis=0) + 1e-3).all()
@@ -106,14 +106,14 @@ def test_windows_begin_in_the_measured_state() -> None:
 
 
 def test_control_periods_are_whole_numbers_of_steps() -> None:
-    """As few as possible, none longer than the model's step."""
+    """The number of steps is the smallest whose step is at most the model's."""
     assert steps_per_period(0.02, 0.002) == 10
     assert steps_per_period(0.021, 0.002) == 11
     assert steps_per_period(0.0005, 0.002) == 1
 
 
-def test_motors_are_those_known_or_else_those_found() -> None:
-    """Known motors give their range of tensions, mass and damping; the lag is always fitted."""
+def test_known_motors_take_precedence() -> None:
+    """Known motors keep tensions, mass and damping; the lag is always fitted."""
     found = with_motors(motors(lag=0.03, strength=0.5), None)
     assert found.motor_lag == 0.03
     assert found.motor_kg == MOTOR_KG
@@ -125,7 +125,7 @@ def test_motors_are_those_known_or_else_those_found() -> None:
 
 
 def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without its dependencies, `mujoco.sysid` can be imported but is empty."""
+    """An empty `mujoco.sysid`, as without its dependencies, raises MissingExtra."""
     monkeypatch.setattr(motion.importlib, "import_module", lambda name: object())
     with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
         fit_dynamics(short()[0], exact(), motors())

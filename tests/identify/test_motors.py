@@ -1,4 +1,4 @@
-"""Commands as functions of time, and the motors that follow them."""
+"""Command signals, and motors that follow them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tests.identify.logs import changed, made_up, recorded
 
 
 def stepped() -> CommandSignal:
-    """All commands are 0, and 1 from the period that ends at 1 s."""
+    """Return commands that step from 0 to 1 in the period that ends at 1 s."""
     log = made_up()
     return CommandSignal(changed(log, commands=np.repeat((log.t > 0.99)[:, None], 7, axis=1) * 1.0))
 
 
 def test_a_command_acts_in_the_period_that_ends_with_its_row() -> None:
-    """From 0.98 s on, and later by the delay; in the step in between by its share."""
+    """A command acts from 0.98 s plus the delay on, and partly in the step in between."""
     late = stepped().delayed(0.96, 0.01, 6, 0.0)
     np.testing.assert_allclose(late[:, 0], [0, 0, 1, 1, 1, 1], atol=1e-9)
     late = stepped().delayed(0.96, 0.01, 6, 0.025)
@@ -26,7 +26,7 @@ def test_a_command_acts_in_the_period_that_ends_with_its_row() -> None:
 
 
 def test_motors_follow_with_their_lag() -> None:
-    """One lag after a step, 1/e of it is left; before the log, the first command acted."""
+    """After one lag, 1/e of a step is left; before the log, the first command acts."""
     made = stepped().activations(0.0, 0.001, 1100, 0.0, 0.030)
     assert made[979, 3] == pytest.approx(0.0, abs=1e-9)
     assert made[1009, 3] == pytest.approx(1.0 - np.exp(-1.0), abs=1e-9)
@@ -37,7 +37,7 @@ def test_motors_follow_with_their_lag() -> None:
 def followed(
     lag: float, delay: float, strength: float, noise: float, most_command: float = 1.0
 ) -> FingerLog:
-    """A log of motors alone, in steps of 1 ms: random commands, 0.2 s each, at fixed lengths."""
+    """Return a log of motors at fixed lengths, with random commands of 0.2 s, in steps of 1 ms."""
     rng = np.random.default_rng(3)
     rows, per_row = 300, 20
     t = 0.02 * np.arange(rows)
@@ -50,7 +50,7 @@ def followed(
         if step % per_row == 0:
             wanted = drive.offset + drive.gain * activation
             tensions[step // per_row] = np.clip(wanted, NOMINAL.least_tension, strength * most)
-        # The period that ends with row i takes the steps from 20 (i - 1) on.
+        # The period that ends with row i starts at step 20 (i - 1).
         row = (step - round(delay / 0.001)) // per_row + 1
         acting = commands[min(max(row, 0), rows - 1)]
         activation = activation + (1.0 - np.exp(-0.001 / lag)) * (acting - activation)
@@ -59,12 +59,12 @@ def followed(
 
 
 def scaled(strength: float) -> FingerParameters:
-    """The nominal finger with stronger or weaker motors."""
+    """Return the nominal finger with scaled tension limits."""
     return NOMINAL.replace(most_tension=tuple(strength * v for v in NOMINAL.most_tension))
 
 
-def test_lag_delay_strength_and_noise_come_out_of_a_synthetic_log() -> None:
-    """Each to a few percent; the strength is relative to that of the known motors."""
+def test_synthetic_logs_give_the_motors() -> None:
+    """Lag, delay, noise and the strength relative to known motors are found."""
     found = fit_motors(followed(0.045, 0.037, 0.8, 0.1), scaled(0.7))
     assert found.lag == pytest.approx(0.045, abs=0.001)
     assert found.delay == pytest.approx(0.037, abs=0.001)
@@ -74,8 +74,8 @@ def test_lag_delay_strength_and_noise_come_out_of_a_synthetic_log() -> None:
     assert all(0.0 < sd < limit for sd, limit in zip(found.sd, (1e-3, 1e-3, 0.01), strict=True))
 
 
-def test_a_strength_that_no_command_reaches_is_not_estimated() -> None:
-    """Below saturation the motors are as strong as assumed; exact tensions have no noise."""
+def test_strength_needs_saturation() -> None:
+    """Without saturation the strength is that assumed; exact tensions have no noise."""
     found = fit_motors(followed(0.03, 0.02, 1.0, 0.0, most_command=0.5))
     assert not found.saturates
     assert found.strength == 1.0
@@ -84,7 +84,7 @@ def test_a_strength_that_no_command_reaches_is_not_estimated() -> None:
 
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
 def test_lag_and_delay_are_found(actions: str) -> None:
-    """In every mode of action, together with the strength of saturated motors."""
+    """Lag, delay and the strength of saturated motors are found in every action mode."""
     most = tuple(0.9 * tension for tension in NOMINAL.most_tension)
     parameters = NOMINAL.replace(
         motor_lag=0.030, command_delay=0.024, most_tension=most, tension_noise=0.2
@@ -92,7 +92,7 @@ def test_lag_and_delay_are_found(actions: str) -> None:
     log, _ = recorded(5.0, actions=actions, parameters=parameters)
     found = fit_motors(log)
     assert found.lag == pytest.approx(0.030, abs=0.002)
-    assert found.delay == pytest.approx(0.024, abs=0.005)  # Measured a step or two late.
+    assert found.delay == pytest.approx(0.024, abs=0.005)  # Measured one or two steps late.
     assert found.saturates
     assert found.strength == pytest.approx(0.9, abs=0.02)
     assert found.tension_noise == pytest.approx(0.2, rel=0.2)

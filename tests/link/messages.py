@@ -1,4 +1,4 @@
-"""Strategies for every message of the link."""
+"""Hypothesis strategies for every message of the link."""
 
 from __future__ import annotations
 

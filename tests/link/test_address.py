@@ -1,4 +1,4 @@
-"""Addresses as people write them."""
+"""Parsing of addresses."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_addresses_are_parsed(text: str, address: Address) -> None:
     ],
 )
 def test_an_invalid_address_is_an_error_with_examples(text: str, words: str) -> None:
-    """The message shows valid addresses."""
+    """The error shows valid addresses."""
     with pytest.raises(LinkError, match=words) as refused:
         parse_address(text)
     assert "192.168.42.1:5000" in str(refused.value)
@@ -61,7 +61,7 @@ def test_an_invalid_address_is_an_error_with_examples(text: str, words: str) -> 
 
 @given(text=st.text(max_size=30))
 def test_any_text_is_an_address_or_an_error(text: str) -> None:
-    """An address survives a round trip; any other text is a `LinkError`."""
+    """An address round-trips; any other text raises LinkError."""
     try:
         address = parse_address(text)
     except LinkError:
@@ -70,11 +70,11 @@ def test_any_text_is_an_address_or_an_error(text: str) -> None:
 
 
 def test_the_port_of_2017_is_the_default() -> None:
-    """5000."""
+    """The default port is 5000."""
     assert DEFAULT_PORT == 5000
 
 
 def test_loopback_addresses() -> None:
-    """A name other than localhost may resolve to any address."""
+    """Only loopback addresses and localhost count; other names may resolve to anything."""
     assert all(map(is_loopback, ("127.0.0.1", "127.9.9.9", "::1", "localhost")))
     assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.42.1", "car.local", "")))

@@ -1,4 +1,4 @@
-"""Keys, proofs that a client holds one, and fingerprints of certificates."""
+"""Keys, proofs of possession, and fingerprints of certificates."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ _roles = st.sampled_from(("person", "program"))
 
 
 @given(key=_parts, nonce=_parts, certificate=_parts, role=_roles)
-def test_the_key_proves_itself(key: bytes, nonce: bytes, certificate: bytes, role: str) -> None:
+def test_a_proof_verifies(key: bytes, nonce: bytes, certificate: bytes, role: str) -> None:
     """Both sides compute the same proof."""
     assert is_proof(make_proof(key, nonce, certificate, role), key, nonce, certificate, role)
 
 
 @given(one=st.tuples(_parts, _parts, _parts, _roles), two=st.tuples(_parts, _parts, _parts, _roles))
-def test_a_proof_fits_nothing_else(
+def test_a_proof_is_bound_to_all_its_inputs(
     one: tuple[bytes, bytes, bytes, str], two: tuple[bytes, bytes, bytes, str]
 ) -> None:
-    """Another key, nonce, certificate or role needs another proof; nothing shifts between them."""
-    # HMAC fills short keys up with zeros (RFC 2104); ours all have 16 bytes.
+    """Another key, nonce, certificate or role needs another proof."""
+    # HMAC pads short keys with zeros (RFC 2104); real keys have 16 bytes.
     one, two = (one[0].ljust(64, b"\0"), *one[1:]), (two[0].ljust(64, b"\0"), *two[1:])
     assert is_proof(make_proof(*one), *two) == (one == two)
 
 
 @given(proof=st.binary(max_size=64))
-def test_random_bytes_are_no_proof(proof: bytes) -> None:
-    """Of any length."""
+def test_random_bytes_do_not_verify(proof: bytes) -> None:
+    """Bytes of any length are refused."""
     assert not is_proof(proof, b"k" * 16, b"n" * NONCE_BYTES, b"", "program")
 
 
-def test_keys_and_nonces_are_new() -> None:
-    """No two are equal."""
+def test_keys_and_nonces_are_unique() -> None:
+    """100 generated keys and nonces differ."""
     assert len({new_key() for _ in range(100)}) == 100
     assert len({new_nonce() for _ in range(100)}) == 100
 
 
 def test_a_key_can_be_copied_by_hand() -> None:
-    """Groups, spaces, letter case and misread digits do not matter."""
+    """Groups, spaces, case and misread digits do not matter."""
     key = new_key()
     assert len(parse_key(key)) == 16
     for written in (
@@ -77,14 +77,14 @@ def test_a_key_can_be_copied_by_hand() -> None:
     ],
 )
 def test_an_invalid_key_is_an_error(text: str, words: str) -> None:
-    """The message says what a key looks like."""
+    """The error says what a key looks like."""
     with pytest.raises(LinkError, match=words):
         parse_key(text)
 
 
 @given(certificate=st.binary(max_size=64))
-def test_a_fingerprint_survives_a_round_trip(certificate: bytes) -> None:
-    """As hexadecimal digits, and with colons and capitals as OpenSSL writes it."""
+def test_a_fingerprint_round_trips(certificate: bytes) -> None:
+    """It parses as hexadecimal digits, also with colons and capitals as OpenSSL prints it."""
     fingerprint = fingerprint_of(certificate)
     text = fingerprint_hex(fingerprint)
     pairs = ":".join(text[i : i + 2] for i in range(0, len(text), 2)).upper()
@@ -92,13 +92,13 @@ def test_a_fingerprint_survives_a_round_trip(certificate: bytes) -> None:
 
 
 def test_the_short_form_has_four_groups() -> None:
-    """Short enough to read aloud, long enough to be unique."""
+    """The short form has four groups of four characters."""
     short = fingerprint_short(fingerprint_of(b"certificate"))
     assert [len(group) for group in short.split("-")] == [4, 4, 4, 4]
 
 
 @pytest.mark.parametrize("text", ["", "ab" * 31, "ab" * 33, "zz" * 32])
 def test_an_invalid_fingerprint_is_an_error(text: str) -> None:
-    """The message shows the expected form."""
+    """The error shows the expected form."""
     with pytest.raises(LinkError, match="64 hexadecimal digits"):
         parse_fingerprint(text)

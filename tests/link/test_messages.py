@@ -28,19 +28,19 @@ DECODERS = {"client": decode_client_message, "robot": decode_robot_message}
 
 
 @given(message=client_messages)
-def test_client_messages_survive_a_round_trip(message: ClientMessage) -> None:
-    """For every type of message."""
+def test_client_messages_round_trip(message: ClientMessage) -> None:
+    """Decoding an encoded message returns an equal one."""
     assert decode_client_message(encode(message)) == message
 
 
 @given(message=robot_messages)
-def test_robot_messages_survive_a_round_trip(message: RobotMessage) -> None:
-    """For every type of message."""
+def test_robot_messages_round_trip(message: RobotMessage) -> None:
+    """Decoding an encoded message returns an equal one."""
     assert decode_robot_message(encode(message)) == message
 
 
-def test_every_message_is_tried() -> None:
-    """A new type of message must join the strategies."""
+def test_every_message_has_a_strategy() -> None:
+    """A new type of message must be added to the strategies."""
     for union, strategy in ((ClientMessage, client_messages), (RobotMessage, robot_messages)):
         tried = {kind.__name__ for kind in get_args(union)}
         assert all(f"{name}" in repr(strategy) for name in tried)
@@ -49,16 +49,16 @@ def test_every_message_is_tried() -> None:
 @pytest.mark.parametrize("side", DECODERS)
 @given(data=st.binary(max_size=300))
 def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
-    """A decoder raises nothing but `LinkError`."""
+    """A decoder raises only LinkError."""
     with contextlib.suppress(LinkError):
         DECODERS[side](data)
 
 
 @given(message=client_messages | robot_messages, data=st.data())
-def test_a_cut_message_is_refused(
+def test_a_truncated_message_is_refused(
     message: ClientMessage | RobotMessage, data: st.DataObject
 ) -> None:
-    """No message is a prefix of another one."""
+    """No message is a prefix of another."""
     whole = encode(message)
     cut = whole[: data.draw(st.integers(0, len(whole) - 1))]
     for decode in DECODERS.values():
@@ -70,19 +70,19 @@ def test_a_cut_message_is_refused(
 def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
     message: ClientMessage, data: st.DataObject
 ) -> None:
-    """A message that decodes also encodes."""
+    """Damaged bytes that decode give a message that encodes again."""
     damaged = bytearray(encode(message))
     bit = data.draw(st.integers(0, 8 * len(damaged) - 1))
     damaged[bit // 8] ^= 1 << bit % 8
     try:
-        heard = decode_client_message(bytes(damaged))
+        decoded = decode_client_message(bytes(damaged))
     except LinkError:
         return
-    assert encode(decode_client_message(encode(heard))) == encode(heard)
+    assert encode(decode_client_message(encode(decoded))) == encode(decoded)
 
 
 def test_trailing_bytes_are_refused() -> None:
-    """A WebSocket message holds one message."""
+    """A WebSocket message holds exactly one message."""
     with pytest.raises(LinkError):
         decode_client_message(encode(messages.Take()) + b"\x00")
 
@@ -94,7 +94,7 @@ def test_a_large_message_is_refused_before_it_is_read() -> None:
 
 
 @pytest.mark.parametrize(
-    "lie",
+    "data",
     [
         b"\x82\xa4kind\xa7command\xa6values\xdd\xff\xff\xff\xff",
         b"\x82\xa4kind\xa5hello\xa5proof\xc6\xff\xff\xff\xff",
@@ -104,10 +104,10 @@ def test_a_large_message_is_refused_before_it_is_read() -> None:
         b"\x82\xa4kind\xa4take\xa1x" + b"\x81\xa1x" * 20_000,
     ],
 )
-def test_a_false_length_costs_no_memory(lie: bytes) -> None:
-    """Nor does deep nesting exhaust the stack."""
+def test_a_false_length_costs_no_memory(data: bytes) -> None:
+    """False lengths and deep nesting raise without allocating memory or exhausting the stack."""
     with pytest.raises(LinkError):
-        decode_client_message(lie)
+        decode_client_message(data)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_a_false_length_costs_no_memory(lie: bytes) -> None:
     ],
 )
 def test_values_out_of_bounds_are_refused(fields: object) -> None:
-    """For the bounds of every message."""
+    """Types and bounds of each field are checked."""
     with pytest.raises(LinkError, match="Not a valid message"):
         decode_client_message(msgspec.msgpack.encode(fields))
 
@@ -140,12 +140,12 @@ def test_values_out_of_bounds_are_refused(fields: object) -> None:
 def test_unknown_keys_are_ignored() -> None:
     """A newer minor version may add keys."""
     fields = {"kind": "command", "seq": 1, "answers": 2, "values": [1], "mood": {"is": ["good"]}}
-    heard = decode_client_message(msgspec.msgpack.encode(fields))
-    assert heard == Command(seq=1, answers=2, values=(1.0,))
+    decoded = decode_client_message(msgspec.msgpack.encode(fields))
+    assert decoded == Command(seq=1, answers=2, values=(1.0,))
 
 
 def test_a_frame_is_sent_as_bytes() -> None:
-    """Without base64, a JPEG costs its own bytes and a few for its length."""
+    """A JPEG adds only its own bytes and a few for its length, without base64."""
     jpeg = bytes(range(256)) * 20
     fields = {name: 0 for name in Observation.__struct_fields__}
     empty = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": b""})
@@ -154,8 +154,8 @@ def test_a_frame_is_sent_as_bytes() -> None:
     assert jpeg in full
 
 
-def test_bytes_are_counted_and_not_shown() -> None:
-    """A log must not hold frames or proofs."""
+def test_bytes_are_not_in_the_repr() -> None:
+    """`repr` gives the size of bytes, so that logs hold no frames or proofs."""
     fields = {name: 0 for name in Observation.__struct_fields__}
     seen = Observation(**(fields | {"frame": bytes(5_000), "holder": "Grace"}))
     assert "frame=<5000 bytes>" in repr(seen)

@@ -1,4 +1,4 @@
-"""Robots and clients that end with their test, and leave no thread behind."""
+"""Fixtures that start robots and clients, and check that no thread remains."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def credentials(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def _no_thread_stays() -> Iterator[None]:
+def _no_thread_remains() -> Iterator[None]:
     before = set(threading.enumerate())
     yield
     eventually(lambda: set(threading.enumerate()) <= before)
@@ -34,14 +34,14 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def run(credentials: Path) -> Iterator[Callable[..., Robot]]:
-    """Start a robot; it ends with the test."""
+    """Start a robot that is stopped after the test."""
     with contextlib.ExitStack() as stack:
         yield lambda **what: stack.enter_context(Robot(**what).running(credentials))
 
 
 @pytest.fixture
 def connect() -> Iterator[Callable[..., RobotClient]]:
-    """Connect to a robot; the link ends with the test."""
+    """Connect to a robot; the connection is closed after the test."""
     with contextlib.ExitStack() as stack:
 
         def made(robot: Robot, **how: Any) -> RobotClient:

@@ -1,4 +1,4 @@
-"""Fake robot: a real WebSocket over TLS on loopback, with a point on a line as its body."""
+"""A fake robot: a real WebSocket over TLS on loopback, with a point on a line as its body."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def eventually(is_true: Callable[[], bool], within_s: float = 5.0) -> None:
     """Wait for a condition."""
     until = time.monotonic() + within_s
     while not is_true():
-        assert time.monotonic() < until, "This did not happen in time."
+        assert time.monotonic() < until, "the condition did not hold in time"
         threading.Event().wait(0.001)
 
 
@@ -54,7 +54,7 @@ class Robot:
     """Settings and state of the robot, which tests change while it runs.
 
     Attributes:
-        silent: Whether it sends nothing more, on connections that stay open.
+        silent: Whether it stops sending, on connections that stay open.
         delay_s: Delay of each answer, s.
         garbage: Bytes to send instead of the next observation.
         refusal: Reason to refuse each command; "" to accept them.
@@ -64,7 +64,7 @@ class Robot:
         absent: Names of the features of the state without a measurement.
         arm_by_itself: Whether its operator arms it as soon as a client takes control.
         home_at_take: Whether it returns to its start when a client takes control.
-        heard: Messages of the clients.
+        messages: Messages received from clients.
     """
 
     actions: tuple[Feature, ...] = (STEERING, THROTTLE)
@@ -89,7 +89,7 @@ class Robot:
     armed: bool = False
     emergency: bool = False
     stop_reason: str = ""
-    heard: list[Any] = field(default_factory=list)
+    messages: list[Any] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.key = new_key()
@@ -127,9 +127,9 @@ class Robot:
         """Arguments of the env."""
         return {"robot": self.address, "key": self.key, "fingerprint": self.fingerprint}
 
-    def told(self, kind: type[Any]) -> list[Any]:
+    def received(self, kind: type[Any]) -> list[Any]:
         """Return the received messages of a type."""
-        return [message for message in self.heard if type(message) is kind]
+        return [message for message in self.messages if type(message) is kind]
 
     def stand_at(self, place: float) -> None:
         """Move the robot to a place, m."""
@@ -164,14 +164,14 @@ class Robot:
 
         self._loop.call_soon_threadsafe(abort)
 
-    def say(self, message: Any) -> None:
+    def send(self, message: Any) -> None:
         """Send a message to all clients."""
 
-        async def send() -> None:
+        async def broadcast() -> None:
             for socket in self._sockets:
                 await socket.send_bytes(m.encode(message))
 
-        asyncio.run_coroutine_threadsafe(send(), self._loop).result(5.0)
+        asyncio.run_coroutine_threadsafe(broadcast(), self._loop).result(5.0)
 
     async def _serve(self, port: int) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
@@ -202,10 +202,10 @@ class Robot:
         assert self._credentials is not None
         nonce = new_nonce()
         await self._send(socket, m.Challenge(version=self.version, nonce=nonce, robot="tin"))
-        heard = await socket.receive()
-        if heard.type is not WSMsgType.BINARY:
+        raw = await socket.receive()
+        if raw.type is not WSMsgType.BINARY:
             return socket
-        hello = m.decode_client_message(heard.data)
+        hello = m.decode_client_message(raw.data)
         assert isinstance(hello, m.Hello)
         key, certificate = parse_key(self.key), self._credentials.fingerprint
         if not is_proof(hello.proof, key, nonce, certificate, hello.role):
@@ -224,11 +224,11 @@ class Robot:
 
     async def _converse(self, socket: web.WebSocketResponse, hello: m.Hello) -> None:
         frame_sent, mine, sent_s = 0, False, 0.0
-        async for heard in socket:
-            if heard.type is not WSMsgType.BINARY:
+        async for raw in socket:
+            if raw.type is not WSMsgType.BINARY:
                 continue
-            message = m.decode_client_message(heard.data)
-            self.heard.append(message)
+            message = m.decode_client_message(raw.data)
+            self.messages.append(message)
             if self.silent:
                 continue
             if self.delay_s:
@@ -249,7 +249,7 @@ class Robot:
                     mine, self.armed = False, False
                 case m.Disarm():
                     self.armed = self.arm_by_itself
-                    self.heard.append("stood")
+                    self.messages.append("stood")
                 case m.EmergencyStop():
                     self.emergency, self.stop_reason = True, message.reason
                 case m.Arm():
@@ -261,7 +261,7 @@ class Robot:
                         self.armed, self.emergency = True, False
                 case m.Command() | m.Acknowledge():
                     if isinstance(message, m.Command):
-                        await self._obey(socket, message)
+                        await self._apply(socket, message)
                     if hello.pace == "realtime":
                         loop = asyncio.get_running_loop()
                         await asyncio.sleep(sent_s + 1.0 / self.control_hz - loop.time())
@@ -275,7 +275,7 @@ class Robot:
                     frame_sent = seen.frame_seq
                     await self._send(socket, seen)
 
-    async def _obey(self, socket: web.WebSocketResponse, command: m.Command) -> None:
+    async def _apply(self, socket: web.WebSocketResponse, command: m.Command) -> None:
         if self.refusal:
             await self._send(socket, m.Refused(reason=self.refusal, seq=command.seq))
         moves = self.armed and not self.emergency and not self.refusal

@@ -1,4 +1,4 @@
-"""Client against a fake robot on a real socket."""
+"""The client against a fake robot on a real socket."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Connect = Callable[..., RobotClient]
 
 
 def test_a_program_takes_control_arms_and_commands(run: Run, connect: Connect) -> None:
-    """The whole exchange, in order."""
+    """Take, arm and command, with the observation that each command answers."""
     robot = run()
     client = connect(robot, pace="lockstep", name="ada")
     client.take()
@@ -36,25 +36,25 @@ def test_a_program_takes_control_arms_and_commands(run: Run, connect: Connect) -
     assert after.jpeg != before.jpeg
     client.close()
     client.close()
-    (command,) = robot.told(m.Command)
+    (command,) = robot.received(m.Command)
     assert (command.answers, command.ttl_ms, command.scale) == (before.message.seq, 250, 1.0)
 
 
 def test_arming_ends_only_an_emergency_stop_that_was_seen(run: Run, connect: Connect) -> None:
-    """An emergency stop after the last observation stays in force."""
+    """Arming acknowledges only stops in the last observation."""
     robot = run()
     client = connect(robot, role="person")
     client.take()
     seen = client.ask().message
     robot.emergency = True
     client.arm()
-    (arm,) = robot.told(m.Arm)
+    (arm,) = robot.received(m.Arm)
     assert arm.answers == seen.seq + 1
     assert arm.emergency == seen.emergencies == 0
 
 
 def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Connect) -> None:
-    """Numbers are never used twice."""
+    """Sequence numbers are unique across threads."""
     client = connect(run(), pace="lockstep")
     numbers: list[int] = []
     threads = [
@@ -71,14 +71,14 @@ def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Conne
 
 
 def test_a_ping_measures_the_round_trip(run: Run, connect: Connect) -> None:
-    """It also returns the robot's time."""
+    """A ping returns the round-trip time and the robot's time."""
     took_s, now_ns = connect(run()).ping()
     assert took_s > 0.0
     assert now_ns > 0
 
 
 def test_without_a_fingerprint_the_error_shows_one(run: Run) -> None:
-    """The message has the command that stores it after a comparison."""
+    """The error gives the command that stores the fingerprint."""
     robot = run()
     with pytest.raises(LinkError) as refused:
         RobotClient.connect(robot.address, key=robot.key)
@@ -90,31 +90,31 @@ def test_without_a_fingerprint_the_error_shows_one(run: Run) -> None:
 
 
 def test_another_certificate_is_refused_and_both_are_shown(run: Run) -> None:
-    """Before the key has been used."""
+    """The connection is refused before the key is used."""
     robot = run()
     expected = "ab" * 32
     with pytest.raises(RobotRefused) as refused:
         RobotClient.connect(replace(robot.known, fingerprint=expected))
     assert robot.fingerprint in str(refused.value)
     assert expected in str(refused.value)
-    assert robot.heard == []
+    assert robot.messages == []
 
 
 def test_a_wrong_key_is_refused(run: Run) -> None:
-    """With the robot's message."""
+    """The error is the robot's message."""
     with pytest.raises(RobotRefused, match="Wrong key"):
         RobotClient.connect(replace(run().known, key=new_key()))
 
 
 @pytest.mark.parametrize(("version", "older"), [(0, "robot"), (2, "workstation")])
 def test_another_version_says_what_to_update(run: Run, version: int, older: str) -> None:
-    """It names the older side."""
+    """The error names the older side."""
     with pytest.raises(LinkError, match=f"on the {older}"):
         RobotClient.connect(run(version=version).known)
 
 
 def test_a_missing_robot_is_an_error_at_once(run: Run, credentials: object) -> None:
-    """The message says what to check."""
+    """The error says what to check."""
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
         known = robot.known
@@ -123,7 +123,7 @@ def test_a_missing_robot_is_an_error_at_once(run: Run, credentials: object) -> N
 
 
 def test_a_failed_connection_is_one_error(run: Run, credentials: object) -> None:
-    """Without a chain of socket errors, or frames of another thread."""
+    """The traceback has no chained socket errors and no frames of another thread."""
     robot = Robot()
     with robot.running(credentials):  # type: ignore[arg-type]
         known = robot.known
@@ -136,11 +136,11 @@ def test_a_failed_connection_is_one_error(run: Run, credentials: object) -> None
 
 
 def test_a_failed_request_is_one_error(run: Run, connect: Connect) -> None:
-    """Also if the link is lost between request and answer."""
+    """A call that waits for an answer raises one error when the connection is cut."""
     robot = run(delay_s=60.0)
     client = connect(robot, timeout_s=30.0)
     threading.Thread(
-        target=lambda: (eventually(lambda: bool(robot.told(m.Take))), robot.cut())
+        target=lambda: (eventually(lambda: bool(robot.received(m.Take))), robot.cut())
     ).start()
     with pytest.raises(LinkError, match="lost") as refused:
         client.take()
@@ -148,18 +148,18 @@ def test_a_failed_request_is_one_error(run: Run, connect: Connect) -> None:
 
 
 def test_an_abandoned_client_gives_control_back(run: Run, connect: Connect) -> None:
-    """Without waiting, and any number of times."""
+    """`abandon` does not wait, and is idempotent."""
     robot = run()
     client = connect(robot)
     client.take()
     client.abandon()
-    eventually(lambda: bool(robot.told(m.Release)) and not client.alive)
+    eventually(lambda: bool(robot.received(m.Release)) and not client.alive)
     client.abandon()
-    assert len(robot.told(m.Release)) == 1
+    assert len(robot.received(m.Release)) == 1
 
 
 def test_plain_connections_must_be_asked_for(run: Run) -> None:
-    """A plain connection to a TLS port is an error."""
+    """A plain connection to a TLS port raises an error."""
     with pytest.raises(LinkError):
         RobotClient.connect(run().address, fingerprint="insecure", timeout_s=1.0)
 
@@ -172,7 +172,7 @@ def test_control_of_another_client_is_not_taken(run: Run, connect: Connect) -> N
 
 
 def test_a_refusal_to_arm_has_a_reason(run: Run, connect: Connect) -> None:
-    """By default only a person arms."""
+    """With arming = "person", a program is refused."""
     client = connect(run(arming="person"))
     client.take()
     with pytest.raises(RobotRefused, match="Only a person"):
@@ -183,7 +183,7 @@ def test_a_refusal_to_arm_has_a_reason(run: Run, connect: Connect) -> None:
 
 
 def test_a_refused_command_has_a_reason(run: Run, connect: Connect) -> None:
-    """The reason is that of this command, not of the one before."""
+    """`refusal` returns the reason for the command with that number."""
     robot = run(refusal="It is too old.")
     client = connect(robot, pace="lockstep")
     client.take()
@@ -199,7 +199,7 @@ def test_events_are_returned_once(run: Run, connect: Connect) -> None:
     robot = run()
     client = connect(robot)
     for i in range(300):
-        robot.say(m.Event(name="bump", text=f"Bump {i}.", at_ns=i))
+        robot.send(m.Event(name="bump", text=f"Bump {i}.", at_ns=i))
     client.ping()
     assert [event.text for event in client.events()] == [f"Bump {i}." for i in range(44, 300)]
     assert client.events() == []
@@ -211,11 +211,11 @@ def test_an_emergency_stop_is_sent_before_closing(run: Run, connect: Connect) ->
     client = connect(robot)
     client.emergency_stop("a dog")
     client.close()
-    eventually(lambda: robot.told(m.EmergencyStop) == [m.EmergencyStop(reason="a dog")])
+    eventually(lambda: robot.received(m.EmergencyStop) == [m.EmergencyStop(reason="a dog")])
 
 
 def test_a_closed_client_raises_an_error(run: Run, connect: Connect) -> None:
-    """From every method."""
+    """Every method raises."""
     client = connect(run())
     client.close()
     assert not client.alive
@@ -233,7 +233,7 @@ def _in_child(client: RobotClient, answers: multiprocessing.Queue[str]) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork.*:DeprecationWarning")
-def test_a_copy_made_by_fork_leaves_the_link_alone(run: Run, connect: Connect) -> None:
+def test_a_forked_client_does_not_touch_the_connection(run: Run, connect: Connect) -> None:
     """A worker process must open its own connection."""
     client = connect(run(), pace="lockstep")
     context = multiprocessing.get_context("fork")
@@ -250,6 +250,6 @@ def test_a_copy_made_by_fork_leaves_the_link_alone(run: Run, connect: Connect) -
 
 @pytest.mark.parametrize("timeout_s", [0.0, -1.0, float("nan")])
 def test_an_invalid_timeout_is_an_error(timeout_s: float) -> None:
-    """Before anything is connected."""
+    """The error is raised before connecting."""
     with pytest.raises(LinkError, match="above 0"):
         RobotClient.connect("192.0.2.1", timeout_s=timeout_s)

@@ -13,7 +13,7 @@ from shapechanger.remote.discovery import FoundRobot, find
 
 @pytest.fixture
 def network() -> Iterator[Zeroconf]:
-    """Multicast that stays on this machine."""
+    """Multicast restricted to this machine."""
     try:
         network = Zeroconf(interfaces=["127.0.0.1"])
     except OSError as error:
@@ -23,7 +23,7 @@ def network() -> Iterator[Zeroconf]:
 
 
 def test_announced_robots_are_found(network: Zeroconf) -> None:
-    """With name, body, address, fingerprint and version, sorted by name."""
+    """Results have name, body, address, fingerprint and version, sorted by name."""
     for name, body, port in (("tank", "tank", 5001), ("car", "car", 5000)):
         network.register_service(
             ServiceInfo(
@@ -41,6 +41,6 @@ def test_announced_robots_are_found(network: Zeroconf) -> None:
     ]
 
 
-def test_an_empty_network_is_no_error(network: Zeroconf) -> None:
-    """A network may block multicast; the list is then empty."""
+def test_an_empty_network_gives_an_empty_list(network: Zeroconf) -> None:
+    """The network may block multicast."""
     assert find(0.1, network) == []

@@ -1,4 +1,4 @@
-"""Inbox between the receiving thread and the callers."""
+"""The inbox between the receiving thread and callers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shapechanger.remote.inbox import Inbox
 
 
 def seen(seq: int, frame_seq: int = 0, frame: bytes | None = None) -> Observation:
-    """An observation of which only the number and the picture matter."""
+    """Build an observation with a number and a frame."""
     return Observation(
         seq=seq,
         captured_ns=0,
@@ -45,7 +45,7 @@ def test_the_inbox_holds_only_the_newest_observation() -> None:
 
 
 def test_an_observation_is_returned_once() -> None:
-    """The error gives the age of the newest one."""
+    """Waiting for a newer one raises, with the age of the newest."""
     now = [10.0]
     inbox = Inbox(lambda: now[0])
     inbox.put(seen(1))
@@ -59,7 +59,7 @@ def test_an_observation_is_returned_once() -> None:
 
 @pytest.mark.parametrize("seq", [1, 2])
 def test_a_replay_is_an_error(seq: int) -> None:
-    """A number that does not increase ends the link."""
+    """A sequence number that does not increase raises an error."""
     inbox = Inbox(lambda: 0.0)
     inbox.put(seen(2))
     with pytest.raises(LinkError, match="as in a replay"):
@@ -67,7 +67,7 @@ def test_a_replay_is_an_error(seq: int) -> None:
 
 
 def test_a_frame_outlives_its_observation() -> None:
-    """Each frame is sent once, and the slot holds only the last observation."""
+    """A frame is sent once, and kept for later observations with its number."""
     inbox = Inbox(lambda: 0.0)
     inbox.put(seen(1, frame_seq=7, frame=b"seven"))
     inbox.put(seen(2, frame_seq=7))
@@ -77,7 +77,7 @@ def test_a_frame_outlives_its_observation() -> None:
 
 
 def test_a_lost_link_ends_all_waits_at_once() -> None:
-    """Later calls raise the same error."""
+    """All waits and later calls raise the first error."""
     inbox = Inbox(lambda: 0.0)
     errors: list[LinkError] = []
 

@@ -11,7 +11,7 @@ from shapechanger.link.authentication import new_key
 from shapechanger.remote.known_robots import KnownRobot, forget, known_names, recall, remember
 
 KEY = "IVPO-EP6N-42IE-SHAG-6YAL-CDJ5-XI"
-"""A key that stays the same, so that each run of the tests has the same names."""
+"""A fixed key, for stable test ids."""
 
 PRINT = "ab" * 32
 
@@ -21,8 +21,8 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
 
 
-def test_a_robot_is_recalled_as_it_was() -> None:
-    """By its name, until it is forgotten."""
+def test_a_known_robot_round_trips() -> None:
+    """A robot is recalled by its name until it is forgotten."""
     robot = KnownRobot("new-bright", "car.local:5000", new_key(), PRINT)
     path = remember(robot)
     assert recall("new-bright") == robot
@@ -36,7 +36,7 @@ def test_a_robot_is_recalled_as_it_was() -> None:
 
 
 def test_a_new_address_replaces_the_old() -> None:
-    """In the same file."""
+    """The same file is updated."""
     key = new_key()
     remember(KnownRobot("car", "car.local", key, PRINT))
     path = remember(KnownRobot("car", "10.0.0.7", key, PRINT))
@@ -45,14 +45,14 @@ def test_a_new_address_replaces_the_old() -> None:
 
 
 def test_a_misspelt_name_gets_a_suggestion() -> None:
-    """With the nearest spelling."""
+    """The error suggests the nearest name."""
     remember(KnownRobot("new-bright", "car.local", new_key(), PRINT))
     with pytest.raises(UnknownName, match="Did you mean 'new-bright'"):
         recall("new-brigt")
 
 
 def test_a_key_that_other_users_can_read_is_refused() -> None:
-    """As in ssh; the message has the command to fix it."""
+    """The error gives the chmod command, as ssh does."""
     path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
     path.chmod(0o644)
     with pytest.raises(LinkError, match="chmod 600"):
@@ -61,7 +61,7 @@ def test_a_key_that_other_users_can_read_is_refused() -> None:
 
 @pytest.mark.parametrize("text", ["adress = 1", "not toml", 'address = "a"\nkey = 1\n'])
 def test_a_broken_file_is_named(text: str) -> None:
-    """The message has its path."""
+    """The error gives the path of the file."""
     path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
     path.write_text(text)
     with pytest.raises(LinkError, match=r"car\.toml"):
@@ -79,17 +79,17 @@ def test_a_broken_file_is_named(text: str) -> None:
     ],
 )
 def test_invalid_attributes_are_errors(name: str, address: str, key: str, fingerprint: str) -> None:
-    """Before the file is written."""
+    """Invalid names, addresses, keys and fingerprints raise errors."""
     with pytest.raises(LinkError):
         KnownRobot(name, address, key, fingerprint)
 
 
 def test_without_encryption_there_may_be_no_key() -> None:
-    """With "insecure" as the fingerprint."""
+    """The key may be empty with the fingerprint "insecure"."""
     assert KnownRobot("car", "car.local", "", "insecure").key == ""
 
 
-def test_a_key_does_not_get_into_a_log() -> None:
-    """`repr` leaves it out."""
+def test_a_key_is_not_in_the_repr() -> None:
+    """`repr` omits the key, so that it is not logged."""
     key = new_key()
     assert key not in repr(KnownRobot("car", "car.local", key, PRINT))

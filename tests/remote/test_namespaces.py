@@ -1,4 +1,4 @@
-"""Cut cable between network namespaces."""
+"""A cut cable between network namespaces."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from tests.twin.robots import until
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 DEADLINE_MS: Final = 250.0
-LATE_MS: Final = 200.0  # Ten times what is promised on a quiet machine.
+LATE_MS: Final = 200.0  # Ten times the time on a quiet machine.
 NAME: Final = f"sc{os.getpid() % 100_000}"
 ROBOT, DRIVER = "10.213.77.1", "10.213.77.2"
 
 
 def ip(*arguments: str) -> None:
-    """Run `ip`, and fail in its words."""
+    """Run `ip`, and raise if it fails."""
     subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
 
 
 @pytest.fixture(scope="module")
 def namespace() -> Iterator[str]:
-    """A network namespace with a cable to here; both are gone afterwards."""
+    """A network namespace with a veth pair to this one, removed after the module."""
     if sys.platform != "linux" or os.geteuid() != 0:
         missing("Network namespaces need Linux and root")
     try:
@@ -61,12 +61,12 @@ def namespace() -> Iterator[str]:
 
 
 def there(robot: RunningRobot) -> KnownRobot:
-    """The robot at its end of the cable."""
+    """Return the robot with its address on the veth pair."""
     return robot.known_at(f"{ROBOT}:{robot.port}")
 
 
 def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
-    """The robot stops at its deadline, and can be driven again after the cable is joined."""
+    """The robot stops at its deadline, and can be driven again after the cable is rejoined."""
     profile = write_profile(tmp_path)
     wiring = TwinWiring(profile.guard_plan(), None)
     within = ("ip", "netns", "exec", namespace)
@@ -88,7 +88,7 @@ def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
             until(lambda: not drives())
             ends = [i.end_ns for i in propelled(read_ledger(robot.ledger_path), wiring)]
             assert max(ends) - cut_ns <= (DEADLINE_MS + LATE_MS) * 1e6
-            # What it still sends reaches nobody.
+            # Commands sent now do not arrive.
             sent = len(driver.sent)
             until(lambda: len(driver.sent) >= sent)
             assert not drives()

@@ -1,4 +1,4 @@
-"""Pictures and observations from the messages of a robot."""
+"""Images and observations decoded from messages of a robot."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from tests.remote.robot import picture
 sides = st.integers(1, 12)
 
 
-def test_a_picture_is_rgb_and_upright() -> None:
-    """Shape (height, width, 3), with red in the first channel."""
+def test_a_frame_decodes_as_upright_rgb() -> None:
+    """The shape is (height, width, 3), with red in the first channel."""
     seen = decode_picture(picture((160, 120), number=10))
     assert seen.shape == (120, 160, 3)
     assert seen.dtype == np.uint8
@@ -30,7 +30,7 @@ def test_a_picture_is_rgb_and_upright() -> None:
 
 @given(data=st.binary(max_size=200))
 def test_invalid_jpegs_are_errors(data: bytes) -> None:
-    """For any bytes."""
+    """Any invalid bytes raise LinkError."""
     with pytest.raises(LinkError, match="invalid JPEG"):
         decode_picture(data)
 
@@ -42,8 +42,8 @@ def test_a_truncated_jpeg_is_an_error() -> None:
         decode_picture(whole[: len(whole) // 2])
 
 
-def test_a_few_bytes_cannot_claim_all_memory() -> None:
-    """A header may claim gigabytes."""
+def test_an_oversized_frame_is_refused() -> None:
+    """The size in the header is checked before decoding."""
     whole = bytearray(picture((16, 16), 1))
     frame = whole.index(b"\xff\xc0")
     whole[frame + 5 : frame + 9] = (20_000).to_bytes(2, "big") * 2
@@ -52,10 +52,10 @@ def test_a_few_bytes_cannot_claim_all_memory() -> None:
 
 
 @given(width=sides, height=sides, wide=sides, high=sides, level=st.integers(0, 255))
-def test_one_colour_stays_that_colour(
+def test_resizing_keeps_a_uniform_colour(
     width: int, height: int, wide: int, high: int, level: int
 ) -> None:
-    """At any size."""
+    """Holds for any source and target size."""
     small = resize_picture(np.full((height, width, 3), level, np.uint8), (wide, high))
     assert small.shape == (high, wide, 3)
     assert small.dtype == np.uint8
@@ -66,22 +66,22 @@ def test_one_colour_stays_that_colour(
 def test_shrinking_by_a_whole_number_keeps_the_mean(
     data: st.DataObject, wide: int, high: int, by: int
 ) -> None:
-    """Up to rounding."""
+    """The mean is kept up to rounding."""
     seed = data.draw(st.integers(0, 2**32 - 1))
     whole = np.random.default_rng(seed).integers(0, 256, (by * high, by * wide, 3), np.uint8)
     assert abs(float(resize_picture(whole, (wide, high)).mean()) - float(whole.mean())) <= 0.5
 
 
 def test_other_sizes_take_the_nearest_pixel() -> None:
-    """Without mirroring or shifting."""
+    """Resizing neither mirrors nor shifts."""
     row = np.arange(5, dtype=np.uint8)
     whole = np.repeat(np.repeat(row[None, :, None], 2, axis=0), 3, axis=2)
     assert resize_picture(whole, (2, 2))[0, :, 0].tolist() == [1, 3]
     assert resize_picture(whole, (10, 2))[0, :, 0].tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
 
 
-def test_an_equal_size_returns_the_picture_itself() -> None:
-    """Without a copy."""
+def test_an_equal_size_returns_the_same_array() -> None:
+    """No copy is made."""
     whole = np.zeros((2, 3, 3), np.uint8)
     assert resize_picture(whole, (3, 2)) is whole
 
@@ -133,7 +133,7 @@ def seen(frame_seq: int, jpeg: bytes | None) -> Received:
 
 
 def test_a_restarted_robot_shows_its_new_frame() -> None:
-    """It counts frames from 1 again, and an equal number means another frame then."""
+    """After a reconnect, an equal frame number is a new frame."""
     robot = spaces()
     before = robot.view(seen(1, picture((16, 12), 1)))
     robot.reconnect()
@@ -143,7 +143,7 @@ def test_a_restarted_robot_shows_its_new_frame() -> None:
 
 
 def test_an_invalid_frame_is_decoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Later observations bring the same frame; the picture stays the last valid one."""
+    """The image remains the last valid one."""
     robot = spaces()
     good = robot.view(seen(1, picture((16, 12), 1)))
     tried: list[bytes] = []

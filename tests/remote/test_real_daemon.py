@@ -1,4 +1,4 @@
-"""Remote env against the real daemon, with a fake guard and camera."""
+"""The remote env against the real daemon, with a fake guard and camera."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ SENSED = {"speed": 0.5, "collision": 0.0, "stall": 0.0, "battery": 7.4}
 
 
 class Served:
-    """A daemon in a thread of its own.
+    """A daemon in its own thread.
 
     Attributes:
-        running: The daemon, to be touched on its own loop only.
+        running: The daemon, to be used on its own loop only.
     """
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **plan: Any) -> None:
@@ -54,7 +54,7 @@ class Served:
 
     @contextlib.contextmanager
     def serving(self) -> Iterator[Served]:
-        """Until the end of the block."""
+        """Serve until the end of the block."""
         thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
         thread.start()
         assert self._ready.wait(20.0)
@@ -70,10 +70,10 @@ class Served:
         return KnownRobot("test", f"127.0.0.1:{self.running.port}", self.key, self.known_at)
 
     def sense(self, **quantities: float) -> None:
-        """Let the guard report sensor values."""
+        """Make the guard report sensor values."""
         sensed = SENSED | quantities
         state = {"quantities": sensed, "sources": dict.fromkeys(sensed, "wheel")}
-        self._loop.call_soon_threadsafe(lambda: self.running.guard.say(**state))
+        self._loop.call_soon_threadsafe(lambda: self.running.guard.send(**state))
 
     async def _serve(self) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
@@ -82,7 +82,7 @@ class Served:
             self._ready.set()
             while not self._stop.is_set():
                 robot.show()
-                robot.guard.say()
+                robot.guard.send()
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(1.0 / HZ):
                         await self._stop.wait()
@@ -90,7 +90,7 @@ class Served:
 
 @pytest.fixture
 def serve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Served]]:
-    """Start a daemon; it ends with the test."""
+    """Start a daemon that is stopped after the test."""
     with contextlib.ExitStack() as stack:
 
         def made(**plan: Any) -> Served:
@@ -119,7 +119,7 @@ def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) 
     ages: list[float] = []
     for _ in range(5):
         seen, reward, terminated, truncated, info = env.step(np.array([0.25, 0.5], np.float32))
-        # Left out in a step whose observation left before the guard had obeyed.
+        # Missing if the observation was sent before the guard applied the action.
         ages += filter(None, [info["latency"].get("observation_age_at_action")])
         assert not terminated
         assert not truncated, info["truncated_because"]
@@ -154,7 +154,7 @@ def test_a_person_takes_control_from_a_program(serve: Callable[..., Served]) -> 
     env.close()
 
 
-def test_a_person_arms_what_a_program_drives(serve: Callable[..., Served]) -> None:
+def test_a_person_arms_for_a_program(serve: Callable[..., Served]) -> None:
     """The program waits for the person, then drives; an emergency stop ends the episode."""
     robot = serve()
     with RobotClient.connect(robot.known, role="person", name="Grace") as person:
@@ -188,7 +188,7 @@ def test_a_command_must_answer_an_observation_that_was_sent(serve: Callable[...,
 
 
 def test_arming_works_after_a_long_silence(serve: Callable[..., Served]) -> None:
-    """The client asks for a new observation first."""
+    """`arm` first asks for a new observation."""
     robot = serve(max_observation_age_ms=100)
     with RobotClient.connect(robot.known, role="person") as person:
         person.take()

@@ -1,4 +1,4 @@
-"""Recording of a remote env by the program."""
+"""Recording a remote env in the program."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Run = Callable[..., Robot]
 
 
 def test_frames_are_recorded_as_they_were_received(run: Run, tmp_path: Path) -> None:
-    """Byte for byte, with the robot's times and applied outputs."""
+    """Frames match byte for byte, with the robot's times and applied outputs."""
     robot = run(arm_by_itself=True)
     options: dict[str, Any] = {"pace": "lockstep", "state": True} | robot.arguments
     with gym.make("shapechanger/RemoteVehicle-v1", **options) as made:

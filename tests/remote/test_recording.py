@@ -1,4 +1,4 @@
-"""Client's side of recordings and suggestions, with the real daemon."""
+"""The client's methods for recordings and suggestions, with the real daemon."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
 
 
 def drive(client: RobotClient, steps: int) -> None:
-    """Command so many times."""
+    """Send commands."""
     seen = client.ask()
     for _ in range(steps):
         seen = client.exchange((0.0, 0.5), seen)
 
 
 def test_a_person_records_marks_and_undoes(robot: Served, tmp_path: Path) -> None:
-    """Each call returns when the disk has done it."""
+    """Each call returns after the change is on the disk."""
     with RobotClient.connect(robot.known, role="person", name="Ada") as client:
         assert client.welcome.can_record
         assert client.recorder is None
@@ -64,9 +64,9 @@ def test_a_person_records_marks_and_undoes(robot: Served, tmp_path: Path) -> Non
 
 
 def test_refused_requests_leave_the_link_up(robot: Served) -> None:
-    """The client finds invalid fields; the robot refuses the rest."""
+    """The client rejects invalid fields; the robot refuses the rest."""
     with RobotClient.connect(robot.known, role="person") as client:
-        for nonsense in (
+        for invalid in (
             lambda: client.record(name="x" * 65),
             lambda: client.undo(0.0),
             lambda: client.undo(float("nan")),
@@ -76,21 +76,21 @@ def test_refused_requests_leave_the_link_up(robot: Served) -> None:
             lambda: client.judge("x", -1, 0, keep=True),
         ):
             with pytest.raises(LinkError, match="Not a valid message"):
-                nonsense()
-        for impossible, why in (
+                invalid()
+        for refused, why in (
             (lambda: client.record(on=False), "Nothing is being recorded"),
             (client.mark, "Nothing is being recorded"),
             (lambda: client.fetch("nothing"), "no episode"),
             (lambda: client.judge("nothing", 0, 1, keep=False), "no episode"),
         ):
             with pytest.raises(RobotRefused, match=why):
-                impossible()
+                refused()
         assert client.browse().episodes == ()
         assert client.alive
 
 
 def test_a_program_suggests_while_a_person_drives(robot: Served) -> None:
-    """Each sees the values of the other."""
+    """Person and program each see the other's values."""
     with (
         RobotClient.connect(robot.known, role="person", name="Ada") as person,
         RobotClient.connect(robot.known, name="net") as program,

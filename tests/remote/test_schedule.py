@@ -1,4 +1,4 @@
-"""Control period, on a clock that the test moves."""
+"""The control period, on a clock set by the test."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ PERIOD = 0.05
 
 
 class Clock:
-    """Time that passes when a test says so."""
+    """A clock set by the test."""
 
     def __init__(self) -> None:
         self.now = 100.0
 
     def __call__(self) -> float:
-        """The time, s."""
+        """Return the time, s."""
         return self.now
 
 
@@ -36,7 +36,7 @@ def test_steps_that_end_a_little_late_keep_the_rate(late: list[float]) -> None:
 
 @given(slower=st.floats(1.0, 1.0 + 0.9 * LATE), steps=st.integers(1, 200))
 def test_a_robot_whose_clock_is_slower_is_followed(slower: float, steps: int) -> None:
-    """The difference never adds up to a missed deadline."""
+    """The difference between the clocks does not accumulate to a missed deadline."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)
     for i in range(1, steps + 1):
@@ -45,7 +45,7 @@ def test_a_robot_whose_clock_is_slower_is_followed(slower: float, steps: int) ->
     assert abs(clock.now - 100.0 - steps * slower * PERIOD) < 1e-9
 
 
-def test_a_step_that_is_too_late_is_counted_and_not_made_up_for() -> None:
+def test_a_late_step_is_counted_and_not_compensated() -> None:
     """The next step has a full period."""
     clock = Clock()
     schedule = Schedule(PERIOD, clock)

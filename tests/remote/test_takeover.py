@@ -1,4 +1,4 @@
-"""Episodes in which a person takes control and gives it back."""
+"""Episodes in which a person takes control and returns it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BACK = (-0.5, -0.4)
 
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
-    """A car in the plain room, in processes of its own."""
+    """A car in the plain room, in its own processes."""
     folder = tmp_path_factory.mktemp("robot")
     with run_robot(find_profile("car"), folder=folder, arguments=("--world", "room")) as running:
         yield running
@@ -44,18 +44,18 @@ def _made(robot: RunningRobot, **options: Any) -> gym.Env[Any, Any]:
 def _step_until(
     env: gym.Env[Any, Any], is_true: Callable[[dict[str, Any]], bool], at_most: int = 100
 ) -> dict[str, Any]:
-    """Step until the info says something; the episode must not end meanwhile."""
+    """Step until a condition on the info holds; the episode must not end before."""
     for _ in range(at_most):
         _, _, terminated, truncated, info = env.step(AHEAD)
         assert not terminated
         assert not truncated, info["truncated_because"]
         if is_true(info):
             return info
-    pytest.fail(f"This did not happen within {at_most} steps.")
+    pytest.fail(f"The condition did not hold within {at_most} steps.")
 
 
 def test_a_person_takes_over_and_gives_back(robot: RunningRobot) -> None:
-    """The info has the person's commands, and the person sees the program's."""
+    """`info` has the person's commands, and the person sees the program's."""
     with _made(robot, interventions=True) as env, robot.client(role="person") as person:
         env.reset()
         info = _step_until(env, lambda info: info["action_applied"][1] > 0.0)
@@ -80,7 +80,7 @@ def test_a_person_takes_over_and_gives_back(robot: RunningRobot) -> None:
 
 
 def test_a_person_who_stops_ends_the_episode(robot: RunningRobot) -> None:
-    """An emergency stop is no intervention, nor is disarming a program that drives."""
+    """Emergency stops and disarming truncate the episode."""
     with _made(robot, interventions=True) as env, robot.client(role="person") as person:
         env.reset()
         _step_until(env, lambda info: info["action_applied"][1] > 0.0)
@@ -96,7 +96,7 @@ def test_a_person_who_stops_ends_the_episode(robot: RunningRobot) -> None:
 
 
 def test_without_interventions_a_person_ends_the_episode(robot: RunningRobot) -> None:
-    """A program without interventions must not believe that it still drives."""
+    """Without `interventions`, a takeover truncates the episode."""
     with _made(robot) as env, robot.client(role="person") as person:
         env.reset()
         person.take()
@@ -109,7 +109,7 @@ def _cut(env: gym.Env[Any, Any]) -> str:
         _, _, _, truncated, info = env.step(AHEAD)
         if truncated:
             return info["truncated_because"]
-    pytest.fail("The episode goes on.")
+    pytest.fail("The episode was not truncated.")
 
 
 def _end_emergency(person: RobotClient) -> None:

@@ -1,4 +1,4 @@
-"""Remote env against a fake robot on a real socket."""
+"""The remote env against a fake robot on a real socket."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ TENDONS = tuple(
 
 
 def made(robot: Robot, **how: Any) -> gym.Env[Any, Any]:
-    """The env of a robot, in step with it."""
+    """Make the env of a robot, in lockstep."""
     return gym.make(ID, **{"pace": "lockstep"} | robot.arguments | how)
 
 
@@ -53,10 +53,8 @@ def made(robot: Robot, **how: Any) -> gym.Env[Any, Any]:
     ],
     ids=lambda promise: promise.__name__,
 )
-def test_an_env_with_pictures_passes_the_checks(
-    run: Run, promise: Callable[[MakeEnv], None]
-) -> None:
-    """Except those for flat observations."""
+def test_an_env_with_images_passes_the_checks(run: Run, promise: Callable[[MakeEnv], None]) -> None:
+    """All checks apply except those for flat observations."""
     promise(partial(made, run(home_at_take=True)))
 
 
@@ -73,16 +71,16 @@ def test_an_env_with_pictures_passes_the_checks(
     ids=lambda promise: promise.__name__,
 )
 @pytest.mark.parametrize("image", [None, False])
-def test_an_env_without_pictures_passes_the_checks(
+def test_an_env_without_images_passes_the_checks(
     run: Run, promise: Callable[[MakeEnv], None], image: bool | None
 ) -> None:
-    """For a robot without a camera, and with `image=False`."""
+    """Without a camera, and with `image=False`."""
     robot = run(home_at_take=True, image_size=None if image is None else (160, 120))
     promise(partial(made, robot, image=image))
 
 
-def test_layouts_name_pictures_and_states(run: Run) -> None:
-    """A picture is one block, in Gymnasium's order of a flattened Dict."""
+def test_layouts_name_images_and_states(run: Run) -> None:
+    """An image is one block, in Gymnasium's order of a flattened Dict."""
     env = made(run(), state=True, size=(40, 30))
     observation, action = layouts_of(env)
     assert observation.names == ("camera/image", *(f.name for f in STATE))
@@ -95,8 +93,8 @@ def test_layouts_name_pictures_and_states(run: Run) -> None:
 
 
 @pytest.mark.parametrize("size", [(160, 120), (80, 60), (128, 128)])
-def test_pictures_have_the_requested_size(run: Run, size: tuple[int, int]) -> None:
-    """160 x 120 by default, 128 x 128 as in 2017."""
+def test_images_have_the_requested_size(run: Run, size: tuple[int, int]) -> None:
+    """The default is 160 x 120; in 2017 it was 128 x 128."""
     env = made(run(), size=size, render_mode="rgb_array")
     seen, _ = env.reset(seed=0)
     assert seen.shape == (size[1], size[0], 3)
@@ -105,7 +103,7 @@ def test_pictures_have_the_requested_size(run: Run, size: tuple[int, int]) -> No
 
 
 def test_the_reward_is_metres_forward(run: Run) -> None:
-    """Signed, so reversing costs; the sensors are named."""
+    """Reversing is negative, and `info` names the sensors."""
     robot = run(reward={"velocity": 2.0})
     env = made(robot, reward={"stall": -5.0})
     env.reset(seed=0)
@@ -122,7 +120,7 @@ def test_the_reward_is_metres_forward(run: Run) -> None:
 
 
 def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
-    """Terminated, not truncated."""
+    """The episode is terminated, not truncated."""
     robot = run()
     env = made(robot, on_reset=lambda seed: robot.stand_at(0.0))
     env.reset(seed=0)
@@ -142,12 +140,12 @@ def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
 
 
 def test_a_bump_between_two_observations_counts_once(run: Run) -> None:
-    """The event reports it after it is over; the bumper's value is not counted again."""
+    """The event counts, and the bumper's later value is not counted again."""
     robot = run(reward={"collision_ends_episode": 0.0})
     env = made(robot)
     env.reset(seed=0)
     env.step(REST)
-    robot.say(m.Event(name="bump", text="It bumped into something.", at_ns=0))
+    robot.send(m.Event(name="bump", text="It bumped into something.", at_ns=0))
     *_, info = env.step(REST)
     assert info["reward_collision"] == -10.0
     assert info["events"] == ("It bumped into something.",)
@@ -156,8 +154,8 @@ def test_a_bump_between_two_observations_counts_once(run: Run) -> None:
     env.close()
 
 
-def test_what_is_not_measured_is_absent_and_not_zero(run: Run) -> None:
-    """It has no term, and `info` names it."""
+def test_an_unmeasured_quantity_is_absent(run: Run) -> None:
+    """It has no reward term, and `info` lists it."""
     robot = run(absent=("speed", "stall"))
     env = made(robot, state=True)
     seen, _ = env.reset(seed=0)
@@ -170,7 +168,7 @@ def test_what_is_not_measured_is_absent_and_not_zero(run: Run) -> None:
 
 
 def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
-    """A command that was not applied has no time to the outputs."""
+    """A command that was not applied has no latency to the outputs."""
     robot = run(clock="real")
     env = made(robot)
     env.reset(seed=0)
@@ -191,21 +189,21 @@ def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
 
 
 def test_a_command_answers_the_last_observation(run: Run) -> None:
-    """The one that the previous step returned."""
+    """Each command answers the observation of the previous step."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
     for _ in range(3):
         env.step(AHEAD)
-    eventually(lambda: len(robot.told(m.Command)) >= 3)
-    answers = [command.answers for command in robot.told(m.Command)]
+    eventually(lambda: len(robot.received(m.Command)) >= 3)
+    answers = [command.answers for command in robot.received(m.Command)]
     assert answers == sorted(set(answers))
     env.close()
 
 
 @pytest.mark.parametrize("how", ["frozen", "broken"])
-def test_an_old_picture_is_never_passed_off_as_new(run: Run, how: str) -> None:
-    """After a freeze or invalid frames the picture is the last one, and info reports it."""
+def test_a_repeated_image_is_reported(run: Run, how: str) -> None:
+    """With a frozen camera or invalid frames, the image is the last valid one."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -223,7 +221,7 @@ def test_an_old_picture_is_never_passed_off_as_new(run: Run, how: str) -> None:
 
 
 def test_an_episode_needs_a_new_frame(run: Run) -> None:
-    """The first observation was made after the reset."""
+    """`reset` raises if no frame arrives after it."""
     env = made(run(frozen=True), reset_timeout_s=0.2)
     with pytest.raises(LinkError, match="Does its camera still work"):
         env.reset(seed=0)
@@ -232,19 +230,19 @@ def test_an_episode_needs_a_new_frame(run: Run) -> None:
 
 @pytest.mark.parametrize("action", [[0.0], [0.0, np.nan], [0.0, np.inf], [[0.0, 0.0]]])
 def test_an_invalid_action_is_an_error(run: Run, action: Any) -> None:
-    """The message has the expected numbers."""
+    """The error names the expected numbers, and no command is sent."""
     robot = run()
     env = RemoteVehicleEnv(pace="lockstep", **robot.arguments)
     env.reset(seed=0)
-    sent = len(robot.told(m.Command))
+    sent = len(robot.received(m.Command))
     with pytest.raises(SpaceMismatch, match="2 finite numbers \\(steering, throttle\\)"):
         env.step(np.array(action))
-    assert len(robot.told(m.Command)) == sent
+    assert len(robot.received(m.Command)) == sent
     env.close()
 
 
 def test_a_larger_action_is_clipped_to_the_range(run: Run) -> None:
-    """As in every env."""
+    """Actions beyond the range are clipped."""
     env = RemoteVehicleEnv(pace="lockstep", **run().arguments)
     env.reset(seed=0)
     *_, info = env.step(np.array([-3.0, 2.0], np.float32))
@@ -260,8 +258,8 @@ def test_a_larger_action_is_clipped_to_the_range(run: Run) -> None:
         ({"held_by": "Grace"}, "Grace has control of the robot now."),
     ],
 )
-def test_a_person_truncates(run: Run, change: dict[str, Any], because: str) -> None:
-    """With the reason and the person's name in info."""
+def test_a_person_truncates_the_episode(run: Run, change: dict[str, Any], because: str) -> None:
+    """`info` has the reason, with the person's name."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
@@ -274,7 +272,7 @@ def test_a_person_truncates(run: Run, change: dict[str, Any], because: str) -> N
 
 
 def test_a_lost_link_truncates_and_the_next_reset_connects_again(credentials: Path) -> None:
-    """The last observation is returned once more, with the reason."""
+    """The last observation is returned again, with the reason."""
     robot = Robot()
     with robot.running(credentials):
         env = made(robot, reset_timeout_s=20.0)
@@ -296,7 +294,7 @@ def test_a_lost_link_truncates_and_the_next_reset_connects_again(credentials: Pa
 
 
 def test_a_silent_link_truncates_in_time(run: Run) -> None:
-    """Without a FIN."""
+    """The timeout applies although the connection is not closed."""
     robot = run()
     env = made(robot, timeout_s=0.3)
     env.reset(seed=0)
@@ -308,32 +306,32 @@ def test_a_silent_link_truncates_in_time(run: Run) -> None:
 
 
 def test_reset_waits_for_the_operator(run: Run) -> None:
-    """`on_waiting` is called once; afterwards we have control of an armed robot."""
+    """`on_waiting` is called once per reset, and the robot is then armed."""
     robot = run(arming="person")
-    said: list[str] = []
+    sentences: list[str] = []
 
-    def told(sentence: str) -> None:
-        said.append(sentence)
+    def on_waiting(sentence: str) -> None:
+        sentences.append(sentence)
         robot.armed = True
 
-    env = made(robot, on_waiting=told, reset_timeout_s=20.0)
+    env = made(robot, on_waiting=on_waiting, reset_timeout_s=20.0)
     _, info = env.reset(seed=0)
     assert info["armed"]
-    assert len(said) == 1
-    assert said[0].startswith("tin waits for its operator: put it at the start and arm it: ")
-    assert "`shapechanger robot drive tin` in another terminal, and there P" in said[0]
+    assert len(sentences) == 1
+    assert sentences[0].startswith("tin waits for its operator: put it at the start and arm it: ")
+    assert "`shapechanger robot drive tin` in another terminal, and there P" in sentences[0]
     env.step(AHEAD)
     env.reset(seed=0)
-    assert robot.told(m.Disarm)  # So that the operator can pick it up.
-    assert len(said) == 2
+    assert robot.received(m.Disarm)  # The operator may pick it up.
+    assert len(sentences) == 2
     env.close()
 
 
 def test_a_reset_disarms_the_robot_first(run: Run) -> None:
-    """The last command of the previous episode is not in force either."""
+    """`on_reset` runs while the robot is disarmed."""
     robot = run()
     disarmed: list[int] = []
-    env = made(robot, on_reset=lambda _: disarmed.append(len(robot.told(m.Disarm))))
+    env = made(robot, on_reset=lambda _: disarmed.append(len(robot.received(m.Disarm))))
     env.reset(seed=0)
     env.step(AHEAD)
     env.reset(seed=0)
@@ -341,8 +339,8 @@ def test_a_reset_disarms_the_robot_first(run: Run) -> None:
     env.close()
 
 
-def test_no_round_trip_is_claimed_across_two_clocks(run: Run) -> None:
-    """A twin's second has another length."""
+def test_no_round_trip_is_reported_across_two_clocks(run: Run) -> None:
+    """The clock of a twin runs at another rate."""
     env = made(run(clock="twin"))
     env.reset(seed=0)
     *_, info = env.step(AHEAD)
@@ -351,8 +349,8 @@ def test_no_round_trip_is_claimed_across_two_clocks(run: Run) -> None:
     env.close()
 
 
-def test_reset_does_not_wait_for_ever(run: Run) -> None:
-    """The message says what to do."""
+def test_reset_times_out(run: Run) -> None:
+    """The error says what to do."""
     env = made(run(arming="person"), reset_timeout_s=0.1)
     with pytest.raises(RobotRefused, match=r"was not armed within 0 s.*shapechanger robot drive"):
         env.reset(seed=0)
@@ -362,7 +360,7 @@ def test_reset_does_not_wait_for_ever(run: Run) -> None:
 def test_a_long_reset_logs_what_it_waits_for(
     run: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Once for each thing, with the command and the key that help."""
+    """Each reason is logged once, with the command that helps."""
     monkeypatch.setattr("shapechanger.envs.remote.operator._LOG_AFTER_S", 0.0)
     robot = run(arming="person")
     remember(robot.known)
@@ -372,14 +370,14 @@ def test_a_long_reset_logs_what_it_waits_for(
         pytest.raises(RobotRefused, match="To arm it, `shapechanger robot drive tin`"),
     ):
         env.reset(seed=0)
-    (said,) = [record.getMessage() for record in caplog.records]
-    assert "tin waits for its operator" in said
-    assert "Waiting for up to 0 s more" in said
+    (message,) = [record.getMessage() for record in caplog.records]
+    assert "tin waits for its operator" in message
+    assert "Waiting for up to 0 s more" in message
     env.close()
 
 
 def test_a_short_wait_is_not_logged(run: Run, caplog: pytest.LogCaptureFixture) -> None:
-    """Up to two seconds."""
+    """Waits of up to two seconds are not logged."""
     env = made(run(arming="person"), reset_timeout_s=0.1)
     with pytest.raises(RobotRefused):
         env.reset(seed=0)
@@ -388,35 +386,35 @@ def test_a_short_wait_is_not_logged(run: Run, caplog: pytest.LogCaptureFixture) 
 
 
 def test_reset_waits_for_control_of_an_armed_robot(run: Run) -> None:
-    """Armed for another client is not enough."""
+    """A robot armed for another client is not enough."""
     robot = run(arming="person")
-    said: list[str] = []
+    sentences: list[str] = []
 
-    def told(sentence: str) -> None:
-        said.append(sentence)
-        # First a person takes it and arms it; then they give it back.
-        robot.held_by = "Grace" if len(said) == 1 else ""
+    def on_waiting(sentence: str) -> None:
+        sentences.append(sentence)
+        # First a person takes and arms it, then gives control back.
+        robot.held_by = "Grace" if len(sentences) == 1 else ""
         robot.armed = True
 
-    env = made(robot, on_waiting=told, reset_timeout_s=20.0)
+    env = made(robot, on_waiting=on_waiting, reset_timeout_s=20.0)
     env.reset(seed=0)
-    assert said[1:] == ["Grace has control."]
+    assert sentences[1:] == ["Grace has control."]
     assert not env.step(AHEAD)[3]
     env.close()
 
 
 def test_reset_waits_for_another_driver(run: Run) -> None:
-    """The reason is the robot's message."""
+    """The reason passed on is the robot's message."""
     robot = run(held_by="Grace")
-    said: list[str] = []
+    sentences: list[str] = []
 
-    def told(sentence: str) -> None:
-        said.append(sentence)
+    def on_waiting(sentence: str) -> None:
+        sentences.append(sentence)
         robot.held_by = ""
 
-    env = made(robot, on_waiting=told, reset_timeout_s=20.0)
+    env = made(robot, on_waiting=on_waiting, reset_timeout_s=20.0)
     env.reset(seed=0)
-    assert said == ["Grace has control."]
+    assert sentences == ["Grace has control."]
     robot.held_by = "Grace"
     impatient = made(robot, reset_timeout_s=0.1)
     with pytest.raises(RobotRefused, match="Grace has control"):
@@ -426,28 +424,28 @@ def test_reset_waits_for_another_driver(run: Run) -> None:
 
 
 def test_the_reset_routine_of_the_profile_runs(run: Run) -> None:
-    """Each step has its duration, by the robot's clock."""
+    """Each step lasts its duration on the robot's clock."""
     robot = run(reset=(((0.0, -0.5), 0.5), ((1.0, 0.0), 0.2)))
     env = made(robot, on_reset="routine")
     env.reset(seed=0)
-    values = [command.values for command in robot.told(m.Command)]
+    values = [command.values for command in robot.received(m.Command)]
     assert values.count((0.0, -0.5)) == 10
     assert values.count((1.0, 0.0)) == 4
     env.close()
 
 
 def test_a_missing_reset_routine_is_an_error(run: Run) -> None:
-    """The message says how to add one, and the robot was not armed."""
+    """The error says how to add one, and the robot is not armed."""
     robot = run()
     env = made(robot, on_reset="routine")
     with pytest.raises(RobotRefused, match=r"\[\[reset\]\]"):
         env.reset(seed=0)
-    assert not robot.told(m.Arm)
+    assert not robot.received(m.Arm)
     env.close()
 
 
 def test_on_reset_gets_the_seed(run: Run) -> None:
-    """A twin's operator can choose the start by the seed."""
+    """The callback can choose the start by the seed."""
     seeds: list[int | None] = []
     env = made(run(), on_reset=seeds.append)
     env.reset(seed=3)
@@ -457,7 +455,7 @@ def test_on_reset_gets_the_seed(run: Run) -> None:
 
 
 def test_steps_last_a_control_period(run: Run) -> None:
-    """In real time, with no observation older than the command."""
+    """In real time, 20 steps take at least 20 periods, less 10 %."""
     robot = run(control_hz=50.0, clock="real")
     env = made(robot, pace="realtime")
     env.reset(seed=0)
@@ -471,13 +469,13 @@ def test_steps_last_a_control_period(run: Run) -> None:
 
 
 def test_a_twins_clock_is_driven_in_lockstep_only(run: Run) -> None:
-    """Its time moves with each observation, so commands in real time would always be too old."""
+    """Real-time commands would be too old, since a twin's time advances with observations."""
     with pytest.raises(RobotRefused, match="pass pace='lockstep'"):
         RemoteVehicleEnv(**run(clock="twin").arguments)
 
 
 def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
-    """Tendons only pull; without a camera the observation is the state."""
+    """Actions are 0 to 1, and without a camera the observation is the state."""
     robot = run(
         actions=TENDONS,
         state=tuple(Feature(f"{f.name}/applied", "1", 0.0, 1.0, f.element) for f in TENDONS),
@@ -501,7 +499,7 @@ def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
 
 
 def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
-    """Also in another process, from the id and its arguments."""
+    """`EnvRef` makes it from its id and arguments, so other processes can too."""
     remember(run().known)
     with EnvRef(ID, {"robot": "tin", "pace": "lockstep"}).make() as env:
         env.reset(seed=0)
@@ -520,34 +518,34 @@ def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
 def test_invalid_arguments_are_errors(
     run: Run, how: dict[str, Any], error: type[Exception]
 ) -> None:
-    """No connection stays open."""
+    """No connection remains open."""
     with pytest.raises(error):
         RemoteVehicleEnv(**run().arguments, **how)
 
 
 def test_closing_gives_control_back(run: Run) -> None:
-    """Any number of times."""
+    """`close` is idempotent."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
     env.close()
     env.close()
-    eventually(lambda: len(robot.told(m.Release)) == 1)
+    eventually(lambda: len(robot.received(m.Release)) == 1)
 
 
 def test_a_dropped_env_gives_control_back(run: Run) -> None:
-    """A notebook that makes a second env must find the robot free."""
+    """Garbage collection releases control, so that another env can be made."""
     robot = run()
     env = made(robot)
     env.reset(seed=0)
     del env
     gc.collect()
-    eventually(lambda: len(robot.told(m.Release)) == 1)
+    eventually(lambda: len(robot.received(m.Release)) == 1)
     made(robot).close()
 
 
 def test_four_keys_drive_as_in_2017(run: Run) -> None:
-    """In the order of the columns of labels.csv; a key that steers does not drive."""
+    """The order is that of labels.csv, and steering keys do not drive."""
     env = FourWay(made(run()), throttle=0.6, steering=0.4)
     env.reset(seed=0)
     applied = {
@@ -563,7 +561,7 @@ def test_four_keys_drive_as_in_2017(run: Run) -> None:
 
 
 def test_four_keys_need_steering_and_throttle(run: Run) -> None:
-    """A finger has neither."""
+    """Other actions raise SpaceMismatch."""
     env = made(run(actions=(THROTTLE,)))
     with pytest.raises(SpaceMismatch, match="steering, throttle"):
         FourWay(env)
@@ -572,7 +570,7 @@ def test_four_keys_need_steering_and_throttle(run: Run) -> None:
 
 @pytest.mark.parametrize("key", [4, -1, 1.5, "forward", [0.0, 1.0], None])
 def test_an_invalid_key_of_the_four_is_an_error(run: Run, key: Any) -> None:
-    """The message lists the keys."""
+    """The error lists the keys."""
     env = FourWay(made(run()))
     with pytest.raises(SpaceMismatch, match=r"0 \(forward\), 1 \(backward\)"):
         env.action(key)

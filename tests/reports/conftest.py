@@ -1,4 +1,4 @@
-"""The study that most tests of the report look at."""
+"""Study and report shared by the tests of reports."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ def study() -> Study:
 
 @pytest.fixture(scope="session")
 def page(study: Study) -> str:
-    """Its report."""
+    """The report of the study."""
     return study_html(study, picture_note="No picture can be drawn here.")

@@ -1,4 +1,4 @@
-"""Studies that nobody ran: curves are drawn from a seed, and everything else follows from them."""
+"""Synthetic studies: curves are drawn from a seed, and all else follows from them."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ SETTINGS = PpoSettings(
 def rising(
     start: float, end: float, half: float, seeds: int = 5, noise: float = 20.0, seed: int = 0
 ) -> NDArray[np.float64]:
-    """Curves from `start` to `end`, half way there after `half` steps, shape (seeds, 11)."""
+    """Return curves from `start` to `end` with half-life `half`, shape (seeds, 11)."""
     rng = np.random.default_rng(seed)
     way = 1.0 - 0.5 ** (STEPS / half)
     return start + (end - start) * way + rng.normal(0.0, noise, (seeds, STEPS.size))
 
 
 def body_map() -> BodyMap:
-    """From a body with one leg to one with two, of which one is new; the tail has gone."""
+    """Return a map from one leg to two; the tail is lost."""
     source = ("torso/z", "leg_1/angle", "tail/angle")
     target = ("torso/z", "leg_1/angle", "leg_2/angle")
     return BodyMap.between(
@@ -55,13 +55,13 @@ def body_map() -> BodyMap:
 
 
 def same_body() -> BodyMap:
-    """A body that only changes its masses."""
+    """Return a map for a change of masses only."""
     layout = Layout((Feature("hinge/angle", "rad"),))
     return BodyMap.identity(layout, Layout((Feature("slide/motor", "1", -1.0, 1.0),)))
 
 
 def results(kind: str, returns: NDArray[np.float64], terms: Sequence[str] = ()) -> list[RunResult]:
-    """The runs of one kind, from returns of shape (seeds, evaluations)."""
+    """Return the runs of one kind, from returns of shape (seeds, evaluations)."""
     return [
         RunResult(
             Run(kind, index),
@@ -98,7 +98,7 @@ def make_study(
     command: str = "shapechanger transfer Ant BigAnt --seeds 5",
     shift: str = "pole: length 0.6 m -> 1.2 m (x2)",
 ) -> Study:
-    """A study in which transfer helps, unless other curves are given."""
+    """Return a study in which transfer helps, unless other curves are given."""
     scratch = rising(0.0, 1000.0, 3000.0) if scratch is None else scratch
     seeds = scratch.shape[0]
     drawn: dict[str, NDArray[np.float64]] = {
@@ -141,7 +141,7 @@ def make_study(
 
 
 def _summaries(plan: Plan, drawn: dict[str, NDArray[np.float64]]) -> dict[str, Summary]:
-    """The measures, with few resamples."""
+    """Return the measures, with few resamples."""
     scratch = LearningCurves(STEPS, drawn["scratch"])
     ends = {arm: float(drawn[arm][:, -plan.last_k :].mean()) for arm in plan.arms}
     floors = {"random actions": float(drawn["random"].mean())}

@@ -1,4 +1,4 @@
-"""The learning curves as a drawing."""
+"""Drawings of learning curves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COUNTINGS: tuple[Counting, ...] = ("target", "total")
 
 
 def same(level: float, seeds: int = 5) -> np.ndarray:
-    """Curves without any spread."""
+    """Return curves without spread."""
     return np.full((seeds, 11), level)
 
 
@@ -36,31 +36,31 @@ STUDIES = {
 
 
 @pytest.mark.parametrize("counting", COUNTINGS)
-def test_the_same_study_gives_the_same_drawing(study: Study, counting: Counting) -> None:
-    """To the last byte, and without a date, so that reports can be compared."""
+def test_drawings_are_reproducible(study: Study, counting: Counting) -> None:
+    """Equal studies give equal bytes, without a date."""
     drawing = learning_curves(study, counting)
     assert drawing == learning_curves(study, counting)
     assert "<dc:date>" not in drawing
     assert "<metadata>" not in drawing
 
 
-def test_the_settings_of_the_user_do_not_matter(study: Study) -> None:
-    """Whatever a matplotlibrc says, the drawing is ours, and the settings stay theirs."""
+def test_matplotlib_settings_are_ignored(study: Study) -> None:
+    """The user's rcParams neither affect the drawing nor change."""
     plain = learning_curves(study, "target")
     with mpl.rc_context({"lines.linewidth": 9.0, "axes.facecolor": "black", "font.size": 4.0}):
         assert learning_curves(study, "target") == plain
         assert mpl.rcParams["font.size"] == 4.0
 
 
-def test_counting_moves_the_curves(study: Study) -> None:
-    """Two panels, two drawings."""
+def test_counting_changes_the_drawing(study: Study) -> None:
+    """Target and total steps give different drawings."""
     assert learning_curves(study, "target") != learning_curves(study, "total")
 
 
 @pytest.mark.parametrize("counting", COUNTINGS)
 @pytest.mark.parametrize("name", STUDIES)
 def test_every_study_can_be_drawn(name: str, counting: Counting) -> None:
-    """Without a warning, as well-formed XML that scales with the page."""
+    """The drawing is well-formed SVG with a viewBox, and no warning is raised."""
     root = ET.fromstring(learning_curves(STUDIES[name], counting))
     assert root.tag.endswith("svg")
     assert "viewBox" in root.attrib

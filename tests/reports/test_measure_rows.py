@@ -1,4 +1,4 @@
-"""The table of measures, against numbers worked out by hand."""
+"""The table of measures, compared with values worked out by hand."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from shapechanger.transfer.metrics import DEFAULT_THRESHOLDS
 from shapechanger.transfer.study import Study
 from tests.reports.studies import STEPS, make_study, rising
 
-# Straight lines, so that areas and crossings can be read off. Scratch rises from 0 to 1000 in
-# 10,240 steps and then ends, on average, at the mean of its last three evaluations: 900.
+# Straight lines, so that areas and crossings are easy to compute. Scratch rises from 0 to 1000 in
+# 10,240 steps, and its final value is the mean of the last three evaluations: 900.
 SLOPE = STEPS / STEPS[-1]
 
 
 def by_name(study: Study, arm: str) -> dict[str, MeasureRow]:
-    """The rows of one arm."""
+    """Return the rows of one arm."""
     return {row.measure: row for row in measure_rows(study) if row.arm == arm}
 
 
 @pytest.fixture(scope="module")
 def lines() -> Study:
-    """Two seeds each: scratch from 0 to 1000, fine-tune 450 above it; random is worth 0."""
+    """Two seeds each: scratch from 0 to 1000, fine-tune 450 above it; random has the mean 0."""
     return make_study(
         scratch=np.array([1000.0 * SLOPE - 9.0, 1000.0 * SLOPE + 9.0]),
         fine_tune=np.array([1000.0 * SLOPE + 450.0, 1000.0 * SLOPE + 450.0]),
@@ -40,14 +40,14 @@ def test_gains_by_hand(lines: Study) -> None:
         assert rows[name].target == "+0.33 [+0.25, +0.42]"
         assert rows[name].unit == "score"
         assert rows[name].method == "Welch's t"
-    # In total steps scratch is read at step 1024, where it has come to 100.
+    # In total steps, scratch is read at step 1024, where it is 100.
     assert rows["Jumpstart"].total == "+0.26 [+0.17, +0.34]"
 
 
 def test_times_by_hand(lines: Study) -> None:
-    """A score of 0.5 is 675: scratch is there after 675 / 1000 of 10,240 steps, 6,912."""
+    """A score of 0.5 is 675, which scratch reaches after 675 / 1000 of 10,240 steps: 6,912."""
     row = by_name(lines, "fine-tune")["Time to threshold 0.5: steps saved"]
-    # Fine-tune needs 225 more than its 450: 2,304 steps, or 3,328 with the source.
+    # Fine-tune starts at 450 and needs 225 more: 2,304 steps, or 3,328 with the source.
     assert row.target.startswith("+4,608 [")
     assert row.total.startswith("+3,584 [")
     assert row.unit == "steps"
@@ -57,8 +57,8 @@ def test_times_by_hand(lines: Study) -> None:
     )
 
 
-def test_runs_that_never_reach_it_are_noted() -> None:
-    """They count with the budget, and the note says which they are."""
+def test_censored_runs_are_noted() -> None:
+    """Runs that never reach the threshold count as the budget, with a note."""
     study = make_study(fine_tune=rising(0.0, 300.0, 1000.0, seed=2))  # Scratch is the best arm.
     note = by_name(study, "fine-tune")["Time to threshold 0.9: steps saved"].note
     assert "0 of 5 seeds of fine-tune after a mean of 10,240 steps" in note
@@ -66,7 +66,7 @@ def test_runs_that_never_reach_it_are_noted() -> None:
 
 
 def test_every_arm_has_every_measure(study: Study) -> None:
-    """Five measures and one row for each threshold, in the order of the plan."""
+    """An arm has five measures and a row per threshold, in the order of the plan."""
     rows = measure_rows(study)
     assert [row.arm for row in rows] == ["zero-shot"] * 9 + ["fine-tune"] * 9
     names = [row.measure for row in rows[:9]]
@@ -75,8 +75,8 @@ def test_every_arm_has_every_measure(study: Study) -> None:
     assert names[5:] == [f"Time to threshold {t:g}: steps saved" for t in DEFAULT_THRESHOLDS]
 
 
-def test_rows_say_what_the_summary_says(study: Study) -> None:
-    """The text is that of the estimates, both ways of counting in their own column."""
+def test_rows_match_the_summary(study: Study) -> None:
+    """Rows have the texts of the estimates, one column for each way of counting."""
     summary = study.summaries["fine-tune"]
     rows = by_name(study, "fine-tune")
     ratio = rows["auc_ratio"]
@@ -87,8 +87,8 @@ def test_rows_say_what_the_summary_says(study: Study) -> None:
     assert ratio.method == summary.in_target_steps.auc_ratio.method
 
 
-def test_what_is_undefined_says_why() -> None:
-    """Zero-shot spans no area; without a score there is no ratio."""
+def test_undefined_measures_have_a_reason() -> None:
+    """Undefined measures have a note with the reason."""
     rows = by_name(make_study(arms=("scratch", "zero-shot")), "zero-shot")
     assert rows["auc_ratio"].target == rows["auc_ratio"].total == "undefined"
     assert rows["auc_ratio"].method == "none"
@@ -100,8 +100,8 @@ def test_what_is_undefined_says_why() -> None:
     assert "there is no score" in rows["Time to threshold 0.5: steps saved"].note
 
 
-def test_notes_of_one_way_of_counting_say_which() -> None:
-    """With the whole budget spent on the source, only the ratio in target steps has an interval."""
+def test_notes_name_their_way_of_counting() -> None:
+    """If only one way of counting lacks an interval, the note names it."""
     row = by_name(make_study(source_steps=10_240), "fine-tune")["auc_ratio"]
     assert row.total == "0 (no interval)"
     assert row.method.endswith("/ none")
@@ -109,7 +109,7 @@ def test_notes_of_one_way_of_counting_say_which() -> None:
 
 
 def test_arms_by_hand(lines: Study) -> None:
-    """Final is the mean of the last three evaluations: 800, 900 and 1000."""
+    """The final value is the mean of the last three evaluations: 800, 900 and 1000."""
     rows = {row.kind: row for row in arm_rows(lines)}
     assert list(rows) == ["source", "random", "zero-action", "scratch", "zero-shot", "fine-tune"]
     scratch = rows["scratch"]
@@ -118,22 +118,22 @@ def test_arms_by_hand(lines: Study) -> None:
     assert scratch.final == scratch.final_return == "900 [786, 1,014]"
     assert scratch.first == "0 [-114, 114]"
     assert scratch.length == "100"
-    # The best run ends at 1350, so good is 1215 and more.
+    # The best run ends at 1350, so good runs end at 1215 or more.
     assert scratch.good == "0 of 2"
     assert rows["fine-tune"].good == "2 of 2"
     assert rows["source"].good == ""
     assert scratch.terms == {}
 
 
-def test_the_source_ends_with_the_policy_that_is_moved(study: Study) -> None:
-    """That is its last evaluation, not a mean of several."""
+def test_the_source_ends_with_its_last_evaluation(study: Study) -> None:
+    """The source row shows the transferred policy: the last evaluation instead of a mean."""
     row = next(row for row in arm_rows(study) if row.kind == "source")
     assert [float(text) for text in row.per_seed.split("; ")] == pytest.approx(
         study.source_return, abs=0.1
     )
 
 
-def test_reward_terms_are_means_of_the_end(study: Study) -> None:
+def test_reward_terms_are_final_means(study: Study) -> None:
     """Each synthetic term is half of the return."""
     rows = {row.kind: row for row in arm_rows(study)}
     assert set(rows["zero-shot"].terms) == {"reward_forward", "reward_survive"}
@@ -141,12 +141,12 @@ def test_reward_terms_are_means_of_the_end(study: Study) -> None:
 
 
 def test_no_run_is_good_where_none_learned() -> None:
-    """There is no way from no skill to the best, so no share of it."""
+    """Without learning, the number of good runs is empty."""
     low = rising(-900.0, -900.0, 1e3)
     study = make_study(scratch=low, fine_tune=low, zero_shot=low[:, :1])
     assert {row.good for row in arm_rows(study)} == {""}
 
 
 def test_a_given_policy_has_no_source_row() -> None:
-    """Its runs are not part of the study."""
+    """A given source policy has no runs in the study."""
     assert "source" not in [row.kind for row in arm_rows(make_study(given=True))]

@@ -1,4 +1,4 @@
-"""Numbers: as many digits as the interval bears."""
+"""Formatting of numbers and intervals."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from shapechanger.transfer.metrics import Estimate, undefined
     ],
 )
 def test_numbers_are_short(value: float, text: str) -> None:
-    """Four digits, separated thousands, and powers of ten where a number is huge."""
+    """Four digits, thousands separators, and exponents for huge numbers."""
     assert number(value) == text
 
 
-def test_a_sign_belongs_to_what_is_shown() -> None:
-    """A difference above zero bears a plus; one that is rounded to zero bears nothing."""
+def test_the_sign_is_that_of_the_rounded_number() -> None:
+    """A positive number gets a plus; one that is rounded to zero gets no sign."""
     assert number(0.25, 2, signed=True) == "+0.25"
     assert number(0.001, 2, signed=True) == "0.00"
     assert number(-0.001, 2, signed=True) == "0.00"
@@ -44,7 +44,7 @@ def test_a_sign_belongs_to_what_is_shown() -> None:
 
 
 def test_steps_are_whole() -> None:
-    """Half a step is nobody's business."""
+    """Steps are rounded to integers."""
     assert count(12_345.4) == "12,345"
 
 
@@ -60,22 +60,22 @@ def test_steps_are_whole() -> None:
         (-2e12, 1e12, 4e12, "1.000e12 [-2.000e12, 4.000e12]"),
     ],
 )
-def test_intervals_bear_two_digits_of_their_width(
+def test_intervals_have_two_significant_digits(
     low: float, value: float, high: float, text: str
 ) -> None:
-    """More would be noise; but an end that is not zero is not shown as zero."""
+    """Digits follow from the width; an end other than zero is not shown as zero."""
     assert interval_text(value, low, high) == text
 
 
-def test_estimates_without_a_value_or_an_interval_say_so() -> None:
-    """A reader must not take them for zero."""
+def test_missing_values_and_intervals_are_stated() -> None:
+    """Estimates without a value or an interval are labelled."""
     assert estimate_text(undefined("Why not.")) == "undefined"
     assert estimate_text(Estimate(0.5), signed=True) == "+0.5000 (no interval)"
     assert estimate_text(Estimate(0.3, 0.2, 0.4), signed=True) == "+0.30 [+0.20, +0.40]"
 
 
-def test_a_list_of_numbers_tells_them_apart() -> None:
-    """All with the same digits after the point."""
+def test_numbers_of_a_list_share_their_digits() -> None:
+    """All numbers of a list have the same decimals."""
     assert list_text([5.0, 7.5, 15.0]) == "5.0; 7.5; 15.0"
     assert list_text([1000.0, 1000.0]) == "1,000; 1,000"
 

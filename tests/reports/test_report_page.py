@@ -1,4 +1,4 @@
-"""The page: all that it must say, and nothing that it must not do."""
+"""The report page: its contents, and no external resources."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ VOID = {"meta", "img"}
 
 
 class Reader(HTMLParser):
-    """Reads a page as a browser would, and complains where a browser would guess.
+    """Parser of a page that asserts that every tag is closed.
 
     Attributes:
-        words: The text of the page, its spaces squeezed.
+        words: The text of the page, with single spaces.
         attributes: Every attribute with its value.
         headings: The text of the headings h1 and h2.
-        ids: The ids.
-        folded: How many elements are folded in.
+        ids: All ids.
+        tags: All tags, in order.
     """
 
     def __init__(self, page: str) -> None:
@@ -49,7 +49,7 @@ class Reader(HTMLParser):
         self.ids = [value for name, value in self.attributes if name == "id"]
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Remember an element."""
+        """Record an element."""
         self.tags.append(tag)
         self.attributes += [(name, value or "") for name, value in attrs]
         if tag not in VOID:
@@ -58,11 +58,11 @@ class Reader(HTMLParser):
             self.headings.append("")
 
     def handle_endtag(self, tag: str) -> None:
-        """See that what ends is what began last."""
+        """Check that tags are nested."""
         assert self._open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        """Remember text."""
+        """Record text."""
         if self._open and self._open[-1] != "style":
             self._pieces.append(data)
         if self._open and self._open[-1] in {"h1", "h2"}:
@@ -70,7 +70,7 @@ class Reader(HTMLParser):
 
 
 def test_sections_come_in_order(page: str) -> None:
-    """From the verdict to the provenance."""
+    """Sections go from the verdict to the provenance, with unique ids."""
     read = Reader(page)
     assert read.headings == [
         "Ant-v1 → BigAnt-v1",
@@ -86,8 +86,8 @@ def test_sections_come_in_order(page: str) -> None:
     assert len(set(read.ids)) == len(read.ids) == 8
 
 
-def test_the_page_needs_nothing_else(page: str) -> None:
-    """No script, no other file, no server: what is drawn comes as data."""
+def test_the_page_is_self_contained(page: str) -> None:
+    """The page has no scripts and loads no other files."""
     read = Reader(page)
     assert {"script", "link", "iframe", "object"}.isdisjoint(read.tags)
     sources = [value for name, value in read.attributes if name in {"src", "href", "srcset"}]
@@ -99,8 +99,8 @@ def test_the_page_needs_nothing_else(page: str) -> None:
     assert "https://" not in page
 
 
-def test_the_numbers_are_those_of_the_table(study: Study, page: str) -> None:
-    """One formatting, two places: a terminal and a page never disagree."""
+def test_numbers_match_the_table(study: Study, page: str) -> None:
+    """The page has the texts of the table in the terminal."""
     read = Reader(page)
     assert verdict(study) in read.words
     for row in measure_rows(study):
@@ -109,8 +109,8 @@ def test_the_numbers_are_those_of_the_table(study: Study, page: str) -> None:
         assert (" ".join(cells) in read.words) == (row.target != "undefined")
 
 
-def test_the_page_says_how_it_was_made(page: str) -> None:
-    """Enough to judge the numbers, and to make them again."""
+def test_provenance_and_methods_are_stated(page: str) -> None:
+    """The page states methods, settings, seeds, versions and the command."""
     read = Reader(page)
     for words in (
         "over training seeds, never over episodes",
@@ -133,8 +133,8 @@ def test_the_page_says_how_it_was_made(page: str) -> None:
         assert words in read.words
 
 
-def test_the_body_map_is_told(page: str) -> None:
-    """Partners are counted and folded in; what has none, on either side, is listed."""
+def test_the_body_map_is_summarised(page: str) -> None:
+    """Matched entries are counted and folded; others are listed."""
     read = Reader(page)
     for words in (
         "2 of 3 source observations and 1 of 2 target actions",
@@ -148,28 +148,28 @@ def test_the_body_map_is_told(page: str) -> None:
     assert read.tags.count("details") == 3
 
 
-def test_bodies_that_match_have_no_list_of_strangers() -> None:
-    """The page says that all is well instead of showing an empty table."""
+def test_matching_bodies_have_no_list() -> None:
+    """If all entries match, a sentence replaces the list."""
     read = Reader(study_html(make_study(the_map=same_body())))
     assert "Every entry has such a partner." in read.words
     assert "does not see" not in read.words
 
 
 def test_one_action_is_singular() -> None:
-    """A pendulum has one motor."""
+    """A single action is written without a plural."""
     pictures = (np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2, 3), np.uint8))
     read = Reader(study_html(make_study(the_map=same_body()), pictures))
     assert "Target: BigAnt-v1, 1 observation, 1 action" in read.words
 
 
-def test_reward_terms_show_what_a_return_is_made_of(page: str) -> None:
-    """One column for each kind of run."""
+def test_reward_terms_have_a_table(page: str) -> None:
+    """The table has a column per kind of run, and is left out without terms."""
     assert "forward 469.4 5 2.500 440.3 200 502.3" in Reader(page).words
     assert "Reward terms" not in Reader(study_html(make_study())).words
 
 
-def test_names_cannot_break_the_page() -> None:
-    """Whatever an env, a term, a command or a certificate is called, it is text."""
+def test_names_are_escaped() -> None:
+    """Names of envs, terms, commands and certificates are escaped."""
     study = make_study(
         source=EnvRef("evil/" + EVIL, {"body": EVIL * 9}),
         command=EVIL,
@@ -185,8 +185,8 @@ def test_names_cannot_break_the_page() -> None:
     assert len(read.headings[0]) < 100
 
 
-def test_pictures_are_in_the_page(study: Study) -> None:
-    """Without loss, with their size, and with words for who cannot see them."""
+def test_pictures_are_embedded(study: Study) -> None:
+    """Pictures are embedded losslessly, with their size and an alternative text."""
     pictures = (
         np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8),
         np.zeros((6, 8, 3), np.uint8)[:, ::-1],
@@ -206,8 +206,8 @@ def test_pictures_are_in_the_page(study: Study) -> None:
     assert "To one scale." in read.words
 
 
-def test_without_pictures_the_page_says_why(page: str, study: Study) -> None:
-    """In the words given, or at least that there are none."""
+def test_without_pictures_a_note_is_shown(page: str, study: Study) -> None:
+    """The given note is shown, or a default one."""
     assert "No picture can be drawn here." in Reader(page).words
     assert "There are no pictures." in Reader(study_html(study)).words
 
@@ -225,15 +225,15 @@ def test_without_pictures_the_page_says_why(page: str, study: Study) -> None:
     ],
     ids=["given policy", "zero-shot", "not learnt", "two seeds", "huge", "no shift", "no command"],
 )
-def test_whatever_is_missing_is_said(study: Study, words: str) -> None:
-    """The page is whole in each case, and nowhere shows a hole of the program."""
+def test_missing_parts_are_stated(study: Study, words: str) -> None:
+    """The page states what is missing, and never shows nan, inf or None."""
     read = Reader(study_html(study))
     assert words in read.words
     assert re.search(r"\b(nan|inf|None|undefined \[)\b", read.words) is None
 
 
-def test_normalisation_is_told() -> None:
-    """A reader must know whether returns are what the env gave: they always are."""
+def test_normalisation_is_stated() -> None:
+    """The page states whether the learner normalises; reported returns never are."""
     assert "reach the learner as they are" in Reader(study_html(make_study())).words
     normal = Reader(study_html(make_study(normalise=True))).words
     assert "Returns in this report never are." in normal
@@ -242,7 +242,7 @@ def test_normalisation_is_told() -> None:
 def test_without_matplotlib_the_extra_is_named(
     study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Rows and verdict do without it; the error says what to install."""
+    """Rows and verdict work without matplotlib; the page raises MissingExtra."""
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)

@@ -1,4 +1,4 @@
-"""The page of a suite: every pair in its place, and honest about its seeds."""
+"""The page of a suite: matrix, methods, seeds and films."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ANTS = [EnvRef(f"shapechanger/{name}-v1") for name in ("Ant", "BigAnt", "Extende
 
 
 def _pairs(**more: tuple[int, ...]) -> dict[str, Study]:
-    """Six pairs of three ants: transfer helps, but from BigAnt to Ant it hurts."""
+    """Return six pairs of three ants; transfer hurts from BigAnt to Ant and helps elsewhere."""
     studies: dict[str, Study] = {}
     for source, target in permutations(ANTS, 2):
         worse = rising(-200.0, 100.0, 3000.0, seed=3)
@@ -30,8 +30,8 @@ def _pairs(**more: tuple[int, ...]) -> dict[str, Study]:
     return studies
 
 
-def test_every_pair_has_its_cell() -> None:
-    """Rows are sources, columns targets; a cell leads to the study's own report."""
+def test_every_pair_has_a_cell() -> None:
+    """Rows are sources and columns targets; each cell links to the report of its study."""
     page = suite_html("ants", _pairs(), seeds=5)
     reader = Reader(page)
     links = [value for name, value in reader.attributes if name == "href"]
@@ -43,7 +43,7 @@ def test_every_pair_has_its_cell() -> None:
 
 
 def test_colours_follow_the_gain() -> None:
-    """Blue where transfer helps and orange where it hurts; text stays legible on both."""
+    """Gains are blue and losses orange, both light enough for text."""
     page = suite_html("ants", _pairs(), seeds=5)
     colours = [part.partition('"')[0] for part in page.split('style="background: #')[1:]]
     assert len(colours) == 6
@@ -53,7 +53,7 @@ def test_colours_follow_the_gain() -> None:
 
 
 def test_methods_are_compared_by_target_and_over_all() -> None:
-    """Interquartile means and the chance to beat scratch, with intervals."""
+    """The page has interquartile means and probabilities of improvement, with intervals."""
     words = Reader(suite_html("ants", _pairs(), seeds=5)).words
     assert words.count("all targets") == 3
     assert words.count("baseline") == 4
@@ -61,8 +61,8 @@ def test_methods_are_compared_by_target_and_over_all() -> None:
     assert "all targets fine-tune 30" in words
 
 
-def test_declared_seeds() -> None:
-    """The page says whether the number of seeds is the declared one, and whether anyone looked."""
+def test_declared_seeds_are_stated() -> None:
+    """The page states whether all declared seeds ran, and earlier looks at the results."""
     assert "declares 5 seeds, and every study has them." in suite_html("a", _pairs(), seeds=5)
     interim = suite_html("a", _pairs(), seeds=8)
     assert "the studies have 5, so these are interim results" in interim
@@ -71,8 +71,8 @@ def test_declared_seeds() -> None:
     assert "Results were also" not in suite_html("a", _pairs(looks=(5,)), seeds=5)
 
 
-def test_a_sweep_has_its_picture() -> None:
-    """One source, and targets that differ in one number: a chart in place of the matrix."""
+def test_a_sweep_has_a_chart() -> None:
+    """A sweep over one number has a chart in place of the matrix."""
     studies = {
         f"Ant-{factor:g}": make_study(target=EnvRef("shapechanger/Ant-v1", {"body": str(factor)}))
         for factor in (0.5, 1.5, 2.0)
@@ -83,8 +83,8 @@ def test_a_sweep_has_its_picture() -> None:
     assert "Fine-tune against scratch" not in reader.headings
 
 
-def test_strips_and_films() -> None:
-    """Pictures are in the page, films lie beside it."""
+def test_strips_are_embedded_and_films_linked() -> None:
+    """Film strips are embedded, and films are linked."""
     strips = {"Ant-to-BigAnt": [FilmStrip("zero-shot: 0.1 m/s", b"\xff\xd8jpeg")]}
     films = {"Ant-to-BigAnt": "a/film.mp4"}
     reader = Reader(suite_html("ants", _pairs(), seeds=5, strips=strips, films=films))
@@ -95,14 +95,14 @@ def test_strips_and_films() -> None:
     assert "Films" not in Reader(suite_html("ants", _pairs(), seeds=5)).headings
 
 
-def test_names_cannot_run() -> None:
-    """Text is text."""
+def test_names_are_escaped() -> None:
+    """Names are escaped."""
     page = suite_html(EVIL, {EVIL: make_study(command=EVIL)}, seeds=5)
     assert "<script" not in page
 
 
-def test_arms_that_only_some_studies_have() -> None:
-    """They are listed, and not compared over all."""
+def test_arms_of_some_studies_are_listed() -> None:
+    """Arms that some studies lack are listed and not compared over all."""
     studies = _pairs()
     studies["Ant-to-BigAnt"] = make_study(
         source=ANTS[0], target=ANTS[1], arms=("scratch", "fine-tune")
@@ -110,8 +110,8 @@ def test_arms_that_only_some_studies_have() -> None:
     assert "only in 5 of 6 studies" in Reader(suite_html("ants", studies, seeds=5)).words
 
 
-def test_nothing_learned_has_no_scores() -> None:
-    """The table stays empty, and the verdict says that the studies show nothing."""
+def test_without_learning_there_are_no_scores() -> None:
+    """The table is empty, and the verdict counts the study as showing nothing."""
     flat = rising(0.0, 0.0, 1e3, noise=0.0)
     studies = {
         "a": make_study(
@@ -124,8 +124,8 @@ def test_nothing_learned_has_no_scores() -> None:
         suite_html("none", {}, seeds=5)
 
 
-def test_pairs_that_are_missing() -> None:
-    """A pair that has not run is not the same body."""
+def test_missing_pairs_are_marked() -> None:
+    """A pair that has not run is marked as such."""
     studies = _pairs()
     del studies["Ant-to-BigAnt"]
     words = Reader(suite_html("ants", studies, seeds=5)).words
@@ -134,7 +134,7 @@ def test_pairs_that_are_missing() -> None:
 
 
 def test_flags_are_not_part_of_a_name() -> None:
-    """An argument such as `put_back` is the same for all envs."""
+    """Arguments such as `put_back` are left out of the names of envs."""
     source, target = (EnvRef(env.id, {"put_back": True}) for env in ANTS[:2])
     page = suite_html("ants", {"Ant-to-BigAnt": make_study(source=source, target=target)}, seeds=5)
     words = Reader(page).words

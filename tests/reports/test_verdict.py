@@ -1,4 +1,4 @@
-"""The verdict, for each thing that can happen."""
+"""The verdict for each outcome."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ FLAT = rising(997.0, 1005.0, 3000.0, noise=2.0)
         (Estimate(None), "unclear"),
     ],
 )
-def test_direction_goes_by_the_interval(estimate: Estimate, expected: Direction) -> None:
-    """A value alone says nothing, and an interval that touches 0 does not either."""
+def test_direction_follows_the_interval(estimate: Estimate, expected: Direction) -> None:
+    """The direction is clear only if the interval excludes 0."""
     assert direction(estimate) == expected
 
 
@@ -51,7 +51,7 @@ def test_direction_goes_by_the_interval(estimate: Estimate, expected: Direction)
     ids=["helped", "hurt", "unclear", "zero-shot", "flat"],
 )
 def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
-    """At most 25 words; all other numbers stand in the table."""
+    """The verdict is one sentence of at most 25 words."""
     text = verdict(study)
     assert text.startswith(words)
     assert text.endswith(".")
@@ -59,15 +59,15 @@ def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
     assert len(text.split()) <= 25
 
 
-def test_scratch_that_stays_low_shows_something_if_another_arm_rises() -> None:
-    """An ant that walks only with a source policy is the result, not a flaw of the study."""
+def test_a_study_is_flat_only_if_no_arm_learns() -> None:
+    """A flat scratch arm is a result if another arm rises."""
     low = rising(0.0, 1.0, 3000.0, noise=0.1)
     assert not is_flat(make_study(scratch=low))
     assert is_flat(make_study(scratch=low + 100.0, fine_tune=low + 101.0, zero_shot=low[:, :1]))
 
 
-def test_caveats_name_what_the_numbers_cannot_say() -> None:
-    """One given policy, few seeds, and a source that takes the whole budget."""
+def test_caveats_name_limits_of_the_study() -> None:
+    """Caveats name a given policy, few seeds, and a source that takes the whole budget."""
     two = make_study(scratch=SCRATCH[:2], given=True)
     text = " ".join(caveats(two))
     assert "until its 2,048 source steps have passed" in text

@@ -18,8 +18,8 @@ from shapechanger.teleop import (
 
 
 @pytest.mark.parametrize(("key", "meaning"), DIRECTIONS.items())
-def test_each_direction_moves_its_action(key: str, meaning: tuple[str, float]) -> None:
-    """W is forward, A is left, and the arrows mean the same."""
+def test_direction_keys_move_their_action(key: str, meaning: tuple[str, float]) -> None:
+    """W is forward and A is left, and so are the arrow keys."""
     keys = HeldKeys()
     assert keys.press(key, 0.0)
     action, value = meaning
@@ -27,16 +27,16 @@ def test_each_direction_moves_its_action(key: str, meaning: tuple[str, float]) -
     assert (keys.value(action, 0.0), keys.value(other, 0.0)) == (value, 0.0)
 
 
-def test_a_press_ends_by_itself() -> None:
-    """A terminal that dies with a key down must not leave the robot running."""
+def test_a_press_expires() -> None:
+    """A press ends after its hold, so that a dead terminal does not leave the robot running."""
     keys = HeldKeys()
     keys.press("w", 10.0)
     assert keys.value("throttle", 10.0 + FIRST_HOLD_S) == 1.0
     assert keys.value("throttle", 10.0 + FIRST_HOLD_S + 1e-6) == 0.0
 
 
-def test_a_held_key_lasts_until_shortly_after_its_last_repeat() -> None:
-    """The hold is long only until the terminal begins to repeat."""
+def test_a_held_key_ends_after_its_last_repeat() -> None:
+    """Once the terminal repeats a key, the hold is short."""
     keys = HeldKeys()
     for n in range(20):
         keys.press("up", n * 0.03 + (0.5 if n else 0.0))
@@ -46,15 +46,15 @@ def test_a_held_key_lasts_until_shortly_after_its_last_repeat() -> None:
 
 
 def test_the_opposite_key_takes_over_at_once() -> None:
-    """S replaces a W that is still held."""
+    """S replaces W at once, although W is still held."""
     keys = HeldKeys()
     keys.press("w", 0.0)
     keys.press("s", 0.1)
     assert keys.value("throttle", 0.1) == -1.0
 
 
-def test_other_keys_move_nothing_and_letting_go_releases_all() -> None:
-    """Only direction keys count."""
+def test_other_keys_are_ignored() -> None:
+    """Keys without a direction are ignored, and `let_go` releases all."""
     keys = HeldKeys()
     assert not keys.press("x", 0.0)
     keys.press("a", 0.0)
@@ -62,23 +62,23 @@ def test_other_keys_move_nothing_and_letting_go_releases_all() -> None:
     assert keys.value("steering", 0.0) == 0.0
 
 
-def test_terminals_spell_arrows_in_two_ways() -> None:
-    """The same arrow is sent differently in application mode."""
+def test_arrow_keys_have_two_encodings() -> None:
+    """Arrows are recognised in normal and in application mode."""
     assert keys_in("\x1b[A\x1bOBq\x1b[C\x1b[D") == ["up", "down", "q", "right", "left"]
 
 
 def test_driving_needs_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The standard input may be a pipe."""
+    """Standard input that is not a terminal raises NoTerminal."""
     with open(os.devnull) as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         with pytest.raises(NoTerminal, match="needs a terminal"):
             Terminal()
 
 
-def test_keys_arrive_without_enter_and_the_terminal_is_restored(
+def test_the_terminal_is_unbuffered_and_restored(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Line editing and echo are off only within the block."""
+    """Keys arrive without Enter within the block, and the settings are restored after it."""
     import termios
 
     ours, theirs = pty.openpty()
@@ -93,8 +93,8 @@ def test_keys_arrive_without_enter_and_the_terminal_is_restored(
     os.close(ours)
 
 
-def test_a_held_key_goes_on_a_little_when_another_one_is_pressed() -> None:
-    """A terminal stops repeating W as soon as A goes down, though both are held."""
+def test_a_held_key_continues_when_another_is_pressed() -> None:
+    """A second key stops the repeats of the first, which continues for one hold."""
     keys = HeldKeys()
     for n in range(30):
         keys.press("w", 0.03 * n)
@@ -104,8 +104,8 @@ def test_a_held_key_goes_on_a_little_when_another_one_is_pressed() -> None:
     assert keys.value("throttle", last + FIRST_HOLD_S) == 1.0
 
 
-def test_no_key_outlives_its_last_press_because_another_one_is_held() -> None:
-    """After W is let go, holding A does not extend it beyond the hold of one press."""
+def test_another_key_does_not_extend_a_hold() -> None:
+    """A key that was let go ends after one hold, although another one is held."""
     keys = HeldKeys()
     for n in range(30):
         keys.press("w", 0.03 * n)
@@ -115,8 +115,8 @@ def test_no_key_outlives_its_last_press_because_another_one_is_held() -> None:
     assert keys.value("throttle", last + FIRST_HOLD_S + 1e-6) == 0.0
 
 
-def test_a_key_that_has_ended_is_not_brought_back_by_another_one() -> None:
-    """An expired key stays expired."""
+def test_another_key_does_not_revive_an_expired_one() -> None:
+    """An expired key stays expired when another one is pressed."""
     keys = HeldKeys()
     keys.press("w", 0.0)
     keys.press("w", 0.5)

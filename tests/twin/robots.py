@@ -1,4 +1,4 @@
-"""Plans of small robots, and processes and conditions for the tests of the twin."""
+"""Plans of small robots, and helpers that run processes and wait for conditions."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ CAR = GuardPlan("car", ACTIONS, (DRIVE, STEER), (ENCODER, BUMPER), enable_pin=25
 
 @contextmanager
 def process(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """Run a Python process that has written a line; it is killed in the end."""
+    """Start a Python process, wait for its first line of output, and kill it on exit."""
     command = [sys.executable, "-c", code, *arguments]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
         try:
@@ -94,6 +94,6 @@ def granted(hardware: TwinHardware) -> GrantedClock:
 
 
 def die(hardware: TwinHardware) -> None:
-    """Close the connection to the board as the death of a process does, without leaving first."""
+    """Close the connection to the board abruptly, as the death of the process does."""
     assert isinstance(hardware.board, BoardClient)
     hardware.board._socket.close()

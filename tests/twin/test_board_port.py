@@ -1,4 +1,4 @@
-"""Servo instructions over a board's socket, to servos in another process."""
+"""Servo instructions sent over a board's socket to servos in another process."""
 
 from __future__ import annotations
 
@@ -35,22 +35,24 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningBoard]:
 
 @pytest.fixture
 def hardware(board: RunningBoard) -> Iterator[TwinHardware]:
-    """Hardware of a guard at that board."""
+    """Hardware of a guard connected to the board."""
     made = connect(board.socket_path)
     yield made
     made.close()
 
 
-def test_outputs_pull_and_the_sensor_hears(board: RunningBoard, hardware: TwinHardware) -> None:
-    """As in a guard: write, let time go by, read."""
+def test_outputs_set_tensions_that_the_sensors_report(
+    board: RunningBoard, hardware: TwinHardware
+) -> None:
+    """Commanded tensions appear in the readings, and servo and magnet faults as failures."""
     outputs, sensors = OutputBank(_PLAN, hardware), Sensors(_PLAN, hardware)
     with Operator(board.socket_path) as operator:
         for _ in range(20):
             outputs.write(_PULL, hardware.clock.now_ns())
             now_ns = operator.advance(0.01)
-            said = sensors.read(now_ns, 0.0)
-        assert said.failures == {}
-        assert said.quantities["FDP/tension"] == pytest.approx(8.0, abs=0.1)
+            reading = sensors.read(now_ns, 0.0)
+        assert reading.failures == {}
+        assert reading.quantities["FDP/tension"] == pytest.approx(8.0, abs=0.1)
         assert operator.tensions()["FDP"] == pytest.approx(8.0, abs=1.5)  # Gears and speed.
         outputs.release()
         operator.advance(0.3)
@@ -71,10 +73,8 @@ def test_outputs_pull_and_the_sensor_hears(board: RunningBoard, hardware: TwinHa
     assert outputs.close(0) == []
 
 
-def test_what_makes_pins_safe_leaves_servos_alone(
-    board: RunningBoard, hardware: TwinHardware
-) -> None:
-    """A packet to them would keep their watchdogs from letting go."""
+def test_make_safe_sends_nothing_to_servos(board: RunningBoard, hardware: TwinHardware) -> None:
+    """`make_safe` sends no packets to servos, so that their watchdogs can expire."""
     outputs = OutputBank(_PLAN, hardware)
     with Operator(board.socket_path) as operator:
         for _ in range(10):
@@ -87,8 +87,8 @@ def test_what_makes_pins_safe_leaves_servos_alone(
     outputs.close(0)
 
 
-def test_a_bus_at_another_device_is_not_there(hardware: TwinHardware) -> None:
-    """A mistyped device is refused, as on the bench."""
+def test_an_unknown_bus_device_is_refused(hardware: TwinHardware) -> None:
+    """A mistyped device path raises an error, as on a real rig."""
     outputs = tuple(
         replace(one, settings={**one.settings, "device": "/dev/ttyUSB7"}) for one in _PLAN.outputs
     )
@@ -97,7 +97,7 @@ def test_a_bus_at_another_device_is_not_there(hardware: TwinHardware) -> None:
 
 
 def test_a_car_has_no_servo_bus(tmp_path: Path) -> None:
-    """Neither has its operator."""
+    """An operator cannot read tendon tensions on a robot without a servo bus."""
     with (
         start_board(CAR, "twin", tmp_path) as board,
         Operator(board.socket_path) as operator,

@@ -1,4 +1,4 @@
-"""The front camera: pictures with their time, into a pipe that may have no reader."""
+"""The front camera: timestamped JPEG frames written to a pipe."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ def _open(board: RunningBoard) -> BinaryIO:
 
 
 def _pictures(data: bytes) -> list[tuple[int, bytes]]:
-    """Each picture with the time in its comment."""
+    """Return the capture time and bytes of each frame."""
     found = re.finditer(
         rb"\xff\xd8\xff\xfe..captured_ns=(\d+)\xff.*?\xff\xd9(?=\xff\xd8|$)", data, re.S
     )
     return [(int(one[1]), one[0]) for one in found]
 
 
-def test_pictures_say_when_they_were_taken(tmp_path: Path) -> None:
-    """In a comment of the JPEG and in the picture itself, 20 a second on the twin's clock."""
+def test_frames_carry_their_capture_time(tmp_path: Path) -> None:
+    """Each frame holds its capture time in a JPEG comment and in its barcode, at 20 fps."""
     with (
         start_board(CAR, "twin", tmp_path, _CAMERA) as board,
         Operator(board.socket_path) as operator,
@@ -56,8 +56,8 @@ def test_pictures_say_when_they_were_taken(tmp_path: Path) -> None:
         assert read_barcode(image) == t
 
 
-def test_nobody_needs_to_read(tmp_path: Path) -> None:
-    """Without a reader pictures are dropped, and a later reader gets only new ones."""
+def test_frames_without_a_reader_are_dropped(tmp_path: Path) -> None:
+    """Without a reader, frames are dropped, and a later reader gets only new ones."""
     with (
         start_board(CAR, "twin", tmp_path, _CAMERA) as board,
         Operator(board.socket_path) as operator,
@@ -68,11 +68,11 @@ def test_nobody_needs_to_read(tmp_path: Path) -> None:
             assert all(t > now - 110_000_000 for t, _ in _pictures(pipe.read(1 << 20)))
         operator.advance(1.0)
         with _open(board):
-            operator.advance(100.0)  # More than the pipe holds: it is full, and time goes on.
+            operator.advance(100.0)  # A full pipe does not stop the clock.
 
 
-def test_in_real_time_only_the_latest_waits(tmp_path: Path) -> None:
-    """A reader that was away gets one picture, and not a queue of old ones."""
+def test_in_real_time_the_pipe_holds_the_latest_frame_only(tmp_path: Path) -> None:
+    """After a pause, a reader gets one frame, not a queue of old ones."""
     with (
         start_board(CAR, "real", tmp_path, CameraPlan("pipe", fps=100.0)) as board,
         _open(board) as pipe,
@@ -92,8 +92,8 @@ def select_on(pipe: BinaryIO) -> select.epoll:
 
 
 @pytest.mark.parametrize("how", ["off", "freeze", "garbage", "short"])
-def test_the_camera_fails(tmp_path: Path, how: CameraFault) -> None:
-    """Nothing new comes that is a whole picture, and afterwards it does again."""
+def test_a_camera_fault_stops_valid_frames(tmp_path: Path, how: CameraFault) -> None:
+    """During a fault no new valid frame arrives; afterwards frames arrive again."""
     with (
         start_board(CAR, "twin", tmp_path, _CAMERA) as board,
         Operator(board.socket_path) as operator,
@@ -112,8 +112,8 @@ def test_the_camera_fails(tmp_path: Path, how: CameraFault) -> None:
         assert _pictures(pipe.read(1 << 20))[-1][0] > newest[0]
 
 
-def test_a_picture_without_a_barcode_is_the_whole_picture(tmp_path: Path) -> None:
-    """A policy must not learn to read the time from pictures; the comment still has it."""
+def test_without_a_barcode_the_comment_still_has_the_time(tmp_path: Path) -> None:
+    """The barcode is optional, so that policies cannot learn it; the comment keeps the time."""
     world = DrivingWorld({"wheels"}, (160, 120), seed=1)
     plain, striped = (
         FrontCameraPipe(
@@ -128,7 +128,7 @@ def test_a_picture_without_a_barcode_is_the_whole_picture(tmp_path: Path) -> Non
     assert read_barcode(simplejpeg.decode_jpeg(striped, "RGB")) == 77
 
 
-def test_pictures_are_small(tmp_path: Path) -> None:
+def test_frames_are_small(tmp_path: Path) -> None:
     """A JPEG of 160 by 120 takes less than 8 kB on average."""
     world = DrivingWorld({"wheels"}, (160, 120), seed=1)
     path = str(tmp_path / "none")
@@ -137,7 +137,7 @@ def test_pictures_are_small(tmp_path: Path) -> None:
     assert np.mean(sizes) < 8000
 
 
-def test_what_is_not_there_cannot_fail(tmp_path: Path) -> None:
+def test_a_twin_without_a_camera_refuses_camera_faults(tmp_path: Path) -> None:
     """A twin without a camera refuses requests about it."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with pytest.raises(RobotError, match="no camera"):

@@ -1,4 +1,4 @@
-"""Registers of the simulated chips, against the numbers of their data sheets."""
+"""Registers of the simulated chips, checked against their data sheets."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _words(chip: SimulatedMpu6050) -> tuple[int, ...]:
     [(0, 16384, 131.0), (1, 8192, 65.5), (2, 4096, 32.8), (3, 2048, 16.4)],
 )
 def test_the_mpu6050_measures_in_each_range(select: int, per_g: int, per_deg_per_s: float) -> None:
-    """Both sensors scale with their own range, sections 4.17 and 4.19 of the register map."""
+    """Accelerometer and gyroscope scale with their ranges, register map sections 4.17 and 4.19."""
     chip = SimulatedMpu6050(lambda: _READINGS)
     chip.write(0x6B, [0])  # Wake up.
     chip.write(0x1C, [select << 3])
@@ -41,7 +41,7 @@ def test_the_mpu6050_measures_in_each_range(select: int, per_g: int, per_deg_per
 
 
 def test_the_mpu6050_sleeps_at_power_on() -> None:
-    """Asleep it measures nothing; a reset puts it to sleep again."""
+    """The chip reads 0 while asleep, at power-on and after a reset."""
     chip = SimulatedMpu6050(lambda: _READINGS)
     assert _words(chip) == (0,) * 7
     chip.write(0x6B, [0])

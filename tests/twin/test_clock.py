@@ -1,4 +1,4 @@
-"""Twin time advances only on request, and waits for all participants."""
+"""Twin time advances only on request and waits for all participants."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ hardware = connect(sys.argv[1])
 clock = hardware.clock
 motor = Motor(22, 27, pin_factory=hardware.pin_factory())
 until = int(sys.argv[2]) if len(sys.argv) > 2 else 2**62
-clock.wait([], until, 0.0)  # From now on it takes part.
+clock.wait([], until, 0.0)  # Join the clock.
 print("waits", flush=True)
 steps = 0
 while True:
@@ -38,7 +38,7 @@ while True:
 
 
 def test_a_participant_is_granted_each_tick(tmp_path: Path) -> None:
-    """100 ticks a second, each done before the next, and the motor moves the car meanwhile."""
+    """A participant is granted 100 ticks a second, each finished before the next."""
     with (
         start_board(CAR, "twin", tmp_path) as board,
         Operator(board.socket_path) as operator,
@@ -51,8 +51,8 @@ def test_a_participant_is_granted_each_tick(tmp_path: Path) -> None:
         assert times == {first + 10_000_000 * tick for tick in range(1, 51)}
 
 
-def test_a_participant_is_granted_when_it_wants_to_be(tmp_path: Path) -> None:
-    """A deadline between two ticks is exact."""
+def test_a_participant_is_granted_its_exact_deadline(tmp_path: Path) -> None:
+    """A deadline between two ticks is granted to the nanosecond."""
     deadline = START_NS + 123_456_789
     with (
         start_board(CAR, "twin", tmp_path) as board,
@@ -63,7 +63,7 @@ def test_a_participant_is_granted_when_it_wants_to_be(tmp_path: Path) -> None:
         assert deadline in _times(board.ledger_path)
 
 
-def test_time_does_not_wait_for_the_dead(tmp_path: Path) -> None:
+def test_time_does_not_wait_for_a_dead_participant(tmp_path: Path) -> None:
     """A participant that dies does not stop time."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_GUARD, board.socket_path):
@@ -72,8 +72,8 @@ def test_time_does_not_wait_for_the_dead(tmp_path: Path) -> None:
         assert operator.advance(1.0) == before + 1_000_000_000
 
 
-def test_without_a_grant_a_wait_comes_back(tmp_path: Path) -> None:
-    """So that a guard can show that it lives while time stands still."""
+def test_a_wait_without_a_grant_returns(tmp_path: Path) -> None:
+    """`wait` returns without a grant, so that a guard can send heartbeats while time is stopped."""
     with start_board(CAR, "twin", tmp_path) as board:
         hardware = connect(board.socket_path)
         clock = granted(hardware)
@@ -83,14 +83,14 @@ def test_without_a_grant_a_wait_comes_back(tmp_path: Path) -> None:
         hardware.close()
 
 
-def test_sleeping_lets_time_go_by(tmp_path: Path) -> None:
-    """A sleep ends at its time; two at once overlap; the newest picture's time comes back."""
+def test_sleep_advances_the_clock(tmp_path: Path) -> None:
+    """Sleeps end on time and overlap, and return the capture time of the newest frame."""
     with start_board(CAR, "twin", tmp_path, CameraPlan("pipe", fps=20.0)) as board:
         hardware = connect(board.socket_path)
         clock = granted(hardware)
 
         async def sleep() -> None:
-            assert await clock.sleep(0.03) is None  # Nobody reads the pictures.
+            assert await clock.sleep(0.03) is None  # The pipe has no reader.
             assert clock.now_ns() == START_NS + 30_000_000
             await asyncio.gather(clock.sleep(0.05), clock.sleep(0.05))
             assert START_NS + 80_000_000 <= clock.now_ns() <= START_NS + 130_000_000
@@ -108,7 +108,7 @@ def test_sleeping_lets_time_go_by(tmp_path: Path) -> None:
 
 
 def test_the_same_seed_and_commands_give_the_same_ledger(tmp_path: Path) -> None:
-    """Byte for byte, but for the numbers of the processes; pictures too."""
+    """Two runs give the same ledger, except for process ids."""
 
     def run(folder: Path) -> str:
         folder.mkdir()
@@ -130,8 +130,8 @@ def test_the_same_seed_and_commands_give_the_same_ledger(tmp_path: Path) -> None
     assert first == second
 
 
-def test_in_real_time_nobody_is_granted_any(tmp_path: Path) -> None:
-    """The machine's time goes by itself, and a wait ends when it should."""
+def test_in_real_time_the_clock_runs_by_itself(tmp_path: Path) -> None:
+    """In real time `advance` raises an error and waits end at their deadlines."""
     with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
         with pytest.raises(RobotError, match="real time"):
             operator.advance(1.0)
@@ -145,8 +145,8 @@ def test_in_real_time_nobody_is_granted_any(tmp_path: Path) -> None:
         hardware.close()
 
 
-def test_a_board_that_ends_is_noticed(tmp_path: Path) -> None:
-    """Waiting for it, or sending to it, raises an error."""
+def test_using_a_closed_board_raises(tmp_path: Path) -> None:
+    """Waiting or sleeping after the board exits raises an error."""
     board = start_board(CAR, "twin", tmp_path)
     hardware = connect(board.socket_path)
     clock = granted(hardware)

@@ -1,4 +1,4 @@
-"""The robot's own guard process on the twin's pins and clock, watched by the oracle."""
+"""The real guard process on the twin's pins and clock, checked by the oracle."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _DEADLINE_MS = 250
 
 
 def test_a_guard_drives_and_stops_at_the_deadline(tmp_path: Path) -> None:
-    """Twenty commands drive the car; after the last one it stops to the nanosecond."""
+    """Twenty commands drive the car; after the last it stops exactly at the deadline."""
     daemon, its_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     heartbeat, its_heartbeat = socket.socketpair()
     with (
@@ -45,9 +45,9 @@ def test_a_guard_drives_and_stops_at_the_deadline(tmp_path: Path) -> None:
                 command, pass_fds=(fd, its_end.fileno(), its_heartbeat.fileno())
             ) as guard,
         ):
-            # It answers once time goes by, so it takes part from then on.
+            # The guard's first message shows that it has joined the clock.
             daemon.setblocking(False)
-            until(lambda: operator.advance(0.01) > 0 and _has_spoken(daemon))
+            until(lambda: operator.advance(0.01) > 0 and _received(daemon))
             now_ns = operator.advance(0.02)
             daemon.send(encode(Order("arm", session=1, issued_ns=now_ns)))
             now_ns = operator.advance(0.02)
@@ -58,7 +58,7 @@ def test_a_guard_drives_and_stops_at_the_deadline(tmp_path: Path) -> None:
                 daemon.send(encode(order))
                 commands.append(ExpectedCommand(now_ns, 1000))
                 now_ns = operator.advance(0.05)
-                while _has_spoken(daemon):
+                while _received(daemon):
                     pass
             driven = operator.where()
             operator.advance(1.0)
@@ -74,7 +74,7 @@ def test_a_guard_drives_and_stops_at_the_deadline(tmp_path: Path) -> None:
         assert time_to_rest(ledger, wiring, last) == pytest.approx(0.25, abs=1e-9)
 
 
-def _has_spoken(daemon: socket.socket) -> bool:
+def _received(daemon: socket.socket) -> bool:
     try:
         return bool(daemon.recv(65536))
     except BlockingIOError:

@@ -1,4 +1,4 @@
-"""A whole robot in this process: it is armed, driven, stopped and restarted."""
+"""An in-process robot: arming, driving, stopping and restarting."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _speed(robot: InProcessRobot, seen: Observation) -> float:
 
 
 def test_a_step_is_one_control_period() -> None:
-    """Time moves by 1/20 s, and the observation answers the command of the step."""
+    """A step advances time by 1/20 s and returns the observation after its command."""
     robot = _robot()
     first = robot.start()
     seen, bumped = robot.step((0.0, 0.5))
@@ -46,8 +46,8 @@ def test_a_step_is_one_control_period() -> None:
     robot.close()
 
 
-def test_it_drives_as_its_profile_lets_it() -> None:
-    """The throttle rises by its slew, and the encoder sees the wheels turn."""
+def test_the_throttle_follows_the_slew_limit() -> None:
+    """The applied throttle rises by the profile's slew, and the encoder measures the speed."""
     world = _room()
     robot = _robot(world)
     robot.start(lambda: world.place(2))
@@ -60,8 +60,8 @@ def test_it_drives_as_its_profile_lets_it() -> None:
     robot.close()
 
 
-def test_it_is_armed_from_the_start_and_says_what_it_is() -> None:
-    """It needs no preparation before the first step."""
+def test_it_starts_armed_and_describes_itself() -> None:
+    """The robot is armed after `start`, and its welcome describes it."""
     robot = _robot()
     seen = robot.start()
     assert seen.armed
@@ -73,7 +73,7 @@ def test_it_is_armed_from_the_start_and_says_what_it_is() -> None:
 
 
 def test_it_can_be_armed_again_after_an_emergency_stop() -> None:
-    """Whoever arms it has seen the stop."""
+    """`arm` clears an emergency stop."""
     robot = _robot()
     robot.start()
     robot._orders.waiting.append(Order("emergency", reason="A hand in the way."))
@@ -85,8 +85,8 @@ def test_it_can_be_armed_again_after_an_emergency_stop() -> None:
     robot.close()
 
 
-def test_a_start_forgets_what_was() -> None:
-    """It is switched off and on again: no command acts on, and the same start is the same."""
+def test_a_start_resets_the_robot() -> None:
+    """After `start`, earlier commands have no effect and the observation is reproducible."""
     world = _room()
     robot = _robot(world)
     first = robot.start(lambda: world.place(2))
@@ -99,11 +99,11 @@ def test_a_start_forgets_what_was() -> None:
     robot.close()
 
 
-def test_pins_that_are_swapped_drive_it_backward(tmp_path: Path) -> None:
-    """It is the profile's pins that move it, and not a short cut past them."""
-    gone: list[float] = []
+def test_swapped_pins_drive_backward(tmp_path: Path) -> None:
+    """The pins of the profile drive the world: swapping them reverses the motion."""
+    travelled: list[float] = []
     for text in (CAR, SWAPPED_WAYS):
-        # The one plan says what is attached and what is driven: only one of the two is swapped.
+        # Swap the pins of the driver only, not those of the wiring.
         world = _room()
         profile = write_profile(tmp_path, text)
         robot = InProcessRobot(
@@ -112,14 +112,14 @@ def test_pins_that_are_swapped_drive_it_backward(tmp_path: Path) -> None:
         robot.start(lambda world=world: world.place(2))
         for _ in range(10):
             robot.step((0.0, 1.0))
-        gone.append(world.inputs().travelled_m)
+        travelled.append(world.inputs().travelled_m)
         robot.close()
-    assert gone[0] > 0.1
-    assert gone[1] == pytest.approx(-gone[0], rel=0.05)
+    assert travelled[0] > 0.1
+    assert travelled[1] == pytest.approx(-travelled[0], rel=0.05)
 
 
-def test_a_command_that_is_refused_says_why() -> None:
-    """As a served robot does; and only once."""
+def test_a_refused_command_gives_its_reason_once() -> None:
+    """`refused` holds the reason of a refused command, and is cleared when read."""
     robot = _robot()  # Not armed before its start.
     robot.step((0.0, 1.0))
     assert robot.refused
@@ -127,8 +127,8 @@ def test_a_command_that_is_refused_says_why() -> None:
     robot.close()
 
 
-def test_a_bump_is_told_though_it_is_over() -> None:
-    """A bump between two observations is not lost."""
+def test_a_bump_between_observations_is_reported() -> None:
+    """A bump that starts and ends between two observations is reported."""
     world = _room()
     robot = _robot(world)
     robot.start(lambda: world.place(2))
@@ -137,8 +137,8 @@ def test_a_bump_is_told_though_it_is_over() -> None:
     robot.close()
 
 
-def test_pictures_are_those_of_the_world() -> None:
-    """As JPEG, of the time of the observation, one for each."""
+def test_frames_show_the_world() -> None:
+    """Each observation carries a new JPEG frame of the world, captured at the same time."""
     world = _room()
     robot = _robot(world, pictures=True)
     seen = robot.start()
@@ -149,13 +149,13 @@ def test_pictures_are_those_of_the_world() -> None:
     assert seen.captured_ns == seen.state_ns
     after = robot.step((0.0, 0.0))[0]
     assert after.frame_seq == seen.frame_seq + 1
-    # A reader that keeps a picture by its number must not take one of the next start for it.
+    # Frame numbers must not repeat after a restart.
     assert robot.start().frame_seq > after.frame_seq
     robot.close()
 
 
-def test_a_closed_robot_is_at_rest_and_moves_no_more() -> None:
-    """Closing twice does no harm, and a start opens it again."""
+def test_a_closed_robot_refuses_steps() -> None:
+    """Closing is idempotent, and `start` reopens the robot."""
     world = _room()
     robot = _robot(world)
     robot.start()
@@ -168,8 +168,8 @@ def test_a_closed_robot_is_at_rest_and_moves_no_more() -> None:
     robot.close()
 
 
-def test_a_sensor_that_is_not_wired_is_told_of(tmp_path: Path) -> None:
-    """The error is that of the guard on the bench, before anything moves."""
+def test_a_sensor_that_is_not_wired_is_refused(tmp_path: Path) -> None:
+    """An unwired sensor raises the guard's error at construction."""
     unwired = changed('[sensor.pack]\ndriver = "ina219"\n', "")
     attached = write_profile(tmp_path, unwired.replace("low_battery_v = 6.6\n", "")).guard_plan()
     profile = write_profile(tmp_path, CAR)

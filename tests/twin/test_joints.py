@@ -1,4 +1,4 @@
-"""Encoders at joints, on the twin's bus."""
+"""Joint encoders on the twin's I2C bus."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def _board(world: World, sensor: SensorPlan) -> LocalBoard:
     return LocalBoard(TwinWiring(GuardPlan("it", (), (), (sensor,))), world)
 
 
-def test_what_is_read_is_where_the_joints_are() -> None:
-    """To half a count of 4096, whatever is wired to which channel and turns which way."""
+def test_readings_match_the_joint_angles() -> None:
+    """Readings match the joint angles within half a count for any channel, zero and direction."""
     world = FingerWorld(NOMINAL, seed=2)
     driver = open_driver(_sensor(), _board(world, _sensor()).hardware)
     for seed in range(5):
@@ -48,21 +48,21 @@ def test_what_is_read_is_where_the_joints_are() -> None:
         assert driver.read(0, 0.0) == pytest.approx(truth, abs=0.51 * _TURN / 4096)
 
 
-def test_noise_is_that_of_the_parameters_and_of_the_seed() -> None:
-    """Each reading draws anew, and the same seed draws the same."""
+def test_encoder_noise_follows_the_parameters_and_the_seed() -> None:
+    """Noise has the configured standard deviation and is reproducible from the seed."""
     noisy = NOMINAL.replace(joint_noise=0.02)
-    said: list[list[float]] = []
+    readings: list[list[float]] = []
     for _ in range(2):
         world = FingerWorld(noisy, seed=2)
         driver = open_driver(_sensor(), _board(world, _sensor()).hardware)
-        said.append([driver.read(0, 0.0)["PIP_flexion/angle"] for _ in range(400)])
-    assert said[0] == said[1]
-    assert np.std(said[0]) == pytest.approx(0.02, rel=0.1)
-    assert np.mean(said[0]) == pytest.approx(world.truth()["PIP_flexion/angle"], abs=0.004)
+        readings.append([driver.read(0, 0.0)["PIP_flexion/angle"] for _ in range(400)])
+    assert readings[0] == readings[1]
+    assert np.std(readings[0]) == pytest.approx(0.02, rel=0.1)
+    assert np.mean(readings[0]) == pytest.approx(world.truth()["PIP_flexion/angle"], abs=0.004)
 
 
-def test_only_open_channels_are_heard() -> None:
-    """None at first; with two open, a line is low where either chip pulls it low."""
+def test_the_multiplexer_passes_open_channels_only() -> None:
+    """No channel is open at first; with two open, a bit is low where either chip pulls it low."""
     chips = [SimulatedAs5600("knee", lambda: 0.0, counts, 1) for counts in (0x0F3, 0x155)]
     mux = Tca9548a({0: chips[0], 6: chips[1]})
     behind = ChannelsBehind(mux)
@@ -88,17 +88,17 @@ def test_only_open_channels_are_heard() -> None:
         ("strong", (True, False, True)),
     ],
 )
-def test_magnets_may_be_gone_too_far_or_too_near(how: str, seen: tuple[bool, ...]) -> None:
-    """The bits MD, ML and MH of the status."""
+def test_the_status_reports_the_magnet(how: str, seen: tuple[bool, ...]) -> None:
+    """The status bits MD, ML and MH report a missing, weak or strong magnet."""
     board = _board(FingerWorld(NOMINAL, seed=0), _sensor())
     sensor = connect_encoders(_sensor(), board.hardware)
     board.pins.encoder("PIP_flexion").set_magnet(how)  # pyright: ignore[reportArgumentType]
-    said = sensor.measure(sensor.encoders[2])
-    assert (said.detects_magnet, said.too_weak, said.too_strong) == seen
+    readings = sensor.measure(sensor.encoders[2])
+    assert (readings.detects_magnet, readings.too_weak, readings.too_strong) == seen
 
 
-def test_joints_that_are_not_there_are_told() -> None:
-    """They follow the world and the faults, and stand at their zero in a world without joints."""
+def test_unknown_joints_are_refused() -> None:
+    """Unknown joints and faults raise; in a world without joints, encoders read 0."""
     with pytest.raises(RobotError, match="and no knee"):
         _board(FingerWorld(NOMINAL, seed=0), _sensor(("knee",)))
     board = _board(DrivingWorld(frozenset(), (160, 120), 0), _sensor(("knee", "ankle")))

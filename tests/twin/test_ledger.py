@@ -1,4 +1,4 @@
-"""The ledger survives what happens to its writer."""
+"""Reading and writing the ledger, including damaged files."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from shapechanger.errors import RobotError
 from shapechanger.twin.signals import LedgerWriter, Transition, read_ledger
 
 
-def test_what_is_written_is_read(tmp_path: Path) -> None:
-    """Lines come back as they were, in the order of their times."""
+def test_a_ledger_round_trips(tmp_path: Path) -> None:
+    """Transitions are read back unchanged, sorted by time."""
     path = tmp_path / "ledger.jsonl"
     ledger = LedgerWriter(path)
     ledger.write(7, "pin", pin=22, duty=0.4, hz=50, pid=1)
@@ -26,8 +26,8 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cut", range(1, 20))
-def test_a_broken_last_line_is_left_out(tmp_path: Path, cut: int) -> None:
-    """A machine that stops in the middle of a line loses that line only."""
+def test_a_truncated_last_line_is_skipped(tmp_path: Path, cut: int) -> None:
+    """A writer that dies in the middle of a line loses only that line."""
     path = tmp_path / "ledger.jsonl"
     ledger = LedgerWriter(path)
     ledger.write(1, "gone", pid=1)
@@ -37,8 +37,8 @@ def test_a_broken_last_line_is_left_out(tmp_path: Path, cut: int) -> None:
     assert read_ledger(path) == [Transition(1, "gone", pid=1)]
 
 
-def test_a_broken_line_in_between_is_refused(tmp_path: Path) -> None:
-    """The file was changed and proves nothing; the error names the line."""
+def test_a_malformed_line_in_the_middle_is_refused(tmp_path: Path) -> None:
+    """A malformed line before the last raises an error that names it."""
     path = tmp_path / "ledger.jsonl"
     path.write_text('{"t": 1, "kind": "gone"}\n{"t": 2, "ki\n{"t": 3, "kind": "gone"}\n')
     with pytest.raises(RobotError, match=r"Line 2 of .*ledger\.jsonl is malformed"):
@@ -46,7 +46,7 @@ def test_a_broken_line_in_between_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_ledger_is_never_written_over(tmp_path: Path) -> None:
-    """The ledger of an earlier run is never overwritten."""
+    """Opening a ledger that exists raises FileExistsError."""
     LedgerWriter(tmp_path / "ledger.jsonl").close()
     with pytest.raises(FileExistsError):
         LedgerWriter(tmp_path / "ledger.jsonl")

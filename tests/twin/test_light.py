@@ -1,4 +1,4 @@
-"""Modules that the guard loads on a twin."""
+"""Modules that the guard imports on a twin."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
 
 
 def test_the_guard_loads_only_light_modules(tmp_path: Path) -> None:
-    """On a twin, the guard loads gpiozero, msgspec and what these need, and nothing heavier."""
+    """On a twin, the guard imports gpiozero, msgspec and their dependencies only."""
     source = str(Path(shapechanger.__file__).parent)
     with start_board(CAR, "twin", tmp_path) as board:
         command = [sys.executable, "-I", "-c", _BARE, source, board.socket_path]

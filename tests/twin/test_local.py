@@ -1,4 +1,4 @@
-"""A board in this process: pins, chips and time without sockets."""
+"""A board in the same process: pins, chips and time without sockets."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _board() -> tuple[LocalBoard, DrivingWorld]:
 
 
 def test_time_moves_only_by_advance() -> None:
-    """It starts at the start of the twin's clock and advances only with the board."""
+    """Time starts at the twin's start time and changes only by `advance`."""
     board, _ = _board()
     assert board.now_ns() == board.hardware.clock.now_ns() == START_NS
     board.advance(START_NS + 10 * _MS)
@@ -40,15 +40,15 @@ def test_time_moves_only_by_advance() -> None:
     ],
     ids=["wait", "sleep"],
 )
-def test_who_waits_would_wait_for_ever(wait: Callable[[Any], object]) -> None:
-    """No other process could advance the time."""
+def test_waiting_raises(wait: Callable[[Any], object]) -> None:
+    """Waiting raises, because no other process could advance the time."""
     board, _ = _board()
     with pytest.raises(RobotError, match="advances only by `advance`"):
         wait(board.hardware.clock)
 
 
 def test_a_pin_drives_the_world() -> None:
-    """Devices of gpiozero move the motor."""
+    """A gpiozero motor moves the vehicle once the enable pin is on."""
     board, world = _board()
     factory = board.hardware.pin_factory()
     assert board.hardware.pin_factory() is factory
@@ -64,8 +64,8 @@ def test_a_pin_drives_the_world() -> None:
     board.hardware.close()
 
 
-def test_an_input_that_nobody_claimed_disturbs_nobody() -> None:
-    """Edges go to the owner of the pin, with the level of that time."""
+def test_edges_of_unclaimed_pins_are_ignored() -> None:
+    """Edges reach only the device that claimed the pin, with the level at that time."""
     board, world = _board()
     factory = board.hardware.pin_factory()
     motor, enable = Motor(22, 27, pin_factory=factory), DigitalOutputDevice(25, pin_factory=factory)
@@ -82,8 +82,8 @@ def test_an_input_that_nobody_claimed_disturbs_nobody() -> None:
     board.hardware.close()
 
 
-def test_closing_lets_go() -> None:
-    """Twice does no harm."""
+def test_closing_is_idempotent() -> None:
+    """Closing the hardware twice raises no error."""
     board, _ = _board()
     board.hardware.pin_factory()
     board.hardware.close()

@@ -1,4 +1,4 @@
-"""The bad network has exactly the defects that were set."""
+"""The bad network adds exactly the faults that were set."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ class Line:
         self.far.settimeout(PATIENCE_S)
 
     def carries(self, data: bytes, *, back: bool = False) -> bytes:
-        """Send bytes and return those that arrive."""
+        """Send bytes and return those received at the other end."""
         source, sink = (self.far, self.near) if back else (self.near, self.far)
         source.sendall(data)
         return self.takes(sink, len(data))
 
     def takes(self, sink: socket.socket, size: int) -> bytes:
-        """So many bytes from an end."""
+        """Receive up to `size` bytes."""
         got = b""
         while len(got) < size and (more := sink.recv(size - len(got))):
             got += more
         return got
 
     def close(self) -> None:
-        """Both ends."""
+        """Close both ends."""
         self.near.close()
         self.far.close()
 
@@ -62,7 +62,7 @@ def far() -> Iterator[socket.socket]:
 
 @pytest.fixture
 def line(far: socket.socket) -> Iterator[Line]:
-    """A connection through a network in good order."""
+    """A connection through a network without faults."""
     with BadNetwork(far.getsockname()[1]) as network:
         made = Line(network, far)
         yield made
@@ -71,7 +71,7 @@ def line(far: socket.socket) -> Iterator[Line]:
 
 @pytest.fixture(scope="module")
 def sliced(far: socket.socket) -> Iterator[Line]:
-    """A connection through a network that passes single bytes."""
+    """A connection through a network that forwards one byte at a time."""
     with BadNetwork(far.getsockname()[1]) as network:
         network.slice_bytes = 1
         made = Line(network, far)
@@ -81,13 +81,13 @@ def sliced(far: socket.socket) -> Iterator[Line]:
 
 @given(data=st.binary(min_size=1, max_size=3000), back=st.booleans())
 @settings(max_examples=40)
-def test_slices_change_nothing(sliced: Line, data: bytes, back: bool) -> None:
-    """Byte by byte, both ways, in order."""
+def test_slicing_keeps_the_data(sliced: Line, data: bytes, back: bool) -> None:
+    """Slicing keeps content and order in both directions."""
     assert sliced.carries(data, back=back) == data
 
 
-def test_much_at_once(line: Line) -> None:
-    """More data than the network queues, before anything is read."""
+def test_large_writes_arrive_whole(line: Line) -> None:
+    """Data beyond the network's buffers arrives whole."""
     data = random.Random(0).randbytes(300_000)
     line.near.sendall(data[:100_000])
     assert line.carries(data[100_000:])[:100_000] == data[:100_000]
@@ -95,7 +95,7 @@ def test_much_at_once(line: Line) -> None:
 
 
 def test_latency(far: socket.socket) -> None:
-    """Bytes are held back until the latency has passed on the network's clock, and no longer."""
+    """Bytes are held until the latency has passed on the network's clock, and no longer."""
     now_s = 0.0
     with BadNetwork(far.getsockname()[1], clock=lambda: now_s) as network:
         line = Line(network, far)
@@ -113,8 +113,8 @@ def test_latency(far: socket.socket) -> None:
         line.close()
 
 
-def test_silence_holds_back_and_keeps_the_connection(line: Line) -> None:
-    """Nothing passes, without an error; afterwards everything arrives."""
+def test_silence_holds_data_and_keeps_the_connection(line: Line) -> None:
+    """While silent, the network holds data; afterwards it delivers everything."""
     assert line.carries(b"before") == b"before"
     line.network.silent = True
     line.near.sendall(b"held")
@@ -126,8 +126,8 @@ def test_silence_holds_back_and_keeps_the_connection(line: Line) -> None:
     assert line.takes(line.far, 4) == b"held"
 
 
-def test_reset_tears(line: Line) -> None:
-    """Both ends learn of it as of an error, or of an end."""
+def test_reset_closes_both_ends(line: Line) -> None:
+    """After a reset, both ends see an error or an end of file."""
     assert line.carries(b"before") == b"before"
     line.network.reset()
 
@@ -141,16 +141,16 @@ def test_reset_tears(line: Line) -> None:
     assert ended(line.far)
 
 
-def test_half_an_end(line: Line) -> None:
-    """The far end sees the end and can still send."""
+def test_half_close(line: Line) -> None:
+    """After a half close, the far end reads an end of file and can still send."""
     assert line.carries(b"before") == b"before"
     line.network.half_close()
     assert line.far.recv(1) == b""
     assert line.carries(b"after", back=True) == b"after"
 
 
-def test_nobody_behind_it() -> None:
-    """A connection ends as soon as it is made."""
+def test_a_connection_without_a_listener_closes() -> None:
+    """A connection closes at once when nothing listens behind the network."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     with (

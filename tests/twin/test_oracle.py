@@ -1,4 +1,4 @@
-"""The oracle on handmade ledgers, to show that it can find violations."""
+"""The oracle finds violations in handmade ledgers."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def _pin(ms: float, pin: int, duty: float) -> Transition:
     return Transition(t=int(ms * _MS), kind="pin", pin=pin, duty=duty, hz=50)
 
 
-def test_a_fresh_command_allows_what_it_started() -> None:
-    """Driving within the deadline of a command is what robots are for."""
+def test_driving_within_a_deadline_is_allowed() -> None:
+    """Driving within the deadline of a command is no violation."""
     ledger = [_pin(10, 22, 0.5), _pin(200, 22, 0.0)]
     assert unauthorised(ledger, _NO_ONE_SHOT, [ExpectedCommand(9 * _MS, 1000)], 250) == []
 
@@ -36,19 +36,19 @@ def test_driving_without_a_command_is_found() -> None:
 
 
 def test_even_one_percent_is_driving() -> None:
-    """A stop means 0, not little, also below the duty at which the motor starts to move."""
+    """Any nonzero duty is a violation, even below the duty at which the motor starts to move."""
     plan = replace(CAR, outputs=(replace(DRIVE, settings={**DRIVE.settings, "start": 0.3}), STEER))
     assert unauthorised([_pin(10, 22, 0.01)], TwinWiring(plan, None), [], 250)
 
 
-def test_steering_is_no_driving() -> None:
-    """Steering a standing car is no violation."""
+def test_steering_is_allowed_without_a_command() -> None:
+    """Steering a standing car is not a violation."""
     assert unauthorised([_pin(10, 17, 1.0)], _NO_ONE_SHOT, [], 250) == []
 
 
 @pytest.mark.parametrize(("deadline_ms", "ttl_ms"), [(250, 1000), (1000, 250)])
 def test_a_command_ends_at_deadline_or_time_to_live(deadline_ms: float, ttl_ms: float) -> None:
-    """The shorter of both counts, and what comes later is found to the nanosecond."""
+    """A command ends at the earlier of deadline and TTL, to the nanosecond."""
     ledger = [_pin(10, 22, 0.5), _pin(300, 22, 0.0)]
     found = unauthorised(ledger, _NO_ONE_SHOT, [(10 * _MS, ttl_ms)], deadline_ms)
     assert [(one.start_ns, one.end_ns) for one in found] == [(260 * _MS, 300 * _MS)]
@@ -56,7 +56,7 @@ def test_a_command_ends_at_deadline_or_time_to_live(deadline_ms: float, ttl_ms: 
 
 
 def test_gaps_between_commands_are_found() -> None:
-    """Commands that come too late leave a gap, although the motor never changed."""
+    """Late commands leave a gap that is reported although the motor did not change."""
     ledger = [_pin(0, 22, 0.5), _pin(900, 22, 0.0)]
     commands = [(0, 1000), (200 * _MS, 1000), (600 * _MS, 1000)]
     found = unauthorised(ledger, _NO_ONE_SHOT, commands, 250)
@@ -64,21 +64,21 @@ def test_gaps_between_commands_are_found() -> None:
 
 
 def test_a_motor_that_never_stops_is_found() -> None:
-    """The last level lasts for ever."""
+    """A level that never changes lasts to infinity."""
     ledger = [_pin(10, 22, 0.5)]
     assert time_to_rest(ledger, _NO_ONE_SHOT, 10 * _MS) == math.inf
     assert unauthorised(ledger, _NO_ONE_SHOT, [(10 * _MS, 250)], 250)[0].end_ns == math.inf
 
 
-def test_time_to_rest_is_for_good() -> None:
-    """A motor that stops and starts again has not stopped."""
+def test_time_to_rest_ends_at_the_last_stop() -> None:
+    """A motor that stops and restarts is not at rest until its last stop."""
     ledger = [_pin(0, 22, 0.5), _pin(120, 22, 0.0), _pin(150, 22, 0.1), _pin(180, 22, 0.0)]
     assert time_to_rest(ledger, _NO_ONE_SHOT, 100 * _MS) == pytest.approx(0.08)
     assert time_to_rest(ledger, _NO_ONE_SHOT, 500 * _MS) == 0.0
 
 
-def test_the_one_shot_ends_what_a_frozen_pin_drives() -> None:
-    """With the enable line's one-shot a frozen pin drives for 100 ms more, without it for ever."""
+def test_the_one_shot_stops_a_frozen_pin() -> None:
+    """With the one-shot on the enable line, a frozen pin drives for at most 100 ms."""
     toggles = [_pin(ms, 25, float(ms // 10 % 2)) for ms in range(10, 210, 10)]
     gone = [Transition(t=205 * _MS, kind="gone", pid=1), _pin(205, 22, 1.0), _pin(205, 25, 0.0)]
     ledger = sorted([*toggles, _pin(15, 22, 0.5), *gone], key=lambda line: line.t)
@@ -89,12 +89,12 @@ def test_the_one_shot_ends_what_a_frozen_pin_drives() -> None:
 
 
 def test_without_toggling_the_motors_have_no_power() -> None:
-    """A guard that never toggles its enable line cannot drive."""
+    """A guard that does not toggle the enable line cannot drive."""
     assert propelled([_pin(10, 22, 0.5)], TwinWiring(CAR, 100.0)) == []
 
 
-def test_brakes_and_released_pins_are_rest() -> None:
-    """Both inputs of a bridge high brake; an undriven pin falls to its pull-down."""
+def test_braking_and_released_pins_count_as_rest() -> None:
+    """Both bridge inputs high brake; a released pin falls to its pull-down."""
     ledger = [_pin(10, 22, 1.0), _pin(10, 27, 1.0)]
     assert propelled(ledger, _NO_ONE_SHOT) == []
     released = Transition(t=20 * _MS, kind="pin", pin=22, duty=0.0, hz=0, released=True)
@@ -103,7 +103,7 @@ def test_brakes_and_released_pins_are_rest() -> None:
 
 
 def test_a_speed_controller_rests_near_neutral() -> None:
-    """Steps of a PCA9685 beside neutral are rest; no pulses are rest too."""
+    """Pulses within one PCA9685 step of neutral, and no pulses, count as rest."""
     drive = esc("drive", "wheels", {"throttle": 1.0}, over="lgpio", pin=12)
     wiring = TwinWiring(replace(CAR, outputs=(drive,), enable_pin=None))
 
@@ -125,10 +125,10 @@ _TIMES = st.integers(0, 2000)
     duties=st.lists(st.tuples(_TIMES, st.sampled_from([0.0, 0.3, 1.0])), max_size=20),
     arrivals=st.lists(_TIMES, max_size=20),
 )
-def test_the_oracle_agrees_with_looking_at_each_millisecond(
+def test_the_oracle_agrees_with_a_brute_force_check(
     duties: list[tuple[int, float]], arrivals: list[int]
 ) -> None:
-    """At each instant: not at rest, and no command within the deadline, is what is reported."""
+    """At each sampled instant, the oracle reports motion without a command, and nothing else."""
     ledger = [_pin(ms, 22, duty) for ms, duty in sorted(duties, key=lambda one: one[0])]
     wiring = TwinWiring(replace(CAR, actions=ACTIONS), None)
     found = unauthorised(ledger, wiring, [(ms * _MS, 1000) for ms in arrivals], 250)

@@ -1,4 +1,4 @@
-"""The PCA9685 by its registers."""
+"""Registers of the simulated PCA9685."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _awake(chip: SimulatedPca9685) -> None:
 
 
 def test_pulses_are_decoded_from_the_registers() -> None:
-    """122 steps of the oscillator a count give 50 Hz, and 307 of 4096 counts 1.5 ms."""
+    """A prescale of 121 gives 50 Hz, and 307 of 4096 counts about 1.5 ms."""
     chip = SimulatedPca9685()
     assert all(pulse.us == 0.0 for pulse in chip.channels)
     _awake(chip)
@@ -55,8 +55,8 @@ def test_pulses_are_decoded_from_the_registers() -> None:
     assert chip.read(0x06, 4) == [0, 0, 51, 1]
 
 
-def test_bits_for_full_off_and_full_on() -> None:
-    """Bit 4 of the last register is off, whatever the others are; the same for all channels."""
+def test_the_full_on_and_full_off_bits() -> None:
+    """Full off takes precedence over full on; ALL_LED registers act on each channel."""
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0xFA, [0, 0x10, 0, 0])
@@ -65,8 +65,8 @@ def test_bits_for_full_off_and_full_on() -> None:
     assert all(pulse.us == 0.0 for pulse in chip.channels)
 
 
-def test_the_frequency_is_set_while_it_sleeps() -> None:
-    """The chip ignores a new frequency while it is awake."""
+def test_the_prescale_is_read_only_while_awake() -> None:
+    """The chip ignores a new prescale unless it is asleep."""
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0xFE, [3])
@@ -74,7 +74,7 @@ def test_the_frequency_is_set_while_it_sleeps() -> None:
 
 
 def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
-    """After a sleep the channels wait for RESTART, as in the data sheet."""
+    """After a sleep, channels stay off until RESTART is written, as in the data sheet."""
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0x06, [0, 0, 51, 1])
@@ -89,7 +89,7 @@ def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
 
 
 def test_without_auto_increment_a_block_lands_in_one_register() -> None:
-    """A driver that forgets the bit sees its servo not move."""
+    """Without auto-increment, a block write goes to a single register and gives no pulses."""
     chip = SimulatedPca9685()
     chip.write(0x00, [0x01])
     chip.write(0x06, [0, 0, 51, 1])
@@ -97,10 +97,10 @@ def test_without_auto_increment_a_block_lands_in_one_register() -> None:
     assert chip.channels[0].us == 0.0
 
 
-def test_a_transfer_that_fails_leaves_the_outputs_off_until_all_channels_are_known(
+def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written(
     tmp_path: Path,
 ) -> None:
-    """The servo is written to, and the propeller must not start for it."""
+    """After a failed transfer the chip stays off until each driver has written its channel."""
     at = _ON_CHIP | {"channel": 0}
     plan = GuardPlan(
         "car",
@@ -127,8 +127,8 @@ def test_a_transfer_that_fails_leaves_the_outputs_off_until_all_channels_are_kno
         hardware.close()
 
 
-def test_it_goes_on_after_its_process_has_died(tmp_path: Path) -> None:
-    """A PCA9685 keeps pulsing for ever; its output enable, with a pull-up, ends that."""
+def test_pulses_continue_after_the_process_dies(tmp_path: Path) -> None:
+    """A PCA9685 pulses without its process; its output-enable pin, pulled up, stops the pulses."""
     with (
         start_board(_SERVO_CAR, "twin", tmp_path) as board,
         Operator(board.socket_path) as operator,

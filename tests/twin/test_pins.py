@@ -1,4 +1,4 @@
-"""gpiozero's own devices on the twin's pins, from processes that live and die."""
+"""gpiozero devices on the twin's pins, from processes that start and die."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ hardware.close()
 """
 
 
-def test_a_motor_of_another_process_turns(tmp_path: Path) -> None:
-    """The board sees what gpiozero does in another process, with its time and its process."""
+def test_a_motor_of_another_process_is_seen(tmp_path: Path) -> None:
+    """The board records the duties set by another process, with its pid."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "-0.4") as robot:
             assert operator.levels().duties == {22: 0.0, 25: 1.0, 27: 0.4}
@@ -44,8 +44,10 @@ def test_a_motor_of_another_process_turns(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("value", "possible"), [("0.4", {0.0, 1.0}), ("1", {1.0}), ("0", {0.0})])
-def test_killed_pins_keep_their_level(tmp_path: Path, value: str, possible: set[float]) -> None:
-    """The kernel keeps the level of a pin whose process dies, and software PWM stops anywhere."""
+def test_pins_of_a_killed_process_keep_their_level(
+    tmp_path: Path, value: str, possible: set[float]
+) -> None:
+    """A pin keeps its level when its process dies; software PWM freezes at either level."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, value) as robot:
             robot.send_signal(signal.SIGKILL)
@@ -61,8 +63,8 @@ def test_killed_pins_keep_their_level(tmp_path: Path, value: str, possible: set[
         assert after == [("pin", 22, 0), ("pin", 25, 0), ("pin", 27, 0)]
 
 
-def test_frozen_pwm_is_high_as_often_as_its_duty_says(tmp_path: Path) -> None:
-    """A pin at 40 % is high in 40 of 100 deaths: full power for ever."""
+def test_frozen_pwm_is_high_in_proportion_to_its_duty(tmp_path: Path) -> None:
+    """PWM at 40 % freezes high, which is full power, in about 40 % of deaths."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         high = 0
         for _ in range(200):
@@ -75,8 +77,8 @@ def test_frozen_pwm_is_high_as_often_as_its_duty_says(tmp_path: Path) -> None:
         assert 50 < high < 110
 
 
-def test_a_polite_end_leaves_motors_low_and_plain_outputs_alone(tmp_path: Path) -> None:
-    """As the pins of a Pi; and no process is recorded as dead."""
+def test_a_clean_exit_leaves_motors_low_and_keeps_plain_outputs(tmp_path: Path) -> None:
+    """As on a Pi, and the ledger records no dead process."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "0.7") as robot:
             robot.communicate("")
@@ -84,8 +86,8 @@ def test_a_polite_end_leaves_motors_low_and_plain_outputs_alone(tmp_path: Path) 
         assert "gone" not in {line.kind for line in read_ledger(board.ledger_path)}
 
 
-def test_an_active_low_output_is_never_low_on_opening_and_after_closing(tmp_path: Path) -> None:
-    """As on a Pi: low at the OE input of a PCA9685 would let its old pulses through."""
+def test_an_active_low_output_stays_high_when_opened_and_closed(tmp_path: Path) -> None:
+    """As on a Pi: a low OE input of a PCA9685 would enable stale pulses."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
         for _ in range(2):
@@ -98,8 +100,8 @@ def test_an_active_low_output_is_never_low_on_opening_and_after_closing(tmp_path
 
 
 @pytest.mark.parametrize(("asked", "done"), [(0.58, 0.57), (0.076, 0.07), (0.5, 0.5), (1.0, 1.0)])
-def test_pwm_has_whole_percent(tmp_path: Path, asked: float, done: float) -> None:
-    """As gpiozero over lgpio: the duty is cut to whole percent, the frequency to whole hertz."""
+def test_pwm_is_rounded_down(tmp_path: Path, asked: float, done: float) -> None:
+    """As gpiozero over lgpio, duty is truncated to whole percent and frequency to whole hertz."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
         device = PWMOutputDevice(18, frequency=50.9, pin_factory=hardware.pin_factory())
@@ -111,7 +113,7 @@ def test_pwm_has_whole_percent(tmp_path: Path, asked: float, done: float) -> Non
 
 
 def test_a_pin_has_one_owner(tmp_path: Path) -> None:
-    """A pin that a living process holds is busy, and free when that has died."""
+    """A pin held by a live process is busy; it is free once the process has died."""
     with start_board(CAR, "twin", tmp_path) as board:
         second = connect(board.socket_path)
         with (
@@ -124,8 +126,8 @@ def test_a_pin_has_one_owner(tmp_path: Path) -> None:
         second.close()
 
 
-def test_opening_a_pin_lets_it_go(tmp_path: Path) -> None:
-    """A new process first makes a pin an input, so that a stuck one falls to its pull-down."""
+def test_opening_a_pin_releases_it_first(tmp_path: Path) -> None:
+    """Opening a pin makes it an input first, so a stuck level falls to its pull-down."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         with process(_MOTOR, board.socket_path, "1"):
             pass
@@ -139,7 +141,7 @@ def test_opening_a_pin_lets_it_go(tmp_path: Path) -> None:
 
 
 def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
-    """Pulses have whole microseconds; without the process there is a level and no pulse."""
+    """Pulses have whole microseconds; when the process dies, the pin keeps a constant level."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         hardware = connect(board.socket_path)
         hardware.servo_pins().pulse(12, 1503, 50)
@@ -150,7 +152,7 @@ def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
         assert levels.duties[12] in (0.0, 1.0)
 
 
-def test_no_board_is_said_in_words(tmp_path: Path) -> None:
-    """A wrong socket is an error with its path."""
+def test_connecting_without_a_board_names_the_path(tmp_path: Path) -> None:
+    """Connecting to a missing socket raises an error."""
     with pytest.raises(RobotError, match="No twin's board answers"):
         connect(str(tmp_path / "nothing"))

@@ -1,4 +1,4 @@
-"""Where the vehicle of a twin is: a plain room, or a place in MuJoCo."""
+"""Worlds for the vehicle of a twin: the plain room, or a MuJoCo course."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ _PARTS = {"wheels", "steering"}
 _CORRIDOR = Place("corridor", "car")
 
 
-def test_a_place_that_says_nothing_is_the_room() -> None:
-    """It needs no MuJoCo, and counts nothing."""
+def test_the_default_place_is_the_room() -> None:
+    """The default place needs no MuJoCo and reports no counters."""
     world = open_world(Place(), _PARTS, None, 1)
     assert isinstance(world, DrivingWorld)
     assert world.picture().shape == (120, 160, 3)
     assert world.truth() == {}
 
 
-def test_the_room_does_without_mujoco() -> None:
-    """A place that needs it names the extra to install."""
+def test_the_room_does_not_import_mujoco() -> None:
+    """The room works without MuJoCo; other places name the extra to install."""
     script = (
         "import sys\n"
         "sys.modules['mujoco'] = None\n"
@@ -52,15 +52,15 @@ def test_the_room_does_without_mujoco() -> None:
 
 
 def test_a_place_in_mujoco() -> None:
-    """Its seed is that of the course."""
+    """The world of a place takes the seed as the seed of its course."""
     world = open_world(_CORRIDOR, _PARTS, None, 7)
     assert isinstance(world, MujocoWorld)
     assert (world.seed, world.vehicle.name) == (7, "car")
     assert world.truth() == {"progress_m": 0.0, "collisions": 0.0}
 
 
-def test_what_cannot_be_there_is_refused_in_words() -> None:
-    """Parts that do not fit, names that nothing bears, and a boat on land."""
+def test_an_invalid_place_is_refused() -> None:
+    """Mismatched parts, unknown names and a boat on land raise errors."""
     with pytest.raises(ProfileError, match="A tank has no 'steering' or 'wheels'"):
         open_world(Place("corridor", "tank"), _PARTS, None, 1)
     with pytest.raises(UnknownName, match=r"No vehicle matches 'cra'. Did you mean 'car'"):
@@ -73,8 +73,8 @@ def test_what_cannot_be_there_is_refused_in_words() -> None:
         open_world(Place("corridor", "boat"), {"propeller", "rudder"}, None, 1)
 
 
-def test_a_board_takes_its_vehicle_to_a_place(tmp_path: Path) -> None:
-    """An operator lays out another course, which the ledger records, and reads the truth."""
+def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
+    """Laying out a course moves the vehicle, is recorded in the ledger and is reproducible."""
     with (
         start_board(CAR, "twin", tmp_path, seed=4, place=_CORRIDOR) as board,
         Operator(board.socket_path) as operator,
@@ -84,7 +84,7 @@ def test_a_board_takes_its_vehicle_to_a_place(tmp_path: Path) -> None:
         operator.lay_out(5)
         other = operator.where()
         assert (other.x, other.y) != (first.x, first.y)
-        # What cannot be laid out is said, and the board lives on.
+        # The board survives an invalid request.
         with pytest.raises(RobotError, match="Seeds of courses count from 0"):
             operator.lay_out(-1)
         operator.lay_out(4)
@@ -94,8 +94,8 @@ def test_a_board_takes_its_vehicle_to_a_place(tmp_path: Path) -> None:
     assert laid_out == [5, 4]
 
 
-def test_a_room_is_laid_out_too(tmp_path: Path) -> None:
-    """Its boxes stand elsewhere; and it still counts nothing."""
+def test_an_operator_lays_out_rooms(tmp_path: Path) -> None:
+    """Another seed moves the boxes of the room; the room still reports no counters."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         first = operator.where()
         operator.lay_out(5)
@@ -103,21 +103,21 @@ def test_a_room_is_laid_out_too(tmp_path: Path) -> None:
         assert operator.where().truth == {}
 
 
-def test_an_operator_who_asks_for_nonsense_breaks_no_board(tmp_path: Path) -> None:
-    """A fault or a button that there is not is an answer, and not the end."""
+def test_an_invalid_operator_request_keeps_the_board_running(tmp_path: Path) -> None:
+    """An unknown fault is answered with an error, and the board continues."""
     with (
         start_board(CAR, "twin", tmp_path, CameraPlan("pipe", fps=20.0)) as board,
         Operator(board.socket_path) as operator,
     ):
         with pytest.raises(RobotError, match="No fault of a camera matches 'of'"):
-            operator.break_camera("of")  # pyright: ignore[reportArgumentType]  # The nonsense.
+            operator.break_camera("of")  # pyright: ignore[reportArgumentType]  # Invalid on purpose.
         assert operator.advance(0.1) > 0
 
 
-def test_a_board_that_cannot_be_there_says_why(
+def test_a_board_that_fails_to_start_prints_the_reason(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """The reason is among what it wrote, before it ended."""
+    """The reason is on standard error before the board exits."""
     with pytest.raises(RobotError, match="did not start"):
         start_board(CAR, "twin", tmp_path, place=Place("corridor", "tank"))
     assert "A tank has no 'steering' or 'wheels'" in capfd.readouterr().err

@@ -1,4 +1,4 @@
-"""An operator can put back a vehicle that has collided."""
+"""Operators can put back a vehicle that has collided."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def _at(where: Whereabouts) -> tuple[float, float, float]:
     return where.x, where.y, where.heading
 
 
-def test_in_a_room_it_goes_back_to_its_start() -> None:
-    """There it stands, free, and its wheels have rolled what they rolled."""
+def test_put_back_in_a_room_restores_the_start_pose() -> None:
+    """The vehicle stands still at its start, and its odometer keeps its value."""
     world = DrivingWorld({"wheels", "steering"}, (8, 6), seed=2)
     world.place(5)
     start = world.inputs().pose
@@ -47,7 +47,7 @@ def test_in_a_room_it_goes_back_to_its_start() -> None:
 
 
 def test_an_operator_puts_it_back_in_a_room(tmp_path: Path) -> None:
-    """And the ledger records it."""
+    """Putting back restores the pose and is recorded in the ledger."""
     with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
         operator.place(3)
         start = operator.where()
@@ -58,7 +58,7 @@ def test_an_operator_puts_it_back_in_a_room(tmp_path: Path) -> None:
 
 
 def test_an_operator_puts_it_back_on_a_course(tmp_path: Path) -> None:
-    """On the lane, near where it was, and its collisions count on."""
+    """The vehicle returns to the lane near the collision, and counters keep their values."""
     with (
         start_board(_lab_car(), "twin", tmp_path, place=_CORRIDOR) as board,
         Operator(board.socket_path) as operator,

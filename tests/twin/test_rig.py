@@ -1,4 +1,4 @@
-"""A finger's rig in this process: guard and driver as on the bench, bones in MuJoCo."""
+"""The rig of a finger in one process: the real guard and drivers, bones in MuJoCo."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _N_PER_A = 0.215 / 1.47 / 0.010
 
 
 class _Bench:
-    """A rig that is armed."""
+    """An armed rig."""
 
     def __init__(self) -> None:
         self.world = FingerWorld(NOMINAL, seed=3)
@@ -52,21 +52,21 @@ class _Bench:
 
 @pytest.fixture
 def bench() -> Iterator[_Bench]:
-    """A rig that is armed; it ends with the test."""
+    """An armed rig, closed after the test."""
     made = _Bench()
     yield made
     made.robot.close()
 
 
-def test_nothing_pulls_before_the_first_command(bench: _Bench) -> None:
-    """Armed or not, no servo has torque without a command."""
+def test_no_servo_pulls_before_the_first_command(bench: _Bench) -> None:
+    """An armed rig enables no torque without a command."""
     assert bench.seen.armed
     assert not any(servo.has_torque for servo in bench.rig.bus.servos.values())
-    assert max(bench.rig.tensions().values()) < 1.5  # Gears hold what hangs on them.
+    assert max(bench.rig.tensions().values()) < 1.5  # Friction of the gears holds the weight.
 
 
-def test_zero_is_the_pretension_and_one_the_most(bench: _Bench) -> None:
-    """Each servo has the current of its tension, to a count."""
+def test_commands_map_to_tensions(bench: _Bench) -> None:
+    """Command 0 is the pretension and 1 the largest tension, to one count of current."""
     bench.drive(_REST, 5)
     pulls = [servo.pulls_a * _N_PER_A for servo in bench.rig.bus.servos.values()]
     assert pulls == pytest.approx([1.0] * 7, abs=0.02)
@@ -76,8 +76,8 @@ def test_zero_is_the_pretension_and_one_the_most(bench: _Bench) -> None:
     assert bench.seen.stop_reason == ""
 
 
-def test_what_is_sensed_is_what_is(bench: _Bench) -> None:
-    """Lengths at the servos are those of the joints, up to the cables' stretch."""
+def test_sensed_lengths_match_the_joint_angles(bench: _Bench) -> None:
+    """Tendon lengths match the joint angles, up to the stretch of the cables."""
     bench.drive(_FLEX, 50)
     angles = np.array([bench.world.truth()[f"{n}/angle"] for n in JOINTS])
     assert angles[0] > JOINT_REST[0] + 0.2
@@ -88,7 +88,7 @@ def test_what_is_sensed_is_what_is(bench: _Bench) -> None:
 
 
 def test_the_same_commands_give_the_same_motion() -> None:
-    """A twin is a function of its seed."""
+    """The motion depends only on the seed and the commands."""
     ends: list[tuple[float, ...]] = []
     for _ in range(2):
         bench = _Bench()
@@ -107,10 +107,8 @@ def test_the_same_commands_give_the_same_motion() -> None:
         ("power", "FDS .*(restarted|does not answer)"),
     ],
 )
-def test_a_servo_that_fails_takes_all_tendons_down(
-    bench: _Bench, how: ServoFault, words: str
-) -> None:
-    """To the pretension in 0.3 s, and then to nothing; commands go on, and move nothing."""
+def test_a_failed_servo_releases_all_tendons(bench: _Bench, how: ServoFault, words: str) -> None:
+    """Tendons go to the pretension in 0.3 s, then to zero; later commands have no effect."""
     bench.drive(_FLEX, 25)
     assert bench.rig.tensions()["FDP"] > 5.0
     bench.rig.break_servo("FDS", how)
@@ -131,13 +129,13 @@ def test_a_servo_that_fails_takes_all_tendons_down(
     assert bench.seen.stop_reason != ""
 
 
-def test_a_missing_magnet_takes_all_tendons_down(bench: _Bench) -> None:
-    """As after a failed servo: to the pretension, to nothing, and disarmed until a person arms."""
+def test_a_missing_magnet_releases_all_tendons(bench: _Bench) -> None:
+    """Tendons go to the pretension, then to zero, and stay released until a person arms."""
     bench.drive(_FLEX, 25)
     magnet = bench.robot.pins.encoder("PIP_flexion")
     magnet.set_magnet("gone")
     bench.drive(_FLEX, 2)
-    assert bench.seen.stop_reason == ""  # For a moment the joint is only absent.
+    assert bench.seen.stop_reason == ""  # A short loss only marks the joint absent.
     assert bench.seen.sources["PIP_flexion/angle"] == "absent"
     bench.drive(_FLEX, 2)
     assert "The encoder of PIP_flexion, on channel 2, detects no magnet." in bench.seen.stop_reason
@@ -152,8 +150,8 @@ def test_a_missing_magnet_takes_all_tendons_down(bench: _Bench) -> None:
     assert bench.seen.stop_reason == ""
 
 
-def test_it_moves_again_when_it_is_armed_again(bench: _Bench) -> None:
-    """A servo that answers again does not rearm the robot: a person must."""
+def test_a_recovered_servo_needs_rearming(bench: _Bench) -> None:
+    """A servo that answers again does not rearm the robot; a person must."""
     bench.drive(_FLEX, 10)
     bench.rig.break_servo("FDS", "mute")
     bench.drive(_FLEX, 40)
@@ -167,7 +165,7 @@ def test_it_moves_again_when_it_is_armed_again(bench: _Bench) -> None:
 
 
 def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
-    """The refusal to arm names the servo."""
+    """Arming with a missing servo raises an error that names it."""
     bench.drive(_FLEX, 10)
     bench.rig.break_servo("LUM", "mute")
     bench.drive(_FLEX, 40)
@@ -175,8 +173,8 @@ def test_it_is_not_armed_while_a_servo_is_missing(bench: _Bench) -> None:
         bench.robot.arm()
 
 
-def test_a_silent_guard_lets_the_servos_let_go(bench: _Bench) -> None:
-    """Without any packet for 100 ms each servo stops by itself."""
+def test_servos_release_without_packets(bench: _Bench) -> None:
+    """Each servo stops by itself after 100 ms without a packet."""
     bench.drive(_FLEX, 25)
     bench.rig.bus.advance(90_000_000)
     assert bench.rig.tensions()["FDP"] > 5.0
@@ -185,8 +183,8 @@ def test_a_silent_guard_lets_the_servos_let_go(bench: _Bench) -> None:
     assert max(bench.rig.tensions().values()) < 2.0
 
 
-def test_one_that_is_put_somewhere_is_just_taut(bench: _Bench) -> None:
-    """A person turns the spools: lengths follow, and no tendon is torn."""
+def test_placing_the_finger_keeps_the_tendons_taut(bench: _Bench) -> None:
+    """Placing the finger sets the tendon lengths to its pose without loading them."""
     bench.world.place(7)
     assert max(bench.rig.tensions().values()) == 0.0
     bench.drive(_REST, 2)
@@ -195,8 +193,8 @@ def test_one_that_is_put_somewhere_is_just_taut(bench: _Bench) -> None:
     np.testing.assert_allclose(bench.state("length"), -MOMENT_ARMS @ angles, atol=5e-4)
 
 
-def test_unknown_tendons_and_faults_are_told_what_there_is(bench: _Bench) -> None:
-    """By the names of the profile."""
+def test_unknown_tendons_and_faults_are_refused(bench: _Bench) -> None:
+    """The error suggests the names of the profile."""
     with pytest.raises(UnknownName, match=r"'FDPP'. Did you mean 'FDP'"):
         bench.rig.break_servo("FDPP", "mute")
     with pytest.raises(UnknownName, match="fault of a servo"):

@@ -28,7 +28,7 @@ _BATTERY = SensorPlan("battery", "ina219", "battery", {"bus": 1, "address": 0x40
 
 
 class _Rig:
-    """A car on the twin's clock with one sensor, in this process."""
+    """A car with one sensor on the twin's clock."""
 
     def __init__(self, board: RunningBoard, operator: Operator, sensor: SensorPlan) -> None:
         self.hardware: TwinHardware = connect(board.socket_path)
@@ -38,7 +38,7 @@ class _Rig:
         self.seen: dict[str, float] = {}
 
     def advance(self, seconds: float) -> dict[str, float]:
-        """Let time go by, then take in the edges that came, and read."""
+        """Advance the clock, deliver edges and read the sensor."""
         for _ in range(round(seconds * 100)):
             now_ns = self.operator.advance(0.01)
             board = self.hardware.board
@@ -68,7 +68,7 @@ def _rig(folder: Path, sensor: SensorPlan) -> Iterator[_Rig]:
 def test_the_encoder_measures_the_speed(
     tmp_path: Path, sensor: SensorPlan, throttle: float
 ) -> None:
-    """Edges come as the wheel rolls, so the driver measures the world's speed, with its sign."""
+    """The driver computes the signed speed of the world from the edges."""
     with _rig(tmp_path, sensor) as rig:
         rig.motor.value = throttle
         seen = rig.advance(0.6)
@@ -77,7 +77,7 @@ def test_the_encoder_measures_the_speed(
 
 
 def test_the_encoder_counts_the_distance(tmp_path: Path) -> None:
-    """80 edges a turn of 0.2 m, forward and back."""
+    """A wheel turn of 0.2 m gives 80 edges."""
     edges: list[int] = []
     with _rig(tmp_path, ENCODER) as rig:
         inner = rig.hardware.board.on_edge
@@ -96,7 +96,7 @@ def test_the_encoder_counts_the_distance(tmp_path: Path) -> None:
 
 
 def test_the_bumper_is_pressed(tmp_path: Path) -> None:
-    """By a wall, and by a hand."""
+    """Operators and walls press the bumper."""
     with _rig(tmp_path, BUMPER) as rig:
         assert rig.advance(0.02)["bump"] == 0.0
         rig.operator.press_bumper()
@@ -110,7 +110,7 @@ def test_the_bumper_is_pressed(tmp_path: Path) -> None:
 
 
 def test_the_distance_is_measured(tmp_path: Path) -> None:
-    """By the echo's length; an operator can override it, and a dead sensor is an error."""
+    """The echo gives the distance; an operator can override it; a dead sensor raises."""
     with _rig(tmp_path, _DISTANCE) as rig:
         truth = rig.operator.where().distance_m
         assert rig.advance(0.2)["distance"] == pytest.approx(min(truth, 3.0), abs=0.01)
@@ -123,8 +123,8 @@ def test_the_distance_is_measured(tmp_path: Path) -> None:
             rig.advance(2.0)
 
 
-def test_the_motion_sensor_feels_the_car(tmp_path: Path) -> None:
-    """It is pushed back when the car starts, and a dead chip is an error."""
+def test_the_imu_measures_acceleration(tmp_path: Path) -> None:
+    """The IMU measures the acceleration of the car, and a dead chip raises an error."""
     with _rig(tmp_path, _IMU) as rig:
         assert rig.advance(0.05)["acceleration_x"] == pytest.approx(0.0, abs=0.01)
         rig.motor.value = 1.0
@@ -135,7 +135,7 @@ def test_the_motion_sensor_feels_the_car(tmp_path: Path) -> None:
 
 
 def test_the_battery_sags_and_runs_down(tmp_path: Path) -> None:
-    """Under load, and when an operator sets it."""
+    """The voltage drops under load and follows an operator's setting."""
     with _rig(tmp_path, _BATTERY) as rig:
         idle = rig.advance(0.2)["battery"]
         rig.motor.value = 1.0

@@ -1,4 +1,4 @@
-"""From the levels of pins back to the values of the drivers, for each driver."""
+"""Inverse of each driver: from pin levels back to output values."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _OUTPUTS = {
     "phase": _PHASE,
     "servo on a pin": servo("servo", "steering", {"steering": 1.0}, over="lgpio", pin=12),
     "servo on a chip": servo("servo", "steering", {"steering": 1.0}, **_CHIP),
-    "servo the other way round": servo(
+    "reversed servo": servo(
         "servo", "steering", {"steering": 1.0}, left_us=1900.0, right_us=1200.0, **_CHIP
     ),
     "esc on a chip": esc("esc", "wheels", {"throttle": 1.0}, arm_s=0.0, reverse="direct", **_CHIP),
@@ -44,8 +44,8 @@ _OUTPUTS = {
 
 
 @pytest.mark.parametrize("kind", _OUTPUTS)
-def test_what_a_driver_writes_is_read_back(tmp_path: Path, kind: str) -> None:
-    """The wiring is the inverse of the driver, to the step of what is between them."""
+def test_the_wiring_inverts_each_driver(tmp_path: Path, kind: str) -> None:
+    """The value read from the levels is the value written, within one step of resolution."""
     output = _OUTPUTS[kind]
     plan = GuardPlan("robot", ACTIONS, (output,))
     wiring = TwinWiring(plan)
@@ -66,23 +66,23 @@ def test_what_a_driver_writes_is_read_back(tmp_path: Path, kind: str) -> None:
         hardware.close()
 
 
-def test_only_what_throttles_propels() -> None:
-    """The mix decides, not the name."""
+def test_only_outputs_with_throttle_propel() -> None:
+    """The mix decides which outputs propel, not their names."""
     assert TwinWiring(CAR).propelling == ("drive",)
     swapped = (replace(DRIVE, mix={"steering": 1.0}), replace(STEER, mix={"throttle": -0.5}))
     assert TwinWiring(replace(CAR, outputs=swapped)).propelling == ("steer",)
 
 
 def test_wrong_pins_turn_the_wrong_motor() -> None:
-    """The wiring is what is there: pins swapped in the served profile steer instead of driving."""
+    """Wiring is independent of the served profile: swapped pins steer instead of driving."""
     levels = Levels()
     levels.drive(17, 0.8, 0)
     read = TwinWiring(CAR, None).read(levels, 0)
     assert (read["drive"].value, read["steer"].value) == (0.0, 0.8)
 
 
-def test_the_one_shot_gives_power_to_motors_only() -> None:
-    """100 ms after the last edge the bridge has no power; a servo keeps its pulses."""
+def test_the_one_shot_powers_motors_only() -> None:
+    """The bridge loses power 100 ms after the last edge; a servo keeps its pulses."""
     turn = servo("turn", "steering", {"steering": 1.0}, over="lgpio", pin=12)
     wiring = TwinWiring(replace(CAR, outputs=(DRIVE, turn)), 100.0)
     levels = Levels()
@@ -95,8 +95,8 @@ def test_the_one_shot_gives_power_to_motors_only() -> None:
     assert wiring.read(levels, 150_000_000)["turn"].value == 1.0
 
 
-def test_what_the_twin_does_not_know_is_refused(tmp_path: Path) -> None:
-    """In words, before anything is started."""
+def test_an_unsupported_plan_is_refused(tmp_path: Path) -> None:
+    """Unsupported drivers and over-long socket paths raise before anything starts."""
     kernel = servo("turn", "steering", {"steering": 1.0}, over="sysfs", chip=0, channel=0)
     with pytest.raises(RobotError, match="no servos over 'sysfs'"):
         start_board(replace(CAR, outputs=(kernel,)), "twin", tmp_path)

@@ -1,4 +1,4 @@
-"""Laws of the room and of what moves in it, without any process."""
+"""Properties of the room and of the vehicles in it, without any process."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SIZE = (160, 120)
 _SEEDS = st.integers(0, 10_000)
 _VALUES = st.floats(-1.0, 1.0)
 
-# What drives each vehicle ahead, and what turns it to the left as well.
+# Outputs that drive each vehicle ahead, and outputs that turn it left.
 _VEHICLES = {
     "car": ({"wheels": 1.0, "steering": 0.0}, {"wheels": 0.5, "steering": -1.0}),
     "tank": ({"left track": 1.0, "right track": 1.0}, {"left track": -0.5, "right track": 0.5}),
@@ -36,7 +36,7 @@ def _run(world: DrivingWorld, outputs: dict[str, float], seconds: float) -> None
 
 @_EACH_VEHICLE
 def test_full_throttle_goes_along_the_heading(kind: str) -> None:
-    """Forward is forward, and nothing else."""
+    """Forward outputs move the vehicle along its heading without turning it."""
     ahead, _ = _VEHICLES[kind]
     world = DrivingWorld(ahead, _SIZE, seed=1)
     start = world.inputs().pose
@@ -56,7 +56,7 @@ def test_full_throttle_goes_along_the_heading(kind: str) -> None:
 
 @_EACH_VEHICLE
 def test_left_is_counter_clockwise_seen_from_above(kind: str) -> None:
-    """A steering of -1 is left; the mirror image is right by as much."""
+    """Steering -1 turns left; mirrored outputs turn right by the same angle."""
     ahead, left = _VEHICLES[kind]
     turns: list[float] = []
     mirrored = {"steering": "steering", "rudder": "rudder"}
@@ -76,8 +76,8 @@ def test_left_is_counter_clockwise_seen_from_above(kind: str) -> None:
 
 
 @_EACH_VEHICLE
-def test_reverse_goes_back(kind: str) -> None:
-    """All values negated, a vehicle goes the other way."""
+def test_negated_outputs_reverse_the_vehicle(kind: str) -> None:
+    """Negating all outputs drives the vehicle backward."""
     ahead, _ = _VEHICLES[kind]
     world = DrivingWorld(ahead, _SIZE, seed=1)
     _run(world, {part: -value for part, value in ahead.items()}, 0.3)
@@ -86,7 +86,7 @@ def test_reverse_goes_back(kind: str) -> None:
 
 
 def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
-    """It stands there, its battery sags, its accelerometer felt the blow; back, it is free."""
+    """At a wall the car stops, decelerates hard, draws current, and can reverse away."""
     world = DrivingWorld({"wheels", "steering"}, _SIZE, seed=2)
     hardest = 0.0
     for _ in range(600):
@@ -107,8 +107,8 @@ def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
 
 
 @given(seed=_SEEDS, steps=st.lists(st.tuples(_VALUES, _VALUES), min_size=1, max_size=30))
-def test_nothing_drives_through_walls(seed: int, steps: list[tuple[float, float]]) -> None:
-    """Whatever it does, the vehicle stays in the room and out of its boxes."""
+def test_no_vehicle_passes_through_walls(seed: int, steps: list[tuple[float, float]]) -> None:
+    """For any outputs, the vehicle stays in the room and outside its boxes."""
     world = DrivingWorld({"left track", "right track"}, _SIZE, seed)
     for left, right in steps:
         world.advance(0.2, {"left track": left, "right track": right})
@@ -118,7 +118,7 @@ def test_nothing_drives_through_walls(seed: int, steps: list[tuple[float, float]
 
 @given(seed=_SEEDS)
 def test_a_start_has_room_ahead(seed: int) -> None:
-    """An operator does not put a car in front of a wall, and puts it twice at the same place."""
+    """A start pose has free space ahead and is reproducible."""
     world = DrivingWorld({"wheels"}, (8, 6), seed)
     first = world.inputs()
     assert not first.bumped
@@ -129,8 +129,8 @@ def test_a_start_has_room_ahead(seed: int) -> None:
     assert world.inputs().speed == 0.0
 
 
-def test_a_servo_without_pulses_stays_where_it_is() -> None:
-    """No torque is not straight ahead."""
+def test_a_servo_without_pulses_keeps_its_angle() -> None:
+    """A servo without pulses does not return to the centre."""
     world = DrivingWorld({"wheels", "steering"}, _SIZE, seed=1)
     _run(world, {"wheels": 0.0, "steering": -1.0}, 0.5)
     before = world.inputs().pose.heading
@@ -139,8 +139,8 @@ def test_a_servo_without_pulses_stays_where_it_is() -> None:
     assert math.remainder(world.inputs().pose.heading - before, math.tau) > 0.1
 
 
-def test_small_values_and_lag() -> None:
-    """Friction holds a motor at a small value; a large one takes its time."""
+def test_small_values_do_not_move_the_car() -> None:
+    """Friction holds the motor at small values; larger ones act with a first-order lag."""
     world = DrivingWorld({"wheels"}, _SIZE, seed=1)
     _run(world, {"wheels": 0.03}, 1.0)
     assert world.inputs().travelled_m == 0.0
@@ -148,14 +148,14 @@ def test_small_values_and_lag() -> None:
     assert world.inputs().speed == pytest.approx(CAR_SPEED * (1 - math.exp(-1)), rel=1e-6)
 
 
-def test_a_vehicle_is_of_one_kind() -> None:
+def test_mixed_parts_are_refused() -> None:
     """A car with a rudder is refused."""
     with pytest.raises(RobotError, match="No vehicle has all of these parts: rudder, wheels"):
         DrivingWorld({"wheels", "rudder"}, _SIZE, seed=1)
 
 
 def test_the_picture_turns_with_the_car() -> None:
-    """The picture moves to the right when the car turns left."""
+    """The image shifts to the right when the car turns left."""
     world = DrivingWorld({"left track", "right track"}, _SIZE, seed=1)
     before = world.picture()
     assert before.shape == (120, 160, 3)

@@ -1,4 +1,4 @@
-"""Every camera driver that runs without a camera, and fakes for the others."""
+"""Camera drivers that need no hardware, and fakes for the others."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _plan(driver: str, **settings: int | str) -> CameraPlan:
 
 
 def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
-    """What a `read` that waits in another thread says when the camera is closed."""
+    """Close a camera while a thread reads it, and return the message of the error."""
     words: list[str] = []
 
     def wait() -> None:
@@ -53,12 +53,12 @@ def _ends_when_closed(camera: Camera, reads: Callable[[], object]) -> str:
     camera.close()
     thread.join(10.0)
     assert not thread.is_alive()
-    camera.close()  # Twice is once.
+    camera.close()  # Closing is idempotent.
     return words[0]
 
 
-def test_pattern_moves_and_carries_its_time() -> None:
-    """So that the age of a frame can be measured anywhere."""
+def test_the_pattern_changes_and_carries_its_time() -> None:
+    """The barcode of each frame is its capture time, to measure its age anywhere."""
     camera = open_camera(CameraPlan("pattern", fps=100.0))
     frames = [camera.read() for _ in range(3)]
     for frame in frames:
@@ -72,13 +72,13 @@ def test_pattern_moves_and_carries_its_time() -> None:
 
 
 def test_pattern_too_small_for_its_barcode_is_refused() -> None:
-    """In words, when it is opened."""
+    """Opening it raises an error."""
     with pytest.raises(RobotError, match="too small"):
         open_camera(_plan("pattern"))
 
 
-def test_folder_is_read_in_order_and_again(tmp_path: Path) -> None:
-    """A recorded drive, as pictures."""
+def test_a_folder_is_read_in_order_and_repeated(tmp_path: Path) -> None:
+    """Images are sorted by name, and other files ignored."""
     for name, value in (("b.jpg", 90), ("a.jpg", 10), ("c.JPEG", 200)):
         (tmp_path / name).write_bytes(_jpeg(value))
     (tmp_path / "notes.txt").write_text("no picture")
@@ -88,8 +88,8 @@ def test_folder_is_read_in_order_and_again(tmp_path: Path) -> None:
     assert "closed" in _ends_when_closed(camera, camera.read)
 
 
-def test_bad_file_is_named_and_left_out(tmp_path: Path) -> None:
-    """One broken picture does not end a drive."""
+def test_a_bad_file_is_named_and_skipped(tmp_path: Path) -> None:
+    """One broken image raises an error, and the next read continues."""
     (tmp_path / "a.jpg").write_bytes(b"broken")
     (tmp_path / "b.jpg").write_bytes(_jpeg(90))
     camera = open_camera(_plan("file", path=str(tmp_path)))
@@ -99,7 +99,7 @@ def test_bad_file_is_named_and_left_out(tmp_path: Path) -> None:
 
 
 def test_folder_without_pictures_is_refused(tmp_path: Path) -> None:
-    """Or none at all."""
+    """An empty and a missing folder raise errors."""
     with pytest.raises(RobotError, match=r"no \.jpg"):
         open_camera(_plan("file", path=str(tmp_path)))
     with pytest.raises(RobotError, match="cannot be read"):
@@ -118,8 +118,8 @@ def _comment(jpeg: bytes, comment: bytes) -> bytes:
     return jpeg[:2] + b"\xff\xfe" + (len(comment) + 2).to_bytes(2, "big") + comment + jpeg[2:]
 
 
-def test_pipe_gives_the_newest_picture_and_its_time(fifo: Path) -> None:
-    """What has waited in the pipe is old."""
+def test_a_pipe_returns_the_newest_frame_and_its_time(fifo: Path) -> None:
+    """Older frames in the pipe are skipped, and garbage is reported."""
     camera = open_camera(_plan("pipe", path=str(fifo)))
     with fifo.open("wb", buffering=0) as writer:
         writer.write(
@@ -144,26 +144,26 @@ def test_pipe_gives_the_newest_picture_and_its_time(fifo: Path) -> None:
     camera.close()
 
 
-def test_pictures_that_waited_in_the_pipe_are_left_out(fifo: Path) -> None:
-    """Without a time of their own they would all look as if they had just been taken."""
+def test_frames_queued_in_the_pipe_are_skipped(fifo: Path) -> None:
+    """Without a timestamp, queued frames would look new."""
     camera = open_camera(_plan("pipe", path=str(fifo)))
     noise = np.random.default_rng(1).integers(0, 256, (24, 32, 3), np.uint8)
     old = simplejpeg.encode_jpeg(noise, 95)
     with fifo.open("wb", buffering=0) as writer:
         fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, 1 << 18)
-        count = 150_000 // len(old)  # More than one read takes.
+        count = 150_000 // len(old)  # More than one read returns.
         writer.write(old * count + _jpeg(90) + _jpeg(20)[:100])
         assert camera.read().jpeg == _jpeg(90)
         writer.write(_jpeg(20)[100:])
         assert camera.read().jpeg == _jpeg(20)
         writer.write(_jpeg(30))
-    assert camera.read().jpeg == _jpeg(30)  # Its writer is gone, but it is the newest.
+    assert camera.read().jpeg == _jpeg(30)  # The writer closed, but this frame is new.
     with pytest.raises(RobotError, match="has ended"):
         camera.read()
 
 
-def test_program_that_is_ahead_is_caught_up_with(tmp_path: Path) -> None:
-    """The pictures that a program has sent while nobody read."""
+def test_frames_queued_by_a_program_are_skipped(tmp_path: Path) -> None:
+    """Frames that a program sent before the first read are skipped."""
     (tmp_path / "stream").write_bytes(_jpeg(10) * 90 + _jpeg(90))
     (tmp_path / "send.py").write_text(
         "import pathlib, sys, time\n"
@@ -177,13 +177,13 @@ def test_program_that_is_ahead_is_caught_up_with(tmp_path: Path) -> None:
 
 
 def test_closing_ends_a_read_that_waits_for_a_writer(fifo: Path) -> None:
-    """The daemon must be able to end."""
+    """`close` unblocks a read on a pipe without a writer."""
     camera = open_camera(_plan("pipe", path=str(fifo)))
     assert _ends_when_closed(camera, camera.read) == "The camera is closed."
 
 
-def test_file_of_pictures_is_read_in_order(tmp_path: Path) -> None:
-    """Nothing in it is newer than the rest."""
+def test_a_file_of_frames_is_read_in_order(tmp_path: Path) -> None:
+    """In a regular file, no frame is skipped."""
     file = tmp_path / "drive.mjpeg"
     file.write_bytes(b"".join(map(_jpeg, (10, 20, 30))))
     camera = open_camera(_plan("pipe", path=str(file)))
@@ -192,8 +192,8 @@ def test_file_of_pictures_is_read_in_order(tmp_path: Path) -> None:
         camera.read()
 
 
-def test_program_is_a_camera(tmp_path: Path) -> None:
-    """Such as rpicam-vid; it ends with the camera."""
+def test_a_program_as_a_camera(tmp_path: Path) -> None:
+    """A command such as rpicam-vid is started, and ends when the camera is closed."""
     (tmp_path / "a.jpg").write_bytes(_jpeg(90))
     script = f"import sys; sys.stdout.buffer.write(open('{tmp_path}/a.jpg','rb').read())"
     command = f'| {sys.executable} -c "{script}; sys.stdout.flush(); import time; time.sleep(60)"'
@@ -204,8 +204,8 @@ def test_program_is_a_camera(tmp_path: Path) -> None:
         open_camera(_plan("pipe", path="| no-such-program"))
 
 
-def test_upside_down_is_turned(tmp_path: Path) -> None:
-    """A camera that hangs from a roof."""
+def test_flip_rotates_frames(tmp_path: Path) -> None:
+    """With `flip`, frames are rotated by 180 degrees."""
     image = np.zeros((24, 32, 3), np.uint8)
     image[:12] = 255
     (tmp_path / "a.jpg").write_bytes(simplejpeg.encode_jpeg(image, 95))
@@ -215,7 +215,7 @@ def test_upside_down_is_turned(tmp_path: Path) -> None:
 
 
 class _Kernel:
-    """Answers a webcam's calls, with buffers in a file."""
+    """A fake of the ioctl calls of a webcam, with buffers in a file."""
 
     def __init__(self, path: Path, size: tuple[int, int] = (32, 24)) -> None:
         path.write_bytes(bytes(3 * mmap.PAGESIZE))
@@ -226,7 +226,7 @@ class _Kernel:
         self._queued: list[int] = []
 
     def ioctl(self, fd: int, call: int, data: Any) -> int:
-        """One call."""
+        """Handle one call."""
         self.calls.append(call)
         if call == api.SET_FORMAT:
             struct.pack_into("=II", data, 8, *self._size)
@@ -248,7 +248,7 @@ class _Kernel:
 
 
 def test_structures_have_the_kernels_sizes() -> None:
-    """Their sizes are part of the calls' numbers."""
+    """The sizes of structures are part of the ioctl numbers."""
     assert len(api.Buffer(0).pack()) == (api.QUEUE >> 16) & 0x3FFF == 88
     assert len(api.pixel_format(1, 1)) == (api.SET_FORMAT >> 16) & 0x3FFF == 208
     assert len(api.frame_rate(1.0)) == (api.SET_PARAMETERS >> 16) & 0x3FFF == 204
@@ -257,8 +257,8 @@ def test_structures_have_the_kernels_sizes() -> None:
     assert api.Buffer.unpack(buffer.pack()) == buffer
 
 
-def test_webcam_gives_the_newest_picture_and_the_kernels_time(tmp_path: Path) -> None:
-    """Over a fake of the kernel; no camera was at hand."""
+def test_a_webcam_returns_the_newest_frame_and_the_kernels_time(tmp_path: Path) -> None:
+    """Older and damaged buffers are skipped (with a fake kernel)."""
     kernel = _Kernel(tmp_path / "video0")
     camera = V4l2(_plan("v4l2", device=str(tmp_path / "video0")), kernel.ioctl)
     assert kernel.calls[-1] == api.STREAM_ON
@@ -276,8 +276,8 @@ def test_webcam_gives_the_newest_picture_and_the_kernels_time(tmp_path: Path) ->
         camera.read()
 
 
-def test_webcam_without_the_size_is_refused(tmp_path: Path) -> None:
-    """With the command that lists its sizes."""
+def test_a_webcam_without_the_frame_size_is_refused(tmp_path: Path) -> None:
+    """The error names the command that lists the sizes."""
     kernel = _Kernel(tmp_path / "video0", size=(640, 480))
     with pytest.raises(RobotError, match="list-formats-ext"):
         V4l2(_plan("v4l2", device=str(tmp_path / "video0")), kernel.ioctl)
@@ -286,7 +286,7 @@ def test_webcam_without_the_size_is_refused(tmp_path: Path) -> None:
 
 
 class _Request:
-    """As `picamera2.request.CompletedRequest`."""
+    """Fake of `picamera2.request.CompletedRequest`."""
 
     def __init__(self, image: np.ndarray) -> None:
         self._image = image
@@ -304,7 +304,7 @@ class _Request:
 
 
 class _Picamera2:
-    """As `picamera2.Picamera2`: the signatures are those of its source (raspberrypi/picamera2)."""
+    """Fake of `picamera2.Picamera2`, with the signatures of its source (raspberrypi/picamera2)."""
 
     made: list[_Picamera2] = []  # noqa: RUF012  (reset by the fixture)
 
@@ -362,7 +362,7 @@ class _Picamera2:
 
 
 class _Transform:
-    """As `libcamera.Transform`."""
+    """Fake of `libcamera.Transform`."""
 
     def __init__(
         self, rotation: int = 0, hflip: int = 0, vflip: int = 0, transpose: int = 0
@@ -372,7 +372,7 @@ class _Transform:
 
 @pytest.fixture
 def picamera2(monkeypatch: pytest.MonkeyPatch) -> type[_Picamera2]:
-    """A Pi with the camera's packages."""
+    """Fake packages of a Pi camera."""
     for name, attribute, value in (
         ("picamera2", "Picamera2", _Picamera2),
         ("libcamera", "Transform", _Transform),
@@ -385,7 +385,7 @@ def picamera2(monkeypatch: pytest.MonkeyPatch) -> type[_Picamera2]:
 
 
 def test_pi_camera_gives_jpeg_with_the_sensors_time(picamera2: type[_Picamera2]) -> None:
-    """Over a recording fake; no camera was at hand."""
+    """Frames are JPEG with the sensor's timestamp, and requests are released (with a fake)."""
     plan = CameraPlan("picamera2", (32, 24), 25.0, 80, flip=True, settings={"number": 0})
     camera = open_camera(plan)
     fake = picamera2.made[0]
@@ -407,8 +407,8 @@ def test_pi_camera_gives_jpeg_with_the_sensors_time(picamera2: type[_Picamera2])
         camera.read()
 
 
-def test_pi_camera_that_hangs_or_changes_its_size_says_so(picamera2: type[_Picamera2]) -> None:
-    """And gives its buffer back all the same."""
+def test_a_pi_camera_that_hangs_or_changes_its_size_raises(picamera2: type[_Picamera2]) -> None:
+    """Requests are released also after an error."""
     camera = open_camera(_plan("picamera2", number=0))
     picamera2.made[0].image = np.zeros((48, 64, 3), np.uint8)
     with pytest.raises(RobotError, match="64 by 48"):
@@ -419,14 +419,14 @@ def test_pi_camera_that_hangs_or_changes_its_size_says_so(picamera2: type[_Picam
         camera.read()
 
 
-def test_pi_camera_that_is_not_there_is_named(picamera2: type[_Picamera2]) -> None:
-    """With the command that lists what there is."""
+def test_a_missing_pi_camera_is_named(picamera2: type[_Picamera2]) -> None:
+    """The error names the command that lists cameras."""
     with pytest.raises(RobotError, match=r"no camera 1.*rpicam-hello"):
         open_camera(_plan("picamera2", number=1))
 
 
-def test_missing_picamera2_is_told_how_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is not on PyPI in a form that works."""
+def test_missing_picamera2_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error explains how to install it, since PyPI has no working release."""
     monkeypatch.setitem(sys.modules, "libcamera", None)
     with pytest.raises(RobotError, match=r"apt install python3-picamera2.*--system-site-packages"):
         open_camera(_plan("picamera2", number=0))

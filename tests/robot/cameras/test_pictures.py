@@ -1,4 +1,4 @@
-"""Barcodes, checks and streams of pictures, without a camera."""
+"""Barcodes, checks and streams of frames, without a camera."""
 
 from typing import Any
 
@@ -46,7 +46,7 @@ def _with_comment(jpeg: bytes, comment: bytes) -> bytes:
 def test_barcode_survives_jpeg(
     number: int, size: tuple[int, int], quality: int, subsampling: str
 ) -> None:
-    """Over a picture of noise, which is the worst."""
+    """The barcode is read back after JPEG compression, even over noise."""
     image = _picture(*size)
     below = image[barcode_rows(size[0]) :].copy()
     draw_barcode(image, number)
@@ -57,39 +57,39 @@ def test_barcode_survives_jpeg(
 
 
 @pytest.mark.parametrize("value", [0, 255])
-def test_plain_picture_has_no_barcode(value: int) -> None:
-    """A dark room is not time zero."""
+def test_a_plain_image_has_no_barcode(value: int) -> None:
+    """A uniform image does not decode as a number."""
     assert read_barcode(np.full((120, 160, 3), value, np.uint8)) is None
 
 
-def test_noise_has_hardly_ever_a_barcode() -> None:
-    """16 bits of check let one in 65536 through."""
+def test_noise_rarely_has_a_barcode() -> None:
+    """A 16-bit checksum accepts one random image in 65536."""
     assert [read_barcode(_picture()) for _ in range(100)] == [None] * 100
 
 
 def test_barcode_that_does_not_fit_is_refused() -> None:
-    """A cell of less than three pixels would not survive."""
+    """Cells narrower than three pixels would not survive compression."""
     with pytest.raises(ValueError, match="not 64 by 48"):
         draw_barcode(_picture(64, 48), 1)
     assert read_barcode(_picture(64, 48)) is None
 
 
-def test_picture_of_the_wrong_size_is_named() -> None:
-    """The client has made room for another one."""
+def test_a_frame_of_the_wrong_size_is_refused() -> None:
+    """The error gives the actual and the expected size."""
     check_jpeg(_jpeg(), (32, 24))
     with pytest.raises(RobotError, match="32 by 24 pixels; the profile sets 160 by 120"):
         check_jpeg(_jpeg(), (160, 120))
 
 
 @pytest.mark.parametrize("data", [b"", b"no picture", _jpeg()[:-2], b"\xff\xd8 and \xff\xd9"])
-def test_garbage_is_no_picture(data: bytes) -> None:
-    """Also one that has the first and last bytes of a picture."""
+def test_invalid_jpeg_is_refused(data: bytes) -> None:
+    """Includes data with the markers of a JPEG at its ends."""
     with pytest.raises(RobotError, match=r"(incomplete|invalid) JPEG"):
         check_jpeg(data, (32, 24))
 
 
-def test_frame_that_is_missing_a_part_is_not_turned() -> None:
-    """Its missing blocks would become grey, and the new JPEG would look complete."""
+def test_a_truncated_frame_is_not_rotated() -> None:
+    """Rotating would re-encode it as a valid JPEG with grey blocks."""
     jpeg = simplejpeg.encode_jpeg(_picture(), 80, colorsubsampling="420")
     broken = jpeg[: len(jpeg) // 2] + b"\xff\xd9"
     with pytest.raises(RobotError, match="cannot be decoded"):
@@ -99,7 +99,7 @@ def test_frame_that_is_missing_a_part_is_not_turned() -> None:
 
 @pytest.mark.parametrize("flip", [False, True])
 def test_a_frame_is_decoded_once(flip: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From the camera's data to the daemon, upside down or not."""
+    """One decode serves rotation and all checks."""
     decoded: list[bytes] = []
     decode = simplejpeg.decode_jpeg
 
@@ -115,8 +115,8 @@ def test_a_frame_is_decoded_once(flip: bool, monkeypatch: pytest.MonkeyPatch) ->
     assert frame.encoded_here is flip
 
 
-def test_same_bytes_are_not_a_new_picture() -> None:
-    """A camera that has frozen goes on sending."""
+def test_repeated_bytes_are_not_a_new_frame() -> None:
+    """A frozen camera repeats its last frame."""
     detector = FreezeDetector()
     assert [detector.is_new(_jpeg(v)) for v in (1, 1, 2, 2, 1)] == [True, False, True, False, True]
 
@@ -127,8 +127,8 @@ def _turned(jpeg: bytes, quality: int) -> bytes:
     return checked_frame(jpeg, 0, plan).jpeg
 
 
-def test_turned_twice_is_as_before() -> None:
-    """Up to what JPEG loses."""
+def test_rotating_twice_restores_the_image() -> None:
+    """Two rotations are the identity, up to JPEG loss."""
     image = np.zeros((24, 32, 3), np.uint8)
     image[:8, :8] = 255
     jpeg = simplejpeg.encode_jpeg(image, 95)
@@ -140,8 +140,8 @@ def test_turned_twice_is_as_before() -> None:
 
 
 @given(values=st.lists(st.integers(0, 255), min_size=1, max_size=5), cut=st.integers(1, 400))
-def test_stream_may_be_cut_anywhere(values: list[int], cut: int) -> None:
-    """A pipe gives what it has."""
+def test_a_stream_is_split_for_any_chunk_size(values: list[int], cut: int) -> None:
+    """Frames are found wherever reads cut the stream."""
     pictures = [_jpeg(value) for value in values]
     stream = b"".join(pictures)
     splitter = JpegSplitter()
@@ -154,8 +154,8 @@ def test_stream_may_be_cut_anywhere(values: list[int], cut: int) -> None:
 
 
 @given(garbage=st.binary(max_size=200), data=st.data())
-def test_stream_goes_on_after_garbage(garbage: bytes, data: st.DataObject) -> None:
-    """Whatever it was, pictures come again; and never without an end."""
+def test_a_stream_recovers_after_garbage(garbage: bytes, data: st.DataObject) -> None:
+    """After any garbage, later frames are found, and the splitter ends."""
     picture = _jpeg()
     splitter = JpegSplitter()
     splitter.feed(picture[: data.draw(st.integers(0, len(picture)))] + garbage)
@@ -168,7 +168,7 @@ def test_stream_goes_on_after_garbage(garbage: bytes, data: st.DataObject) -> No
             continue
         if found[-1] is None:
             break
-    assert found.count(picture) >= 1 or found == [None]  # A broken length may swallow some.
+    assert found.count(picture) >= 1 or found == [None]  # A damaged length may skip some.
     splitter.feed(picture * 400)
     for _ in range(5000):
         try:
@@ -181,8 +181,8 @@ def test_stream_goes_on_after_garbage(garbage: bytes, data: st.DataObject) -> No
     assert found.count(picture) >= 1
 
 
-def test_stream_without_end_is_cut_off() -> None:
-    """4 MiB, and no more memory."""
+def test_an_endless_frame_is_refused() -> None:
+    """A frame of more than 4 MiB raises an error and frees its memory."""
     splitter = JpegSplitter()
     splitter.feed(_jpeg()[:-2] + bytes(4 * 1024 * 1024))
     with pytest.raises(RobotError, match="more than"):
@@ -191,8 +191,8 @@ def test_stream_without_end_is_cut_off() -> None:
     assert splitter.next() == _jpeg(7)
 
 
-def test_time_of_capture_is_in_the_comment() -> None:
-    """And only there."""
+def test_the_capture_time_is_read_from_the_comment() -> None:
+    """Missing and malformed comments give None."""
     assert captured_ns_of(_with_comment(_jpeg(), b"captured_ns=1234567890123")) == 1234567890123
     assert captured_ns_of(_with_comment(_jpeg(), b"captured_ns=soon")) is None
     assert captured_ns_of(_with_comment(_jpeg(), b"x" * 100)) is None

@@ -1,4 +1,4 @@
-"""Console in a browser, with the twin's pins."""
+"""The console in a browser, and the outputs of its robot."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _PROVOKED: Final = ("net::ERR_", "WebSocket connection to")
 
 
 class Console:
-    """A page in a browser of its own.
+    """A page of the console in its own browser context.
 
     Args:
         browser: The browser.
@@ -48,7 +48,7 @@ class Console:
 
     Attributes:
         page: The page.
-        errors: Errors of its scripts and of the browser, such as a breach of the policy.
+        errors: Errors of its scripts and of the browser, such as policy violations.
         requested: The addresses that it requested.
     """
 
@@ -68,7 +68,7 @@ class Console:
         self.errors: list[str] = []
         self.requested: list[str] = []
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("console", lambda said: self._hear(said.type, said.text))
+        self.page.on("console", lambda message: self._on_console(message.type, message.text))
         self.page.on("request", lambda request: self.requested.append(request.url))
         if script:
             self.page.add_init_script(script)
@@ -85,7 +85,7 @@ class Console:
         """Close the page."""
         self._context.close()
 
-    def _hear(self, kind: str, text: str) -> None:
+    def _on_console(self, kind: str, text: str) -> None:
         if kind == "error" and not any(words in text for words in _PROVOKED):
             self.errors.append(text)
 
@@ -109,7 +109,7 @@ class Console:
         raise AssertionError("The robot was not armed, though E was pressed.")
 
     def drive(self, key: str, pins: Pins, way: float = 0.0) -> None:
-        """Hold a key until the robot was propelled, in a direction (the sign of `way`) or in any.
+        """Hold a key until the robot moves, in the direction of the sign of `way` or in any.
 
         On a busy machine the page may receive nothing for so long that the key must be pressed
         again.
@@ -156,7 +156,7 @@ class Console:
 
 
 class Pins:
-    """Outputs of a robot's twin, by its ledger alone.
+    """Outputs of a robot's twin, read from its ledger.
 
     Unlike `read_ledger` this reads each line once, because it is called often and the ledger of a
     shared robot gets long.
@@ -184,7 +184,7 @@ class Pins:
         self._pushes = [now] if now else []
 
     def await_motion(self, way: float = 0.0) -> None:
-        """Wait until the robot was propelled, in a direction (the sign of `way`) or in any."""
+        """Wait until the robot moves, in the direction of the sign of `way` or in any."""
         until(lambda: self.moves(way), 60.0)
 
     def moves(self, way: float = 0.0) -> bool:

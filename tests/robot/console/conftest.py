@@ -52,7 +52,7 @@ def car(served_car: RunningRobot) -> RunningRobot:
 
 @pytest.fixture
 def hasty_car(tmp_path: Path) -> Iterator[RunningRobot]:
-    """The same in real time, which does not wait for a page."""
+    """The same car in real time."""
     with _served(tmp_path, "real") as robot:
         yield robot
 

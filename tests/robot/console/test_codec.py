@@ -54,7 +54,7 @@ def _again(console: Console, *packed: bytes) -> list[str]:
 
 
 def test_every_value_survives_a_round_trip(car: RunningRobot, visit: Visit) -> None:
-    """Integers, texts, bytes, arrays and maps of every width, exactly."""
+    """Integers, strings, bytes, arrays and maps of every width round-trip exactly."""
     console = visit(car, key="")
     packed = [msgspec.msgpack.encode(value) for value in _VALUES if abs(_number(value)) < 2**64]
     for one, text in zip(packed, _again(console, *packed), strict=True):
@@ -65,21 +65,21 @@ def test_every_value_survives_a_round_trip(car: RunningRobot, visit: Visit) -> N
 def test_messages_of_both_sides_are_decoded(car: RunningRobot, visit: Visit) -> None:
     """The robot decodes the page's messages, and the page the robot's."""
     console = visit(car, key="")
-    said = [
+    sent = [
         m.Hello(version=m.VERSION, proof=b"x" * 32, name="Ada", role="person"),
         m.Command(seq=2**53, answers=1, values=(0.25, -1.0), scale=1.0),
         m.Arm(answers=3, emergency=2),
         m.EmergencyStop(reason="Space was pressed."),
     ]
-    back = _again(console, *(m.encode(each) for each in said))
-    assert [m.decode_client_message(base64.b64decode(each)) for each in back] == said
+    back = _again(console, *(m.encode(each) for each in sent))
+    assert [m.decode_client_message(base64.b64decode(each)) for each in back] == sent
     pong = m.Pong(token=1, now_ns=2**62 + 1)
     (text,) = _again(console, m.encode(pong))
     assert m.decode_robot_message(base64.b64decode(text)) == pong
 
 
 def test_broken_bytes_are_refused(car: RunningRobot, visit: Visit) -> None:
-    """Cut off, too long, too deep, or of an unknown type."""
+    """Truncated, oversized, too deeply nested and unknown values raise RangeError."""
     console = visit(car, key="")
     whole = m.encode(m.Pong(token=1, now_ns=2**40))
     broken = [whole[:-1], whole + b"\xc0", b"", b"\x91" * 100 + b"\xc0", b"\xc1", b"\xd4\x00\x00"]
@@ -88,7 +88,7 @@ def test_broken_bytes_are_refused(car: RunningRobot, visit: Visit) -> None:
 
 
 def test_the_page_computes_the_robots_proof(car: RunningRobot, visit: Visit) -> None:
-    """For keys as people write them, with and without a certificate."""
+    """Proofs match for keys in any notation, with and without a certificate."""
     console = visit(car, key="")
     cases = [(new_key(), bytes(range(32)), certificate) for certificate in (b"", b"\x01" * 32)]
     for key, nonce, certificate in cases:
@@ -106,7 +106,7 @@ def test_the_page_computes_the_robots_proof(car: RunningRobot, visit: Visit) -> 
 
 
 def test_the_page_has_the_version_of_the_robot(car: RunningRobot, visit: Visit) -> None:
-    """Another version would be refused."""
+    """Page and robot use the same protocol version."""
     console = visit(car, key="")
     version = "async () => (await import('/console/link.js')).VERSION"
     assert console.page.evaluate(version) == m.VERSION

@@ -38,8 +38,8 @@ def test_the_live_picture_changes(car: RunningRobot, visit: Visit) -> None:
     until(lambda: console.pixels() != before, 60.0)
 
 
-def test_a_key_moves_the_pins_until_it_is_let_go(car: RunningRobot, visit: Visit) -> None:
-    """In both directions; they rest at once after key-up."""
+def test_a_key_drives_until_it_is_released(car: RunningRobot, visit: Visit) -> None:
+    """Outputs rest after key-up, in both directions."""
     console, pins = visit(car), Pins(car)
     console.arm()
     for key, way in (("s", -1.0), ("ArrowDown", -1.0), ("w", 1.0)):
@@ -51,7 +51,7 @@ def test_a_key_moves_the_pins_until_it_is_let_go(car: RunningRobot, visit: Visit
 
 
 def test_a_page_that_loses_the_focus_stops_driving(car: RunningRobot, visit: Visit) -> None:
-    """Held keys must be pressed again."""
+    """After a blur, held keys must be pressed again."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -65,7 +65,7 @@ def test_a_page_that_loses_the_focus_stops_driving(car: RunningRobot, visit: Vis
 
 
 def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> None:
-    """The person cannot see the robot."""
+    """A hidden page stops the robot, because the person cannot see it."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -84,7 +84,7 @@ def test_a_hidden_page_stops_and_disarms(car: RunningRobot, visit: Visit) -> Non
 def test_closing_the_tab_stops_the_robot_within_the_deadline(
     hasty_car: RunningRobot, visit: Visit, how: str
 ) -> None:
-    """In the ledger, counted from the last command, however the page ends."""
+    """However the page ends, outputs rest within the deadline of the last command."""
     console, pins = visit(hasty_car), Pins(hasty_car)
     console.arm()
     console.drive("w", pins)
@@ -126,8 +126,8 @@ def test_space_and_escape_stop_the_robot_with_any_focus(
     console.page.keyboard.up("w")
 
 
-def test_the_stop_button_stops_when_it_is_pressed_down(car: RunningRobot, visit: Visit) -> None:
-    """Not only when it is let go; the click that follows is not a second stop."""
+def test_the_stop_button_acts_on_pointer_down(car: RunningRobot, visit: Visit) -> None:
+    """The click that follows does not count as a second stop."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.drive("w", pins)
@@ -145,8 +145,8 @@ def test_the_stop_button_stops_when_it_is_pressed_down(car: RunningRobot, visit:
     console.stop()
 
 
-def test_a_mouse_and_a_finger_drive_with_the_stick(car: RunningRobot, visit: Visit) -> None:
-    """It springs back, and a finger on it does not scroll the page."""
+def test_the_stick_works_with_mouse_and_touch(car: RunningRobot, visit: Visit) -> None:
+    """The stick returns to the centre, and touching it does not scroll the page."""
     pins = Pins(car)
     for how in ({}, PHONE):
         console = visit(car, **how)
@@ -204,7 +204,7 @@ def test_a_gamepad_drives_once_its_sticks_have_been_at_rest(
 
 
 def test_tilting_a_phone_drives(car: RunningRobot, visit: Visit) -> None:
-    """Relative to how it is held at first: tilted away it drives forward."""
+    """Tilt is relative to the pose when it was enabled; tilting away drives forward."""
     console, pins = visit(car, **PHONE), Pins(car)
     console.arm()
     browser = console.page.context.new_cdp_session(console.page)

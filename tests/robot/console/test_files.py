@@ -11,8 +11,8 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.console import ENTRY, console_files
 
 
-def test_the_page_names_only_files_that_are_there() -> None:
-    """Scripts, styles and what they import."""
+def test_the_page_refers_only_to_existing_files() -> None:
+    """Scripts, styles and imports exist in the package."""
     files = console_files()
     for name, (_, body) in files.items():
         text = body.decode()
@@ -22,8 +22,8 @@ def test_the_page_names_only_files_that_are_there() -> None:
             assert path.rpartition("/")[2] in files, (name, path)
 
 
-def test_nothing_is_inline_and_nothing_comes_from_elsewhere() -> None:
-    """The policy would forbid it in a browser; this needs none."""
+def test_no_inline_code_and_no_external_resources() -> None:
+    """Checks statically what the content security policy enforces in a browser."""
     for name, (_, body) in console_files().items():
         text = body.decode()
         outside = set(re.findall(r"https?://[^\s\"'`)]+", text))
@@ -35,7 +35,7 @@ def test_nothing_is_inline_and_nothing_comes_from_elsewhere() -> None:
 
 
 def test_a_missing_page_is_an_error(tmp_path: Path) -> None:
-    """As after a failed installation."""
+    """A folder without index.html and a missing folder raise errors."""
     with pytest.raises(RobotError, match=r"has no index.html"):
         console_files(tmp_path)
     with pytest.raises(RobotError, match="Cannot read"):

@@ -24,7 +24,7 @@ Visit = Callable[..., Console]
 def test_without_the_key_only_the_form_and_the_name_are_shown(
     car: RunningRobot, visit: Visit
 ) -> None:
-    """The robot reveals nothing else."""
+    """Without a key the robot reveals its name, version and certificate only."""
     console = visit(car, key="")
     console.await_words("#robot", "test-car")
     assert console.page.locator("#key-form").is_visible()
@@ -33,14 +33,12 @@ def test_without_the_key_only_the_form_and_the_name_are_shown(
     trusting = ssl._create_unverified_context()
     url = f"{console.address}console/robot.json"
     with urllib.request.urlopen(url, context=trusting) as answer:
-        said = set(json.load(answer))
-    assert said == {"robot", "version", "certificate", "open"}
+        revealed = set(json.load(answer))
+    assert revealed == {"robot", "version", "certificate", "open"}
 
 
-def test_the_key_leaves_the_address_at_once_and_is_kept_only_if_asked(
-    car: RunningRobot, visit: Visit
-) -> None:
-    """No screenshot and no history shows the key."""
+def test_the_key_is_removed_from_the_address(car: RunningRobot, visit: Visit) -> None:
+    """The key is stored only on request, and "leave" deletes it."""
     console = visit(car)
     console.await_state(link="open", view="drive")
     assert console.page.url == console.address
@@ -56,7 +54,7 @@ def test_the_key_leaves_the_address_at_once_and_is_kept_only_if_asked(
 
 
 def test_a_wrong_key_is_an_error_and_keeps_the_form(car: RunningRobot, visit: Visit) -> None:
-    """For text that is not a key, and the key of another robot; then the right one connects."""
+    """Malformed and wrong keys show an error; the right key then connects."""
     console = visit(car, key="ABCD-EFGH")
     trouble = "#key-trouble"
     console.await_words(trouble, "A key has 26 letters and digits, got 8.")
@@ -77,15 +75,15 @@ def test_a_wrong_key_is_an_error_and_keeps_the_form(car: RunningRobot, visit: Vi
 
 
 def test_the_page_requests_only_the_robot(car: RunningRobot, visit: Visit) -> None:
-    """No outside resource; a breach of the policy would be an error of the page."""
+    """All requests go to the robot; a policy violation would be a page error."""
     console = visit(car)
     console.await_state(picture="live")
     assert console.requested
     assert all(url.startswith(console.address) for url in console.requested)
 
 
-def test_every_control_has_a_name_and_a_place(car: RunningRobot, visit: Visit) -> None:
-    """In the accessibility tree, with landmarks; STOP is first in the focus order."""
+def test_every_control_has_an_accessible_name(car: RunningRobot, visit: Visit) -> None:
+    """The accessibility tree has landmarks, and STOP is first in the focus order."""
     console = visit(car)
     console.await_state(picture="live")
     session = console.page.context.new_cdp_session(console.page)
@@ -109,10 +107,10 @@ def test_every_control_has_a_name_and_a_place(car: RunningRobot, visit: Visit) -
 
 
 @pytest.mark.parametrize("size", [DESK, PHONE, PHONE_ON_ITS_SIDE])
-def test_nothing_overlaps_and_targets_are_large(
+def test_controls_are_large_and_do_not_overlap(
     car: RunningRobot, visit: Visit, size: dict[str, Any]
 ) -> None:
-    """On a desktop and on a phone; nothing is wider than the screen."""
+    """On desktop and phone, targets are large enough and fit the screen width."""
     console = visit(car, **size)
     console.await_state(picture="live")
     page = console.page
@@ -138,7 +136,7 @@ def test_nothing_overlaps_and_targets_are_large(
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_texts_have_enough_contrast(car: RunningRobot, visit: Visit, scheme: str) -> None:
-    """At least 4.5 between each text and its background (WCAG 2.2, 1.4.3)."""
+    """The contrast of each text is at least 4.5 (WCAG 2.2, 1.4.3)."""
     console = visit(car, color_scheme=scheme, reduced_motion="reduce")
     console.await_state(picture="live")
     poor = console.page.evaluate(
@@ -168,7 +166,7 @@ def test_texts_have_enough_contrast(car: RunningRobot, visit: Visit, scheme: str
 
 
 def test_reduced_motion_stops_all_animations(car: RunningRobot, visit: Visit) -> None:
-    """Only the picture moves."""
+    """No animation runs with prefers-reduced-motion."""
     console = visit(car, reduced_motion="reduce")
     console.await_state(link="open", view="drive")
     console.page.evaluate("document.body.dataset.recording = 'true'")
@@ -176,7 +174,7 @@ def test_reduced_motion_stops_all_animations(car: RunningRobot, visit: Visit) ->
 
 
 def test_a_file_that_fails_to_load_is_requested_again(chromium: Browser, car: RunningRobot) -> None:
-    """The page is reloaded, and still has the key."""
+    """The page reloads itself and keeps the key."""
     context = chromium.new_context(ignore_https_errors=True)
     page = context.new_page()
     lost: list[str] = []

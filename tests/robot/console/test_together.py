@@ -45,7 +45,7 @@ def _program(car: RunningRobot, throttle: float) -> Generator[threading.Event]:
 
     def run() -> None:
         with car.client(name="Expert", frames=False) as client:
-            until(lambda: _is_given(client), 60.0)
+            until(lambda: _takes(client), 60.0)
             seen = client.ask().message
             with contextlib.suppress(LinkError):
                 client.arm()
@@ -66,18 +66,16 @@ def _program(car: RunningRobot, throttle: float) -> Generator[threading.Event]:
         thread.join()
 
 
-def _is_given(client: RobotClient) -> bool:
-    """Return True once a program gets control, after the robot noticed that a page has left."""
+def _takes(client: RobotClient) -> bool:
+    """Try to take control, and return whether it was granted."""
     with contextlib.suppress(RobotRefused):
         client.take()
         return True
     return False
 
 
-def test_a_second_person_cannot_take_the_robot_from_the_first(
-    car: RunningRobot, visit: Visit
-) -> None:
-    """The second one sees who has control, and can stop the robot."""
+def test_a_second_person_cannot_take_control(car: RunningRobot, visit: Visit) -> None:
+    """The second person sees who has control, and can stop the robot."""
     first, second, pins = visit(car), visit(car), Pins(car)
     first.arm()
     second.await_state(link="open", driver="person")
@@ -93,7 +91,7 @@ def test_a_second_person_cannot_take_the_robot_from_the_first(
 
 
 def test_a_person_takes_over_from_a_program_by_driving(car: RunningRobot, visit: Visit) -> None:
-    """At once and without arming again; the page shows what the program suggests."""
+    """Control changes without rearming, and the page shows the program's suggestion."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.page.keyboard.press("x")
@@ -117,7 +115,7 @@ def test_a_person_takes_over_from_a_program_by_driving(car: RunningRobot, visit:
 def test_a_slow_page_stops_its_robot_and_delays_no_other_client(
     hasty_car: RunningRobot, visit: Visit
 ) -> None:
-    """Its main thread hangs for two seconds; afterwards held keys must be pressed again."""
+    """While the page's main thread hangs, the robot stops and other clients are served."""
     console, pins = visit(hasty_car), Pins(hasty_car)
     console.arm()
     console.drive("w", pins)
@@ -151,7 +149,7 @@ def test_a_slow_page_stops_its_robot_and_delays_no_other_client(
 def test_a_page_reconnects_after_a_restart_and_moves_nothing(
     chromium: Browser, tmp_path: Path
 ) -> None:
-    """It reports the loss, reconnects by itself, and waits to be armed."""
+    """The page reports the loss, reconnects, and waits to be armed."""
     with socket.create_server(("127.0.0.1", 0)) as found:
         port = found.getsockname()[1]
     arguments = (*IN_A_ROOM, "--port", str(port))
@@ -180,10 +178,8 @@ def test_a_page_reconnects_after_a_restart_and_moves_nothing(
         console.stop()
 
 
-def test_a_drive_is_recorded_marked_undone_browsed_and_judged(
-    car: RunningRobot, visit: Visit, recordings: Path
-) -> None:
-    """The steps and frames are on the robot's disk, and the page shows them again."""
+def test_recording_a_drive(car: RunningRobot, visit: Visit, recordings: Path) -> None:
+    """Record, mark, undo, browse and judge an episode from the page."""
     console, pins = visit(car), Pins(car)
     console.arm()
     console.page.keyboard.press("r")
@@ -226,8 +222,8 @@ def test_a_drive_is_recorded_marked_undone_browsed_and_judged(
     console.await_state(robot="emergency")
 
 
-def test_a_finger_is_driven_by_sliders_that_hold(chromium: Browser, tmp_path: Path) -> None:
-    """Each of the seven tendons starts where it is, and follows its slider."""
+def test_sliders_drive_a_finger(chromium: Browser, tmp_path: Path) -> None:
+    """Each tendon starts at its present value, and follows and holds its slider."""
     (tmp_path / "finger.toml").write_text((_SHIPPED / "finger-pwm.toml").read_text())
     with (
         run_robot(tmp_path / "finger.toml", folder=tmp_path, arguments=IN_A_ROOM) as robot,

@@ -16,7 +16,7 @@ from tests.robot.daemon.plans import guard_state
 
 
 class FakeGuard:
-    """The guard's end of the socket: it applies orders at once, and answers with its state."""
+    """The guard's end of the socket, which applies orders and replies with its state."""
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -51,10 +51,10 @@ class FakeGuard:
                 return
             order = decode_order(data)
             self.orders.append(order)
-            self._obey(order)
-        self.say()
+            self._apply(order)
+        self.send()
 
-    def say(self, **changes: Any) -> None:
+    def send(self, **changes: Any) -> None:
         """Send the state."""
         self.state = dataclasses.replace(self.state, at_ns=self._now_ns(), **changes)
         self._socket.send(encode(self.state))
@@ -64,7 +64,7 @@ class FakeGuard:
         """Return the kinds of the orders so far."""
         return [order.kind for order in self.orders]
 
-    def _obey(self, order: Order) -> None:
+    def _apply(self, order: Order) -> None:
         changes: dict[str, Any] = {}
         rest = {"applied": (0.0, 0.0), "applied_seq": None}
         may_arm = order.person or not self.state.emergency
@@ -99,7 +99,7 @@ class FakeCamera:
         self._frames: queue.Queue[Frame | str | int] = queue.Queue()
 
     def open(self, plan: CameraPlan) -> FakeCamera:
-        """Stand in for `open_camera`."""
+        """Replace `open_camera`."""
         self.opened += 1
         return self
 
@@ -128,7 +128,7 @@ class FakeCamera:
 
 
 class SteppedClock:
-    """Clock that moves in steps, as a twin's."""
+    """A clock that moves in steps, as that of a twin does."""
 
     def __init__(self) -> None:
         self.ns = 1_000_000_000
@@ -141,7 +141,7 @@ class SteppedClock:
         return self.ns
 
     def wait(self, readable: Any, until_ns: int, at_most_s: float) -> bool:
-        """Not used by the daemon."""
+        """Raise, since the daemon does not use it."""
         raise NotImplementedError
 
     async def sleep(self, seconds: float) -> int | None:

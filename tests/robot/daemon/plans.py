@@ -1,4 +1,4 @@
-"""Plan, frames and guard states of a car, for tests of the daemon."""
+"""Plan, frames and guard states of a car, for the tests of the daemon."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def car_plan(**changes: Any) -> DaemonPlan:
 def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:
     """Return a JPEG that differs from that of every other number."""
     rng = np.random.default_rng(number)
-    # Coarse blocks, as a street has them, and not noise, which no JPEG is small for.
+    # Coarse blocks, since noise does not compress.
     coarse = rng.integers(0, 256, (size[1] // 8, size[0] // 8, 3), dtype=np.uint8)
     return simplejpeg.encode_jpeg(coarse.repeat(8, 0).repeat(8, 1), quality=80)
 

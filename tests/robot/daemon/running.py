@@ -1,4 +1,4 @@
-"""A daemon in this process on real sockets, and a client of raw messages."""
+"""A daemon in this process on real sockets, and a client that sends raw messages."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ async def until(condition: Callable[[], object], what: str) -> None:
 
 
 class Client:
-    """Client that sends exactly what a test asks for."""
+    """A client that sends exactly what a test asks for."""
 
     def __init__(self, socket: aiohttp.ClientWebSocketResponse, certificate: bytes) -> None:
         self.socket = socket
         self.certificate = certificate
-        self.heard: list[RobotMessage] = []
+        self.received: list[RobotMessage] = []
 
-    async def say(self, message: ClientMessage) -> None:
+    async def send(self, message: ClientMessage) -> None:
         """Send a message."""
         await self.socket.send_bytes(encode(message))
 
@@ -73,23 +73,23 @@ class Client:
             message = await self.socket.receive()
         if message.type is not aiohttp.WSMsgType.BINARY:
             return None
-        heard = decode_robot_message(message.data)
-        self.heard.append(heard)
-        return heard
+        received = decode_robot_message(message.data)
+        self.received.append(received)
+        return received
 
     async def expect(self, kind: type[_M]) -> _M:
         """Return the next message of a type, and skip others."""
-        while (message := await self.hear()) is not None:
+        while (message := await self.receive()) is not None:
             if isinstance(message, kind):
                 return message
-        raise AssertionError(f"The robot closed without a {kind.__name__}: {self.heard}")
+        raise AssertionError(f"The robot closed without a {kind.__name__}: {self.received}")
 
     async def closed_with(self) -> str:
         """Return the reason with which the robot closes the connection."""
         refused = await self.expect(Refused)
         while not refused.fatal:
             refused = await self.expect(Refused)
-        assert await self.hear() is None
+        assert await self.receive() is None
         return refused.reason
 
     async def greet(self, key: bytes = b"", **hello: Any) -> Welcome:
@@ -97,12 +97,12 @@ class Client:
         challenge = await self.expect(Challenge)
         role = hello.setdefault("role", "program")
         proof = make_proof(key, challenge.nonce, self.certificate, role)
-        await self.say(Hello(**({"version": VERSION, "proof": proof} | hello)))
+        await self.send(Hello(**({"version": VERSION, "proof": proof} | hello)))
         return await self.expect(Welcome)
 
     async def take(self) -> Lease:
         """Ask for control."""
-        await self.say(Take())
+        await self.send(Take())
         return await self.expect(Lease)
 
     async def obtain(self) -> None:
@@ -112,13 +112,13 @@ class Client:
 
     async def observe(self) -> Observation:
         """Ask for an observation."""
-        await self.say(Acknowledge())
+        await self.send(Acknowledge())
         return await self.expect(Observation)
 
     async def drive(self, seq: int, *values: float, answers: int | None = None) -> Observation:
         """Command in answer to a new observation."""
         seen = (await self.observe()).seq if answers is None else answers
-        await self.say(Command(seq=seq, answers=seen, values=values or (0.0, 0.5)))
+        await self.send(Command(seq=seq, answers=seen, values=values or (0.0, 0.5)))
         return await self.expect(Observation)
 
 
@@ -137,7 +137,7 @@ class Running:
     pictures: int = 0
 
     def show(self) -> None:
-        """Let the camera take a new picture."""
+        """Make the camera deliver a new frame."""
         self.pictures += 1
         self.camera.put(Frame(picture(self.pictures), self.clock.now_ns()))
 
@@ -166,7 +166,7 @@ class Running:
 
     @contextlib.asynccontextmanager
     async def idle(self, stranger: socket.socket) -> AsyncIterator[None]:
-        """Connect through the TLS handshake, and send nothing."""
+        """Complete the TLS handshake, and send nothing."""
         context = ssl.create_default_context()
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
         _, writer = await asyncio.open_connection(sock=stranger, ssl=context, server_hostname="x")
@@ -183,7 +183,7 @@ class Running:
     async def arm(self, client: Client, emergency: int = 0) -> None:
         """Send a request to arm in answer to a new observation."""
         seen = await client.observe()
-        await client.say(Arm(answers=seen.seq, emergency=emergency))
+        await client.send(Arm(answers=seen.seq, emergency=emergency))
 
     async def armed(self, client: Client) -> None:
         """Let a person take control and arm."""
@@ -204,13 +204,13 @@ async def running(
     guard = FakeGuard(clock.now_ns)
     if plan.clock == "real":
         guard.attach()
-    guard.say()
+    guard.send()
     ready, tell = os.pipe()
     daemon = process.Daemon(plan, clock, guard.daemon_fd, ready_fd=tell)
     task = asyncio.create_task(daemon.run())
     reading = asyncio.create_task(asyncio.to_thread(os.read, ready, 4096))
     await asyncio.wait((reading, task), return_when=asyncio.FIRST_COMPLETED)
-    if not reading.done():  # The daemon could not begin.
+    if not reading.done():  # The daemon failed to start.
         os.close(tell)
         await reading
         os.close(ready)

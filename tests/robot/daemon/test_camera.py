@@ -46,20 +46,20 @@ class Watched:
 
 @pytest.fixture
 def camera() -> FakeCamera:
-    """A camera that returns the frames that a test puts in."""
+    """A fake camera."""
     return FakeCamera()
 
 
 @pytest.fixture
 def watched(camera: FakeCamera) -> Iterator[Watched]:
-    """A reader of that camera."""
+    """A reader of the fake camera."""
     watched = Watched(camera)
     yield watched
     watched.reader.close()
 
 
 def test_valid_new_frames_are_accepted() -> None:
-    """In order of their capture times."""
+    """Frames with increasing capture times pass all checks."""
     checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
     assert checks.refusal(Frame(picture(2), 2)) == ""
@@ -81,7 +81,7 @@ GOOD = picture(3)
     ],
 )
 def test_invalid_frames_are_rejected(jpeg: bytes, captured_ns: int, words: str) -> None:
-    """With a reason; a rejected frame does not change the newest capture time."""
+    """A rejected frame does not change the newest capture time."""
     checks = FrameChecks(lambda: NOW_NS)
     assert checks.refusal(Frame(picture(1), 1)) == ""
     assert words in checks.refusal(Frame(jpeg, captured_ns))
@@ -103,7 +103,7 @@ def test_a_frozen_camera_delivers_nothing_and_is_reported_once(
 
 
 def test_a_camera_that_fails_is_reopened(camera: FakeCamera, watched: Watched) -> None:
-    """After a pause; failure and recovery are reported."""
+    """Failure and recovery are both reported."""
     camera.put(Frame(picture(1), 1))
     camera.fail("The camera was unplugged.")
     camera.put(Frame(picture(2), 2))
@@ -114,16 +114,16 @@ def test_a_camera_that_fails_is_reopened(camera: FakeCamera, watched: Watched) -
 def test_a_camera_that_cannot_be_opened_is_tried_again(
     camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The robot is served without frames meanwhile."""
+    """Meanwhile the robot is served without frames."""
     opens: list[int] = []
 
-    def reluctant(plan: CameraPlan) -> FakeCamera:
+    def fail_once(plan: CameraPlan) -> FakeCamera:
         opens.append(1)
         if len(opens) == 1:
             raise RobotError("No camera is connected.")
         return camera
 
-    monkeypatch.setattr(camera, "open", reluctant)
+    monkeypatch.setattr(camera, "open", fail_once)
     watched = Watched(camera)
     camera.put(Frame(picture(1), 1))
     watched.until(lambda: len(watched.frames) == 1)
@@ -132,7 +132,7 @@ def test_a_camera_that_cannot_be_opened_is_tried_again(
 
 
 def test_a_camera_that_sends_only_garbage_is_reopened(camera: FakeCamera, watched: Watched) -> None:
-    """After ten invalid frames in a row."""
+    """Ten invalid frames in a row reopen the camera."""
     for at in range(10):
         camera.put(Frame(b"garbage", at))
     camera.put(Frame(picture(1), 100))
@@ -142,7 +142,7 @@ def test_a_camera_that_sends_only_garbage_is_reopened(camera: FakeCamera, watche
 
 
 def test_closing_ends_a_camera_without_frames(watched: Watched) -> None:
-    """A camera that hangs must not keep the daemon from ending."""
+    """A camera that hangs does not keep the daemon from exiting."""
     watched.reader.close()
     assert not watched.reader._thread.is_alive()
     assert watched.reports == []

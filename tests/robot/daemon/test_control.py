@@ -1,4 +1,4 @@
-"""Control lease, and how long commands and suggestions are in force."""
+"""Control lease, and expiry of commands and suggestions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def held_by(client: ClientIdentity) -> ControlLease:
 
 
 def test_a_person_takes_control_from_a_program_at_once() -> None:
-    """The program that lost the lease is returned."""
+    """`take` returns the program that lost the lease."""
     lease = held_by(SAC)
     assert lease.refusal(ANN) == ""
     assert lease.take(ANN) == SAC
@@ -47,7 +47,7 @@ def test_no_other_client_takes_control(holder: ClientIdentity, other: ClientIden
 
 
 def test_taking_control_twice_changes_nothing() -> None:
-    """Commands on their way still belong to the lease."""
+    """The lease keeps its number, so commands in flight stay valid."""
     lease = held_by(SAC)
     assert lease.take(SAC) is None
     assert lease.number == 1
@@ -81,7 +81,7 @@ def test_there_is_one_holder_and_numbers_only_rise(moves: list[tuple[str, Client
 
 @given(ttl_ms=st.integers(1, 1_000), age_ms=st.integers(0, 1_200))
 def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: int) -> None:
-    """The limits are its own time to live and the robot's deadline."""
+    """A command expires at the earlier of its TTL and the robot's deadline."""
     now_ns = 0
     hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
     assert hub.commanded() == ()
@@ -96,7 +96,7 @@ def test_a_command_expires_at_the_shorter_of_both_limits(ttl_ms: int, age_ms: in
 
 
 def test_the_newest_suggestion_counts_until_it_expires() -> None:
-    """It replaces that of another client; its departure is tested in `test_session_stateful`."""
+    """A suggestion replaces that of another client, and expires after the deadline."""
     now_ns = 0
     hub = SessionHub(car_plan(deadline_ms=250), lambda: now_ns, lambda order: None)
     assert hub.suggested() is None

@@ -25,22 +25,22 @@ from tests.robot.daemon.plans import car_plan
 
 
 def test_credentials_are_made_once(tmp_path: Path) -> None:
-    """A second time they stay, since clients know them."""
+    """Existing credentials are kept, since clients have pinned them."""
     made = make_credentials(tmp_path / "car", "car")
     assert make_credentials(tmp_path / "car", "car") == made == load_credentials(tmp_path / "car")
     assert len(read_key(made.key_file)) == 16
 
 
-def test_only_the_owner_reads_them(tmp_path: Path) -> None:
-    """From the first moment on."""
+def test_only_the_owner_can_read_credentials(tmp_path: Path) -> None:
+    """Key files have mode 600, and their folder 700."""
     made = make_credentials(tmp_path / "a" / "car", "car")
     assert made.key_file.stat().st_mode & 0o777 == 0o600
     assert made.private_key.stat().st_mode & 0o777 == 0o600
     assert (tmp_path / "a" / "car").stat().st_mode & 0o777 == 0o700
 
 
-def test_the_certificate_is_what_it_should_be(tmp_path: Path) -> None:
-    """Its name, its curve and ten years, also where the clock is years behind."""
+def test_the_certificate_fields(tmp_path: Path) -> None:
+    """Name, fingerprint and validity; it is valid even if the robot's clock is years behind."""
     made = make_credentials(tmp_path, "my car")
     certificate = x509.load_pem_x509_certificate(made.certificate.read_bytes())
     assert certificate.subject.rfc4514_string() == "CN=my car"
@@ -50,23 +50,23 @@ def test_the_certificate_is_what_it_should_be(tmp_path: Path) -> None:
     assert made.fingerprint == fingerprint_of(der)
 
 
-def test_tls_is_the_newest(tmp_path: Path) -> None:
-    """Nothing below 1.3."""
+def test_tls_1_3_is_required(tmp_path: Path) -> None:
+    """The server context accepts TLS 1.3 only."""
     made = make_credentials(tmp_path, "car")
     context, fingerprint = server_tls(made.certificate, made.private_key)
     assert context.minimum_version is ssl.TLSVersion.TLSv1_3
     assert fingerprint == made.fingerprint
 
 
-def test_what_is_missing_is_said_with_the_way_out(tmp_path: Path) -> None:
-    """The message names the command that makes it."""
+def test_missing_credentials_name_the_command(tmp_path: Path) -> None:
+    """The error names the command that creates them."""
     with pytest.raises(RobotError, match="shapechanger robot init"):
         load_credentials(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["key", "certificate.key"])
 def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> None:
-    """The message has the command that fixes it."""
+    """The error gives the chmod command."""
     make_credentials(tmp_path, "car")
     (tmp_path / name).chmod(0o640)
     with pytest.raises(RobotError, match="chmod 600"):
@@ -74,8 +74,8 @@ def test_a_key_that_others_may_read_is_refused(tmp_path: Path, name: str) -> Non
 
 
 @pytest.mark.parametrize("name", ["key", "certificate.pem", "certificate.key"])
-def test_half_of_it_is_not_made_up(tmp_path: Path, name: str) -> None:
-    """The remaining file may have been copied."""
+def test_incomplete_credentials_are_not_completed(tmp_path: Path, name: str) -> None:
+    """If only some files exist, none is created."""
     make_credentials(tmp_path, "car")
     (tmp_path / name).unlink()
     with pytest.raises(RobotError, match="only some"):
@@ -93,8 +93,8 @@ def test_half_of_it_is_not_made_up(tmp_path: Path, name: str) -> None:
         ("certificate.pem", b"\xff"),
     ],
 )
-def test_garbage_is_refused(tmp_path: Path, name: str, garbage: bytes) -> None:
-    """The message names the file."""
+def test_malformed_credentials_are_refused(tmp_path: Path, name: str, garbage: bytes) -> None:
+    """The error names the file."""
     make_credentials(tmp_path, "car")
     (tmp_path / name).write_bytes(garbage)
     with pytest.raises(RobotError, match=name):
@@ -102,21 +102,23 @@ def test_garbage_is_refused(tmp_path: Path, name: str, garbage: bytes) -> None:
 
 
 def test_a_certificate_of_another_key_is_refused(tmp_path: Path) -> None:
-    """They must be a pair."""
+    """Certificate and private key must match."""
     one, two = (make_credentials(tmp_path / name, name) for name in ("one", "two"))
     with pytest.raises(RobotError, match="do not match"):
         server_tls(one.certificate, two.private_key)
 
 
-def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
-    """As for every error of the file system."""
+def test_a_folder_that_cannot_be_created_raises(tmp_path: Path) -> None:
+    """OutputError replaces the OSError."""
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="Cannot write"):
         make_credentials(tmp_path / "file" / "car", "car")
 
 
-def test_the_folder_follows_the_desktop(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """XDG_CONFIG_HOME, which counts only if it is absolute."""
+def test_the_folder_follows_xdg_config_home(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Relative values of XDG_CONFIG_HOME are ignored."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     assert credentials_folder("car") == tmp_path / "shapechanger/robots/car"
     monkeypatch.setenv("XDG_CONFIG_HOME", "relative")
@@ -124,14 +126,14 @@ def test_the_folder_follows_the_desktop(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 
 @pytest.mark.parametrize("name", ["", "..", ".hidden", "a/b", "a\0b"])
-def test_a_name_cannot_lead_elsewhere(name: str) -> None:
-    """It must be a valid folder name."""
+def test_a_name_cannot_leave_the_folder(name: str) -> None:
+    """The robot's name must be a valid folder name."""
     with pytest.raises(RobotError, match="valid folder name"):
         credentials_folder(name)
 
 
 def test_serving_other_machines_needs_a_key() -> None:
-    """Unless `insecure` is set."""
+    """Serving beyond loopback needs TLS and a key, or `insecure`."""
     check_exposure(car_plan(host="127.0.0.1"))
     check_exposure(car_plan(host="0.0.0.0", insecure=True))
     secured = {"certificate": "c", "private_key": "p", "key_file": "k"}
@@ -142,7 +144,7 @@ def test_serving_other_machines_needs_a_key() -> None:
 
 
 def test_reading_credentials_does_not_import_the_certificate_builder() -> None:
-    """It would cost the daemon 10 MB."""
+    """Importing `cryptography` would cost the daemon 10 MB."""
     script = (
         "import sys, shapechanger.robot.daemon.process; "
         "assert 'cryptography' not in sys.modules and 'gpiozero' not in sys.modules"

@@ -15,27 +15,27 @@ from tests.robot.daemon.plans import car_plan
 
 
 class FakeZeroconf:
-    """Remembers what was announced."""
+    """Records announced services."""
 
     def __init__(self) -> None:
         self.announced: list[Any] = []
         self.closed = False
 
     async def async_register_service(self, info: Any, allow_name_change: bool) -> None:
-        """Announce."""
+        """Record a service."""
         self.announced.append(info)
 
     async def async_unregister_all_services(self) -> None:
-        """Take it back."""
+        """Remove all services."""
         self.announced.clear()
 
     async def async_close(self) -> None:
-        """End."""
+        """Record the call."""
         self.closed = True
 
 
 def test_the_announcement_describes_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With all that `shapechanger robot find` shows."""
+    """The announcement has what `shapechanger robot find` shows."""
     fake = FakeZeroconf()
     monkeypatch.setattr(discovery, "AsyncZeroconf", lambda: fake)
 
@@ -62,7 +62,7 @@ def test_the_announcement_describes_the_robot(monkeypatch: pytest.MonkeyPatch) -
 def test_a_failed_announcement_is_only_a_warning(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The robot serves anyway."""
+    """The robot is served anyway."""
 
     def broken() -> None:
         raise OSError("Network is unreachable")

@@ -1,4 +1,4 @@
-"""Short run of `benchmarks/fuzz_link.py`."""
+"""A short run of `benchmarks/fuzz_link.py`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_mutated_messages_crash_nothing_and_move_nothing() -> None:
 
 
 def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The daemon answers with a reason or closes, and serves the next client."""
+    """The daemon refuses or closes, and serves the next client."""
     secret = tmp_path / "secret"
     secret.mkdir()
     (secret / "episode.json").write_text("{}")
@@ -45,7 +45,7 @@ def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch, tmp_pat
                 assert (await client.drive(1, 0.0, 0.5)).applied_seq == 1
             moving = [order for order in robot.guard.orders if order.kind == "command"]
             assert [order.values for order in moving] == [(0.0, 0.5)]
-            # A program records nothing, and writes nothing anywhere.
+            # Programs cannot record, so no file was written.
             assert [path.name for path in tmp_path.iterdir()] == ["secret"]
             assert [path.name for path in secret.iterdir()] == ["episode.json"]
 

@@ -1,4 +1,4 @@
-"""Link from the daemon to the guard."""
+"""The connection from the daemon to the guard."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.realtime
 
 
 class Ends:
-    """Both ends, and what was called."""
+    """Both ends of the connection, and the calls received."""
 
     def __init__(self) -> None:
         self.guard, daemon = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -26,8 +26,8 @@ class Ends:
         self.lost: list[bool] = []
         self.port = GuardLink(daemon.detach(), self.states.append, lambda: self.lost.append(True))
 
-    def heard(self) -> list[Order]:
-        """All orders that the guard can read now."""
+    def received(self) -> list[Order]:
+        """Return all orders that the guard can read now."""
         orders: list[Order] = []
         while True:
             try:
@@ -38,7 +38,7 @@ class Ends:
 
 @pytest.fixture
 def ends() -> Iterator[Ends]:
-    """Both ends."""
+    """Both ends of the connection."""
     ends = Ends()
     yield ends
     ends.port.close()
@@ -46,7 +46,7 @@ def ends() -> Iterator[Ends]:
 
 
 def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None:
-    """An invalid datagram costs only itself."""
+    """Only the invalid datagram is lost."""
     ends.guard.send(encode(guard_state(at_ns=1)))
     ends.guard.send(b"nonsense")
     ends.guard.send(b'{"at_ns": 3}')
@@ -55,8 +55,8 @@ def test_states_arrive_in_order_and_invalid_ones_are_skipped(ends: Ends) -> None
     assert [state.at_ns for state in ends.states] == [1, 4]
 
 
-def test_a_guard_that_is_gone_is_noticed_once(ends: Ends) -> None:
-    """By the end of the socket; later orders are dropped."""
+def test_a_lost_guard_is_reported_once(ends: Ends) -> None:
+    """The end of the socket is reported, and later orders are dropped."""
     ends.guard.close()
     ends.port.drain()
     ends.port.drain()
@@ -64,21 +64,21 @@ def test_a_guard_that_is_gone_is_noticed_once(ends: Ends) -> None:
     assert ends.lost == [True]
 
 
-def test_a_guard_that_is_gone_is_noticed_by_sending(ends: Ends) -> None:
-    """Before or after the end of the socket is read."""
+def test_a_lost_guard_is_detected_on_send(ends: Ends) -> None:
+    """Sending to a closed socket reports the loss."""
     ends.guard.close()
     ends.port.send(Order(kind="command"))
     assert ends.lost == [True]
 
 
 def test_a_full_socket_keeps_stops_and_drops_commands(ends: Ends) -> None:
-    """The guard reads a stop later, and no commands behind it."""
+    """Stops are queued and sent later; commands are dropped."""
 
     async def play() -> list[Order]:
         ends.port.attach(asyncio.get_running_loop())
         for seq in range(5_000):
             ends.port.send(Order(kind="command", seq=seq, values=(0.1,)))
-        before = [order.seq for order in ends.heard()]
+        before = [order.seq for order in ends.received()]
         assert before == list(range(len(before)))
         assert len(before) < 5_000
         for seq in range(5_000, 10_000):
@@ -88,15 +88,15 @@ def test_a_full_socket_keeps_stops_and_drops_commands(ends: Ends) -> None:
             ends.port.send(Order(kind="emergency", reason="stop"))
             ends.port.send(Order(kind="halt"))
             ends.port.send(Order(kind="arm"))
-        heard: list[Order] = []
+        received: list[Order] = []
 
         def stopped() -> bool:
-            heard.extend(ends.heard())
-            return [order.kind for order in heard[-3:]] == ["disarm", "emergency", "halt"]
+            received.extend(ends.received())
+            return [order.kind for order in received[-3:]] == ["disarm", "emergency", "halt"]
 
         await until(stopped, "all stops have arrived")
-        return heard
+        return received
 
-    heard = asyncio.run(play())
-    assert {order.kind for order in heard[:-3]} == {"command"}
-    assert heard[-4].seq < 9_999
+    received = asyncio.run(play())
+    assert {order.kind for order in received[:-3]} == {"command"}
+    assert received[-4].seq < 9_999

@@ -1,4 +1,4 @@
-"""Library of recordings: the same bytes, bounded, and nothing outside the folder."""
+"""Library of recordings: exact bytes, bounded answers, nothing outside the folder."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def ask(tmp_path: Path) -> Iterator[Ask]:
 
 
 def record(folder: Path, count: int, outcome: str = "") -> Path:
-    """An episode with a new picture at every second step, and a mark."""
+    """Record an episode with a new frame at every second step, and a mark."""
     with EpisodeWriter.create(folder, HEADER) as writer:
         for number in range(count):
             jpeg = picture(number) if number % 2 == 0 else None
@@ -64,8 +64,8 @@ def record(folder: Path, count: int, outcome: str = "") -> Path:
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 100_000])
-def test_the_pieces_put_together_are_the_episode(ask: Ask, tmp_path: Path, count: int) -> None:
-    """To the last byte, for any number of lines per request."""
+def test_the_pieces_reassemble_the_episode(ask: Ask, tmp_path: Path, count: int) -> None:
+    """The bytes match for any number of lines per request."""
     path = record(tmp_path, 60)
     lines, shown, pictures = b"", None, []
     at, total = 0, 1
@@ -85,8 +85,8 @@ def test_the_pieces_put_together_are_the_episode(ask: Ask, tmp_path: Path, count
     assert pictures == [episode.jpeg(step) for step in episode.steps]
 
 
-def test_a_piece_is_cut_where_it_would_be_too_large(ask: Ask, tmp_path: Path) -> None:
-    """A single large line is sent alone."""
+def test_pieces_are_limited_in_size(ask: Ask, tmp_path: Path) -> None:
+    """A large line is sent alone, and one beyond the limit is refused."""
     large = b"\xff\xd8" + bytes(MAX_PIECE)
     with EpisodeWriter.create(tmp_path, HEADER) as writer:
         for jpeg in (picture(1), large, picture(2), b"\xff\xd8" + bytes(5 << 20)):
@@ -100,17 +100,19 @@ def test_a_piece_is_cut_where_it_would_be_too_large(ask: Ask, tmp_path: Path) ->
 
 @given(
     count=st.integers(0, 40),
-    said=st.lists(st.tuples(st.booleans(), st.integers(0, 39), st.integers(0, 39)), max_size=5),
+    judgements=st.lists(
+        st.tuples(st.booleans(), st.integers(0, 39), st.integers(0, 39)), max_size=5
+    ),
 )
 @settings(max_examples=25)
 def test_a_summary_agrees_with_the_whole_episode(
-    tmp_path_factory: pytest.TempPathFactory, count: int, said: list[tuple[bool, int, int]]
+    tmp_path_factory: pytest.TempPathFactory, count: int, judgements: list[tuple[bool, int, int]]
 ) -> None:
-    """After each judgement too."""
+    """Counts match after each judgement."""
     folder = tmp_path_factory.mktemp("kept")
     path = record(folder, count, "time")
     recordings = RecordingFolder(folder)
-    for good, one, other in [(True, 0, 0), *said]:
+    for good, one, other in [(True, 0, 0), *judgements]:
         first, last = sorted((one, other))
         if last < count:
             (keep if good else drop)(path, first, last, "bad")
@@ -122,7 +124,7 @@ def test_a_summary_agrees_with_the_whole_episode(
 
 
 def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:
-    """The last id asks for the rest; other folders are not listed."""
+    """`before` continues the list; folders that are not episodes are skipped."""
     (tmp_path / "notes.txt").touch()
     (tmp_path / "empty").mkdir()
     (tmp_path / ".hidden").mkdir()
@@ -146,8 +148,8 @@ def test_the_list_is_newest_first_and_bounded(ask: Ask, tmp_path: Path) -> None:
     assert len(rest.episodes) == 3
 
 
-def test_nothing_outside_the_folder_is_shown(ask: Ask, tmp_path: Path) -> None:
-    """By a name, which the message itself refuses, or by a link."""
+def test_episodes_outside_the_folder_are_refused(ask: Ask, tmp_path: Path) -> None:
+    """Paths, parents and symbolic links are refused."""
     elsewhere = record(tmp_path / "elsewhere", 2)
     (tmp_path / "linked").symlink_to(elsewhere)
     for name in ("linked", "elsewhere", f"elsewhere/{elsewhere.name}", "..", ".", ""):
@@ -159,8 +161,8 @@ def test_nothing_outside_the_folder_is_shown(ask: Ask, tmp_path: Path) -> None:
     assert len(read_episode(elsewhere).kept) == 2
 
 
-def test_a_line_cannot_name_a_file_elsewhere(ask: Ask, tmp_path: Path) -> None:
-    """The frame's name is checked."""
+def test_a_line_cannot_refer_outside_the_episode(ask: Ask, tmp_path: Path) -> None:
+    """The file name of a frame is checked."""
     path = record(tmp_path, 1)
     (tmp_path / "secret.jpg").write_bytes(b"secret")
     (path / "steps.jsonl").write_text(
@@ -172,7 +174,7 @@ def test_a_line_cannot_name_a_file_elsewhere(ask: Ask, tmp_path: Path) -> None:
 
 
 def test_damage_is_reported_and_the_rest_is_readable(ask: Ask, tmp_path: Path) -> None:
-    """In the list and in the answer; an incomplete last line is ignored."""
+    """An incomplete last line is ignored; missing frames and bad headers are reported."""
     path = record(tmp_path, 4)
     with (path / "steps.jsonl").open("ab") as file:
         file.write(b'{"kind":"drop","first":0,"la')
@@ -194,7 +196,7 @@ _parts = st.lists(st.sampled_from((b"a", b"bb\n", b"\n", b"c\rd\n", b"x" * 70_00
 
 @given(parts=_parts)
 def test_every_complete_line_of_a_growing_file_is_found(parts: list[bytes]) -> None:
-    """After each refresh, and only complete lines."""
+    """Each refresh finds all complete lines and no partial one."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "lines"
         path.touch()
@@ -211,7 +213,7 @@ def test_every_complete_line_of_a_growing_file_is_found(parts: list[bytes]) -> N
 
 
 def test_a_replaced_or_truncated_file_is_read_again(tmp_path: Path) -> None:
-    """`repair` does both."""
+    """The index is rebuilt, as after `repair`."""
     path = tmp_path / "lines"
     path.write_bytes(b"one\ntwo\nthree\n")
     index = LineIndex(path)

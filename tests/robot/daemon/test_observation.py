@@ -1,4 +1,4 @@
-"""Observations for one client."""
+"""Observations built for one client."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ READER = StateReader(STATE, ACTIONS)
 
 
 def observation(**changes: Any) -> Any:
-    """An observation of a robot at rest."""
+    """Build an observation of a robot at rest."""
     fields: dict[str, Any] = {
         "seq": 7,
         "now_ns": 50,
@@ -30,7 +30,7 @@ def observation(**changes: Any) -> Any:
 
 
 def test_an_absent_quantity_is_nan() -> None:
-    """Never a zero that looks like a measurement."""
+    """Absent quantities are NaN, not 0."""
     seen = observation(state=guard_state(applied=(0.1, 0.5)))
     assert seen.state[0] == 0.25
     assert math.isnan(seen.state[1])
@@ -39,7 +39,7 @@ def test_an_absent_quantity_is_nan() -> None:
 
 
 def test_without_a_state_of_the_guard_all_is_unknown() -> None:
-    """The robot does not count as armed."""
+    """All values are NaN, and the robot does not count as armed."""
     seen = observation(state=None)
     assert all(map(math.isnan, seen.state))
     assert "guard" in seen.stop_reason
@@ -48,26 +48,26 @@ def test_without_a_state_of_the_guard_all_is_unknown() -> None:
 
 
 def test_a_frame_is_sent_once() -> None:
-    """The same frame keeps its number and time."""
+    """A frame already sent is omitted, but keeps its number and time."""
     assert observation().frame == b"jpeg"
     again = observation(frame_sent=3)
     assert (again.frame, again.frame_seq, again.captured_ns) == (None, 3, 30)
 
 
 def test_a_client_may_decline_frames() -> None:
-    """The capture time of the newest one is sent anyway."""
+    """The capture time of the newest frame is sent anyway."""
     seen = observation(frame_sent=None)
     assert (seen.frame, seen.captured_ns) == (None, 30)
 
 
 def test_without_a_camera_the_time_is_that_of_the_state() -> None:
-    """There is no capture time."""
+    """`captured_ns` is then the time of the state."""
     seen = observation(newest=None)
     assert (seen.frame, seen.frame_seq, seen.captured_ns) == (None, 0, 40)
 
 
 def test_a_command_of_an_earlier_lease_is_not_reported() -> None:
-    """Its number could be one of this client's own."""
+    """Its number could equal one of this client's."""
     state = guard_state(applied=(0.0, 0.5), applied_session=1, applied_seq=9, applied_ns=39)
     own = observation(state=state, command_ns=38)
     assert (own.applied_seq, own.applied_ns, own.command_ns) == (9, 39, 38)

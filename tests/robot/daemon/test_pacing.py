@@ -1,4 +1,4 @@
-"""Pace of observations."""
+"""Pacing of observations."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ STEPPED = car_plan(clock="twin", control_hz=20.0, tick_hz=100.0, arming="anyone"
 
 
 def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Exactly; any other order takes one tick of the guard."""
+    """A command takes exactly one control period; other orders take one guard tick."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -49,7 +49,7 @@ def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch)
             assert seen.armed
             for seq in range(1, 50):
                 before_ns = clock.ns
-                await client.say(Command(seq=seq, answers=seen.seq, values=(0.0, 0.5)))
+                await client.send(Command(seq=seq, answers=seen.seq, values=(0.0, 0.5)))
                 seen = await client.expect(Observation)
                 assert seen.state_ns == clock.ns == before_ns + 50_000_000
                 assert seen.applied_seq == seq
@@ -60,7 +60,7 @@ def test_in_lockstep_each_command_is_one_period(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_lockstep_waits_for_its_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also with a slow camera driver."""
+    """The observation waits for the frame of its time, even if the camera is slow."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -80,7 +80,7 @@ def test_lockstep_waits_for_its_frame(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_client_in_control_advances_time_in_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An observer does not make it faster."""
+    """An observer does not advance the time."""
     clock = SteppedClock()
 
     async def script(robot: Running) -> None:
@@ -90,7 +90,7 @@ def test_the_client_in_control_advances_time_in_steps(monkeypatch: pytest.Monkey
             stood_ns = clock.ns
             for _ in range(3):
                 assert (await watcher.observe()).sent_ns == stood_ns
-            await driver.say(Command(seq=1, answers=seen.seq, values=(0.0, 0.0)))
+            await driver.send(Command(seq=1, answers=seen.seq, values=(0.0, 0.0)))
             await driver.expect(Observation)
             assert clock.ns == stood_ns + 50_000_000
 
@@ -98,7 +98,7 @@ def test_the_client_in_control_advances_time_in_steps(monkeypatch: pytest.Monkey
 
 
 def test_lockstep_may_exceed_the_message_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The robot sets the pace of a thousand steps."""
+    """In lockstep the robot sets the pace, so the rate limit does not apply."""
 
     async def script(robot: Running) -> None:
         async with robot.client(pace="lockstep") as client:
@@ -109,7 +109,7 @@ def test_lockstep_may_exceed_the_message_rate(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many acknowledgements are one credit, and frames in between are skipped."""
+    """Acknowledgements do not accumulate, and frames in between are skipped."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
@@ -123,9 +123,9 @@ def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPa
                 while (newest := await other.observe()).frame != picture(6):
                     pass
             for _ in range(3):
-                await client.say(Acknowledge())
+                await client.send(Acknowledge())
             assert (await client.expect(Observation)).frame_seq == newest.frame_seq
-            pending = [message for message in client.heard if isinstance(message, Observation)]
+            pending = [message for message in client.received if isinstance(message, Observation)]
             assert pending[-1].seq == seen.seq + 1
 
     play(script, monkeypatch, car_plan())
@@ -134,7 +134,7 @@ def test_in_real_time_an_observation_costs_a_credit(monkeypatch: pytest.MonkeyPa
 def test_without_frames_observations_are_sent_once_a_period(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Even if the client asks faster."""
+    """Asking faster does not help."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
@@ -146,8 +146,8 @@ def test_without_frames_observations_are_sent_once_a_period(
     play(script, monkeypatch, car_plan(control_hz=50.0, camera=None))
 
 
-def test_a_camera_that_freezes_keeps_its_old_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The guard and the client see the age of the frame."""
+def test_a_frozen_camera_keeps_its_capture_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Guard and client see the age of the last new frame."""
 
     async def script(robot: Running) -> None:
         robot.show()

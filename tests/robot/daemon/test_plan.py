@@ -11,8 +11,8 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from tests.robot.daemon.plans import car_plan
 
 
-def test_a_plan_survives_a_round_trip_through_json() -> None:
-    """With all fields."""
+def test_a_plan_round_trips() -> None:
+    """All fields survive JSON."""
     plan = car_plan(reward={"speed": 1.0}, reset=(((0.0, -0.3), 1.5), ((0.0, 0.0), 0.5)))
     assert DaemonPlan.from_dict(json.loads(json.dumps(plan.to_dict()))) == plan
 
@@ -30,6 +30,6 @@ def test_a_plan_survives_a_round_trip_through_json() -> None:
     ],
 )
 def test_an_invalid_field_is_named(change: dict[str, object], words: str) -> None:
-    """In the error message."""
+    """The error names the field."""
     with pytest.raises(ProfileError, match=words):
         DaemonPlan.from_dict(json.loads(json.dumps(car_plan().to_dict() | change)))

@@ -1,4 +1,4 @@
-"""Limits before authentication: a new connection finds room, and a silent one is dropped."""
+"""Limits on connections before authentication."""
 
 from __future__ import annotations
 
@@ -32,33 +32,33 @@ def test_the_oldest_connection_of_a_crowded_address_is_dropped() -> None:
 
     async def play() -> None:
         connections = PreAuthConnections(max_total=10, max_per_address=2)
-        friend, crowd = Fake("a"), [Fake("b") for _ in range(5)]
-        for number, sock in enumerate([friend, *crowd]):
+        other, crowd = Fake("a"), [Fake("b") for _ in range(5)]
+        for number, sock in enumerate([other, *crowd]):
             connections.add(number, sock)
         assert [sock.dropped for sock in crowd] == [1, 1, 1, 0, 0]
-        assert friend.dropped == 0
+        assert other.dropped == 0
 
     asyncio.run(play())
 
 
-def test_a_crowd_of_one_address_costs_only_itself() -> None:
-    """A full set drops from the address with the most connections."""
+def test_a_full_set_drops_from_the_most_crowded_address() -> None:
+    """One address cannot displace connections of others."""
 
     async def play() -> None:
         connections = PreAuthConnections(max_total=4, max_per_address=4)
-        crowd, friend = [Fake("b") for _ in range(4)], Fake("a")
-        for number, sock in enumerate([*crowd, friend]):
+        crowd, other = [Fake("b") for _ in range(4)], Fake("a")
+        for number, sock in enumerate([*crowd, other]):
             connections.add(number, sock)
         assert [sock.dropped for sock in crowd] == [1, 0, 0, 0]
         connections.drop_one()
         assert [sock.dropped for sock in crowd] == [1, 1, 0, 0]
-        assert friend.dropped == 0
+        assert other.dropped == 0
 
     asyncio.run(play())
 
 
 def test_a_served_request_restarts_the_timeout() -> None:
-    """A browser loads the console in many requests over the same sockets."""
+    """A browser loads the console with many requests over the same sockets."""
 
     async def play() -> None:
         connections = PreAuthConnections(max_total=2, max_per_address=2, timeout_s=0.05)
@@ -82,7 +82,7 @@ def test_a_served_request_restarts_the_timeout() -> None:
 
 
 def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
-    """A connection that opened the link, authenticated or ended is not."""
+    """Connections that opened the link, authenticated or ended are exempt."""
 
     async def play() -> None:
         connections = PreAuthConnections(timeout_s=0.01)
@@ -109,7 +109,7 @@ def test_a_silent_connection_is_dropped_after_the_timeout() -> None:
 def test_a_new_connection_always_fits_and_the_limits_hold(
     arrivals: list[tuple[str, bool]], max_total: int, max_per_address: int
 ) -> None:
-    """A new connection stays until the next one; a closed one counts no more."""
+    """A new connection stays at least until the next one, and closed ones do not count."""
 
     async def play() -> None:
         connections = PreAuthConnections(max_total, max_per_address)

@@ -1,4 +1,4 @@
-"""Daemon in its own process, as the supervisor starts it."""
+"""The daemon in its own process, as the supervisor starts it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.realtime
 
 @dataclass
 class Started:
-    """A daemon's process, and the other ends of its sockets."""
+    """A daemon process, and the other ends of its sockets."""
 
     process: subprocess.Popen[bytes]
     guard: socket.socket
@@ -37,7 +37,7 @@ class Started:
     port: int = 0
 
     def ended(self) -> tuple[int, str]:
-        """Its exit status and what it said."""
+        """Wait for the exit, and return the exit status and standard error."""
         assert self.process.stderr is not None
         with self.process.stderr as stderr:
             return self.process.wait(20.0), stderr.read().decode()
@@ -45,7 +45,7 @@ class Started:
 
 @pytest.fixture
 def begun() -> Iterator[Started]:
-    """A daemon that the guard has said nothing to."""
+    """A daemon that has no state from the guard yet."""
     daemon = car_plan(camera=None, discovery=True).to_dict()
     guard_plan = GuardPlan("car", (ActionPlan("steering"), ActionPlan("throttle")), ())
     plan = plan_fd(ServePlan(guard_plan, daemon))
@@ -73,10 +73,10 @@ def begun() -> Iterator[Started]:
     guard_end.close()
     heart_end.close()
     heart.settimeout(20.0)
-    said, (life,), _, _ = socket.recv_fds(guard, 16, 2)
-    assert said == LIFELINE
-    with os.fdopen(ready, "rb") as told:
-        yield Started(process, guard, heart, told, life)
+    log, (life,), _, _ = socket.recv_fds(guard, 16, 2)
+    assert log == LIFELINE
+    with os.fdopen(ready, "rb") as ready_file:
+        yield Started(process, guard, heart, ready_file, life)
     for end in (guard, heart):
         end.close()
     os.close(life)
@@ -95,20 +95,20 @@ def started(begun: Started) -> Started:
 
 
 def test_it_serves_sends_heartbeats_and_ends_on_a_signal(started: Started) -> None:
-    """With exit status 0; the guard sees the end of the socket."""
+    """SIGTERM ends it with status 0, and the guard sees the socket close."""
     assert started.heart.recv(16) == b"."
     with socket.create_connection(("127.0.0.1", started.port), 20.0):
         pass
     started.process.send_signal(signal.SIGTERM)
     assert started.guard.recv(16) == b""
-    status, said = started.ended()
+    status, log = started.ended()
     assert status == 0
-    assert "listens at 127.0.0.1" in said
-    assert "is not announced: only this machine reaches 127.0.0.1" in said
+    assert "listens at 127.0.0.1" in log
+    assert "is not announced: only this machine reaches 127.0.0.1" in log
 
 
 def test_the_lifeline_ends_when_it_is_killed(started: Started) -> None:
-    """Not before."""
+    """The pipe closes when the daemon dies, and not before."""
     poll = select.poll()
     poll.register(started.life, select.POLLIN)
     assert poll.poll(50) == []
@@ -117,7 +117,7 @@ def test_the_lifeline_ends_when_it_is_killed(started: Started) -> None:
 
 
 def test_the_lifeline_thread_holds_no_other_file(started: Started) -> None:
-    """A connection that the daemon closes is closed."""
+    """A connection closed by the daemon is really closed."""
     with socket.create_connection(("127.0.0.1", started.port), 20.0) as client:
         client.sendall(b"this is no request\r\n\r\n")
         while client.recv(4096):  # Until its end.
@@ -127,8 +127,8 @@ def test_the_lifeline_thread_holds_no_other_file(started: Started) -> None:
     assert 1 in held.values()
 
 
-def test_a_missing_guard_is_no_crash() -> None:
-    """The reader of the socket reports it."""
+def test_sending_the_lifeline_to_a_closed_socket_raises_nothing() -> None:
+    """The reader of the socket reports the loss."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.close()
     with theirs:
@@ -136,33 +136,33 @@ def test_a_missing_guard_is_no_crash() -> None:
 
 
 def test_no_client_connects_before_the_first_state(begun: Started) -> None:
-    """The state of the outputs would be unknown."""
-    assert begun.heart.recv(16) == b"."  # It runs.
+    """Without a state, the outputs are unknown, so the daemon does not listen."""
+    assert begun.heart.recv(16) == b"."  # The daemon is running.
     begun.guard.close()
-    status, said = begun.ended()
+    status, log = begun.ended()
     assert (status, begun.ready.readline()) == (1, b"")
-    assert "listens" not in said
-    assert "The guard is gone." in said
+    assert "listens" not in log
+    assert "The guard is gone." in log
 
 
-def test_it_ends_with_the_guard(started: Started) -> None:
-    """With an error message; the supervisor restarts both."""
+def test_the_daemon_exits_when_the_guard_is_lost(started: Started) -> None:
+    """The supervisor then restarts both."""
     started.guard.close()
-    status, said = started.ended()
+    status, log = started.ended()
     assert status == 1
-    assert "The guard is gone." in said
+    assert "The guard is gone." in log
 
 
-def test_it_ends_with_the_supervisor(started: Started) -> None:
-    """No process could stop the guard otherwise."""
+def test_the_daemon_exits_when_the_supervisor_is_lost(started: Started) -> None:
+    """Without a supervisor, no process could stop the guard."""
     started.heart.close()
-    status, said = started.ended()
+    status, log = started.ended()
     assert status == 1
-    assert "The supervisor is gone." in said
+    assert "The supervisor is gone." in log
 
 
-def test_a_blocked_log_does_not_end_it(started: Started) -> None:
-    """As with a full disk behind stderr: it goes on serving."""
+def test_a_closed_log_does_not_end_the_daemon(started: Started) -> None:
+    """The daemon continues to serve when standard error fails."""
     assert started.process.stderr is not None
     started.process.stderr.close()
     for _ in range(20):

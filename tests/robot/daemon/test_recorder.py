@@ -1,4 +1,4 @@
-"""Recorder: pairing of commands with observations, and the thread that writes."""
+"""Recorder: pairing of commands with observations, and the writer thread."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ WITHIN_S = 20.0
 
 
 def step(number: int) -> tuple[Step, bytes]:
-    """A step that tells its number, and its picture."""
+    """Return a step that encodes its number, and its frame."""
     return (
         Step(action=(0.0, number / 1e6), driver="person", captured_ns=number * 50_000_000),
         picture(number % 5),
@@ -42,7 +42,7 @@ def step(number: int) -> tuple[Step, bytes]:
 
 
 def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
-    """The episode is closed with its outcome."""
+    """Steps, marks and undo are applied in order, and the outcome is stored."""
     reports: list[tuple[str, str]] = []
     answers: list[str] = []
     thread = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
@@ -52,7 +52,7 @@ def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
     thread.edit(Mark(text="here"), answers.append)
     thread.edit(Undo(seconds=0.5), answers.append)
     thread.end("time")
-    assert thread.add(*step(41))  # Too late: it has ended well, and this is no trouble.
+    assert thread.add(*step(41))  # Ignored after the end.
     assert thread.join(WITHIN_S)
     assert reports == [("begun", ""), ("ended", "")]
     assert answers == ["There is no step to mark yet.", "There is nothing to undo.", "", ""]
@@ -65,7 +65,7 @@ def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("bytes_each", [0, 1 << 20])
 def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_each: int) -> None:
-    """Queued steps and bytes are bounded; here the disk is busy elsewhere."""
+    """Queued steps and bytes are bounded; the disk is simulated as busy."""
     busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
     reports: list[tuple[str, str]] = []
     thread = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
@@ -83,7 +83,7 @@ def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_
 
 
 def test_an_error_of_the_disk_is_reported(tmp_path: Path) -> None:
-    """Once, and the episode does not begin."""
+    """It is reported once, and the episode does not start."""
     (tmp_path / "kept").write_text("in the way")
     reports: list[tuple[str, str]] = []
     thread = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
@@ -110,7 +110,7 @@ while True:
 
 
 def test_an_episode_of_a_killed_daemon_can_be_repaired(tmp_path: Path) -> None:
-    """After SIGKILL at random moments all complete steps are there."""
+    """After SIGKILL at random moments, all reported steps are on the disk."""
     rng = random.Random(5)
     for number in range(2):
         folder = tmp_path / str(number)
@@ -139,7 +139,7 @@ ADA, NET = ClientIdentity(1, "Ada", "person"), ClientIdentity(2, "net", "program
 
 
 def seen(seq: int, at_ns: int, **changes: Any) -> Observation:
-    """What a client is sent."""
+    """Build an observation sent to a client."""
     fields: dict[str, Any] = {
         "seq": seq,
         "captured_ns": at_ns,
@@ -164,7 +164,7 @@ def seen(seq: int, at_ns: int, **changes: Any) -> Observation:
 
 
 def frame(seq: int) -> NumberedFrame:
-    """A picture that tells its number."""
+    """Build a frame that encodes its number."""
     return NumberedFrame(seq, Frame(b"jpeg %d" % seq, seq))
 
 
@@ -185,7 +185,7 @@ def built() -> Built:
 
 
 def test_the_next_observation_brings_the_applied_outputs(built: Built) -> None:
-    """With the reason of a stop."""
+    """The step gets applied outputs and stop reason from the next observation."""
     built.builder.observed(1, seen(1, 100, suggested=(0.9,)), frame(1))
     built.builder.decided(ADA, 1, (0.5,), 110)
     assert built.written == []
@@ -198,8 +198,8 @@ def test_the_next_observation_brings_the_applied_outputs(built: Built) -> None:
     assert (step.driver, step.state, step.stop_reason) == ("person", (100.0,), "A bump.")
 
 
-def test_of_two_decisions_on_one_observation_the_later_one_counts(built: Built) -> None:
-    """As when a key is let go at once."""
+def test_the_later_of_two_decisions_counts(built: Built) -> None:
+    """A second command in answer to the same observation replaces the first."""
     built.builder.observed(1, seen(1, 100), None)
     built.builder.decided(ADA, 1, (0.5,), 110)
     built.builder.decided(ADA, 1, (0.0,), 115)
@@ -208,8 +208,8 @@ def test_of_two_decisions_on_one_observation_the_later_one_counts(built: Built) 
     assert (step.action, step.decided_ns, step.applied) == ((0.0,), 115, None)
 
 
-def test_a_command_that_answers_no_known_observation_is_no_step(built: Built) -> None:
-    """Such as one from before the recording, or of another client."""
+def test_a_command_for_an_unknown_observation_is_skipped(built: Built) -> None:
+    """Commands that answer earlier observations or those of others are not recorded."""
     built.builder.observed(1, seen(1, 100), None)
     for who, answers in ((ADA, 2), (NET, 1)):
         built.builder.decided(who, answers, (0.5,), 110)
@@ -220,7 +220,7 @@ def test_a_command_that_answers_no_known_observation_is_no_step(built: Built) ->
 
 
 def test_a_client_without_control_does_not_complete_applied_outputs(built: Built) -> None:
-    """The outputs then follow another client."""
+    """Its step has no applied outputs, since those follow another client."""
     built.builder.observed(2, seen(1, 100), None)
     built.builder.decided(NET, 1, (0.5,), 110)
     built.builder.observed(2, seen(2, 120, mine=False), None)
@@ -233,10 +233,10 @@ def test_a_client_without_control_does_not_complete_applied_outputs(built: Built
         st.tuples(st.booleans(), st.sampled_from((ADA, NET)), st.integers(0, 4)), max_size=60
     )
 )
-def test_time_never_runs_backwards_and_no_frame_repeats(
+def test_times_increase_and_no_frame_repeats(
     said: list[tuple[bool, ClientIdentity, int]],
 ) -> None:
-    """For any order of observations and commands."""
+    """Holds for any order of observations and commands."""
     built = Built()
     newest = {ADA.session: 0, NET.session: 0}
     for now_ns, (looks, who, back) in enumerate(said):

@@ -55,8 +55,8 @@ def play(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
 
 
 async def recording(client: Client, on: bool = True) -> RecorderState:
-    """Begin or end, and wait until the disk says so."""
-    await client.say(Record(on=on, name="corridor"))
+    """Start or stop recording, and wait for the confirmation."""
+    await client.send(Record(on=on, name="corridor"))
     while True:
         state = await client.expect(RecorderState)
         if state.recording == on and state.episode:
@@ -64,26 +64,28 @@ async def recording(client: Client, on: bool = True) -> RecorderState:
 
 
 async def drive(robot: Running, client: Client, first: int, count: int) -> list[Observation]:
-    """Command so many times, each in answer to an observation with a new picture."""
+    """Send `count` commands, each in answer to an observation with a new frame."""
     seen: list[Observation] = []
     for seq in range(first, first + count):
         robot.show()
         await until(lambda: robot.daemon._hub.newest is not None, "there is a picture")
         answered = await client.observe()
         seen.append(answered)
-        await client.say(Command(seq=seq, answers=answered.seq, values=(0.1, seq / 100), scale=0.5))
+        await client.send(
+            Command(seq=seq, answers=answered.seq, values=(0.1, seq / 100), scale=0.5)
+        )
         await client.expect(Observation)
     return seen
 
 
 def only(folder: Path) -> Path:
-    """The one episode of a recording."""
+    """Return the only episode of a folder."""
     (episode,) = (path for path in folder.iterdir() if not path.name.startswith("."))
     return episode
 
 
 def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) -> None:
-    """With the camera's frame, the applied outputs and the robot's times."""
+    """Each step has the frame, the applied outputs and the robot's times."""
     seen: list[Observation] = []
 
     async def script(robot: Running) -> None:
@@ -95,7 +97,7 @@ def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) 
             began = await recording(person)
             assert (began.steps, began.dropped, began.text) == (0, 0, "")
             seen.extend(await drive(robot, person, 1, 12))
-            await person.say(Mark(text="a corner\n"))
+            await person.send(Mark(text="a corner\n"))
             while (state := await person.expect(RecorderState)).marks == 0:
                 pass
             assert state.steps == 12
@@ -123,8 +125,8 @@ def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) 
     assert len({step.frame for step in episode.steps}) > 6
 
 
-def test_nothing_is_recorded_while_disarmed(play: Any, tmp_path: Path) -> None:
-    """Such steps teach nothing."""
+def test_no_step_is_recorded_while_disarmed(play: Any, tmp_path: Path) -> None:
+    """The episode of a disarmed robot has no steps."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
@@ -137,8 +139,8 @@ def test_nothing_is_recorded_while_disarmed(play: Any, tmp_path: Path) -> None:
     assert read_episode(only(tmp_path / "kept")).steps == ()
 
 
-def test_an_episode_goes_on_after_a_change_of_control(play: Any, tmp_path: Path) -> None:
-    """Each step has its driver, and the program's suggestion while a person drove."""
+def test_an_episode_continues_after_a_change_of_control(play: Any, tmp_path: Path) -> None:
+    """Each step has its driver, and the program's suggestion while a person drives."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person, robot.client(name="net") as program:
@@ -149,7 +151,7 @@ def test_an_episode_goes_on_after_a_change_of_control(play: Any, tmp_path: Path)
             await drive(robot, program, 1, 3)
             await person.obtain()
             suggestion = await program.observe()
-            await program.say(Suggest(seq=9, answers=suggestion.seq, values=(-1.0, 5.0)))
+            await program.send(Suggest(seq=9, answers=suggestion.seq, values=(-1.0, 5.0)))
             assert (await program.expect(Observation)).suggested == (-1.0, 5.0)
             (answered,) = await drive(robot, person, 1, 1)
             assert (answered.suggested, answered.suggested_by) == ((-1.0, 5.0), "net")
@@ -164,7 +166,7 @@ def test_an_episode_goes_on_after_a_change_of_control(play: Any, tmp_path: Path)
 
 
 def test_undo_drops_the_newest_steps(play: Any, tmp_path: Path) -> None:
-    """They stay on the disk; without steps it is refused."""
+    """Dropped steps stay on the disk; undo without steps is refused."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
@@ -172,14 +174,14 @@ def test_undo_drops_the_newest_steps(play: Any, tmp_path: Path) -> None:
             await until(lambda: robot.daemon._hub.state.armed, "it is armed")
             await recording(person)
             await drive(robot, person, 1, 5)
-            await person.say(Undo(seconds=3_600.0))
+            await person.send(Undo(seconds=3_600.0))
             while (await person.expect(RecorderState)).dropped != 5:
                 pass
-            await person.say(Undo())
+            await person.send(Undo())
             assert (await person.expect(Refused)).reason == "There is nothing to undo."
             await recording(person, on=False)
             for nothing in (Undo(), Mark(), Record(on=False)):
-                await person.say(nothing)
+                await person.send(nothing)
                 assert (await person.expect(Refused)).reason == "Nothing is being recorded."
 
     play(script)
@@ -188,20 +190,20 @@ def test_undo_drops_the_newest_steps(play: Any, tmp_path: Path) -> None:
 
 
 def test_only_persons_record_and_judge(play: Any, tmp_path: Path) -> None:
-    """A program may read recordings."""
+    """Programs can only read recordings."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as program:
-            for wish in (
+            for request in (
                 Record(on=True),
                 Record(on=False),
                 Mark(),
                 Undo(),
                 Judge(episode="x", first=0, last=0),
             ):
-                await program.say(wish)
+                await program.send(request)
                 assert "Only a person" in (await program.expect(Refused)).reason
-            await program.say(Browse())
+            await program.send(Browse())
             assert (await program.expect(Recordings)) == Recordings(episodes=())
 
     play(script)
@@ -209,13 +211,13 @@ def test_only_persons_record_and_judge(play: Any, tmp_path: Path) -> None:
 
 
 def test_a_robot_without_a_folder_does_not_record(play: Any) -> None:
-    """Its welcome says so, and it refuses requests."""
+    """Its welcome reports this, and it refuses requests."""
 
     async def script(robot: Running) -> None:
         async with robot.connect() as person:
             assert (await person.greet(role="person")).can_record is False
-            for wish in (Record(on=True), Browse(), Fetch(episode="x")):
-                await person.say(wish)
+            for request in (Record(on=True), Browse(), Fetch(episode="x")):
+                await person.send(request)
                 assert "without a folder" in (await person.expect(Refused)).reason
 
     play(script, recordings="")
@@ -227,7 +229,7 @@ def test_recording_is_refused_if_the_disk_fails(play: Any, tmp_path: Path) -> No
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person, robot.client() as program:
-            await person.say(Record(on=True))
+            await person.send(Record(on=True))
             assert "Cannot write" in (await person.expect(Refused)).reason
             assert "Cannot write" in (await program.expect(RecorderState)).text
             assert not (await person.expect(RecorderState)).recording
@@ -236,7 +238,7 @@ def test_recording_is_refused_if_the_disk_fails(play: Any, tmp_path: Path) -> No
 
 
 def test_a_failing_disk_ends_the_recording_and_not_the_drive(play: Any, tmp_path: Path) -> None:
-    """The folder is removed during the recording."""
+    """After the folder disappears, driving continues and a new recording can start."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
@@ -250,28 +252,28 @@ def test_a_failing_disk_ends_the_recording_and_not_the_drive(play: Any, tmp_path
             while robot.daemon._hub.recorder.on:
                 await drive(robot, person, seq, 1)
                 seq += 1
-            told = [m for m in person.heard if isinstance(m, RecorderState)]
-            while not told[-1].text:
-                told.append(await person.expect(RecorderState))
-            assert "Cannot write" in told[-1].text
-            assert not told[-1].recording
+            states = [m for m in person.received if isinstance(m, RecorderState)]
+            while not states[-1].text:
+                states.append(await person.expect(RecorderState))
+            assert "Cannot write" in states[-1].text
+            assert not states[-1].recording
             assert (await person.drive(seq)).applied_seq == seq
-            await recording(person)  # And the next one begins.
+            await recording(person)  # A new recording starts.
 
     play(script)
 
 
 def test_two_recordings_cannot_share_a_folder(play: Any, tmp_path: Path) -> None:
-    """Neither of two persons on one robot, nor of two robots."""
+    """This holds for two clients of one robot and for two robots."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json())
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as one, robot.client(role="person") as two:
             with EpisodeWriter.create(tmp_path / "kept", header):
-                await one.say(Record(on=True))
+                await one.send(Record(on=True))
                 assert "in use by another recorder" in (await one.expect(Refused)).reason
             await recording(one)
-            await two.say(Record(on=True))
+            await two.send(Record(on=True))
             assert "recorded already" in (await two.expect(Refused)).reason
             await recording(two, on=False)
 
@@ -279,7 +281,7 @@ def test_two_recordings_cannot_share_a_folder(play: Any, tmp_path: Path) -> None
 
 
 def test_recording_ends_when_the_last_person_leaves(play: Any, tmp_path: Path) -> None:
-    """A program that drives on is informed."""
+    """Other clients are informed."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as program:
@@ -298,7 +300,7 @@ def test_recording_ends_when_the_last_person_leaves(play: Any, tmp_path: Path) -
 
 
 def test_the_state_is_broadcast_each_second(play: Any) -> None:
-    """With the number of steps."""
+    """All clients get the number of steps."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person, robot.client() as program:
@@ -306,7 +308,7 @@ def test_the_state_is_broadcast_each_second(play: Any) -> None:
             await until(lambda: robot.daemon._hub.state.armed, "it is armed")
             await recording(person)
             await drive(robot, person, 1, 3)
-            await program.say(Acknowledge())
+            await program.send(Acknowledge())
             while (await program.expect(RecorderState)).steps < 2:
                 pass
 
@@ -316,7 +318,7 @@ def test_the_state_is_broadcast_each_second(play: Any) -> None:
 def test_the_episode_is_closed_when_the_daemon_ends(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """As if a person had ended it."""
+    """The episode is closed as if a person had stopped it."""
 
     async def run() -> None:
         async with (
@@ -336,7 +338,7 @@ def test_the_episode_is_closed_when_the_daemon_ends(
 
 
 def test_recordings_can_be_listed_fetched_and_judged(play: Any, tmp_path: Path) -> None:
-    """The list, the lines and frames as on the disk, and bad steps."""
+    """Lines and frames match the disk, and judged steps are excluded."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json(), control_hz=10.0, driver="Ada")
     with EpisodeWriter.create(tmp_path / "kept", header) as writer:
         for number in range(30):
@@ -346,7 +348,7 @@ def test_recordings_can_be_listed_fetched_and_judged(play: Any, tmp_path: Path) 
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as person:
-            await person.say(Browse())
+            await person.send(Browse())
             (summary,) = (await person.expect(Recordings)).episodes
             assert summary == EpisodeSummary(
                 id=name,
@@ -358,28 +360,28 @@ def test_recordings_can_be_listed_fetched_and_judged(play: Any, tmp_path: Path) 
                 driver="Ada",
                 outcome="",
             )
-            await person.say(Judge(episode=name, first=10, last=14))
+            await person.send(Judge(episode=name, first=10, last=14))
             (summary,) = (await person.expect(Recordings)).episodes
             assert (summary.kept, summary.seconds) == (25, 2.5)
-            await person.say(Judge(episode=name, first=12, last=12, keep=True))
+            await person.send(Judge(episode=name, first=12, last=12, keep=True))
             assert (await person.expect(Recordings)).episodes[0].kept == 26
-            await person.say(Judge(episode=name, first=0, last=99))
+            await person.send(Judge(episode=name, first=0, last=99))
             assert "has the steps 0 to 29" in (await person.expect(Refused)).reason
-            await person.say(Fetch(episode=name, first=28, count=100))
+            await person.send(Fetch(episode=name, first=28, count=100))
             piece = await person.expect(Piece)
             assert (piece.first, piece.total, len(piece.lines)) == (28, 32, 4)
             assert piece.frames == (picture(27), None, None, None)
             assert json.loads(piece.header)["driver"] == "Ada"
-            await person.say(Fetch(episode=name, first=32))
+            await person.send(Fetch(episode=name, first=32))
             assert (await person.expect(Piece)).lines == ()
-            await person.say(Fetch(episode="20260101T000000Z-0001"))
+            await person.send(Fetch(episode="20260101T000000Z-0001"))
             assert "There is no episode" in (await person.expect(Refused)).reason
 
     play(script)
 
 
 def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> None:
-    """Answers are large, and must not fill the robot's memory."""
+    """A second request is refused, since answers are large."""
     header = EpisodeHeader(action_layout=ACTIONS.to_json())
     with EpisodeWriter.create(tmp_path / "kept", header) as writer:
         for number in range(200):
@@ -389,13 +391,13 @@ def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> N
     async def script(robot: Running) -> None:
         async with robot.client() as program:
             for _ in range(40):
-                await program.say(Fetch(episode=name))
-            await program.say(Browse())
+                await program.send(Fetch(episode=name))
+            await program.send(Browse())
             refused = await program.expect(Refused)
             assert "one question" in refused.reason
-            await program.say(Ping(token=1))
+            await program.send(Ping(token=1))
             await program.expect(Pong)
-            pieces = [m for m in program.heard if isinstance(m, Piece)]
+            pieces = [m for m in program.received if isinstance(m, Piece)]
             assert all(0 < len(encode(piece)) < MAX_PIECE + 100_000 for piece in pieces)
             assert len(pieces) < 40
 
@@ -403,7 +405,7 @@ def test_one_question_about_recordings_at_a_time(play: Any, tmp_path: Path) -> N
 
 
 def test_a_client_that_only_listens_gets_all_events(play: Any, tmp_path: Path) -> None:
-    """Over TLS too, where a sent message seemed to wait for the next one."""
+    """Events are flushed without further messages, over TLS too."""
     made = make_credentials(tmp_path / "credentials", "test car")
     secured = {"certificate": str(made.certificate), "private_key": str(made.private_key)}
 
@@ -411,8 +413,8 @@ def test_a_client_that_only_listens_gets_all_events(play: Any, tmp_path: Path) -
         async with robot.client() as program:
             for number in range(6):
                 robot.daemon._hub.event("news", str(number))
-                while (heard := await program.expect(Event)).name != "news":
+                while (received := await program.expect(Event)).name != "news":
                     pass
-                assert heard.text == str(number)
+                assert received.text == str(number)
 
     play(script, **secured)

@@ -1,4 +1,4 @@
-"""Daemon on real sockets: authentication, control, limits and stops."""
+"""The daemon on real sockets: authentication, control, limits and stops."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ Script = Callable[[Running], Awaitable[None]]
 
 @pytest.fixture
 def play(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Runs a script with a daemon."""
+    """Run a script with a daemon."""
 
     def play(script: Script, plan: DaemonPlan | None = None) -> None:
         async def whole() -> None:
@@ -74,7 +74,7 @@ def secured(tmp_path: Path) -> tuple[DaemonPlan, bytes]:
 
 
 def test_a_client_with_the_key_is_welcomed(play: Any, secured: tuple[DaemonPlan, bytes]) -> None:
-    """Over TLS 1.3, with a description of the robot."""
+    """The connection uses TLS 1.3, and the welcome describes the robot."""
     plan, key = secured
 
     async def script(robot: Running) -> None:
@@ -91,7 +91,7 @@ def test_a_client_with_the_key_is_welcomed(play: Any, secured: tuple[DaemonPlan,
 def test_a_wrong_key_is_refused_slowly(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each time; the right key is accepted at once, from the same address too."""
+    """Each wrong key is delayed; the right key is accepted at once from the same address."""
     plan, key = secured
     monkeypatch.setattr(server, "_WRONG_KEY_S", 0.05)
 
@@ -103,7 +103,7 @@ def test_a_wrong_key_is_refused_slowly(
                 with pytest.raises(AssertionError):
                     await client.greet(b"wrong" * 4)
                 assert loop.time() - began >= 0.05
-                refused = client.heard[-1]
+                refused = client.received[-1]
                 assert isinstance(refused, Refused)
                 assert refused.fatal
                 assert "Wrong key" in refused.reason
@@ -115,10 +115,10 @@ def test_a_wrong_key_is_refused_slowly(
 
 
 @pytest.mark.parametrize("spoiled", ["nonce", "certificate", "role"])
-def test_a_proof_made_elsewhere_does_not_fit(
+def test_a_proof_for_another_challenge_is_refused(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch, spoiled: str
 ) -> None:
-    """A replayed proof, one for another certificate, one for another role."""
+    """Proofs are bound to nonce, certificate and role."""
     plan, key = secured
     monkeypatch.setattr(server, "_WRONG_KEY_S", 0.0)
 
@@ -129,18 +129,18 @@ def test_a_proof_made_elsewhere_does_not_fit(
             certificate = b"c" * 32 if spoiled == "certificate" else client.certificate
             role = "person" if spoiled == "role" else "program"
             proof = make_proof(key, nonce, certificate, role)
-            await client.say(Hello(version=VERSION, proof=proof))
+            await client.send(Hello(version=VERSION, proof=proof))
             assert "Wrong key" in await client.closed_with()
 
     play(script, plan)
 
 
 def test_another_version_is_refused_with_both_numbers(play: Any) -> None:
-    """The message says what to do."""
+    """The error gives both versions."""
 
     async def script(robot: Running) -> None:
         async with robot.connect() as client:
-            await client.say(Hello(version=VERSION + 1, proof=b""))
+            await client.send(Hello(version=VERSION + 1, proof=b""))
             reason = await client.closed_with()
             assert f"version {VERSION} " in reason
             assert f"client {VERSION + 1}" in reason
@@ -165,12 +165,12 @@ async def _large(client: Client) -> None:
 
 
 async def _hello_again(client: Client) -> None:
-    await client.say(Hello(version=VERSION, proof=b""))
+    await client.send(Hello(version=VERSION, proof=b""))
 
 
 async def _flood(client: Client) -> None:
     for token in range(1_000):
-        await client.say(Ping(token=token))
+        await client.send(Ping(token=token))
 
 
 async def _ping_flood(client: Client) -> None:
@@ -200,7 +200,7 @@ async def _pong_flood(client: Client) -> None:
 def test_an_invalid_message_ends_the_connection_and_stops_the_robot(
     play: Any, misbehave: Callable[[Client], Awaitable[None]], words: str
 ) -> None:
-    """After authentication too; the client is sent the reason."""
+    """The client gets the reason, and the robot is disarmed."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -215,13 +215,13 @@ def test_an_invalid_message_ends_the_connection_and_stops_the_robot(
 
 
 def test_a_huge_message_ends_the_connection_early(play: Any) -> None:
-    """100 MB are not buffered first."""
+    """A message of 100 MB is not buffered."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             with contextlib.suppress(ConnectionError, aiohttp.ClientError):
                 await client.socket.send_bytes(bytes(100 * 10**6))
-            while await client.hear() is not None:
+            while await client.receive() is not None:
                 pass
             assert client.socket.close_code in (1006, 1009)
 
@@ -231,7 +231,7 @@ def test_a_huge_message_ends_the_connection_early(play: Any) -> None:
 def test_a_client_without_a_hello_is_disconnected(
     play: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After a limited time."""
+    """The hello has a timeout."""
     monkeypatch.setattr(connection, "HELLO_TIMEOUT_S", 0.05)
 
     async def script(robot: Running) -> None:
@@ -242,20 +242,20 @@ def test_a_client_without_a_hello_is_disconnected(
 
 
 def test_connections_are_limited_before_and_after_authentication(play: Any) -> None:
-    """Sixteen of one address before; six programs and eight clients in total after."""
+    """16 per address before authentication; 6 programs and 8 clients in total after it."""
 
     async def script(robot: Running) -> None:
         strangers = [robot.connect() for _ in range(17)]
         clients = [await stranger.__aenter__() for stranger in strangers]
         await clients[0].expect(Challenge)
-        assert await clients.pop(0).hear() is None  # The last one got the first one's place.
+        assert await clients.pop(0).receive() is None  # Displaced by the 17th connection.
         for client in clients[:6]:
             await client.greet(role="program")
-        await clients[6].say(Hello(version=VERSION, proof=b"", role="program"))
+        await clients[6].send(Hello(version=VERSION, proof=b"", role="program"))
         assert "only a person can still connect" in await clients[6].closed_with()
         await clients[7].greet(role="person")
         async with robot.client(role="person"), robot.connect() as ninth:
-            await ninth.say(Hello(version=VERSION, proof=b"", role="person"))
+            await ninth.send(Hello(version=VERSION, proof=b"", role="person"))
             assert "8 clients are connected" in await ninth.closed_with()
         for stranger in strangers:
             await stranger.__aexit__(None, None, None)
@@ -264,7 +264,7 @@ def test_connections_are_limited_before_and_after_authentication(play: Any) -> N
 
 
 def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
-    """All clients learn who has control; commands of the previous holder no longer count."""
+    """All clients are told of the holder, and commands of the previous holder are refused."""
 
     async def script(robot: Running) -> None:
         async with (
@@ -280,7 +280,7 @@ def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
             assert (lost.mine, lost.holder) == (False, "Ann")
             assert "took control from sac" in lost.reason
             assert "halt" in robot.guard.kinds()  # The last command of sac is no longer in force.
-            await sac.say(Command(seq=1, answers=0, values=(0.0, 1.0)))
+            await sac.send(Command(seq=1, answers=0, values=(0.0, 1.0)))
             assert "do not have control" in (await sac.expect(Refused)).reason
             assert (await ann.drive(1, 0.0, 0.5)).action_applied == (0.0, 0.5)
         commands = [order for order in robot.guard.orders if order.kind == "command"]
@@ -289,8 +289,8 @@ def test_a_second_program_waits_and_a_person_does_not(play: Any) -> None:
     play(script)
 
 
-def test_old_commands_do_not_reach_the_guard(play: Any) -> None:
-    """Repeated, out of order, answering nothing that was sent, of the wrong length, not finite."""
+def test_invalid_commands_do_not_reach_the_guard(play: Any) -> None:
+    """Repeated, out of order, unanswerable, of the wrong length, or not finite."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -304,7 +304,7 @@ def test_old_commands_do_not_reach_the_guard(play: Any) -> None:
                 (7, seen.seq, (1.0,), "has 2 values, got 1"),
                 (8, seen.seq, (0.0, nan), "must be finite"),
             ):
-                await client.say(Command(seq=seq, answers=answers, values=values))
+                await client.send(Command(seq=seq, answers=answers, values=values))
                 refused = await client.expect(Refused)
                 assert (refused.seq, refused.fatal) == (seq, False)
                 assert words in refused.reason
@@ -314,14 +314,14 @@ def test_old_commands_do_not_reach_the_guard(play: Any) -> None:
 
 
 def test_an_invalid_command_ends_the_command_before_it(play: Any) -> None:
-    """At once, and not at the deadline; the robot stays armed for valid commands."""
+    """The previous command ends at once; the robot stays armed."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)
             seen = await client.drive(1, 0.0, 0.5)
-            await client.say(Command(seq=2, answers=seen.seq, values=(0.0, float("nan"))))
-            await until(lambda: robot.guard.kinds()[-1] == "halt", "it is told to stand")
+            await client.send(Command(seq=2, answers=seen.seq, values=(0.0, float("nan"))))
+            await until(lambda: robot.guard.kinds()[-1] == "halt", "it is halted")
             assert robot.guard.state.armed
             assert robot.guard.state.applied == (0.0, 0.0)
             assert (await client.drive(3, 0.0, 0.25)).action_applied == (0.0, 0.25)
@@ -329,7 +329,7 @@ def test_an_invalid_command_ends_the_command_before_it(play: Any) -> None:
     play(script)
 
 
-def test_an_invalid_command_that_is_old_or_of_another_client_ends_nothing(play: Any) -> None:
+def test_an_old_or_foreign_invalid_command_changes_nothing(play: Any) -> None:
     """The newer command stays in force."""
     nan = float("nan")
 
@@ -338,7 +338,7 @@ def test_an_invalid_command_that_is_old_or_of_another_client_ends_nothing(play: 
             await robot.armed(client)
             seen = await client.drive(5, 0.0, 0.5)
             for speaker, seq in ((client, 5), (client, 4), (other, 9)):
-                await speaker.say(Command(seq=seq, answers=seen.seq, values=(0.0, nan)))
+                await speaker.send(Command(seq=seq, answers=seen.seq, values=(0.0, nan)))
                 await speaker.expect(Refused)
             assert robot.guard.kinds() == ["arm", "command"]
 
@@ -346,16 +346,16 @@ def test_an_invalid_command_that_is_old_or_of_another_client_ends_nothing(play: 
 
 
 def test_a_late_request_to_arm_is_refused(play: Any) -> None:
-    """The operator may have looked away; an observation that was never sent arms nothing either."""
+    """Requests that answer an old or unsent observation are refused."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await client.take()
             seen = await client.observe()
             await asyncio.sleep(0.03)  # This is the age itself, and no wait for something.
-            await client.say(Arm(answers=seen.seq))
+            await client.send(Arm(answers=seen.seq))
             assert "at most 20 ms are allowed" in (await client.expect(Refused)).reason
-            await client.say(Arm(answers=seen.seq + 1))
+            await client.send(Arm(answers=seen.seq + 1))
             reason = (await client.expect(Refused)).reason
             assert reason.startswith("Not armed. ")
             assert "not sent to this client" in reason
@@ -364,15 +364,15 @@ def test_a_late_request_to_arm_is_refused(play: Any) -> None:
     play(script, car_plan(max_observation_age_ms=20))
 
 
-def test_a_person_takes_an_armed_robot_as_it_is(play: Any) -> None:
-    """It stops, and stays armed: the person may have to steer at once."""
+def test_a_person_takes_over_an_armed_robot(play: Any) -> None:
+    """The robot halts and stays armed, since the person may have to steer at once."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as sac, robot.client(role="person") as ann:
             await robot.armed(sac)
             await sac.drive(1, 0.0, 0.5)
             await ann.obtain()
-            await until(lambda: robot.guard.kinds()[-1] == "halt", "it is told to stand")
+            await until(lambda: robot.guard.kinds()[-1] == "halt", "it is halted")
             assert robot.guard.kinds() == ["arm", "command", "halt"]
             assert (await ann.drive(1, 0.0, 0.25)).action_applied == (0.0, 0.25)
 
@@ -383,7 +383,7 @@ def test_a_person_takes_an_armed_robot_as_it_is(play: Any) -> None:
 def test_a_hundred_silent_connections_keep_no_client_out(
     play: Any, secured: tuple[DaemonPlan, bytes], what: str
 ) -> None:
-    """From the same address; a client with the key connects and stops the robot."""
+    """Another client of the same address can still connect and stop the robot."""
     plan, key = secured
 
     async def script(robot: Running) -> None:
@@ -403,7 +403,7 @@ def test_a_hundred_silent_connections_keep_no_client_out(
                 if what == "idles":
                     await stack.enter_async_context(robot.idle(stranger))
             async with robot.client(key, role="person") as client:
-                await client.say(EmergencyStop(reason="a child"))
+                await client.send(EmergencyStop(reason="a child"))
                 await until(lambda: robot.guard.state.emergency, "it has stopped")
 
     play(script, plan)
@@ -413,7 +413,7 @@ def test_a_hundred_silent_connections_keep_no_client_out(
 def test_a_connection_without_a_request_is_dropped(
     play: Any, secured: tuple[DaemonPlan, bytes], monkeypatch: pytest.MonkeyPatch, secure: bool
 ) -> None:
-    """During the TLS handshake or after it; an authenticated client stays."""
+    """Applies during and after the TLS handshake; authenticated clients stay."""
     plan, key = secured if secure else (car_plan(), b"")
     monkeypatch.setattr(server, "PreAuthConnections", lambda: PreAuthConnections(timeout_s=0.2))
 
@@ -422,14 +422,14 @@ def test_a_connection_without_a_request_is_dropped(
             context = ssl.create_default_context()
             context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
             for tls in {None, context if secure else None}:
-                for said in (b"", b"GET / HTTP/1.1\r\n", b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"):
-                    if tls is None and secure and said:
+                for request in (b"", b"GET / HTTP/1.1\r\n", b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"):
+                    if tls is None and secure and request:
                         continue
                     ends = await asyncio.open_connection("127.0.0.1", robot.port, ssl=tls)
-                    ends[1].write(said)
+                    ends[1].write(request)
                     async with asyncio.timeout(20.0):
-                        heard = await ends[0].read()
-                    assert heard.startswith(b"HTTP/1.1 200 OK" if b"Host" in said else b"")
+                        received = await ends[0].read()
+                    assert received.startswith(b"HTTP/1.1 200 OK" if b"Host" in request else b"")
                     ends[1].close()
             await client.observe()
 
@@ -437,22 +437,22 @@ def test_a_connection_without_a_request_is_dropped(
 
 
 def test_a_command_in_answer_to_an_old_observation_is_refused(play: Any) -> None:
-    """The command itself may be new."""
+    """The age of the observation counts, not that of the command."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)
             seen = await client.observe()
             await asyncio.sleep(0.03)  # This is the age itself, and no wait for something.
-            await client.say(Command(seq=1, answers=seen.seq, values=(0.0, 1.0)))
+            await client.send(Command(seq=1, answers=seen.seq, values=(0.0, 1.0)))
             assert "at most 20 ms are allowed" in (await client.expect(Refused)).reason
             assert "command" not in robot.guard.kinds()
 
     play(script, car_plan(max_observation_age_ms=20))
 
 
-def test_the_scale_of_a_command_only_lowers_it(play: Any) -> None:
-    """Its values are multiplied; the frame's time is passed on."""
+def test_the_scale_multiplies_the_values(play: Any) -> None:
+    """The capture time of the frame is passed on."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
@@ -461,7 +461,7 @@ def test_the_scale_of_a_command_only_lowers_it(play: Any) -> None:
             seen = await client.observe()
             while seen.frame is None:
                 seen = await client.observe()
-            await client.say(
+            await client.send(
                 Command(seq=1, answers=seen.seq, values=(-1.0, 0.5), scale=0.5, ttl_ms=80)
             )
             await client.expect(Observation)
@@ -474,13 +474,13 @@ def test_the_scale_of_a_command_only_lowers_it(play: Any) -> None:
 
 @pytest.mark.parametrize("how", ["release", "close", "abort"])
 def test_leaving_disarms_the_robot(play: Any, how: str) -> None:
-    """By a release, by closing, and by vanishing."""
+    """Release, close and abort all disarm."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person", name="Ann") as client:
             await robot.armed(client)
             if how == "release":
-                await client.say(Release())
+                await client.send(Release())
             elif how == "close":
                 await client.socket.close()
             else:
@@ -492,7 +492,7 @@ def test_leaving_disarms_the_robot(play: Any, how: str) -> None:
 
 
 def test_an_observer_that_leaves_stops_nothing(play: Any) -> None:
-    """Only the client in control does."""
+    """Only the departure of the client in control disarms."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as driver:
@@ -505,8 +505,8 @@ def test_an_observer_that_leaves_stops_nothing(play: Any) -> None:
     play(script)
 
 
-def test_any_client_can_stop_the_robot_and_only_a_person_can_end_that(play: Any) -> None:
-    """With or without control; all clients get the reason."""
+def test_any_client_can_stop_the_robot_and_only_a_person_can_rearm(play: Any) -> None:
+    """Control is not needed to stop; all clients get the reason."""
 
     async def script(robot: Running) -> None:
         async with (
@@ -514,7 +514,7 @@ def test_any_client_can_stop_the_robot_and_only_a_person_can_end_that(play: Any)
             robot.client(name="sac") as sac,
         ):
             await robot.armed(ann)
-            await sac.say(EmergencyStop(reason="a\x1b[2Jcat"))
+            await sac.send(EmergencyStop(reason="a\x1b[2Jcat"))
             event = await ann.expect(Event)
             while event.name != "emergency":
                 event = await ann.expect(Event)
@@ -533,7 +533,7 @@ def test_any_client_can_stop_the_robot_and_only_a_person_can_end_that(play: Any)
 
 @pytest.mark.parametrize("arming", ["person", "anyone"])
 def test_clients_that_may_arm(play: Any, arming: str) -> None:
-    """A program only if the profile permits it, and only with control."""
+    """A program may arm only if the profile permits it, and only with control."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as one, robot.client() as two:
@@ -542,7 +542,7 @@ def test_clients_that_may_arm(play: Any, arming: str) -> None:
             await one.take()
             await robot.arm(two)
             await two.expect(Refused)
-            await two.say(Disarm())
+            await two.send(Disarm())
             assert "emergency stop" in (await two.expect(Refused)).reason
             await robot.arm(one)
             if arming == "person":
@@ -551,7 +551,7 @@ def test_clients_that_may_arm(play: Any, arming: str) -> None:
                 return
             await until(lambda: robot.guard.state.armed, "it is armed")
             assert robot.guard.orders[-1].person is False
-            await one.say(EmergencyStop())
+            await one.send(EmergencyStop())
             await until(lambda: robot.guard.state.emergency, "it is stopped")
             while not (await one.observe()).emergency:
                 pass
@@ -562,25 +562,25 @@ def test_clients_that_may_arm(play: Any, arming: str) -> None:
 
 
 def test_a_refusal_of_the_guard_is_passed_on(play: Any) -> None:
-    """To the client in control, with the number of the command."""
+    """The client in control gets the reason and the number of its command."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             await client.take()
             seen = await client.observe()
-            await client.say(Command(seq=3, answers=seen.seq, values=(0.0, 1.0)))
+            await client.send(Command(seq=3, answers=seen.seq, values=(0.0, 1.0)))
             assert await client.expect(Refused) == Refused(reason="Not armed.", seq=3)
 
     play(script)
 
 
 def test_a_ping_is_answered_with_the_time(play: Any) -> None:
-    """And its token."""
+    """The pong has the ping's token and the robot's time."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             before = robot.clock.now_ns()
-            await client.say(Ping(token=77))
+            await client.send(Ping(token=77))
             pong = await client.expect(Pong)
             assert pong.token == 77
             assert before <= pong.now_ns <= robot.clock.now_ns()
@@ -589,7 +589,7 @@ def test_a_ping_is_answered_with_the_time(play: Any) -> None:
 
 
 def test_a_client_that_does_not_read_is_dropped(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Meanwhile another client sees no difference."""
+    """Meanwhile other clients are not delayed."""
     patience_s = 3.0
     monkeypatch.setattr(connection, "_SEND_S", patience_s)
 
@@ -601,21 +601,21 @@ def test_a_client_that_does_not_read_is_dropped(play: Any, monkeypatch: pytest.M
         robot.transport(slow).pause_reading()
         async with robot.client() as client:
 
-            async def nag() -> None:
+            async def keep_asking() -> None:
                 while True:
                     robot.show()
-                    await slow.say(Acknowledge())
+                    await slow.send(Acknowledge())
                     await asyncio.sleep(0.004)
 
-            nagging = asyncio.create_task(nag())
+            pinging = asyncio.create_task(keep_asking())
             loop, worst = asyncio.get_running_loop(), 0.0
             while robot.guard.kinds()[-1:] != ["disarm"]:
                 began = loop.time()
                 await client.observe()
                 worst = max(worst, loop.time() - began)
-            nagging.cancel()
-            await asyncio.gather(nagging, return_exceptions=True)
-            assert worst < patience_s  # Or it waited for the other one to be dropped.
+            pinging.cancel()
+            await asyncio.gather(pinging, return_exceptions=True)
+            assert worst < patience_s  # The other client was not delayed.
             await client.obtain()
         robot.transport(slow).abort()
         await connecting.__aexit__(None, None, None)
@@ -624,7 +624,7 @@ def test_a_client_that_does_not_read_is_dropped(play: Any, monkeypatch: pytest.M
 
 
 def test_the_console_reveals_only_the_robots_name(play: Any) -> None:
-    """The headers keep other pages from using its files."""
+    """Security headers are set on every page."""
 
     async def script(robot: Running) -> None:
         async with robot.session.get(robot.url) as page:
@@ -650,7 +650,7 @@ def test_the_console_reveals_only_the_robots_name(play: Any) -> None:
 
 
 def test_a_page_of_another_server_cannot_drive(play: Any) -> None:
-    """Scripts of other pages run in the browsers of people near the robot."""
+    """WebSocket requests from another origin are refused."""
 
     async def script(robot: Running) -> None:
         with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
@@ -663,7 +663,7 @@ def test_a_page_of_another_server_cannot_drive(play: Any) -> None:
 
 
 def test_a_port_in_use_is_an_error(play: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The message has the likely reason."""
+    """The error gives the likely reason."""
 
     async def script(robot: Running) -> None:
         with pytest.raises(RobotError, match="served already"):
@@ -673,26 +673,26 @@ def test_a_port_in_use_is_an_error(play: Any, monkeypatch: pytest.MonkeyPatch) -
     play(script)
 
 
-def test_the_daemon_ends_when_the_guard_is_gone(play: Any) -> None:
-    """It could not serve the robot."""
+def test_the_daemon_exits_when_the_guard_is_lost(play: Any) -> None:
+    """Connections are closed."""
 
     async def script(robot: Running) -> None:
         async with robot.client() as client:
             robot.guard.close()
             assert await robot.task == "The guard is gone."
-            while await client.hear() is not None:
+            while await client.receive() is not None:
                 pass
 
     play(script)
 
 
 def test_taking_control_twice_makes_no_new_lease(play: Any) -> None:
-    """Commands on their way still count."""
+    """Commands in flight stay valid."""
 
     async def script(robot: Running) -> None:
         async with robot.client(role="person") as client:
             await robot.armed(client)
-            await client.say(Take())
+            await client.send(Take())
             await client.expect(Lease)
             await client.drive(1)
             assert robot.guard.orders[-1].session == 1

@@ -239,7 +239,7 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def only_allowed_commands_reach_the_guard(self) -> None:
-        """Exactly those that the model allows, in order, with increasing lease and number."""
+        """The guard gets the model's commands, in order, with increasing lease and number."""
         commands = [order for order in self.orders if order.kind == "command"]
         assert [(order.seq, order.values) for order in commands] == self.allowed
         numbers = [(order.session, order.seq) for order in commands]
@@ -254,19 +254,19 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def only_invalid_commands_and_a_new_holder_halt_the_robot(self) -> None:
-        """Late, repeated and foreign commands do not."""
+        """Late, repeated and foreign commands do not halt it."""
         assert sum(order.kind == "halt" for order in self.orders) == self.halts
 
     @invariant()
     def the_lease_has_the_expected_holder(self) -> None:
-        """That of the model."""
+        """The holder is that of the model."""
         held = self.hub.lease.holder
         place = next((p for p, s in self.sessions.items() if s.client == held), None)
         assert place == self.holder
 
     @invariant()
     def the_newest_suggestion_is_shown_until_it_expires(self) -> None:
-        """That of the model, with its sender."""
+        """Values and sender are those of the model."""
         shown, expected = self.hub.suggested(), self.suggestion
         if expected is None or self.now_ns > expected[2]:
             assert shown is None
@@ -277,7 +277,7 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def no_command_is_in_force_without_a_holder(self) -> None:
-        """Nor after the deadline."""
+        """No command is in force after the deadline either."""
         if self.holder is None or self.now_ns - self.commanded_ns > DEADLINE_NS:
             assert self.hub.commanded() == ()
         elif self.hub.commanded():

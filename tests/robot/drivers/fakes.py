@@ -1,4 +1,4 @@
-"""Pins, buses and pulses that remember what they were told."""
+"""Fake pins, buses and pulses that record what was written."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ MS = 1_000_000
 
 
 class Fault:
-    """Makes one operation on the hardware fail; nothing fails until it is armed.
+    """Makes one armed operation on the hardware fail.
 
     Attributes:
-        happened: Whether the operation has come, and failed.
+        happened: Whether the operation was reached and failed.
     """
 
     def __init__(self) -> None:
@@ -33,20 +33,20 @@ class Fault:
         self.happened = False
 
     def arm(self, operation: int, takes_effect: bool) -> None:
-        """Let an operation fail, counted from 1 on.
+        """Make the given operation fail.
 
         Args:
-            operation: Which one.
-            takes_effect: Whether it is done all the same, as by a chip that acknowledges too late.
+            operation: Number of the operation, from 1.
+            takes_effect: Whether it still takes effect, as with a late acknowledgement of a chip.
         """
         self._left, self._takes_effect, self.happened = operation, takes_effect, False
 
     def disarm(self) -> None:
-        """Let nothing fail."""
+        """Make no operation fail."""
         self._left = 0
 
     def during(self, operation: Callable[[], None]) -> None:
-        """Do an operation, unless it is the one that fails."""
+        """Run an operation, unless it is the one that fails."""
         self._left -= 1
         fails = self._left == 0
         if not fails or self._takes_effect:
@@ -57,7 +57,7 @@ class Fault:
 
 
 class ScriptedPin(MockPWMPin):
-    """A pin whose changes are logged, at a time that the test sets."""
+    """A pin that logs its changes, at times set by the test."""
 
     def _set_state(self, value: float) -> None:
         self.factory.fault.during(lambda: super(ScriptedPin, self)._set_state(value))
@@ -71,7 +71,7 @@ class ScriptedPin(MockPWMPin):
 
 
 class ScriptedFactory(MockFactory):
-    """Makes such pins."""
+    """Factory of scripted pins."""
 
     def __init__(self) -> None:
         super().__init__(pin_class=ScriptedPin)
@@ -86,7 +86,7 @@ class ScriptedFactory(MockFactory):
 
 
 class FakeBus:
-    """Chips as tables of registers; a chip that is not there does not acknowledge."""
+    """Chips as tables of registers; an absent chip does not acknowledge."""
 
     def __init__(self, chips: dict[int, dict[int, int]], fault: Fault) -> None:
         self.chips = chips
@@ -104,7 +104,7 @@ class FakeBus:
         self.write_i2c_block_data(i2c_addr, value, [])
 
     def read_byte_data(self, i2c_addr: int, register: int) -> int:
-        """One register."""
+        """Read one register."""
         return self._chip(i2c_addr).get(register, 0)
 
     def write_byte_data(self, i2c_addr: int, register: int, value: int) -> None:
@@ -112,7 +112,7 @@ class FakeBus:
         self.write_i2c_block_data(i2c_addr, register, [value])
 
     def read_i2c_block_data(self, i2c_addr: int, register: int, length: int) -> list[int]:
-        """Several registers."""
+        """Read several registers."""
         chip = self._chip(i2c_addr)
         return [chip.get(register + i, 0) for i in range(length)]
 
@@ -120,16 +120,16 @@ class FakeBus:
         """Set several registers."""
         chip = self._chip(i2c_addr)
         self.writes.append((i2c_addr, register, list(data)))
-        for i, byte in enumerate(data):  # A transfer may break off in its middle.
+        for i, byte in enumerate(data):  # A transfer may fail in the middle.
             self._fault.during(functools.partial(chip.__setitem__, register + i, byte))
 
     def close(self) -> None:
-        """Let go."""
+        """Close it."""
         self.closed += 1
 
 
 class FakeServoPins:
-    """Remembers the width of each pin's pulses."""
+    """Records the pulse width of each pin."""
 
     def __init__(self, fault: Fault) -> None:
         self.widths_us: dict[int, int] = {}
@@ -140,11 +140,11 @@ class FakeServoPins:
         self._fault.during(functools.partial(self.widths_us.__setitem__, pin, width_us))
 
     def close(self) -> None:
-        """Let go."""
+        """Close it."""
 
 
 class FakeHardware:
-    """All of it.
+    """All fake hardware of a robot.
 
     Attributes:
         fault: Makes an operation on a pin, a chip or a pulse fail.
@@ -158,23 +158,23 @@ class FakeHardware:
         self.pulses = FakeServoPins(self.fault)
 
     def pin_factory(self) -> Any:
-        """The pins."""
+        """Return the scripted pins."""
         return self.factory
 
     def i2c(self, bus: int) -> FakeBus:
-        """The one bus."""
+        """Return the only bus."""
         return self.bus
 
     def servo_pins(self) -> FakeServoPins:
-        """The pulses."""
+        """Return the fake servo pins."""
         return self.pulses
 
     def servo_port(self, settings: BusSettings) -> ServoPort:
-        """There is none here: servos have a twin of their own."""
+        """Raise, since servo buses are simulated elsewhere."""
         raise RobotError(f"The bus at {settings.device} cannot be opened.")
 
     def close(self) -> None:
-        """Let go."""
+        """Close it."""
         self.factory.close()
 
     def output(self, driver: str, **settings: Any) -> OutputDriver:

@@ -1,4 +1,4 @@
-"""Output drivers on hardware that fails once: afterwards the next write must reach it."""
+"""Output drivers recover from a single hardware failure with the next write."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _MOST_OPERATIONS = 100
 
 
 class _Bench:
-    """A driver's hardware, and what it does."""
+    """The hardware of a driver, and its state."""
 
     def __init__(self, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self.driver, self.settings = _OUTPUTS[name]
@@ -57,7 +57,7 @@ class _Bench:
         fault = self.hardware.fault
 
         class Pwm(SysfsPwm):
-            """Fails like the rest."""
+            """Kernel PWM with the same fault injection."""
 
             def __init__(self, chip: int, channel: int, hz: int) -> None:
                 super().__init__(chip, channel, hz, tmp_path)
@@ -72,7 +72,7 @@ class _Bench:
         return self.hardware.output(self.driver, **self.settings)
 
     def state(self) -> dict[str, Any]:
-        """What reaches the motor."""
+        """Return what reaches the motor."""
         chip = self.hardware.bus.chips[0x40]
         pins = {
             pin.info.name: float(pin.state)
@@ -80,7 +80,7 @@ class _Bench:
             if pin.function == "output"
         }
         if not pins.get("GPIO6"):
-            pins.pop("GPIO5", None)  # Without a speed the direction says nothing.
+            pins.pop("GPIO5", None)  # Without a speed the direction has no effect.
         return {
             "pins": pins,
             "pulses": {pin: us for pin, us in self.hardware.pulses.widths_us.items() if us},
@@ -95,13 +95,13 @@ Bench = Callable[[], _Bench]
 
 @pytest.fixture(params=_OUTPUTS)
 def bench(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
-    """Makes a bench for each output driver, over each way of pulses."""
+    """Make a bench for each output driver, over each way of sending pulses."""
     made = iter(range(10 * _MOST_OPERATIONS))
     return lambda: _Bench(request.param, tmp_path / str(next(made)), monkeypatch)
 
 
 def _state_after(bench: Bench, *values: float) -> dict[str, Any]:
-    """What the hardware does when nothing fails."""
+    """Return the state after writes without a failure."""
     sound = bench()
     output = sound.open()
     for i, value in enumerate(values):
@@ -109,12 +109,12 @@ def _state_after(bench: Bench, *values: float) -> dict[str, Any]:
     return sound.state()
 
 
-# What servos say of a failure is tried in `dynamixel/test_faults.py`.
+# `dynamixel/test_faults.py` covers these.
 _ON_A_BUS = {"dynamixel"}
 
 
-def test_every_driver_is_tried() -> None:
-    """Whoever adds a driver is told about this law."""
+def test_every_driver_is_covered() -> None:
+    """Each registered output driver takes part in these tests."""
     assert {driver for driver, _ in _OUTPUTS.values()} == set(OUTPUT_DRIVERS) - _ON_A_BUS
 
 
@@ -123,7 +123,7 @@ def test_every_driver_is_tried() -> None:
 def test_after_a_failure_the_next_write_reaches_the_hardware(
     bench: Bench, before: float, asked: float, takes_effect: bool
 ) -> None:
-    """Whichever operation fails, and whether or not it took effect: a driver must not trust it."""
+    """Whichever operation fails, and whether or not it took effect, the next write applies."""
     expected = {after: _state_after(bench, before, after) for after in (0.0, before, asked)}
     for after in expected:
         for operation in range(1, _MOST_OPERATIONS):
@@ -148,7 +148,7 @@ def test_after_a_failure_the_next_write_reaches_the_hardware(
 def test_after_a_failed_release_the_next_one_reaches_the_hardware(
     bench: Bench, takes_effect: bool
 ) -> None:
-    """So it does, and so does a write: what was let go must be gripped again."""
+    """After a failed release, a second release and a write both take effect."""
     expected: list[dict[str, Any]] = []
     for operation in range(_MOST_OPERATIONS):  # None of them is number 0.
         tried = bench()
@@ -170,7 +170,7 @@ def test_after_a_failed_release_the_next_one_reaches_the_hardware(
 
 @pytest.mark.parametrize("takes_effect", [False, True])
 def test_after_a_failed_opening_it_can_be_opened(bench: Bench, takes_effect: bool) -> None:
-    """The supervisor tries again until the outputs are safe, with the pins that it has."""
+    """The supervisor can retry opening with the same pins."""
     expected = _state_after(bench)
     for operation in range(1, _MOST_OPERATIONS):
         tried = bench()
@@ -187,8 +187,8 @@ def test_after_a_failed_opening_it_can_be_opened(bench: Bench, takes_effect: boo
 
 
 @pytest.mark.parametrize("takes_effect", [False, True])
-def test_after_a_failed_end_it_can_be_opened(bench: Bench, takes_effect: bool) -> None:
-    """A driver whose last words were lost holds nothing, and the next one makes it rest."""
+def test_after_a_failed_close_it_can_be_opened(bench: Bench, takes_effect: bool) -> None:
+    """A driver whose close failed holds no pin, and the next one brings the output to rest."""
     expected = _state_after(bench, 0.0)
     for operation in range(1, _MOST_OPERATIONS):
         tried = bench()

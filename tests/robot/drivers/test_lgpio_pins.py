@@ -1,4 +1,4 @@
-"""The Pi's own pins, over a fake lgpio that behaves as its source says."""
+"""The Pi's pins, over a fake lgpio modelled on its source."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class _Lgpio(types.ModuleType):
 
 @pytest.fixture
 def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Lgpio]:
-    """A Raspberry Pi 4 with this lgpio."""
+    """A Raspberry Pi 4 with the fake lgpio."""
     fake = _Lgpio()
     ours = ("gpiozero.pins.lgpio", "shapechanger.robot.drivers.lgpio_pins")
     for name in (*ours, "shapechanger.robot.drivers.lgpio_pins"):
@@ -105,7 +105,7 @@ def _motor(factory: Any) -> Any:
 
 @pytest.mark.parametrize(("ours", "level"), [(False, 1), (True, 0)])
 def test_zero_is_low_at_once(lgpio: _Lgpio, ours: bool, level: int) -> None:
-    """Gpiozero alone leaves the pin high until the cycle ends, up to 20 ms at 50 Hz."""
+    """A duty of 0 is low at once; plain gpiozero leaves the pin high for up to 20 ms at 50 Hz."""
     motor = _motor(_factory(ours))
     motor.forward(0.4)
     motor.stop()
@@ -113,8 +113,8 @@ def test_zero_is_low_at_once(lgpio: _Lgpio, ours: bool, level: int) -> None:
     motor.close()
 
 
-def test_both_inputs_are_never_high_on_the_way_back(lgpio: _Lgpio) -> None:
-    """The cycles of two pins do not begin together, so the first must be low before."""
+def test_both_inputs_are_never_high_when_reversing(lgpio: _Lgpio) -> None:
+    """The first input goes low before the second goes high, since their cycles are not in phase."""
     motor = _motor(_factory(ours=True))
     motor.forward(0.4)
     motor.backward(0.4)
@@ -123,7 +123,7 @@ def test_both_inputs_are_never_high_on_the_way_back(lgpio: _Lgpio) -> None:
 
 
 def test_closed_outputs_stay_low_outputs(lgpio: _Lgpio) -> None:
-    """An input would float where the pull-down is missing."""
+    """Closed pins remain outputs, since inputs would float without a pull-down."""
     factory = _factory(ours=True)
     motor = _motor(factory)
     motor.forward(1.0)
@@ -134,8 +134,8 @@ def test_closed_outputs_stay_low_outputs(lgpio: _Lgpio) -> None:
     assert lgpio.closed
 
 
-def test_gpiozero_alone_would_let_go_of_the_level(lgpio: _Lgpio) -> None:
-    """The reason for the pins of our own: closing a motor in its high phase leaves no level."""
+def test_plain_gpiozero_leaves_a_closed_pin_high(lgpio: _Lgpio) -> None:
+    """Documents why the custom factory exists."""
     motor = _motor(_factory(ours=False))
     motor.forward(1.0)
     motor.close()
@@ -143,8 +143,8 @@ def test_gpiozero_alone_would_let_go_of_the_level(lgpio: _Lgpio) -> None:
     assert lgpio.levels[22] == 1
 
 
-def test_active_low_output_is_never_low_on_opening_and_after_closing(lgpio: _Lgpio) -> None:
-    """Low at the OE input of a PCA9685 would let its old pulses through."""
+def test_active_low_output_stays_high_when_opened_and_closed(lgpio: _Lgpio) -> None:
+    """A low OE input of a PCA9685 would enable stale pulses."""
     from gpiozero import DigitalOutputDevice
 
     factory = _factory(ours=True)
@@ -155,8 +155,8 @@ def test_active_low_output_is_never_low_on_opening_and_after_closing(lgpio: _Lgp
     assert (26 in lgpio.outputs, lgpio.levels[26]) == (True, 1)
 
 
-def test_gpiozero_makes_1400_us_out_of_1500_us(lgpio: _Lgpio) -> None:
-    """The reason for refusing its servo: int(7.5) of 100 steps of 20 ms (gpiozero#1209)."""
+def test_plain_gpiozero_sends_1400_us_for_1500_us(lgpio: _Lgpio) -> None:
+    """Documents why its Servo is not used: int(7.5) of 100 steps of 20 ms (gpiozero#1209)."""
     from gpiozero import Servo
 
     servo = Servo(17, initial_value=0, pin_factory=_factory(ours=False))
@@ -165,10 +165,10 @@ def test_gpiozero_makes_1400_us_out_of_1500_us(lgpio: _Lgpio) -> None:
     servo.close()
 
 
-def test_servo_pins_let_go_also_when_a_pin_fails(
+def test_closing_servo_pins_continues_after_a_failure(
     lgpio: _Lgpio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever tries again would find them busy; and the other pins end as well."""
+    """When one pin fails, the others go low and the chip is closed."""
     pins = importlib.import_module("shapechanger.robot.drivers.lgpio_pins").LgpioServoPins()
     for pin in (17, 18, 19):
         pins.pulse(pin, 1500, 50)
@@ -186,7 +186,7 @@ def test_servo_pins_let_go_also_when_a_pin_fails(
 
 
 def test_servo_pulses_are_whole_microseconds_and_end_low(lgpio: _Lgpio) -> None:
-    """Lgpio forgets a pin at the level of that moment; ours is low."""
+    """Closing sets the pin low, where lgpio keeps its present level."""
     pins = importlib.import_module("shapechanger.robot.drivers.lgpio_pins").LgpioServoPins()
     pins.pulse(17, 1503, 50)
     assert lgpio.pulses[17] == 1503

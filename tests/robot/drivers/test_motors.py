@@ -14,8 +14,8 @@ _values = st.floats(-1.0, 1.0)
 
 
 @given(value=_values, start=st.floats(0.0, 0.5), full=st.floats(0.6, 1.0))
-def test_duty_comes_back_within_a_step(value: float, start: float, full: float) -> None:
-    """What a motor is said to do is what it does, to one step of lgpio."""
+def test_duty_round_trips_within_a_step(value: float, start: float, full: float) -> None:
+    """The value read back from a duty is the value written, within one step of lgpio."""
     duty = Duty(start, full)
     assert duty.size_at(duty.of(value)) == pytest.approx(abs(value), abs=0.011 / (full - start))
 
@@ -27,14 +27,14 @@ def test_duty_survives_the_truncation_of_lgpio(steps: int) -> None:
 
 
 def test_smallest_value_starts_the_motor() -> None:
-    """Below its start a motor only hums."""
+    """Any nonzero value maps to at least the start duty."""
     assert Duty(start=0.25).of(1e-6) == 0.25
     assert Duty(start=0.25).of(0.0) == 0.0
 
 
 @given(values=st.lists(_values, min_size=1, max_size=8))
 def test_never_both_directions(values: list[float]) -> None:
-    """Both inputs of an H-bridge on would be a brake at best."""
+    """The two inputs of an H-bridge are never high together."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     for value in values:
@@ -46,15 +46,15 @@ def test_never_both_directions(values: list[float]) -> None:
 
 
 def test_pwm_has_the_frequency_of_the_profile() -> None:
-    """The 2017 car has 50 Hz, gpiozero 100."""
+    """The profile sets the PWM frequency, where gpiozero defaults to 100 Hz."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     assert [hardware.factory.pin(pin).frequency for pin in (22, 27)] == [50, 50]
     motor.close()
 
 
-def test_forward_is_forward() -> None:
-    """Swapped pins must not pass."""
+def test_forward_drives_the_forward_pin() -> None:
+    """Positive values drive the forward pin, negative ones the backward pin."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     assert motor.write(0.4, 0) == pytest.approx(0.4)
@@ -64,7 +64,7 @@ def test_forward_is_forward() -> None:
 
 
 def test_enable_is_on_only_while_the_motor_is_held() -> None:
-    """Letting go means that the bridge is off."""
+    """`release` switches the bridge off, and a write switches it on."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE | {"enable": 24})
     enable = hardware.factory.pin(24)
@@ -77,7 +77,7 @@ def test_enable_is_on_only_while_the_motor_is_held() -> None:
 
 @pytest.mark.parametrize(("driver", "settings"), [("hbridge", _HBRIDGE), ("phase_enable", _PHASE)])
 def test_close_leaves_everything_low(driver: str, settings: dict[str, float]) -> None:
-    """Closing twice is closing once."""
+    """All pins are low after `close`, which is idempotent."""
     hardware = FakeHardware()
     motor = hardware.output(driver, **settings)
     motor.write(1.0, 0)
@@ -88,7 +88,7 @@ def test_close_leaves_everything_low(driver: str, settings: dict[str, float]) ->
 
 @pytest.mark.parametrize(("value", "broken"), [(0.5, 27), (-0.5, 22)])
 def test_one_input_goes_low_also_when_the_other_one_fails(value: float, broken: int) -> None:
-    """The motor turns by the other one."""
+    """A failure on one input does not keep the other from going low."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     motor.write(value, 0)
@@ -99,7 +99,7 @@ def test_one_input_goes_low_also_when_the_other_one_fails(value: float, broken: 
 
 
 def test_backward_leaves_both_inputs_low_when_it_is_closed() -> None:
-    """The direction input would otherwise stay high for ever."""
+    """`close` also sets the direction input low."""
     hardware = FakeHardware()
     motor = hardware.output("phase_enable", **_PHASE)
     motor.write(-1.0, 0)
@@ -108,8 +108,8 @@ def test_backward_leaves_both_inputs_low_when_it_is_closed() -> None:
     assert ("GPIO5", 0.0) in hardware.factory.log
 
 
-def test_pin_in_use_is_refused_in_words() -> None:
-    """Two motors on one pin is a mistake in the profile."""
+def test_a_pin_in_use_is_refused() -> None:
+    """Two motors on one pin raise an error that names the pin."""
     hardware = FakeHardware()
     motor = hardware.output("hbridge", **_HBRIDGE)
     with pytest.raises(RobotError, match="GPIO22"):
@@ -118,7 +118,7 @@ def test_pin_in_use_is_refused_in_words() -> None:
 
 
 def test_speed_is_zero_while_the_direction_changes() -> None:
-    """And it does not stutter where the direction stays."""
+    """The enable pin goes low before a change of direction, and only then."""
     hardware = FakeHardware()
     motor = hardware.output("phase_enable", **_PHASE)
     for value in (0.5, 0.6, -0.6, -0.7):

@@ -1,4 +1,4 @@
-"""Servos and speed controllers, and what sends their pulses."""
+"""Servos, speed controllers and their pulse sources."""
 
 from pathlib import Path
 from typing import Any
@@ -31,32 +31,32 @@ _ON_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "hz": 50, "output_enab
 
 
 def _asleep() -> dict[int, int]:
-    """A PCA9685 after power-up: MODE1 says asleep, the prescaler 30 (data sheet, table 5)."""
+    """Return the registers of a PCA9685 after power-up: asleep, prescale 30."""
     return {0x00: 0x11, 0x01: 0x04, 0xFE: 0x1E}
 
 
 def _width_us(hardware: FakeHardware, channel: int) -> float:
-    """The pulse that the chip's registers say."""
+    """Return the pulse width set in the chip's registers."""
     low, high = (hardware.bus.chips[0x40][0x06 + 4 * channel + i] for i in (2, 3))
     return (high << 8 | low) * 4.88
 
 
 @given(value=st.floats(-1.0, 1.0), ends=st.tuples(st.floats(500, 1400), st.floats(1600, 2500)))
 def test_width_and_value_are_inverse(value: float, ends: tuple[float, float]) -> None:
-    """What is said to be done is what was asked for, whichever way a servo is mounted."""
+    """Width and value convert back and forth, also for a reversed servo."""
     for low, high in (ends, ends[::-1]):
         pulses = PulseRange(low, 1500.0, high)
         assert pulses.value(pulses.width_us(value)) == pytest.approx(value, abs=1e-9)
 
 
 def test_middle_outside_of_the_ends_is_refused() -> None:
-    """Both sides of such a servo would be the same."""
+    """A centre outside of the end points is refused."""
     with pytest.raises(RobotError, match="must lie between"):
         PulseRange(1000.0, 900.0, 2000.0)
 
 
-def test_servo_gets_no_pulse_before_it_is_told() -> None:
-    """It would jump."""
+def test_servo_gets_no_pulse_before_the_first_write() -> None:
+    """A pulse on opening would make the servo jump."""
     hardware = FakeHardware()
     servo = hardware.output("servo", **_SERVO | _AT)
     assert hardware.pulses.widths_us == {}
@@ -67,8 +67,8 @@ def test_servo_gets_no_pulse_before_it_is_told() -> None:
     servo.close()
 
 
-def test_servo_keeps_its_speed() -> None:
-    """90 degrees a second are a value of 1 a second, at 180 degrees from end to end."""
+def test_servo_is_limited_in_speed() -> None:
+    """At 180 degrees of travel, 90 degrees a second are a value of 1 a second."""
     servo = FakeHardware().output("servo", **_SERVO | _AT | {"travel_deg_per_s": 90.0})
     assert servo.write(0.0, 0) == 0.0
     assert servo.write(1.0, 100 * MS) == pytest.approx(0.1)
@@ -76,7 +76,7 @@ def test_servo_keeps_its_speed() -> None:
 
 
 def test_controller_gets_neutral_until_it_is_armed() -> None:
-    """It would refuse to start, or take what it gets for neutral."""
+    """Neutral is sent for `arm_s`, also after a release."""
     hardware = FakeHardware()
     esc = hardware.output("esc", **_ESC | _AT)
     assert hardware.pulses.widths_us == {12: 1500}
@@ -86,7 +86,7 @@ def test_controller_gets_neutral_until_it_is_armed() -> None:
     assert esc.write(1.0, 7_500 * MS) == 1.0
     assert hardware.pulses.widths_us == {12: 2000}
     esc.release()
-    assert esc.write(1.0, 8_000 * MS) == 0.0  # It must see neutral again.
+    assert esc.write(1.0, 8_000 * MS) == 0.0  # It needs neutral again.
     esc.close()
     assert hardware.pulses.widths_us == {12: 0}
 
@@ -97,31 +97,31 @@ def _armed(reverse: str) -> tuple[Any, FakeHardware]:
     return esc, hardware
 
 
-def test_controller_without_reverse_stands() -> None:
-    """And says so."""
+def test_controller_without_reverse_stays_at_neutral() -> None:
+    """A negative value sends neutral and returns 0."""
     esc, hardware = _armed("none")
     assert esc.write(-1.0, 0) == 0.0
     assert hardware.pulses.widths_us == {12: 1500}
 
 
 def test_controller_reverses_at_once() -> None:
-    """Where it can."""
+    """With reverse = "direct", a negative value acts at once."""
     assert _armed("direct")[0].write(-1.0, 0) == -1.0
 
 
 def test_controller_brakes_before_it_reverses() -> None:
-    """Brake, neutral, reverse; after going forward it all begins again."""
+    """With reverse = "double": brake, neutral, reverse, and again after going forward."""
     esc, hardware = _armed("double")
     esc.write(1.0, 0)
-    told: list[tuple[float, int]] = []
+    sent: list[tuple[float, int]] = []
     for ms in range(0, 600, 100):
-        told.append((esc.write(-0.5, ms * MS), hardware.pulses.widths_us[12]))
-    assert told == [(0, 1250), (0, 1250), (0, 1500), (0, 1500), (-0.5, 1250), (-0.5, 1250)]
+        sent.append((esc.write(-0.5, ms * MS), hardware.pulses.widths_us[12]))
+    assert sent == [(0, 1250), (0, 1250), (0, 1500), (0, 1500), (-0.5, 1250), (-0.5, 1250)]
     assert esc.write(0.0, 700 * MS) == 0.0
     assert esc.write(-0.5, 800 * MS) == -0.5  # It has not gone forward.
     assert esc.write(0.5, 900 * MS) == 0.5
     assert esc.write(-0.5, 1000 * MS) == 0.0
-    assert esc.write(0.5, 1050 * MS) == 0.5  # A wish to go forward waits for nothing.
+    assert esc.write(0.5, 1050 * MS) == 0.5  # Forward acts at once.
 
 
 def test_prescaler_of_50_hz() -> None:
@@ -130,7 +130,7 @@ def test_prescaler_of_50_hz() -> None:
 
 
 def test_chip_is_set_up_asleep_and_woken() -> None:
-    """The prescaler takes nothing else; and nothing that was there before may start again."""
+    """The prescaler is set while asleep, and stale channels are off before waking."""
     hardware = FakeHardware({0x40: _asleep()})
     hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
     assert [(register, data) for _, register, data in hardware.bus.writes] == [
@@ -143,28 +143,28 @@ def test_chip_is_set_up_asleep_and_woken() -> None:
     ]
 
 
-def test_chip_that_runs_is_not_put_to_sleep() -> None:
-    """Other channels hold a cat on its legs."""
+def test_a_running_chip_is_not_put_to_sleep() -> None:
+    """A chip that is already configured keeps pulsing its other channels."""
     hardware = FakeHardware({0x40: {0x00: 0x20, 0xFE: 121}})
     hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
     assert [register for _, register, _ in hardware.bus.writes] == [0x01, 0x00, 0x06 + 12]
 
 
 def test_pulse_is_in_whole_steps() -> None:
-    """1.5 ms are 307 steps of 4.88 us, and the servo says that it is a little beside."""
+    """Pulses are multiples of 4.88 us, and `write` returns the value in effect."""
     hardware = FakeHardware({0x40: _asleep()})
     servo = hardware.output("servo", **_SERVO | _ON_CHIP, channel=15)
     assert servo.write(0.0, 0) == pytest.approx((307 * 4.88 - 1500) / 500)
     assert hardware.bus.writes[-1] == (0x40, 0x06 + 60, [0, 0, 307 & 0xFF, 307 >> 8])
     before = len(hardware.bus.writes)
     servo.write(0.0, 1)
-    assert len(hardware.bus.writes) == before  # Nothing new, nothing sent.
+    assert len(hardware.bus.writes) == before  # An unchanged value is not sent again.
     servo.release()
     assert hardware.bus.writes[-1] == (0x40, 0x06 + 60, [0, 0, 0, 0x10])
 
 
 def test_channels_share_their_chip() -> None:
-    """And a chip is opened afresh after the last one has let go."""
+    """Channels share one chip, which is closed with its last channel and can be reopened."""
     hardware = FakeHardware({0x40: _asleep()})
     servos = [hardware.output("servo", **_SERVO | _ON_CHIP, channel=c) for c in range(12)]
     assert sum(register == 0xFE for _, register, _ in hardware.bus.writes) == 1
@@ -181,7 +181,7 @@ def test_channels_share_their_chip() -> None:
 
 
 def test_output_enable_is_low_only_while_something_is_sent() -> None:
-    """It is active low; a resistor keeps the outputs off before we come and after we go."""
+    """The active-low output enable is low only while at least one channel is in use."""
     hardware = FakeHardware({0x40: _asleep()})
     on_chip = _ON_CHIP | {"output_enable": 26}
     one, two = (hardware.output("servo", **_SERVO | on_chip, channel=c) for c in (0, 1))
@@ -196,7 +196,7 @@ def test_output_enable_is_low_only_while_something_is_sent() -> None:
 
 
 def test_outputs_are_off_when_the_bus_fails() -> None:
-    """The chip would go on with what it was told last, full throttle perhaps."""
+    """When the chip does not answer, output enable goes high to stop its last pulses."""
     hardware = FakeHardware({0x40: _asleep()})
     servo = hardware.output("servo", **_SERVO | _ON_CHIP | {"output_enable": 26}, channel=0)
     servo.write(1.0, 0)
@@ -210,7 +210,7 @@ def test_outputs_are_off_when_the_bus_fails() -> None:
 
 
 def test_outputs_stay_off_while_a_channel_is_in_doubt() -> None:
-    """The controller may go on at full throttle; writing to the servo must not let it."""
+    """After a failed write, writing another channel must not enable the outputs."""
     hardware = FakeHardware({0x40: _asleep()})
     on_chip = _ON_CHIP | {"output_enable": 26}
     esc = hardware.output("esc", **_ESC | on_chip | {"arm_s": 0.0}, channel=0)
@@ -227,7 +227,7 @@ def test_outputs_stay_off_while_a_channel_is_in_doubt() -> None:
 
 
 def test_outputs_of_a_dead_process_do_not_come_back() -> None:
-    """The first controller that is opened turns the outputs of all channels on."""
+    """Opening a channel clears stale pulses on all others."""
     stale = {0x06 + 4 + 2: 410 & 0xFF, 0x06 + 4 + 3: 410 >> 8}  # Channel 1: 2000 us.
     hardware = FakeHardware({0x40: {0x00: 0x20, 0xFE: 121} | stale})
     hardware.output("esc", **_ESC | _ON_CHIP | {"output_enable": 26}, channel=0)
@@ -235,8 +235,8 @@ def test_outputs_of_a_dead_process_do_not_come_back() -> None:
     assert (0x40, 0xFD, [0x10]) in hardware.bus.writes
 
 
-def test_chip_that_lost_its_power_is_started_again() -> None:
-    """It would otherwise take the pulses, and send none."""
+def test_a_chip_that_lost_power_is_configured_again() -> None:
+    """After the error, the next writes restore mode, prescaler and pulses."""
     hardware = FakeHardware({0x40: _asleep()})
     esc, servo = (
         hardware.output("servo", **_SERVO | _ON_CHIP, channel=channel) for channel in (0, 1)
@@ -257,14 +257,14 @@ def test_chip_that_lost_its_power_is_started_again() -> None:
     assert _width_us(hardware, 1) == pytest.approx(1750, abs=5)
 
 
-def test_chip_that_is_not_there_is_named() -> None:
-    """With its address, because that is what one looks for with i2cdetect."""
+def test_a_missing_chip_is_named() -> None:
+    """The error gives address and bus, as for i2cdetect."""
     with pytest.raises(RobotError, match="PCA9685 at 0x40 on I2C bus 1 does not answer"):
         FakeHardware().output("servo", **_SERVO | _ON_CHIP, channel=3)
 
 
-def test_chip_that_lost_its_power_is_noticed() -> None:
-    """It sleeps then, and would stay silent for ever."""
+def test_a_chip_that_lost_power_is_reported() -> None:
+    """A chip that has gone to sleep raises an error within 100 writes."""
     hardware = FakeHardware({0x40: _asleep()})
     servo = hardware.output("servo", **_SERVO | _ON_CHIP, channel=0)
     servo.write(0.0, 0)
@@ -279,7 +279,7 @@ def test_chip_that_lost_its_power_is_noticed() -> None:
 
 
 def test_kernel_pwm_is_written_in_nanoseconds(tmp_path: Path) -> None:
-    """The files of /sys/class/pwm, in a folder of ours."""
+    """Period and duty cycle are written to files in nanoseconds."""
     folder = tmp_path / "pwmchip0" / "pwm1"
     folder.mkdir(parents=True)
     pwm = SysfsPwm(0, 1, 50, tmp_path)
@@ -293,7 +293,7 @@ def test_kernel_pwm_is_written_in_nanoseconds(tmp_path: Path) -> None:
     assert files() == {"period": 20_000_000, "duty_cycle": 0, "enable": 0}
 
 
-def test_kernel_pwm_that_is_not_there_is_named(tmp_path: Path) -> None:
-    """The overlay is missing in config.txt."""
+def test_a_missing_kernel_pwm_is_named(tmp_path: Path) -> None:
+    """Without the overlay in config.txt, opening raises an error."""
     with pytest.raises(RobotError, match="pwmchip0 does not answer"):
         SysfsPwm(0, 0, 50, tmp_path)

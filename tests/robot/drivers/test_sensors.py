@@ -1,4 +1,4 @@
-"""Sensors, at the level of pins and registers."""
+"""Sensor drivers, at the level of pins and registers."""
 
 import math
 import struct
@@ -20,7 +20,7 @@ _BUMPER = {"pins": [6, 13], "pull": "up"}
 
 
 def _turn(hardware: FakeHardware, backward: bool, turns: int, period_s: float) -> float:
-    """Turn a quadrature encoder, from and to both levels high; a leads forward."""
+    """Turn a quadrature encoder, starting and ending with both channels high; a leads forward."""
     edges = [(5, 0), (6, 0), (5, 1), (6, 1)]
     if backward:
         edges = [(6, 0), (5, 0), (6, 1), (5, 1)]
@@ -33,8 +33,8 @@ def _turn(hardware: FakeHardware, backward: bool, turns: int, period_s: float) -
 
 
 @pytest.mark.parametrize("backward", [False, True])
-def test_quadrature_knows_the_direction(backward: bool) -> None:
-    """One count is 10 mm; one in 20 ms is 0.5 m/s."""
+def test_quadrature_gives_the_direction(backward: bool) -> None:
+    """One count is 10 mm, so one in 20 ms is 0.5 m/s, with its sign."""
     hardware = FakeHardware()
     encoder = hardware.sensor("encoder", **_QUADRATURE)
     now_s = _turn(hardware, backward, 3, 0.02)
@@ -45,7 +45,7 @@ def test_quadrature_knows_the_direction(backward: bool) -> None:
 
 @given(speed=st.floats(0.05, 5.0), counts=st.integers(2, 30))
 def test_speed_is_distance_over_time(speed: float, counts: int) -> None:
-    """Whatever the speed, and however many edges are seen."""
+    """The speed is exact at any edge rate."""
     hardware = FakeHardware()
     encoder = hardware.sensor("encoder", **_QUADRATURE)
     now_s = _turn(hardware, False, counts, 0.01 / speed)
@@ -53,7 +53,7 @@ def test_speed_is_distance_over_time(speed: float, counts: int) -> None:
 
 
 def test_one_channel_has_the_sign_of_the_propulsion() -> None:
-    """And keeps the last one while the robot rolls out."""
+    """A single channel takes the sign of the propulsion, and keeps it while coasting."""
     hardware = FakeHardware()
     encoder = hardware.sensor("encoder", **_ENCODER)
     for i in range(6):
@@ -63,8 +63,8 @@ def test_one_channel_has_the_sign_of_the_propulsion() -> None:
     assert encoder.read(50 * MS, 1.0)["speed"] == pytest.approx(0.5)
 
 
-def test_wheel_without_edges_stands() -> None:
-    """Its speed falls as the next edge stays away, and is zero after half a second."""
+def test_wheel_without_edges_slows_to_zero() -> None:
+    """The speed falls while no edge comes, and is zero after half a second."""
     hardware = FakeHardware()
     encoder = hardware.sensor("encoder", **_QUADRATURE)
     assert encoder.read(0, 0.0) == {"speed": 0.0}
@@ -74,8 +74,8 @@ def test_wheel_without_edges_stands() -> None:
     assert encoder.read(now_ns + 501 * MS, 1.0)["speed"] == 0.0
 
 
-def test_short_push_is_not_missed() -> None:
-    """A bumper may spring back between two reads."""
+def test_a_short_press_is_reported() -> None:
+    """A bumper pressed and released between two reads is reported once."""
     hardware = FakeHardware()
     bumper = hardware.sensor("switch", **_BUMPER)
     assert bumper.read(0, 1.0) == {"bump": 0.0}
@@ -88,8 +88,8 @@ def test_short_push_is_not_missed() -> None:
     bumper.close()
 
 
-def test_switch_to_three_volts() -> None:
-    """The other way of wiring it."""
+def test_a_switch_to_3v3() -> None:
+    """A switch with a pull-down reads 1 when high."""
     hardware = FakeHardware()
     bumper = hardware.sensor("switch", pins=[6], pull="down")
     assert bumper.read(0, 0.0) == {"bump": 0.0}
@@ -103,19 +103,19 @@ def _echo(hardware: FakeHardware, seconds: float) -> None:
 
 
 def test_echo_is_a_distance() -> None:
-    """Sound goes there and back."""
+    """The distance is half the echo time times the speed of sound, up to `max_m`."""
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
     assert sonar.read(0, 1.0) == {}
     _echo(hardware, 2 * 0.5 / 343.2)
     assert sonar.read(10 * MS, 1.0)["distance"] == pytest.approx(0.5)
-    _echo(hardware, 0.038)  # What it sends when it has heard nothing.
+    _echo(hardware, 0.038)  # Sent when there was no echo.
     assert sonar.read(20 * MS, 1.0)["distance"] == 2.0
     sonar.close()
 
 
-def test_pings_keep_their_distance() -> None:
-    """At most one in 60 ms, or one hears the echo of the one before."""
+def test_pings_are_at_least_60_ms_apart() -> None:
+    """Closer pings could receive the echo of the one before."""
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
     pings: list[int] = []
@@ -140,7 +140,7 @@ def _forbid(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_ping_never_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a robot the trigger stays high for 10 us without giving the processor away."""
+    """The trigger stays high for 10 us by busy waiting, without yielding the processor."""
     _forbid("sleep", monkeypatch)
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
@@ -155,7 +155,7 @@ def test_a_ping_never_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_ping_of_simulated_pins_takes_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It neither sleeps nor reads the clock of the machine."""
+    """On simulated hardware, a ping neither sleeps nor reads the machine's clock."""
     hardware = FakeHardware()
     monkeypatch.setattr(hardware, "clock", _SimulatedClock())
     sonar = hardware.sensor("hcsr04", **_SONAR)
@@ -167,7 +167,7 @@ def test_a_ping_of_simulated_pins_takes_no_time(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_sonar_fails_after_three_missed_echoes_and_comes_back() -> None:
-    """A cable came loose: the last "far" must not be believed for long."""
+    """The last distance is reported until three echoes are missed; a new echo clears the error."""
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
     sonar.read(0, 1.0)
@@ -182,7 +182,7 @@ def test_sonar_fails_after_three_missed_echoes_and_comes_back() -> None:
 
 
 def test_sonar_with_a_long_echo_does_not_fail() -> None:
-    """Some modules hold the line for 200 ms when nothing is near, and hear no ping meanwhile."""
+    """Some modules hold the line for 200 ms without an obstacle, and ignore pings meanwhile."""
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
     for ms in range(0, 1200, 10):
@@ -193,8 +193,8 @@ def test_sonar_with_a_long_echo_does_not_fail() -> None:
         assert sonar.read(ms * MS, 1.0) in ({}, {"distance": 2.0})
 
 
-def test_sonar_whose_line_hangs_fails() -> None:
-    """A line that stays high says nothing."""
+def test_sonar_with_a_stuck_line_fails() -> None:
+    """An echo line that stays high raises an error."""
     hardware = FakeHardware()
     sonar = hardware.sensor("hcsr04", **_SONAR)
     sonar.read(0, 1.0)
@@ -211,7 +211,7 @@ def _motion(x: int, y: int, z: int, yaw: int) -> dict[int, int]:
 
 
 def test_motion_is_in_si_units() -> None:
-    """4 g and 500 deg/s are the ends of its numbers."""
+    """Full scale is 4 g and 500 deg/s; readings are in m/s^2 and rad/s."""
     hardware = FakeHardware({0x68: _motion(8192, -4096, 8192, 655)})
     imu = hardware.sensor("mpu6050", bus=1, address=0x68)
     read = imu.read(0, 1.0)
@@ -224,7 +224,7 @@ def test_motion_is_in_si_units() -> None:
 
 
 def test_gyroscope_learns_its_zero_while_the_robot_rests() -> None:
-    """It says up to 20 deg/s when nothing turns."""
+    """A reading at rest sets the bias of the gyroscope."""
     hardware = FakeHardware({0x68: _motion(0, 0, 8192, 655)})
     imu = hardware.sensor("mpu6050", bus=1, address=0x68)
     assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(0.0)
@@ -234,7 +234,7 @@ def test_gyroscope_learns_its_zero_while_the_robot_rests() -> None:
 
 @pytest.mark.parametrize("counts", [-32768, -1, 1, 32767])
 def test_motion_uses_the_whole_range(counts: int) -> None:
-    """Full scale is 4 g and 500 deg/s, with a sign."""
+    """Raw counts are signed 16-bit numbers."""
     hardware = FakeHardware({0x69: _motion(counts, -1 - counts, 8192, counts)})
     read = hardware.sensor("mpu6050", bus=1, address=0x69).read(0, 1.0)
     assert read["acceleration_x"] == pytest.approx(counts / 8192 * 9.80665)
@@ -243,16 +243,16 @@ def test_motion_uses_the_whole_range(counts: int) -> None:
 
 
 @pytest.mark.parametrize(("deg_per_s", "learns"), [(-24.9, True), (24.9, True), (25.1, False)])
-def test_gyroscope_learns_no_zero_from_a_robot_that_turns(deg_per_s: float, learns: bool) -> None:
-    """Above 25 deg/s the robot itself turns, as when someone carries it."""
+def test_gyroscope_learns_no_bias_while_turning(deg_per_s: float, learns: bool) -> None:
+    """Rates above 25 deg/s are motion, not bias."""
     hardware = FakeHardware({0x68: _motion(0, 0, 8192, round(deg_per_s * 65.5))})
     yaw_rate = hardware.sensor("mpu6050", bus=1, address=0x68).read(0, 0.0)["yaw_rate"]
     expected = 0.0 if learns else math.radians(round(deg_per_s * 65.5) / 65.5)
     assert yaw_rate == pytest.approx(expected)
 
 
-def test_gyroscope_zero_follows_slowly() -> None:
-    """By 2 % of the difference in each reading at rest."""
+def test_gyroscope_bias_is_filtered() -> None:
+    """Each reading at rest moves the bias by 2 % of the difference."""
     hardware = FakeHardware({0x68: _motion(0, 0, 8192, 0)})
     imu = hardware.sensor("mpu6050", bus=1, address=0x68)
     imu.read(0, 0.0)
@@ -260,8 +260,8 @@ def test_gyroscope_zero_follows_slowly() -> None:
     assert imu.read(0, 0.0)["yaw_rate"] == pytest.approx(0.98 * math.radians(10.0))
 
 
-def test_other_chip_or_none_is_named() -> None:
-    """With what it calls itself, since there are many that look the same."""
+def test_a_wrong_or_missing_chip_is_named() -> None:
+    """The error gives the identity that the chip reports."""
     with pytest.raises(RobotError, match="identifies itself as 0x71, not 0x68"):
         FakeHardware({0x68: {0x75: 0x71}}).sensor("mpu6050", bus=1, address=0x68)
     with pytest.raises(RobotError, match="0x68 on I2C bus 1 does not answer"):
@@ -270,8 +270,8 @@ def test_other_chip_or_none_is_named() -> None:
         FakeHardware().sensor("ina219", bus=1, address=0x40)
 
 
-def test_motion_sensor_that_sleeps_is_noticed() -> None:
-    """After a loss of power all of its numbers are 0, gravity too."""
+def test_a_sleeping_imu_is_reported() -> None:
+    """After a loss of power all readings are 0, including gravity."""
     hardware = FakeHardware({0x68: _motion(0, 0, 8192, 0)})
     imu = hardware.sensor("mpu6050", bus=1, address=0x68)
     hardware.bus.chips[0x68] |= _motion(0, 0, 0, 0)
@@ -280,7 +280,7 @@ def test_motion_sensor_that_sleeps_is_noticed() -> None:
 
 
 def test_battery_is_in_volts() -> None:
-    """4 mV a step, above three bits of status; it is asked ten times a second."""
+    """The voltage has 4 mV steps above three status bits, and is read at most every 100 ms."""
     hardware = FakeHardware({0x41: {0x02: (1850 << 3 | 2) >> 8, 0x03: (1850 << 3 | 2) & 0xFF}})
     battery = hardware.sensor("ina219", bus=1, address=0x41)
     assert battery.read(0, 0.0)["battery"] == pytest.approx(7.4)
@@ -292,7 +292,7 @@ def test_battery_is_in_volts() -> None:
 
 
 def test_temperature_is_in_degrees(tmp_path: Path) -> None:
-    """The kernel says thousandths."""
+    """The kernel reports thousandths of a degree; the file is read once a second."""
     file = tmp_path / "temp"
     file.write_text("48312\n")
     sensor = FakeHardware().sensor("cpu_temperature", path=str(file))

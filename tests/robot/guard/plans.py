@@ -1,4 +1,4 @@
-"""Robots for the tests of the guard."""
+"""Robot plans for the tests of the guard."""
 
 from dataclasses import replace
 
@@ -53,14 +53,14 @@ def car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardP
 
 
 def quick_car(limits: LimitPlan | None = None, stop: StopPlan | None = None) -> GuardPlan:
-    """The same without slew."""
+    """The same car without slew limits."""
     plan = car(limits, stop)
     actions = tuple(replace(action, slew_per_s=float("inf")) for action in plan.actions)
     return replace(plan, actions=actions)
 
 
 def arm(now_ns: int, emergency: int = 0, *, person: bool = True) -> Order:
-    """Somebody arms the robot now."""
+    """An order to arm, issued now."""
     return Order("arm", issued_ns=now_ns, emergency=emergency, person=person)
 
 

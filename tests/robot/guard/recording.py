@@ -1,8 +1,8 @@
-"""Hardware that writes every change of a pin to a file, for tests with real processes.
+"""Hardware that appends each change of a pin to a file, for tests with real processes.
 
-Its argument is the file. Each line is a JSON object: what (`pin`, `duty`), who (`pid`) and when
-(`t`, CLOCK_MONOTONIC in ns). Pins of different processes know nothing of each other; so, as on a
-Raspberry Pi, what a process left is what its last line says.
+The argument of `connect` is the file. Each line is a JSON object with the change (`pin`, `duty`),
+the process (`pid`) and the time (`t`, CLOCK_MONOTONIC in ns). Processes do not share pin state, so
+the last line of a pin gives its level after a process died, as on a Raspberry Pi.
 """
 
 import json
@@ -17,11 +17,11 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 from shapechanger.robot.hardware import RealClock
 
 _STUCK = "stuck-"
-"""Begins the name of a file that makes a pin fail: `stuck-22` beside the record."""
+"""Prefix of a file next to the record that makes a pin fail, such as `stuck-GPIO22`."""
 
 
 class Record:
-    """The file, for those who write and those who read."""
+    """Reader and writer of the file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -34,18 +34,18 @@ class Record:
         os.close(fd)
 
     def lines(self) -> list[dict[str, Any]]:
-        """All complete lines."""
+        """Return all complete lines."""
         if not self.path.exists():
             return []
         text = self.path.read_text()
         return [json.loads(line) for line in text[: text.rfind("\n") + 1].splitlines()]
 
     def pins(self) -> Iterator[dict[str, Any]]:
-        """The lines of pins."""
+        """Return the lines about pins."""
         return (line for line in self.lines() if "pin" in line)
 
     def is_at_rest(self) -> bool:
-        """Whether every pin was low last."""
+        """Return whether the last level of each pin is low."""
         return not any({line["pin"]: line["duty"] for line in self.pins()}.values())
 
 
@@ -69,15 +69,15 @@ class _Hardware:
         self._factory = MockFactory(pin_class=Pin)
 
     def pin_factory(self) -> MockFactory:
-        """Mock pins that write."""
+        """Return the recorded mock pins."""
         return self._factory
 
     def close(self) -> None:
-        """Let go of the pins; they keep their level."""
+        """Do nothing: pins keep their level."""
 
 
 def connect(path: str) -> _Hardware:
-    """Recorded pins; the argument is the file."""
+    """Connect recorded pins; the argument is the file."""
     record = Record(Path(path))
     record.write(opened="hardware")
     return _Hardware(record)

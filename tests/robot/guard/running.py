@@ -1,4 +1,4 @@
-"""A supervisor with guard and stand-in daemon in processes of their own, on recorded pins."""
+"""A supervisor, guard and stand-in daemon in separate processes, on recorded pins."""
 
 import contextlib
 import os
@@ -21,38 +21,38 @@ _PINS = {"GPIO17", "GPIO4", "GPIO22", "GPIO27"}
 
 
 class Robot:
-    """The processes and what they wrote."""
+    """The processes and their record."""
 
     def __init__(self, process: "subprocess.Popen[bytes]", record: Record) -> None:
         self.process = process
         self.record = record
 
     def pids(self, opened: str) -> list[int]:
-        """Those that opened the hardware, without the supervisor, or those of the daemon."""
+        """Return the pids of the guards ("hardware") or daemons, without the supervisor."""
         lines = self.record.lines()
         pids = [line["pid"] for line in lines if line.get("opened") == opened]
         return [pid for pid in pids if pid != self.process.pid]
 
     def drive(self) -> None:
-        """Wait until it drives."""
+        """Wait until the robot drives."""
         until(lambda: any(line["duty"] > 0.0 for line in self.record.pins()))
 
     def kill(self, opened: str, number: signal.Signals) -> int:
-        """Send a signal to the first guard ("hardware") or daemon, and say when."""
+        """Signal the first guard ("hardware") or daemon, and return the time of the last record."""
         before = self.record.lines()[-1]["t"]
         os.kill(self.pids(opened)[0], number)
         return before
 
     def commands(self) -> list[int]:
-        """When the daemon sent its commands."""
+        """Return the times at which the daemon sent commands."""
         return [line["t"] for line in self.record.lines() if "command" in line]
 
     def rested_ns(self, after_ns: int, pid: int | None = None) -> int:
-        """Wait until every pin was put to rest after a time, and say when the last one was.
+        """Wait until every pin went to rest after a time, and return when the last one did.
 
         Args:
             after_ns: The time.
-            pid: By which process; None for any.
+            pid: Process that must have set the pins; None for any.
         """
         found: dict[str, int] = {}
 
@@ -71,13 +71,13 @@ class Robot:
         return max(found.values())
 
     def notes(self, key: str) -> list[Any]:
-        """Everything of one kind that was written."""
+        """Return all values recorded under a key."""
         return [line[key] for line in self.record.lines() if key in line]
 
 
 @contextlib.contextmanager
 def running(folder: Path, plan: GuardPlan | None = None, **daemon: object) -> Iterator[Robot]:
-    """Start a robot that drives, and end it."""
+    """Start a robot that drives, and stop it on exit."""
     record = Record(folder / "record")
     record.write(opened="test")
     fd = plan_fd(
@@ -98,7 +98,7 @@ def running(folder: Path, plan: GuardPlan | None = None, **daemon: object) -> It
         if process.poll() is None:
             process.kill()
             process.wait()
-        # They end themselves when the supervisor is gone; those that are stopped cannot.
+        # Guard and daemon exit without their supervisor, unless they are stopped.
         for pid in robot.pids("hardware") + robot.pids("daemon"):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGCONT)

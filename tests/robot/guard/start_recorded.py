@@ -1,6 +1,6 @@
-"""Starts guard or supervisor as `robot/guard/start.py` does, with the tests within reach.
+"""Start the guard or the supervisor as `robot/guard/start.py` does, with importable tests.
 
-Isolated mode knows no PYTHONPATH, so the folder with the tests is named here. The daemon is a
+Isolated mode ignores PYTHONPATH, so the repository is added to the path here. The daemon is a
 stand-in.
 """
 
@@ -32,7 +32,7 @@ def main(program: str, arguments: list[str]) -> None:
         guard=(python, "-I", str(here), "guard"),
         daemon=(python, "-I", str(here.with_name("stand_in.py"))),
     )
-    # The plan is the real one; what is run is told here.
+    # Use the real plan, but these commands.
     supervisor.ProcessCommands.of = classmethod(lambda cls, plan: commands)
     supervisor.main(arguments)
 

@@ -1,4 +1,4 @@
-"""The guard's end of the daemon's socket: the daemon is gone when its socket ends, or its life."""
+"""The guard's end of the daemon socket detects the loss of the daemon."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapechanger.robot.guard.messages import Order, encode
 
 @pytest.fixture
 def ends() -> Iterator[tuple[DaemonChannel, socket.socket]]:
-    """The guard's end and the daemon's."""
+    """The guard's channel and the daemon's socket."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     channel = DaemonChannel(ours.detach())
     yield channel, theirs
@@ -22,8 +22,8 @@ def ends() -> Iterator[tuple[DaemonChannel, socket.socket]]:
     theirs.close()
 
 
-def test_the_end_of_the_socket_is_the_end(ends: tuple[DaemonChannel, socket.socket]) -> None:
-    """What was said before it is heard."""
+def test_a_closed_socket_means_a_lost_daemon(ends: tuple[DaemonChannel, socket.socket]) -> None:
+    """Orders sent before the socket closed are still read."""
     channel, daemon = ends
     daemon.send(encode(Order(kind="halt")))
     daemon.close()
@@ -31,8 +31,8 @@ def test_the_end_of_the_socket_is_the_end(ends: tuple[DaemonChannel, socket.sock
     assert channel.lost
 
 
-def test_the_end_of_its_life_is_the_end(ends: tuple[DaemonChannel, socket.socket]) -> None:
-    """Though the socket is still open; and it is waited for like the socket."""
+def test_a_closed_life_pipe_means_a_lost_daemon(ends: tuple[DaemonChannel, socket.socket]) -> None:
+    """The pipe is polled like the socket, and its end counts although the socket is open."""
     channel, daemon = ends
     watched, held = os.pipe()
     assert len(channel.filenos()) == 1
@@ -46,8 +46,8 @@ def test_the_end_of_its_life_is_the_end(ends: tuple[DaemonChannel, socket.socket
     assert channel.lost
 
 
-def test_a_second_life_is_not_kept(ends: tuple[DaemonChannel, socket.socket]) -> None:
-    """Nobody sends two, and whoever did would fill the guard with descriptors."""
+def test_a_second_life_pipe_is_closed(ends: tuple[DaemonChannel, socket.socket]) -> None:
+    """Further descriptors are closed, so that they cannot accumulate."""
     channel, daemon = ends
     pipes = [os.pipe() for _ in range(2)]
     for watched, _ in pipes:
@@ -56,6 +56,6 @@ def test_a_second_life_is_not_kept(ends: tuple[DaemonChannel, socket.socket]) ->
     assert channel.orders() == ([], [])
     with pytest.raises(BrokenPipeError):
         os.write(pipes[1][1], b"x")
-    os.write(pipes[0][1], b"x")  # Somebody still reads the first one.
+    os.write(pipes[0][1], b"x")  # The first pipe is still open.
     for _, held in pipes:
         os.close(held)

@@ -1,4 +1,4 @@
-"""What is said of outputs that do something else than they were told."""
+"""Estimated actions and reasons when outputs deviate from their commands."""
 
 import pytest
 
@@ -36,17 +36,17 @@ _SLOW = "Output steer: it turns no faster than its profile allows."
         ((0.0, 0.05), (0.3, 0.0), f"{_WAITS} {_SLOW}"),
     ],
 )
-def test_an_action_is_what_its_output_does(
+def test_an_action_is_estimated_from_its_output(
     has: tuple[float, float], actions: tuple[float, float], reason: str
 ) -> None:
-    """Steps of a pulse are no difference; a controller at neutral is rest."""
+    """Rounding of pulses makes no difference; a controller at neutral is at rest."""
     done = ActionEstimator(_CAR).estimate((0.5, -0.4), (-0.4, -0.05), has)
     assert done.actions == pytest.approx(actions)
     assert done.reason == reason
 
 
-def test_outputs_of_several_actions_tell_of_rest_only() -> None:
-    """Two tracks at rest are a tank at rest; one of them alone tells of no action."""
+def test_mixed_outputs_show_rest_only() -> None:
+    """Two tracks at rest give actions at rest; one track alone gives no estimate."""
     estimator = ActionEstimator(_TANK)
     assert estimator.estimate((0.2, 0.5), (0.7, 0.3), (0.0, 0.0)).actions == (0.0, 0.0)
     one = estimator.estimate((0.2, 0.5), (0.7, 0.3), (0.0, 0.3))
@@ -54,7 +54,7 @@ def test_outputs_of_several_actions_tell_of_rest_only() -> None:
     assert one.reason == "Output left: it does not follow."
 
 
-def test_an_action_with_two_outputs_goes_as_long_as_one_of_them_does() -> None:
+def test_an_action_with_two_outputs_is_active_while_one_moves() -> None:
     """A second propeller whose controller still waits does not hide the first."""
     boat = GuardPlan(
         "boat",

@@ -1,4 +1,4 @@
-"""The log of guard and supervisor, which never waits."""
+"""The non-blocking log of guard and supervisor."""
 
 import fcntl
 import logging
@@ -20,44 +20,44 @@ def pipe() -> Iterator[tuple[int, int]]:
     os.close(read)
 
 
-def _say(lines: logging.Handler, words: str) -> None:
+def _emit(lines: logging.Handler, words: str) -> None:
     lines.handle(logging.LogRecord("robot", logging.INFO, "", 0, words, None, None))
 
 
-def test_a_pipe_that_nobody_reads_loses_lines_and_holds_up_nothing(
+def test_a_full_pipe_drops_lines(
     pipe: tuple[int, int],
 ) -> None:
-    """They are counted, and the descriptor, which is shared, stays as it was."""
+    """Lost lines are counted, and the flags of the shared descriptor do not change."""
     read, write = pipe
     flags = fcntl.fcntl(write, fcntl.F_GETFL)
     lines = _Lines(write)
     for _ in range(100):
-        _say(lines, "x" * 100)
+        _emit(lines, "x" * 100)
     seen = os.read(read, 1 << 16)
     written = seen.count(b"\n")
     assert 0 < written < 100
-    _say(lines, "Again.")
+    _emit(lines, "Again.")
     assert (
         os.read(read, 1 << 16) == f"Again. ({100 - written} lines before it were lost.)\n".encode()
     )
     assert fcntl.fcntl(write, fcntl.F_GETFL) == flags
 
 
-def test_a_line_is_never_longer_than_a_pipe_takes_at_once(pipe: tuple[int, int]) -> None:
-    """A longer one would wait for a reader; what has no bytes is written otherwise."""
+def test_a_line_is_cut_to_the_size_of_a_pipe(pipe: tuple[int, int]) -> None:
+    """Longer lines would block; characters that cannot be encoded are escaped."""
     read, write = pipe
-    _say(_Lines(write), "\ud800" * 10_000)
+    _emit(_Lines(write), "\ud800" * 10_000)
     data = os.read(read, 1 << 16)
     assert len(data) == 4096
     assert data.startswith(b"\\ud800")
     assert data.endswith(b"\n")
 
 
-def test_a_log_without_anybody_at_the_other_end_is_no_error() -> None:
-    """The robot goes on."""
+def test_a_log_without_a_reader_raises_nothing() -> None:
+    """Writing to a pipe whose reader is closed is ignored."""
     read, write = os.pipe()
     os.close(read)
     try:
-        _say(_Lines(write), "Hello.")
+        _emit(_Lines(write), "Hello.")
     finally:
         os.close(write)

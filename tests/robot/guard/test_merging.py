@@ -1,4 +1,4 @@
-"""Several sensors of one kind: the one that calls for more care counts."""
+"""Merging several sensors of one kind: the most cautious reading counts."""
 
 import itertools
 
@@ -22,7 +22,7 @@ from shapechanger.robot.guard.sensors import merge
 def test_the_order_of_sensors_does_not_matter(
     name: str, values: tuple[float, float], counts: float
 ) -> None:
-    """A pressed bumper is not hidden by a free one, nor a near wall by a far one."""
+    """A pressed bumper overrides a free one and a near obstacle a far one, in either order."""
     for pair in itertools.permutations(zip(values, ("one", "two"), strict=True)):
         quantities: dict[str, float] = {}
         sources: dict[str, str] = {}
@@ -32,8 +32,8 @@ def test_the_order_of_sensors_does_not_matter(
         assert sources == {name: dict(zip(values, ("one", "two"), strict=True))[counts]}
 
 
-def test_of_other_quantities_the_last_one_counts() -> None:
-    """With its source."""
+def test_the_last_reading_of_other_quantities_counts() -> None:
+    """The value and the source of the last sensor are kept."""
     quantities = {"yaw_rate": 1.0}
     sources = {"yaw_rate": "one"}
     merge(quantities, sources, {"yaw_rate": 0.5}, "two")

@@ -1,4 +1,4 @@
-"""From the actions of a robot to the values of its outputs."""
+"""Output values mixed from the actions of a robot."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _PLAN = GuardPlan(
 )
 
 
-def test_an_output_is_its_offset_and_what_it_takes_of_each_action() -> None:
-    """And never beyond its range."""
+def test_an_output_is_its_offset_plus_its_weighted_actions() -> None:
+    """The result is clipped to the output's range."""
     assert output_values(_PLAN, [0.25, 0.5]) == (0.75, 0.5)
     assert output_values(_PLAN, [1.0, 1.0]) == (1.0, 0.25)
 
 
 @pytest.mark.parametrize("actions", [[], [0.5], [0.0, 0.5, 0.0]])
-def test_too_many_or_too_few_numbers_are_refused_in_words(actions: list[float]) -> None:
-    """The message names the actions."""
+def test_a_wrong_number_of_actions_is_refused(actions: list[float]) -> None:
+    """The error names the actions."""
     with pytest.raises(ValueError, match=r"tank has 2 actions \(steering, throttle\), got "):
         output_values(_PLAN, actions)

@@ -1,4 +1,4 @@
-"""The guard's loop on a clock that is handed in, with mock pins and real sockets."""
+"""The guard's loop with a fake clock, mock pins and real sockets."""
 
 import itertools
 import logging
@@ -23,14 +23,14 @@ _T0 = 1_000 * MS
 
 
 class _Clock:
-    """Time that goes by when it is waited for; what happens meanwhile is said beforehand."""
+    """A clock that advances when waited for, with scheduled events."""
 
     def __init__(self) -> None:
         self.time_ns = _T0
         self.events: list[tuple[int, Callable[[], object]]] = []
 
     def at(self, ms: int, event: Callable[[], object]) -> None:
-        """Let something happen so many milliseconds after the start."""
+        """Schedule an event, in milliseconds after the start."""
         self.events.append((_T0 + ms * MS, event))
         self.events.sort(key=lambda event: event[0])
 
@@ -47,7 +47,7 @@ class _Clock:
 
 
 class _Bench:
-    """A guard with everything around it."""
+    """A guard with its hardware, daemon and supervisor ends."""
 
     def __init__(self, plan: GuardPlan, **options: bool) -> None:
         self.clock = _Clock()
@@ -66,12 +66,12 @@ class _Bench:
     def duty(self, pin: int) -> float:
         return self.factory.pin(pin).state
 
-    def say(self, *orders: Order) -> None:
+    def send(self, *orders: Order) -> None:
         for order in orders:
             self.daemon.send(encode(order))
 
     def read(self) -> list[GuardState]:
-        """Take in all states so far."""
+        """Read all states sent so far."""
         try:
             while data := self.daemon.recv(1 << 16):
                 self.states.append(decode_state(data))
@@ -80,7 +80,7 @@ class _Bench:
         return self.states
 
     def run(self, end_ms: int) -> GuardState:
-        """Run until a time, and give the last state."""
+        """Run until a time, and return the last state."""
         self.clock.at(end_ms, lambda: setattr(self.guard, "ended", "the test is over"))
         self.guard.run(self.heartbeat)
         return self.read()[-1]
@@ -95,7 +95,7 @@ class _Bench:
 
 @pytest.fixture
 def make() -> Iterator[Callable[[GuardPlan], _Bench]]:
-    """Make benches that are closed in the end."""
+    """Make benches that are closed after the test."""
     benches: list[_Bench] = []
 
     def bench(plan: GuardPlan, **options: bool) -> _Bench:
@@ -112,14 +112,14 @@ def _plan(**changes: object) -> GuardPlan:
 
 
 def _drives(bench: _Bench) -> None:
-    bench.clock.at(1, lambda: bench.say(arm(_T0), command(1, _T0)))
+    bench.clock.at(1, lambda: bench.send(arm(_T0), command(1, _T0)))
 
 
 _Make = Callable[..., _Bench]
 
 
 def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> None:
-    """Not at the next tick, and not at the tick after the deadline."""
+    """A command acts on arrival and ends at its deadline, not at the next tick."""
     bench = make(_plan())
     duties: dict[int, float] = {}
     _drives(bench)
@@ -136,12 +136,12 @@ def test_an_order_acts_when_it_arrives_and_ends_at_its_deadline(make: _Make) -> 
 
 
 def test_the_drive_is_written_before_the_steering(make: _Make) -> None:
-    """A servo on a slow bus must not delay a stop."""
+    """Propelling outputs come first, so that a slow servo bus cannot delay a stop."""
     assert list(make(_plan()).run(10).outputs) == ["drive", "steer"]
 
 
-def test_states_come_on_every_change_and_at_50_hz(make: _Make) -> None:
-    """The daemon sees each change, and that the guard lives."""
+def test_states_are_sent_on_change_and_at_50_hz(make: _Make) -> None:
+    """A state is sent on each change, and at least every 20 ms."""
     bench = make(_plan())
     _drives(bench)
     bench.run(100)
@@ -151,17 +151,17 @@ def test_states_come_on_every_change_and_at_50_hz(make: _Make) -> None:
     assert max(gaps) <= 20 * MS
 
 
-def test_a_refusal_is_said_once(make: _Make) -> None:
-    """With the number of the command that it is about."""
+def test_a_refusal_is_sent_once(make: _Make) -> None:
+    """One state carries the refusal and the number of its command."""
     bench = make(_plan())
-    bench.clock.at(5, lambda: bench.say(command(7, _T0)))
+    bench.clock.at(5, lambda: bench.send(command(7, _T0)))
     bench.run(50)
     refused = [(s.refused, s.refused_seq) for s in bench.states if s.refused]
     assert refused == [("Command 7 is refused. Not armed.", 7)]
 
 
-def test_garbage_is_refused_in_words(make: _Make) -> None:
-    """It is no order, whatever it is."""
+def test_garbage_is_refused(make: _Make) -> None:
+    """Malformed and oversized datagrams are reported as refused."""
     bench = make(_plan())
     bench.clock.at(5, lambda: bench.daemon.send(b"\xff{"))
     bench.clock.at(6, lambda: bench.daemon.send(b"[" * 20_000))
@@ -170,16 +170,16 @@ def test_garbage_is_refused_in_words(make: _Make) -> None:
 
 
 def test_a_full_socket_drops_states_and_does_not_stop_the_guard(make: _Make) -> None:
-    """A daemon that does not read any more is not waited for."""
+    """The guard does not block on a daemon that stopped reading."""
     bench = make(_plan())
     bench.daemon.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
-    bench.clock.at(20_000, lambda: bench.say(arm(bench.clock.time_ns)))
+    bench.clock.at(20_000, lambda: bench.send(arm(bench.clock.time_ns)))
     bench.clock.at(20_100, bench.read)
     assert bench.run(20_200).armed
 
 
 def test_the_enable_pin_is_toggled_at_every_tick(make: _Make) -> None:
-    """Its edges keep the one-shot going that enables the motors; afterwards it is low."""
+    """Edges drive the motors' one-shot, and the pin is low after `close`."""
     bench = make(_plan(enable_pin=5))
     pin = bench.factory.pin(5)
     bench.clock.at(1, pin.clear_states)
@@ -190,11 +190,11 @@ def test_the_enable_pin_is_toggled_at_every_tick(make: _Make) -> None:
 
 
 def test_the_button_is_an_emergency_stop(make: _Make) -> None:
-    """Pressed is ground; while it is pressed nobody arms."""
+    """A low button pin stops the robot, and refuses arming while pressed."""
     bench = make(_plan(stop_pin=6))
     _drives(bench)
     bench.clock.at(45, lambda: bench.factory.pin(6).drive_low())
-    bench.clock.at(60, lambda: bench.say(arm(_T0, 1)))
+    bench.clock.at(60, lambda: bench.send(arm(_T0, 1)))
     state = bench.run(80)
     assert (state.armed, state.emergency, state.emergencies) == (False, True, 1)
     assert any("button is pressed" in s.refused for s in bench.states)
@@ -202,7 +202,7 @@ def test_the_button_is_an_emergency_stop(make: _Make) -> None:
 
 
 def test_a_lost_daemon_disarms(make: _Make) -> None:
-    """Whatever its last command was."""
+    """When the daemon's socket closes, the drive rests at once."""
     bench = make(_plan())
     _drives(bench)
     duties: list[float] = []
@@ -214,8 +214,8 @@ def test_a_lost_daemon_disarms(make: _Make) -> None:
     assert duties == [0.5, 0.0]
 
 
-def test_a_daemon_that_left_with_states_unread_is_lost_too(make: _Make) -> None:
-    """The kernel says so in another way then."""
+def test_a_daemon_that_exits_with_unread_states_is_lost(make: _Make) -> None:
+    """The kernel then reports a reset instead of an end of file."""
     bench = make(_plan())
     _drives(bench)
     bench.clock.at(15, bench.daemon.close)
@@ -224,25 +224,25 @@ def test_a_daemon_that_left_with_states_unread_is_lost_too(make: _Make) -> None:
     assert bench.duty(22) == 0.0
 
 
-def test_a_lost_supervisor_ends_it(make: _Make) -> None:
-    """Nobody would notice its death any more."""
+def test_a_lost_supervisor_ends_the_guard(make: _Make) -> None:
+    """The guard exits when its supervisor does, since its own death would go unnoticed."""
     bench = make(_plan())
     bench.clock.at(15, bench.supervisor.close)
     bench.guard.run(bench.heartbeat)
     assert bench.guard.ended == "the supervisor is gone"
 
 
-def test_its_heart_beats(make: _Make) -> None:
-    """In every round, here; a supervisor that does not listen is no reason to stop."""
+def test_the_guard_sends_heartbeats(make: _Make) -> None:
+    """Heartbeats are sent in every round, and an unread socket does not stop the guard."""
     bench = make(_plan())
     bench.run(10_000)
     assert len(bench.supervisor.recv(1 << 20)) > 100
 
 
-def test_an_output_that_fails_rests_everything_until_it_obeys_and_somebody_arms(
+def test_a_failed_output_stops_all_until_rearmed(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its enable line is not triggered while it does not obey."""
+    """While an output fails, the enable pin is not toggled and arming fails."""
     bench = make(_plan(enable_pin=5))
     _drives(bench)
     drive, steer = (driver for _, driver in bench.guard._outputs._drivers)
@@ -254,10 +254,10 @@ def test_an_output_that_fails_rests_everything_until_it_obeys_and_somebody_arms(
     pin = bench.factory.pin(5)
     bench.clock.at(31, lambda: monkeypatch.setattr(drive, "write", fail))
     bench.clock.at(45, lambda: edges.append(len(pin.states)))
-    bench.clock.at(45, lambda: bench.say(arm(_T0 + 45 * MS, 1)))
+    bench.clock.at(45, lambda: bench.send(arm(_T0 + 45 * MS, 1)))
     bench.clock.at(60, lambda: edges.append(len(pin.states)))
     bench.clock.at(60, monkeypatch.undo)
-    bench.clock.at(85, lambda: bench.say(arm(_T0 + 85 * MS, 2), command(2, _T0 + 85 * MS)))
+    bench.clock.at(85, lambda: bench.send(arm(_T0 + 85 * MS, 2), command(2, _T0 + 85 * MS)))
     state = bench.run(100)
     assert edges[0] == edges[1]
     assert len(pin.states) > edges[1]
@@ -265,14 +265,14 @@ def test_an_output_that_fails_rests_everything_until_it_obeys_and_somebody_arms(
     assert "Output drive does not answer." in stopped[0].stop_reason
     assert all(s.outputs["steer"] == 0.0 and s.applied == (0.0, 0.0) for s in stopped)
     assert "NOT at rest: Output drive: Output drive does not answer." in stopped[0].stop_reason
-    assert "NOT at rest" not in stopped[-1].stop_reason  # It obeys by then.
-    assert stopped[-1].emergencies == 2  # Armed while it did not obey: that failed again.
+    assert "NOT at rest" not in stopped[-1].stop_reason
+    assert stopped[-1].emergencies == 2  # Arming before the output recovered failed again.
     assert state.applied_seq == 2
     assert steer.write(0.0, 0) == 0.0
 
 
-def test_a_released_robot_lets_go_once(make: _Make) -> None:
-    """At its start and at each stop; in between it grips."""
+def test_outputs_are_released_once_per_stop(make: _Make) -> None:
+    """Outputs are released at the start and once at each stop."""
     plan = _plan()
     bench = make(replace(plan, stop=replace(plan.stop, then="release")))
     released: list[str] = []
@@ -287,22 +287,22 @@ def test_a_released_robot_lets_go_once(make: _Make) -> None:
     assert released == ["drive", "steer"] * 2
 
 
-def test_after_a_failure_it_begins_with_an_emergency_stop(make: _Make) -> None:
-    """Whatever was stopped before stays stopped: only a person ends it."""
+def test_a_restart_after_a_failure_starts_in_emergency_stop(make: _Make) -> None:
+    """Only a person can clear the emergency stop."""
     bench = make(_plan(), after_failure=True)
-    bench.clock.at(1, lambda: bench.say(arm(_T0, 1, person=False), command(1, _T0)))
+    bench.clock.at(1, lambda: bench.send(arm(_T0, 1, person=False), command(1, _T0)))
     state = bench.run(20)
     assert (state.armed, state.emergency, state.emergencies) == (False, True, 1)
     words = "Emergency stop: the robot's processes failed and started afresh."
     assert state.stop_reason == words
     assert not any(state.applied_seq for state in bench.states)
     bench.guard.ended = ""
-    bench.clock.at(21, lambda: bench.say(arm(_T0, 1)))
+    bench.clock.at(21, lambda: bench.send(arm(_T0, 1)))
     assert bench.run(40).armed
 
 
-def test_an_order_without_sense_ends_the_command_before(make: _Make) -> None:
-    """At once, and not only at its deadline."""
+def test_an_invalid_order_ends_the_previous_command(make: _Make) -> None:
+    """The previous command ends at once, not at its deadline."""
     bench = make(_plan())
     _drives(bench)
     duties: list[float] = []
@@ -315,10 +315,10 @@ def test_an_order_without_sense_ends_the_command_before(make: _Make) -> None:
     assert any("must be a finite number" in state.refused for state in bench.states)
 
 
-def test_a_controller_that_does_not_obey_yet_is_told_of(
+def test_a_controller_that_does_not_follow_yet_is_reported(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is said to be applied is what the outputs do, and why."""
+    """The applied action is what the outputs do, with the reason for the difference."""
     plan = _plan()
     bench = make(plan)
     drive = bench.guard._outputs._drivers[0][1]
@@ -333,37 +333,37 @@ def test_a_controller_that_does_not_obey_yet_is_told_of(
 
 
 class _Sensor:
-    """A sensor that says what it is told, or fails."""
+    """A sensor that returns a set reading or raises a set error."""
 
     def __init__(self) -> None:
-        self.says: dict[str, float] | Exception = {"bump": 0.0}
+        self.reading: dict[str, float] | Exception = {"bump": 0.0}
 
     def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        if isinstance(self.says, Exception):
-            raise self.says
-        return self.says
+        if isinstance(self.reading, Exception):
+            raise self.reading
+        return self.reading
 
     def close(self) -> None:
-        self.says = {}
+        self.reading = {}
 
 
 def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is no number counts as a failure."""
+    """Errors and non-finite values of a protective sensor stop the robot."""
     sensor = _Sensor()
     monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: sensor)
     bench = make(_plan(sensors=(SensorPlan("bumper", "switch", "bump"),)))
     _drives(bench)
-    said: list[dict[str, float] | Exception] = [
+    readings: list[dict[str, float] | Exception] = [
         {"bump": 1.0},
         RobotError("No answer."),
         {"bump": float("nan")},
         OSError("No bus."),
         {"bump": 0.0},
     ]
-    for i, what in enumerate(said):
-        bench.clock.at(25 + 10 * i, lambda what=what: setattr(sensor, "says", what))
+    for i, what in enumerate(readings):
+        bench.clock.at(25 + 10 * i, lambda what=what: setattr(sensor, "reading", what))
     bench.run(100)
     reasons = list(dict.fromkeys(state.stop_reason for state in bench.states))
     fails = "Sensor bumper fails, and can protect no longer: "
@@ -380,11 +380,11 @@ def test_sensors_are_read_at_every_tick_and_a_failing_one_stops(
 
 
 class _SlowSensor(_Sensor):
-    """A sensor that lets time go by, and remembers what the drive did when it was asked."""
+    """A sensor that takes time, and records the drive's duty when it is read."""
 
     def __init__(self, takes_ms: int) -> None:
         super().__init__()
-        self.says = {"speed": 1.0}
+        self.reading = {"speed": 1.0}
         self.takes_ns = takes_ms * MS
         self.bench: _Bench | None = None
         self.driven: list[tuple[int, float]] = []
@@ -404,14 +404,14 @@ def _with(
 
 
 def test_no_stop_waits_for_a_sensor(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At its deadline the drive rests first; and a deadline that passes meanwhile counts."""
+    """At its deadline the drive rests before sensors are read, and reading time counts."""
     sensor = _SlowSensor(takes_ms=15)
     bench = _with(make, monkeypatch, {"wheel": sensor}, "speed")
     _drives(bench)
     sensor.bench = bench
     bench.run(320)
     assert all(duty == 0.0 for t, duty in sensor.driven if t >= _T0 + 250 * MS)
-    # Decided with the time after the sensor, not with that before it.
+    # The decision uses the time after the sensors were read.
     acting = [state.at_ns for state in bench.states if state.applied_seq == 1]
     assert max(acting) < _T0 + 250 * MS
     assert all(not state.stop_reason for state in bench.states if state.at_ns in acting)
@@ -420,7 +420,7 @@ def test_no_stop_waits_for_a_sensor(make: _Make, monkeypatch: pytest.MonkeyPatch
 def test_a_sensor_that_is_slow_stops_the_robot(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It holds up every stop; so the robot rests until it answers in time."""
+    """A slow sensor delays stops, so the robot rests until it answers in time."""
     sensor = _SlowSensor(takes_ms=0)
     bench = _with(make, monkeypatch, {"wheel": sensor}, "speed")
     _drives(bench)
@@ -439,9 +439,9 @@ def test_a_sensor_that_is_slow_stops_the_robot(
 def test_a_pressed_bumper_is_not_hidden_by_a_free_one(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two sensors of one kind protect twice."""
+    """The robot stops when either of two bumpers is pressed."""
     front, other = _Sensor(), _Sensor()
-    front.says = {"bump": 1.0}
+    front.reading = {"bump": 1.0}
     bench = _with(make, monkeypatch, {"front": front, "other": other}, "bump")
     _drives(bench)
     state = bench.run(100)
@@ -450,16 +450,16 @@ def test_a_pressed_bumper_is_not_hidden_by_a_free_one(
     assert state.sources["bump"] == "front"
 
 
-def test_of_two_eyes_both_must_see(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One that has heard no echo yet may be the one with something before it."""
+def test_all_distance_sensors_must_report(make: _Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A distance sensor without an echo yet may face an obstacle."""
     left, right = _Sensor(), _Sensor()
-    left.says, right.says = {"distance": 2.0}, {}
+    left.reading, right.reading = {"distance": 2.0}, {}
     eyes = {"left": left, "right": right}
     monkeypatch.setattr(sensors, "open_sensor", lambda plan, hardware: eyes[plan.name])
     plans = tuple(SensorPlan(name, "hcsr04", "distance") for name in eyes)
     bench = make(_plan(sensors=plans, limits=LimitPlan(stop_distance_m=0.5)))
     _drives(bench)
-    bench.clock.at(55, lambda: setattr(right, "says", {"distance": 1.0}))
+    bench.clock.at(55, lambda: setattr(right, "reading", {"distance": 1.0}))
     state = bench.run(100)
     reasons = list(dict.fromkeys(state.stop_reason for state in bench.states))
     assert reasons == ["Not armed.", "Not forward: the distance ahead is not known.", ""]
@@ -469,7 +469,7 @@ def test_of_two_eyes_both_must_see(make: _Make, monkeypatch: pytest.MonkeyPatch)
 def test_the_outputs_rest_before_anything_is_closed(
     make: _Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sensor or a pin may take its time to be closed."""
+    """Closing sensors and pins can take time, so outputs rest first."""
     sensor = _Sensor()
     bench = _with(make, monkeypatch, {"bumper": sensor}, "bump")
     _drives(bench)
@@ -484,7 +484,7 @@ def test_the_outputs_rest_before_anything_is_closed(
 def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The outputs that were opened before it are at rest and closed."""
+    """Sensors and outputs opened before the failure are closed."""
     opened = [_Sensor()]
 
     def open_sensor(plan: SensorPlan, hardware: object) -> _Sensor:
@@ -506,12 +506,12 @@ def test_a_sensor_that_cannot_be_opened_leaves_nothing_open(
 
         with pytest.raises(RobotError, match="No answer"):
             Guard(_plan(sensors=plans), _Hardware(), None, logging.getLogger("test"))
-    assert opened[0].says == {}
-    OutputDevice(22, pin_factory=factory).close()  # Nobody has the pin any more.
+    assert opened[0].reading == {}
+    OutputDevice(22, pin_factory=factory).close()  # The pin is free.
 
 
-def test_wrong_arguments_end_it_in_a_line(capfd: pytest.CaptureFixture[str]) -> None:
-    """With exit code 1."""
+def test_wrong_arguments_exit_with_one_line(capfd: pytest.CaptureFixture[str]) -> None:
+    """The exit code is 1, with one line on standard error."""
     with pytest.raises(SystemExit) as ended:
         main(["--plan-fd", "3"])
     assert ended.value.code == 1

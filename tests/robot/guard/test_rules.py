@@ -1,4 +1,4 @@
-"""Each rule of the guard, exact to the nanosecond, with the time handed in."""
+"""Each rule of the guard, to the nanosecond, with explicit times."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def _driving(plan: GuardPlan, values: tuple[float, ...] = (0.5, 0.5)) -> Rules:
 
 
 def test_a_new_guard_is_not_armed() -> None:
-    """Nobody has said that the robot may move."""
+    """Commands are refused before arming."""
     rules = Rules(quick_car(), _T0)
     assert "Not armed" in rules.offer(command(1, _T0), _T0)
     decision = rules.tick(_T0)
@@ -43,8 +43,8 @@ def test_a_new_guard_is_not_armed() -> None:
     assert decision.stop_reason == "Not armed."
 
 
-def test_a_command_acts_until_its_deadline_and_not_a_nanosecond_longer() -> None:
-    """The deadline is counted from when the daemon received the command."""
+def test_a_command_ends_exactly_at_its_deadline() -> None:
+    """The deadline counts from when the daemon received the command."""
     rules = _armed(quick_car())
     assert rules.tick(_T0).stop_reason == "No fresh command."
     assert not rules.offer(command(1, _T0 - 10 * MS), _T0)
@@ -56,16 +56,16 @@ def test_a_command_acts_until_its_deadline_and_not_a_nanosecond_longer() -> None
     assert rules.tick(end).stop_reason == "No fresh command."
 
 
-def test_a_command_may_allow_itself_less_but_not_more_than_the_deadline() -> None:
-    """The shorter of both counts."""
+def test_a_ttl_can_shorten_but_not_extend_the_deadline() -> None:
+    """The earlier of TTL and deadline counts."""
     rules = _armed(quick_car())
     assert not rules.offer(command(1, _T0, ttl_ms=20), _T0)
     assert rules.tick(_T0 + 20 * MS - 1).seq == 1
     assert rules.tick(_T0 + 20 * MS).seq is None
 
 
-def test_a_command_from_a_little_ahead_acts_from_now() -> None:
-    """Clocks of two processes agree; a time ahead never lengthens the deadline."""
+def test_a_command_slightly_in_the_future_counts_from_now() -> None:
+    """A timestamp up to 50 ms ahead is accepted, but never extends the deadline."""
     rules = _armed(quick_car())
     assert not rules.offer(command(1, _T0 + 50 * MS), _T0)
     assert rules.tick(_T0 + 250 * MS).seq is None
@@ -83,16 +83,16 @@ def test_a_command_from_a_little_ahead_acts_from_now() -> None:
         (command(6, _T0, session=2, ttl_ms=0), "0 ms old"),
     ],
 )
-def test_what_is_not_the_newest_fresh_command_is_refused(order: Order, words: str) -> None:
-    """Repeated, older, of an older lease, late, or from the future: the newest one goes on."""
+def test_stale_commands_are_refused(order: Order, words: str) -> None:
+    """Repeated, older, late, future and old-session commands leave the newest in effect."""
     rules = _armed(quick_car())
     assert not rules.offer(command(5, _T0, session=2), _T0)
     assert words in rules.offer(order, _T0)
     assert rules.tick(_T0).seq == 5
 
 
-def test_a_newest_command_that_makes_no_sense_ends_the_one_before() -> None:
-    """Whoever sent it had done with that one; what is older than it changes nothing."""
+def test_an_invalid_command_ends_the_previous_one() -> None:
+    """An invalid newer command ends the previous one; an invalid older one is ignored."""
     rules = _driving(quick_car())
     assert "1 values" in rules.offer(command(5, _T0, (0.1,)), _T0)
     assert rules.tick(_T0).stop_reason == "No fresh command."
@@ -101,26 +101,26 @@ def test_a_newest_command_that_makes_no_sense_ends_the_one_before() -> None:
     assert rules.tick(_T0).seq == 6
 
 
-def test_a_refused_command_still_makes_older_ones_old() -> None:
-    """Whoever sent it had done with the ones before."""
+def test_a_refused_command_supersedes_older_ones() -> None:
+    """A command older than a refused one is not newer."""
     rules = _armed(quick_car())
     assert rules.offer(command(7, _T0 - 300 * MS), _T0)
     assert "not newer" in rules.offer(command(6, _T0), _T0)
 
 
-def test_a_burst_that_is_read_late_does_nothing() -> None:
-    """A guard that was stopped finds seconds of orders; neither arming nor moving still counts."""
+def test_stale_orders_have_no_effect() -> None:
+    """After a pause of the guard, queued orders to arm and to move are too old."""
     rules = Rules(quick_car(), _T0)
     late = _T0 + 5_000 * MS
-    said = [arm(_T0), *(command(i, _T0 + i * 20 * MS) for i in range(1, 100))]
-    assert all(rules.offer(order, late) for order in said)
+    orders = [arm(_T0), *(command(i, _T0 + i * 20 * MS) for i in range(1, 100))]
+    assert all(rules.offer(order, late) for order in orders)
     assert not rules.arming.armed
     assert not rules.offer(arm(late), late)
     assert rules.tick(late).actions == (0.0, 0.0)
 
 
-def test_what_was_said_before_arming_does_not_move_anything() -> None:
-    """Disarming ends a command for good, also when it would still be fresh after arming."""
+def test_commands_before_arming_have_no_effect() -> None:
+    """Disarming ends a command for good, even if it is still fresh after arming."""
     rules = _driving(quick_car())
     assert not rules.offer(Order("disarm", reason="the lease was lost."), _T0 + 1)
     stopped = rules.tick(_T0 + 1)
@@ -133,22 +133,22 @@ def test_what_was_said_before_arming_does_not_move_anything() -> None:
 
 
 def test_ending_disarms() -> None:
-    """Between the order to end and the end nothing moves."""
+    """After the order to end, no command acts."""
     rules = _driving(quick_car())
     assert not rules.offer(Order("end"), _T0)
     assert rules.tick(_T0).seq is None
 
 
 def test_a_halt_ends_the_newest_command_and_leaves_the_robot_armed() -> None:
-    """Who takes the robot from a program finds it standing, and may drive at once."""
+    """After a halt, the next controller can drive without arming."""
     rules = _driving(quick_car())
     assert not rules.offer(Order("halt"), _T0)
     assert rules.tick(_T0).seq is None
     assert rules.arming.armed
 
 
-def test_an_emergency_stop_latches_until_somebody_who_knows_of_it_arms() -> None:
-    """One that came while the order to arm was on its way is not ended by it."""
+def test_an_emergency_stop_latches_until_acknowledged() -> None:
+    """An order to arm must name the current count of emergency stops."""
     rules = _driving(quick_car())
     rules.offer(Order("emergency", reason="a child."), _T0)
     rules.offer(Order("emergency"), _T0)
@@ -167,7 +167,7 @@ def test_an_emergency_stop_latches_until_somebody_who_knows_of_it_arms() -> None
 
 
 def test_only_a_person_ends_an_emergency_stop() -> None:
-    """A program may arm a robot that allows it, and never one that somebody stopped."""
+    """A program can arm the robot, but not after an emergency stop."""
     rules = Rules(quick_car(), _T0)
     assert not rules.offer(arm(_T0, person=False), _T0)
     rules.stop("a child.")
@@ -177,8 +177,8 @@ def test_only_a_person_ends_an_emergency_stop() -> None:
     assert not rules.offer(arm(_T0, 1), _T0)
 
 
-def test_what_others_say_is_cut() -> None:
-    """A state has to fit into a datagram, whatever reasons it repeats."""
+def test_reasons_are_truncated() -> None:
+    """A state must fit into a datagram, so reasons are cut."""
     rules = _driving(quick_car())
     rules.disarm("\N{GRINNING FACE}" * 1024)
     assert len(rules.tick(_T0).stop_reason.encode()) < 250
@@ -186,8 +186,8 @@ def test_what_others_say_is_cut() -> None:
     assert len(rules.tick(_T0).stop_reason.encode()) < 250
 
 
-def test_the_button_stops_and_keeps_from_arming_while_it_is_pressed() -> None:
-    """Each press is one emergency stop, however long it is held."""
+def test_a_pressed_button_stops_and_prevents_arming() -> None:
+    """Each press counts as one emergency stop, however long it is held."""
     rules = _driving(quick_car())
     rules.press(True)
     rules.press(True)
@@ -199,25 +199,25 @@ def test_the_button_stops_and_keeps_from_arming_while_it_is_pressed() -> None:
 
 
 def test_values_stay_within_the_caps() -> None:
-    """Of the robot's own profile, whatever is asked."""
+    """Values beyond the profile's caps are clipped and reported."""
     rules = _driving(quick_car(), (0.0, 0.0))
     rules.offer(command(2, _T0, (-9.0, 9)), _T0)
     decision = rules.tick(_T0)
     assert decision.actions == (-0.8, 0.6)
     assert decision.stop_reason == "Clipped by the robot's caps."
     rules.offer(command(3, _T0, (-0.800000011920929, 0.6000000238418579)), _T0)
-    assert rules.tick(_T0).stop_reason == ""  # A cap as a 32-bit float is no clip.
+    assert rules.tick(_T0).stop_reason == ""  # Rounding to 32 bits is not clipping.
 
 
 def test_an_action_that_rests_outside_its_caps_is_refused() -> None:
-    """A stop could not lead anywhere."""
+    """A rest value outside of the caps raises an error."""
     action = ActionPlan("throttle", 0.2, 0.6)
     with pytest.raises(RobotError, match="'throttle' rests at 0, outside its caps"):
         Rules(replace(car(), actions=(action,)), 0)
 
 
-def test_slew_holds_away_from_rest_and_not_towards_it() -> None:
-    """Starting is gentle, stopping is not; the other way leads through rest."""
+def test_slew_limits_moves_away_from_rest_only() -> None:
+    """Moves towards rest are immediate, and a change of sign passes through rest."""
     rules = _armed(car())
 
     def at(ms: int, throttle: float) -> float:
@@ -233,8 +233,8 @@ def test_slew_holds_away_from_rest_and_not_towards_it() -> None:
     assert at(60, 0.4) == 0.0
 
 
-def test_a_pause_is_no_leave_to_jump() -> None:
-    """A guard that did not run for a while goes on as if it had paused two ticks."""
+def test_slew_is_limited_after_a_pause() -> None:
+    """After a pause of the guard, slew allows at most the change of two ticks."""
     rules = _armed(car())
     later = _T0 + 10_000 * MS
     rules.offer(command(1, later, (0.0, 0.6)), later)
@@ -242,7 +242,7 @@ def test_a_pause_is_no_leave_to_jump() -> None:
 
 
 def test_three_levels() -> None:
-    """A motor that knows full left, off and full right gets nothing in between, at once."""
+    """An action with three levels takes its low, rest or high value, without slew."""
     steering = ActionPlan("steering", -0.4, 0.4, slew_per_s=1.0, levels="three", threshold=0.3)
     rules = _armed(replace(car(), actions=(steering,)))
     seen: list[float] = []
@@ -253,12 +253,12 @@ def test_three_levels() -> None:
 
 
 def test_a_stop_holds_and_ramps_what_does_not_propel() -> None:
-    """The steering stays where it was and then goes back; the drive rests at once."""
+    """On a stop, steering holds and ramps to rest; the drive rests at once."""
     rules = _driving(quick_car(stop=StopPlan(hold_ms=100, ramp_ms=200, then="release")))
     rules.disarm("")
     assert rules.tick(_T0).actions == (0.5, 0.0)
     assert rules.next_wake_ns(_T0 + 95 * MS) == _T0 + 100 * MS
-    rules.stop("")  # A second stop does not begin anew.
+    rules.stop("")  # A second stop does not restart the ramp.
     assert rules.tick(_T0 + 100 * MS).actions == (0.5, 0.0)
     assert rules.tick(_T0 + 200 * MS).actions == (pytest.approx(0.25), 0.0)
     assert not rules.tick(_T0 + 300 * MS - 1).release
@@ -268,8 +268,8 @@ def test_a_stop_holds_and_ramps_what_does_not_propel() -> None:
     assert rules.next_wake_ns(_T0 + 300 * MS) == _T0 + 310 * MS
 
 
-def test_a_new_guard_has_let_go() -> None:
-    """Where a stop ends in letting go, a start begins so, and a command grips."""
+def test_a_new_guard_starts_released() -> None:
+    """With then = "release", outputs start released until a command acts."""
     rules = Rules(quick_car(stop=StopPlan(hold_ms=100, then="release")), _T0)
     assert rules.tick(_T0).release
     rules.offer(arm(_T0), _T0)
@@ -278,7 +278,7 @@ def test_a_new_guard_has_let_go() -> None:
 
 
 def test_an_output_that_fails_stops_everything_without_hold() -> None:
-    """Nobody knows what it does; so nothing else may go on for a while."""
+    """A failed output stops all actions at once, without hold or ramp."""
     rules = _driving(quick_car(stop=StopPlan(hold_ms=100)))
     rules.fail("Output drive: no answer", _T0)
     decision = rules.tick(_T0)
@@ -286,13 +286,13 @@ def test_an_output_that_fails_stops_everything_without_hold() -> None:
     assert decision.stop_reason == "Emergency stop: Output drive: no answer"
 
 
-def test_blind_is_still() -> None:
-    """The newest picture decides, whichever command told of it."""
+def test_a_stale_frame_stops_the_robot() -> None:
+    """The newest frame counts, whichever command reported it."""
     rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
     rules.offer(command(1, _T0), _T0)
     assert rules.tick(_T0).stop_reason == "Blind: no picture yet."
     rules.offer(command(2, _T0, frame_ns=_T0 + 51 * MS), _T0)
-    assert rules.tick(_T0).seq is None  # A picture from the future is none.
+    assert rules.tick(_T0).seq is None  # A frame from the future is ignored.
     rules.offer(command(3, _T0, frame_ns=_T0 - 40 * MS), _T0)
     rules.offer(command(4, _T0, frame_ns=_T0 - 90 * MS), _T0)
     end = _T0 + 60 * MS
@@ -303,16 +303,16 @@ def test_blind_is_still() -> None:
     assert rules.tick(end).seq == 5
 
 
-def test_without_a_command_nothing_is_said_of_pictures() -> None:
-    """Commands tell of them; without one there may be a new picture all the same."""
+def test_without_a_command_no_stale_frame_is_reported() -> None:
+    """Commands report frames, so their absence is the reason given."""
     rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
     assert rules.tick(_T0).stop_reason == "No fresh command."
     rules.offer(command(1, _T0, frame_ns=_T0), _T0)
     assert rules.tick(_T0 + 300 * MS).stop_reason == "No fresh command."
 
 
-def test_a_picture_from_a_little_ahead_counts_from_now() -> None:
-    """It never lengthens the time until the robot is blind."""
+def test_a_frame_slightly_in_the_future_counts_from_now() -> None:
+    """A frame time up to 50 ms ahead never extends the limit."""
     rules = _armed(quick_car(LimitPlan(camera_stale_ms=100)))
     rules.offer(command(1, _T0, frame_ns=_T0 + 50 * MS), _T0)
     assert rules.tick(_T0 + 100 * MS - 1).seq == 1
@@ -332,8 +332,8 @@ def _ask(rules: Rules, seq: int, now_ns: int, throttle: float) -> tuple[float, s
     return decision.actions[1], decision.stop_reason
 
 
-def test_a_bump_keeps_it_from_going_forward_and_lets_it_go_back() -> None:
-    """While it touches, and some time after; one touch is one bump."""
+def test_a_bump_prevents_driving_forward() -> None:
+    """While pressed and for a hold time, only backward is allowed; one press is one bump."""
     rules = _driving(quick_car())
     words = "Not forward: the bumper touched something."
     _sense(rules, _T0, bump=1.0)
@@ -350,8 +350,8 @@ def test_a_bump_keeps_it_from_going_forward_and_lets_it_go_back() -> None:
     assert rules.bumps == 2
 
 
-def test_something_near_keeps_it_from_going_forward() -> None:
-    """And only where the profile has a distance."""
+def test_a_near_obstacle_prevents_driving_forward() -> None:
+    """Without `stop_distance_m`, distances are ignored."""
     rules = _driving(quick_car(LimitPlan(stop_distance_m=0.3)))
     _sense(rules, _T0, distance=0.29)
     assert _ask(rules, 2, _T0, 0.5) == (0.0, "Not forward: something is near.")
@@ -368,8 +368,8 @@ def test_something_near_keeps_it_from_going_forward() -> None:
     "sensing",
     [Sensing(), Sensing({"distance": 2.0}, {"distance": "eye"}, silent=frozenset({"other"}))],
 )
-def test_an_unknown_distance_keeps_it_from_going_forward(sensing: Sensing) -> None:
-    """Also that of one of two sensors; and only where a distance was to stop it."""
+def test_an_unknown_distance_prevents_driving_forward(sensing: Sensing) -> None:
+    """Applies when any distance sensor has no reading, and only with `stop_distance_m`."""
     rules = _driving(quick_car(LimitPlan(stop_distance_m=0.3)))
     rules.sense(sensing, _T0)
     assert _ask(rules, 2, _T0, 0.5) == (0.0, "Not forward: the distance ahead is not known.")
@@ -382,8 +382,8 @@ def test_an_unknown_distance_keeps_it_from_going_forward(sensing: Sensing) -> No
     assert _ask(other, 2, _T0, 0.5) == (0.5, "")
 
 
-def test_what_the_outputs_do_not_yet_do_is_no_push() -> None:
-    """A controller that waits at neutral does not stall, and has no direction."""
+def test_a_controller_at_neutral_does_not_stall() -> None:
+    """While outputs do not follow yet, there is no stall and no direction."""
     rules = _driving(quick_car())
     for ms in range(0, 1_000, 10):
         now_ns = _T0 + ms * MS
@@ -396,7 +396,7 @@ def test_what_the_outputs_do_not_yet_do_is_no_push() -> None:
 
 @pytest.mark.parametrize("name", ["wheel", "bumper"])
 def test_a_slow_sensor_stops_whatever_it_measures(name: str) -> None:
-    """It holds up every stop."""
+    """A slow sensor delays every stop, so any slow sensor stops the robot."""
     rules = _driving(quick_car())
     rules.sense(Sensing(failures={name: "Slow."}, slow=frozenset({name})), _T0)
     decision = rules.tick(_T0)
@@ -405,8 +405,8 @@ def test_a_slow_sensor_stops_whatever_it_measures(name: str) -> None:
 
 
 @pytest.mark.parametrize(("throttle", "way"), [(0.5, "forward"), (-0.4, "backward")])
-def test_a_stall_ends_the_push_until_something_else_is_asked(throttle: float, way: str) -> None:
-    """It pushes and does not move; the same push again would not help."""
+def test_a_stall_stops_until_another_command(throttle: float, way: str) -> None:
+    """The same throttle is refused after a stall until another value was commanded."""
     rules = _driving(quick_car(), (0.5, throttle))
     words = f"Not {way}: it pushes and does not move."
     _sense(rules, _T0, speed=0.0)
@@ -424,8 +424,8 @@ def test_a_stall_ends_the_push_until_something_else_is_asked(throttle: float, wa
     assert _ask(rules, 7, later + MS, throttle) == (throttle, "")
 
 
-def test_what_moves_or_hardly_pushes_does_not_stall() -> None:
-    """A wheel that turns now and then breaks the time."""
+def test_no_stall_while_moving_or_at_low_throttle() -> None:
+    """Occasional motion resets the time, and small throttle values do not count."""
     rules = _driving(quick_car())
     for ms in range(0, 4_000, 100):
         _sense(rules, _T0 + ms * MS, speed=0.2 if ms % 300 == 0 else 0.0)
@@ -436,8 +436,8 @@ def test_what_moves_or_hardly_pushes_does_not_stall() -> None:
     assert rules.senses.quantities["stall"] == 0.0
 
 
-def test_nothing_is_said_of_a_stall_that_nobody_would_notice() -> None:
-    """Without a measured speed, or where the profile does not want it."""
+def test_no_stall_without_a_speed_or_limit() -> None:
+    """Without a measured speed, or with `stall_s = 0`, no stall is estimated."""
     rules = _driving(quick_car())
     _sense(rules, _T0)
     assert rules.senses.quantities == {}
@@ -446,13 +446,13 @@ def test_nothing_is_said_of_a_stall_that_nobody_would_notice() -> None:
     assert rules.senses.quantities == {"speed": 0.0}
 
 
-def test_a_low_battery_is_believed_after_a_while_and_then_for_good() -> None:
-    """One noisy reading is nothing; and a battery recovers as soon as nothing moves."""
+def test_a_low_battery_is_debounced_and_latched() -> None:
+    """Short dips are ignored; once detected, the stop lasts until arming."""
     rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
     _sense(rules, _T0, battery=6.0)
     _sense(rules, _T0 + 400 * MS, battery=6.5)
     _sense(rules, _T0 + 500 * MS, battery=6.0)
-    _sense(rules, _T0 + 999 * MS, battery=6.0)  # 499 ms: not believed yet.
+    _sense(rules, _T0 + 999 * MS, battery=6.0)  # 499 ms: not counted yet.
     assert _ask(rules, 2, _T0 + 999 * MS, 0.5) == (0.5, "")
     _sense(rules, _T0 + 1_000 * MS, battery=6.05)
     words = "The battery has 6.05 V, less than 6.4 V."
@@ -466,7 +466,7 @@ def test_a_low_battery_is_believed_after_a_while_and_then_for_good() -> None:
 
 @pytest.mark.parametrize(("name", "bad"), [("battery", 6.3), ("temperature", 80.5)])
 def test_a_low_battery_and_a_hot_computer_count_after_half_a_second(name: str, bad: float) -> None:
-    """Not 1 ns earlier, and at exactly that time."""
+    """The debounce time is exactly 500 ms."""
     limits = LimitPlan(low_battery_v=6.4, high_temperature_c=80.0, stall_s=0.0)
     half_a_second = 500 * MS
     for after_ns, stops in ((half_a_second - 1, False), (half_a_second, True)):
@@ -478,7 +478,7 @@ def test_a_low_battery_and_a_hot_computer_count_after_half_a_second(name: str, b
 
 
 def test_a_battery_exactly_at_its_limit_is_not_low() -> None:
-    """And a low one starts again from zero after each good reading."""
+    """A reading at or above the limit restarts the debounce time."""
     rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
     for ms in range(0, 1200, 100):
         _sense(rules, _T0 + ms * MS, battery=6.4 if ms < 700 else 6.39)
@@ -488,7 +488,7 @@ def test_a_battery_exactly_at_its_limit_is_not_low() -> None:
 
 
 def test_a_battery_that_is_still_low_stops_at_once_after_arming() -> None:
-    """Arming again and again gives no driving in between."""
+    """Rearming does not restart the debounce time."""
     rules = _driving(quick_car(LimitPlan(low_battery_v=6.4)))
     for ms in range(0, 600, 100):
         _sense(rules, _T0 + ms * MS, battery=6.0)
@@ -499,7 +499,7 @@ def test_a_battery_that_is_still_low_stops_at_once_after_arming() -> None:
 
 
 def test_a_hot_computer_rests_until_it_has_cooled() -> None:
-    """Believed after a while, too."""
+    """The temperature is debounced, and the stop ends once it is at the limit."""
     rules = _driving(quick_car(LimitPlan(high_temperature_c=80.0)))
     _sense(rules, _T0, temperature=81.0)
     _sense(rules, _T0 + 500 * MS, temperature=82.0)
@@ -521,8 +521,8 @@ def test_a_hot_computer_rests_until_it_has_cooled() -> None:
         ("meter", LimitPlan(low_battery_v=6.0), True),
     ],
 )
-def test_a_sensor_that_protects_and_fails_stops(name: str, limits: LimitPlan, stops: bool) -> None:
-    """It can protect no longer; one that only informs may fail."""
+def test_a_failed_protective_sensor_stops(name: str, limits: LimitPlan, stops: bool) -> None:
+    """A failure of a sensor that only informs is ignored."""
     rules = _driving(quick_car(limits))
     rules.sense(Sensing(failures={name: "No answer."}), _T0)
     decision = rules.tick(_T0)
@@ -535,8 +535,8 @@ def test_a_sensor_that_protects_and_fails_stops(name: str, limits: LimitPlan, st
     assert rules.tick(_T0).seq == 1
 
 
-def test_a_speed_that_is_not_measured_is_estimated_where_the_profile_says_how() -> None:
-    """It follows from what is applied, and says so."""
+def test_an_unmeasured_speed_is_estimated() -> None:
+    """With a gain in m/s, the speed is estimated from the applied throttle."""
     plan = quick_car()
     steering, throttle = plan.actions
     plan = replace(plan, actions=(steering, replace(throttle, unit="m/s", gain=3.0)))
@@ -556,10 +556,10 @@ def test_a_speed_that_is_not_measured_is_estimated_where_the_profile_says_how() 
         ({"speed": 1.0}, 0.0, "estimated"),
     ],
 )
-def test_a_collision_has_the_source_that_told_of_it(
+def test_a_collision_names_its_source(
     sensed: dict[str, float], collision: float, source: str
 ) -> None:
-    """A bumper is certain, a stall the last thing that tells."""
+    """A bumper takes precedence over an estimated stall."""
     rules = _driving(quick_car())
     _sense(rules, _T0, **sensed)
     assert rules.senses.quantities["collision"] == collision
@@ -567,7 +567,7 @@ def test_a_collision_has_the_source_that_told_of_it(
 
 
 def test_the_direction_is_that_of_the_propulsion() -> None:
-    """For encoders that cannot tell forward from backward; steering a tank is neither."""
+    """The direction is for encoders with one channel; turning a tank has none."""
     rules = _driving(quick_car())
     assert rules.direction == 1.0
     _ask(rules, 2, _T0, 0.0)
@@ -584,8 +584,8 @@ def test_the_direction_is_that_of_the_propulsion() -> None:
     assert turning.tick(_T0).actions == (0.0,)
 
 
-def test_temperature_protects_too() -> None:
-    """A thermometer that fails stops where a limit was set."""
+def test_a_failed_thermometer_stops() -> None:
+    """A thermometer protects when a temperature limit is set."""
     plan = replace(
         quick_car(LimitPlan(high_temperature_c=80.0)),
         sensors=(SensorPlan("chip", "cpu_temperature", "temperature"),),
@@ -597,7 +597,7 @@ def test_temperature_protects_too() -> None:
 
 @pytest.mark.parametrize(("slow", "armed"), [(False, False), (True, True)])
 def test_servos_that_fail_disarm_and_slow_ones_only_stop(slow: bool, armed: bool) -> None:
-    """Failed servos have released their tendons: a person has to look before they pull again."""
+    """Failed servos have released their tendons, so a person must rearm; slow ones need not."""
     plan = replace(quick_car(), sensors=(SensorPlan("spools", "dynamixel", "tendons"),))
     rules = _driving(plan)
     late = frozenset({"spools"}) if slow else frozenset[str]()

@@ -1,6 +1,6 @@
-"""What the rules hold under any orders, sensings and steps of time.
+"""Invariants of the rules under arbitrary orders, readings and time steps.
 
-The model below says when the robot may propel, from the words of the safety contract and not from
+The model below decides when the robot may propel, from the safety contract and independently of
 the code of the rules.
 """
 
@@ -31,7 +31,7 @@ _steps = st.one_of(
 
 
 class _World(RuleBasedStateMachine):
-    """Rules beside a model of what they must hold."""
+    """The rules and a model of their invariants."""
 
     @initialize(
         levels=_levels,
@@ -40,7 +40,7 @@ class _World(RuleBasedStateMachine):
         stale_ms=st.sampled_from([0, 60, 150]),
     )
     def start(self, levels: str, slew: float, stop: str, stale_ms: int) -> None:
-        """A car, with a camera that is believed for less or more than its deadline, or none."""
+        """Set up a car with or without a camera whose limit differs from the deadline."""
         self.stale_ns = stale_ms * MS
         limits = LimitPlan(
             deadline_ms=_DEADLINE_NS // MS,
@@ -89,7 +89,7 @@ class _World(RuleBasedStateMachine):
         follows: bool,
         is_good: bool,
     ) -> None:
-        """Any command; half number themselves as they should, half are good but for their age."""
+        """Offer any command; half have the next number, half are valid except for their age."""
         if follows:
             session, seq = max(self.newest[0], 0), self.newest[1] + 1
         if is_good:
@@ -113,19 +113,19 @@ class _World(RuleBasedStateMachine):
         assert accepted == (not refusal)
         is_due = issued_ns <= self.now_ns + 50 * MS and self.now_ns < until_ns
         if is_newer and is_due and len(values) != 2:
-            self.acting = None  # Whoever sent it had done with the one before.
+            self.acting = None  # An invalid newer command ends the previous one.
         if accepted:
             self.acting, self.until_ns = (session, seq), until_ns
 
     @rule(values=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=2))
     def drive(self, values: list[float]) -> None:
-        """Everybody does what they should, so that there is something to stop."""
+        """Arm and send a valid command, so that there is motion to stop."""
         self.arm(0, 0, person=True)
         self.command(0, 0, 0, 1_000, values, 0, follows=True, is_good=True)
 
     @rule(steps=st.integers(2, 30))
-    def go_on(self, steps: int) -> None:
-        """Time goes by in ticks, and nothing else happens."""
+    def run_ticks(self, steps: int) -> None:
+        """Advance by several ticks."""
         for _ in range(steps):
             self.wait_for_the_rules()
             self.holds()
@@ -136,7 +136,7 @@ class _World(RuleBasedStateMachine):
         person=st.booleans(),
     )
     def arm(self, age_ns: int, behind: int, person: bool) -> None:
-        """Somebody arms, who may not have seen the last emergency, or may be no person."""
+        """Arm, possibly without the last emergency count, or as a program."""
         seen = max(0, self.emergencies - behind)
         order = Order("arm", issued_ns=self.now_ns - age_ns, emergency=seen, person=person)
         refusal = self.rules.offer(order, self.now_ns)
@@ -147,7 +147,7 @@ class _World(RuleBasedStateMachine):
 
     @rule(kind=st.sampled_from(["disarm", "emergency", "end"]))
     def stop(self, kind: str) -> None:
-        """Anybody stops it."""
+        """Disarm, stop or end."""
         assert not self.rules.offer(Order(kind), self.now_ns)
         self.armed, self.acting = False, None
         if kind == "emergency":
@@ -155,7 +155,7 @@ class _World(RuleBasedStateMachine):
 
     @rule()
     def halt(self) -> None:
-        """Somebody else takes the command: what was said last acts no more."""
+        """End the last command."""
         assert not self.rules.offer(Order("halt"), self.now_ns)
         self.acting = None
 
@@ -176,7 +176,7 @@ class _World(RuleBasedStateMachine):
         fails: str,
         is_slow: bool,
     ) -> None:
-        """The sensors say anything."""
+        """Report any sensor readings."""
         quantities = {
             "bump": float(bump),
             "distance": distance,
@@ -197,19 +197,19 @@ class _World(RuleBasedStateMachine):
 
     @rule(step_ns=_steps)
     def wait(self, step_ns: int) -> None:
-        """Time goes by."""
+        """Advance the time."""
         self.now_ns += step_ns
 
     @rule()
     def wait_for_the_rules(self) -> None:
-        """Time goes by as the guard's loop lets it."""
+        """Advance to the wake time of the rules, as the guard's loop does."""
         wake_ns = self.rules.next_wake_ns(self.now_ns)
         assert self.now_ns < wake_ns <= self.now_ns + _TICK_NS
         self.now_ns = wake_ns
 
     @invariant()
     def holds(self) -> None:
-        """Everything that is promised."""
+        """Check all invariants."""
         if not hasattr(self, "rules"):
             return
         now_ns = self.now_ns
@@ -243,7 +243,7 @@ class _World(RuleBasedStateMachine):
         for action, old, new in zip(self.plan.actions, before, self.actions, strict=True):
             assert action.low <= new <= action.high
             was, is_now = old - action.rest, new - action.rest
-            assert was * is_now >= 0.0, "It passes through rest."
+            assert was * is_now >= 0.0, "a change of sign must pass through rest"
             if action.levels == "three":
                 assert new in (action.low, action.rest, action.high)
             elif abs(is_now) > abs(was) and action.slew_per_s < float("inf"):

@@ -1,4 +1,4 @@
-"""The plan that processes inherit, and what of it guard and supervisor load."""
+"""The plan that processes inherit, and the modules that guard and supervisor import."""
 
 import os
 import subprocess
@@ -27,20 +27,20 @@ pytestmark = pytest.mark.realtime
 _PLAN = ServePlan(car(), {"port": 5000, "nested": {"a": [1, 2]}}, ("module:function", "argument"))
 
 
-def test_a_plan_comes_back_as_it_was() -> None:
-    """Through JSON, with infinite slew and all."""
+def test_a_plan_round_trips() -> None:
+    """JSON keeps all values, including infinite slew."""
     plan = replace(_PLAN, guard=replace(car(), actions=(ActionPlan("throttle"),)))
     assert ServePlan.from_json(plan.to_json()) == plan
 
 
-def test_a_guard_has_its_deadline_to_show_that_it_lives_or_longer_on_a_twin() -> None:
-    """Never less than the deadline, since it may wait so long."""
+def test_the_guard_may_be_silent_for_its_deadline() -> None:
+    """The limit is the deadline, or `patience_ms` on a twin."""
     assert _PLAN.guard_silence_ms == 250
     assert replace(_PLAN, patience_ms=5_000).guard_silence_ms == 5_000
 
 
-def test_several_processes_may_read_the_same_file() -> None:
-    """It is inherited, and reading does not move it."""
+def test_several_processes_can_read_the_plan() -> None:
+    """The descriptor is inheritable, and reading does not move its offset."""
     fd = plan_fd(_PLAN)
     try:
         assert os.get_inheritable(fd)
@@ -53,8 +53,8 @@ def test_several_processes_may_read_the_same_file() -> None:
         os.close(fd)
 
 
-def test_nobody_changes_a_plan() -> None:
-    """A process that inherits it must not move the limits of the next guard."""
+def test_a_plan_is_read_only() -> None:
+    """Writing to the descriptor and truncating it raise PermissionError."""
     fd = plan_fd(_PLAN)
     try:
         for change in (lambda: os.pwrite(fd, b"x", 0), lambda: os.ftruncate(fd, 0)):
@@ -66,7 +66,7 @@ def test_nobody_changes_a_plan() -> None:
 
 
 def test_outputs_are_mixed_from_actions_and_clipped() -> None:
-    """A tank's tracks: throttle plus and minus steering."""
+    """The tracks of a tank are throttle plus and minus steering."""
     plan = GuardPlan(
         "tank",
         (ActionPlan("steering"), ActionPlan("throttle")),
@@ -82,8 +82,8 @@ def test_outputs_are_mixed_from_actions_and_clipped() -> None:
         output_values(plan, (1.0,))
 
 
-def test_restarts_are_limited_in_a_time() -> None:
-    """Five in a minute; later ones may be had again."""
+def test_restarts_are_limited_per_period() -> None:
+    """Restarts older than the period do not count."""
     restarts = Restarts(most=2, within_s=60.0)
     second = 10**9
     assert [restarts.may_restart(t * second) for t in (0, 30, 59, 60, 61, 90)] == [
@@ -96,8 +96,8 @@ def test_restarts_are_limited_in_a_time() -> None:
     ]
 
 
-def test_restarts_come_ever_more_slowly() -> None:
-    """The first one at once; later ones leave time for what keeps failing."""
+def test_restarts_back_off() -> None:
+    """The first restart has no delay; later delays double."""
     restarts = Restarts()
     pauses = [restarts.pause_s for t in range(5) if restarts.may_restart(t)]
     assert pauses == pytest.approx([0.0, 0.2, 0.6, 1.4, 3.0])
@@ -105,21 +105,21 @@ def test_restarts_come_ever_more_slowly() -> None:
 
 @pytest.mark.parametrize("arguments", [["--a", "1"], ["--a", "1", "--c", "2"], ["--a"]])
 def test_wrong_arguments_are_refused(arguments: list[str]) -> None:
-    """Only we write these command lines."""
+    """Missing, unknown and incomplete arguments raise ValueError."""
     with pytest.raises(ValueError, match=r"This takes --a N --b N|argument 2 is"):
         descriptors(arguments, ("--a", "--b"))
 
 
-def test_the_daemon_cannot_be_hidden_by_the_folder_it_is_started_in() -> None:
-    """And the guard takes nothing from its environment."""
+def test_processes_ignore_the_working_folder() -> None:
+    """The guard runs in isolated mode, and the daemon without the working folder on its path."""
     commands = supervisor.ProcessCommands.of(_PLAN)
     assert commands.guard == (sys.executable, "-I", start.__file__, "guard")
     assert supervisor_command(_PLAN, 7)[1:] == ["-I", start.__file__, "supervise", "--plan-fd", "7"]
     assert commands.daemon == (sys.executable, "-P", "-m", "shapechanger.robot.daemon")
 
 
-def test_safe_pins_goes_on_past_an_output_that_fails(tmp_path: Path) -> None:
-    """Every other output is put to rest, and the enable pin too."""
+def test_make_safe_continues_after_a_failed_output(tmp_path: Path) -> None:
+    """All other outputs and the enable pin are put to rest."""
     record = Record(tmp_path / "record")
     (tmp_path / "stuck-GPIO17").touch()
     plan = replace(car(), enable_pin=5)
@@ -152,8 +152,8 @@ print(*sys.modules)
 """
 
 
-def test_guard_and_supervisor_load_nothing_but_their_drivers() -> None:
-    """What is not loaded cannot fail, and takes no memory."""
+def test_guard_and_supervisor_import_only_their_drivers() -> None:
+    """Fewer imports mean fewer failures and less memory."""
     command = [sys.executable, "-I", "-c", _LISTS_MODULES, start.__file__]
     before = "import sys; print(*sys.modules)"
     bare = subprocess.check_output([sys.executable, "-I", "-c", before], text=True).split()

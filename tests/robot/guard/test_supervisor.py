@@ -1,7 +1,7 @@
-"""Killed, stopped and silent processes: the pins rest, with real processes and real signals.
+"""Pins rest when processes are killed, stopped or silent, with real processes and signals.
 
-The times allowed are ten times those that are promised, because the machine that runs the tests
-does other things too; `make bench` measures them.
+The time limits are ten times those promised, because the test machine may be busy; `make bench`
+measures the real times.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ _MOST_GUARD_KB = 25 * 1024
 
 def _is_gone(pid: int) -> bool:
     try:
-        # A process that ended and was not waited for has no memory any more.
+        # A zombie process has no memory.
         return "VmRSS" not in Path(f"/proc/{pid}/status").read_text()
     except FileNotFoundError:
         return True
@@ -45,8 +45,8 @@ def _log(folder: Path) -> str:
     return (folder / "log").read_text()
 
 
-def test_told_to_end_it_rests_and_ends(tmp_path: Path) -> None:
-    """SIGTERM is the orderly way; the guard is as small as promised."""
+def test_sigterm_stops_the_robot(tmp_path: Path) -> None:
+    """After SIGTERM pins rest and all processes exit; the guard's memory is within its limit."""
     with running(tmp_path) as robot:
         robot.drive()
         status = Path(f"/proc/{robot.pids('hardware')[0]}/status").read_text()
@@ -58,15 +58,15 @@ def test_told_to_end_it_rests_and_ends(tmp_path: Path) -> None:
         assert all(map(_is_gone, robot.pids("hardware") + robot.pids("daemon")))
 
 
-def test_the_daemon_may_end_it(tmp_path: Path) -> None:
-    """The order "end" ends the guard, and then there is nothing to supervise."""
+def test_the_daemon_can_end_the_robot(tmp_path: Path) -> None:
+    """After the order "end", guard and supervisor exit with code 0."""
     with running(tmp_path, commands=5, ends=True) as robot:
         assert robot.process.wait(20) == 0
         assert robot.record.is_at_rest()
 
 
 def test_killed_daemon(tmp_path: Path) -> None:
-    """The guard notices the end of the stream, and both are started afresh, not armed."""
+    """The guard detects the closed socket; both processes restart in emergency stop."""
     with running(tmp_path) as robot:
         robot.drive()
         guard = robot.pids("hardware")[0]
@@ -75,13 +75,13 @@ def test_killed_daemon(tmp_path: Path) -> None:
         until(lambda: len(robot.pids("daemon")) == len(robot.pids("hardware")) == 2)
         assert _is_gone(guard)
         assert robot.record.is_at_rest()
-        # Whatever was stopped before stays stopped.
+        # The restart must not clear a stop.
         words = "guard: Emergency stop: the robot's processes failed and started afresh."
         until(lambda: words in _log(tmp_path))
 
 
 def test_silent_daemon(tmp_path: Path) -> None:
-    """It lives and says nothing more: the newest command acts until its deadline, no longer."""
+    """A daemon that sends no commands: the last one acts until its deadline."""
     with running(tmp_path, commands=20) as robot:
         until(lambda: len(robot.commands()) == 20)
         last_ns = robot.commands()[-1]
@@ -90,7 +90,7 @@ def test_silent_daemon(tmp_path: Path) -> None:
 
 
 def test_stopped_daemon(tmp_path: Path) -> None:
-    """SIGSTOP is silence too; after two seconds it is killed."""
+    """A daemon stopped by SIGSTOP is silent, and is killed after two seconds."""
     with running(tmp_path) as robot:
         robot.drive()
         stopped_ns = robot.kill("daemon", signal.SIGSTOP)
@@ -101,7 +101,7 @@ def test_stopped_daemon(tmp_path: Path) -> None:
 
 
 def test_killed_guard(tmp_path: Path) -> None:
-    """The pins keep their levels; the supervisor puts them to rest, before anything else."""
+    """Pins keep their levels, so the supervisor first puts them to rest."""
     with running(tmp_path) as robot:
         robot.drive()
         killed_ns = robot.kill("hardware", signal.SIGKILL)
@@ -111,7 +111,7 @@ def test_killed_guard(tmp_path: Path) -> None:
 
 
 def test_stopped_guard(tmp_path: Path) -> None:
-    """A guard whose heart is silent is killed, and the pins are put to rest for it."""
+    """A guard without heartbeats is killed, and the supervisor puts the pins to rest."""
     with running(tmp_path) as robot:
         robot.drive()
         guard = robot.pids("hardware")[0]
@@ -121,7 +121,7 @@ def test_stopped_guard(tmp_path: Path) -> None:
 
 
 def test_killed_supervisor(tmp_path: Path) -> None:
-    """Guard and daemon notice, and end; nothing stays that nobody supervises."""
+    """Without a supervisor, guard and daemon put the pins to rest and exit."""
     with running(tmp_path) as robot:
         robot.drive()
         guard = robot.pids("hardware")[0]
@@ -132,8 +132,8 @@ def test_killed_supervisor(tmp_path: Path) -> None:
         assert robot.record.is_at_rest()
 
 
-def test_a_supervisor_that_was_stopped_too_does_not_blame_the_others(tmp_path: Path) -> None:
-    """After Ctrl-Z and `fg` the hearts have been silent because nobody listened."""
+def test_a_resumed_supervisor_restarts_nothing(tmp_path: Path) -> None:
+    """Heartbeats that were not read while the supervisor was stopped do not count as silence."""
     with running(tmp_path) as robot:
         robot.drive()
         os.kill(robot.process.pid, signal.SIGSTOP)
@@ -144,16 +144,16 @@ def test_a_supervisor_that_was_stopped_too_does_not_blame_the_others(tmp_path: P
         assert len(robot.pids("hardware")) == 1
 
 
-def test_it_gives_up_when_they_fail_too_often(tmp_path: Path) -> None:
-    """A daemon that cannot start is not started for ever."""
+def test_the_supervisor_gives_up_after_too_many_failures(tmp_path: Path) -> None:
+    """A daemon that cannot start ends the supervisor with code 1."""
     with running(tmp_path, record="/nowhere/record") as robot:
         assert robot.process.wait(60) == 1
         assert robot.record.is_at_rest()
     assert "gives up: the daemon is gone, once too often." in _log(tmp_path)
 
 
-def test_a_stuck_output_is_said_to_be_unsafe(tmp_path: Path) -> None:
-    """Everything else rests, and the exit code says that one output does not obey."""
+def test_a_stuck_output_is_reported_as_unsafe(tmp_path: Path) -> None:
+    """Other outputs rest, and the exit code is 3."""
     with running(tmp_path) as robot:
         robot.drive()
         stuck_ns = robot.record.lines()[-1]["t"]
@@ -168,8 +168,8 @@ def test_a_stuck_output_is_said_to_be_unsafe(tmp_path: Path) -> None:
     assert "NOT SAFE" in _log(tmp_path)
 
 
-def test_what_does_not_obey_is_told_to_rest_again_and_again(tmp_path: Path) -> None:
-    """Nothing starts and nothing ends before all outputs are at rest."""
+def test_a_stuck_output_is_retried(tmp_path: Path) -> None:
+    """No process restarts before all outputs are at rest."""
     with running(tmp_path) as robot:
         robot.drive()
         (tmp_path / "stuck-GPIO22").touch()
@@ -181,7 +181,7 @@ def test_what_does_not_obey_is_told_to_rest_again_and_again(tmp_path: Path) -> N
                 x.get("opened") == "hardware" and x["pid"] == robot.process.pid for x in lines
             )
 
-        until(lambda: attempts() > 8)  # More than there may be restarts.
+        until(lambda: attempts() > 8)  # More attempts than allowed restarts.
         assert len(robot.pids("hardware")) == 1
         mended_ns = robot.record.lines()[-1]["t"]
         (tmp_path / "stuck-GPIO22").unlink()
@@ -190,8 +190,8 @@ def test_what_does_not_obey_is_told_to_rest_again_and_again(tmp_path: Path) -> N
     assert _log(tmp_path).count("NOT SAFE") == 1
 
 
-def test_outputs_that_no_guard_ever_had_are_not_waited_for(tmp_path: Path) -> None:
-    """A robot that is not wired as its profile says is told of, and ends."""
+def test_a_stuck_output_at_the_start_ends_the_supervisor(tmp_path: Path) -> None:
+    """A robot that is not wired as its profile says exits with code 3."""
     (tmp_path / "stuck-GPIO22").touch()
     with running(tmp_path) as robot:
         assert robot.process.wait(30) == 3
@@ -199,7 +199,7 @@ def test_outputs_that_no_guard_ever_had_are_not_waited_for(tmp_path: Path) -> No
 
 
 class _Stuck:
-    """A guard that is stuck in the kernel: SIGKILL ends it only after a while."""
+    """A guard stuck in the kernel: SIGKILL takes effect only after some polls."""
 
     name = "guard"
     has_beaten = True
@@ -222,11 +222,11 @@ class _Stuck:
         """Nothing is open."""
 
     def __getattr__(self, name: str) -> object:
-        raise AssertionError(f"{name}: it was killed already; every moment counts.")
+        raise AssertionError(f"{name} was used although the guard was already killed")
 
 
 class _Daemon(_Stuck):
-    """A daemon that ends when it is told to."""
+    """A daemon that exits when terminated."""
 
     name = "daemon"
 
@@ -238,20 +238,20 @@ class _Daemon(_Stuck):
 
 
 @contextlib.contextmanager
-def _supervisor(told: str) -> Iterator[Supervisor]:
-    """One without processes."""
+def _supervisor(end_reason: str) -> Iterator[Supervisor]:
+    """A supervisor without processes."""
     log = logging.getLogger("test")
     one = Supervisor(ServePlan(quick_car(), {}), -1, ProcessCommands((), ()), log)
-    one._end_reason = told
+    one._end_reason = end_reason
     with one._woken, one._waker:
         yield one
 
 
-@pytest.mark.parametrize("told", ["", "ended by SIGTERM"])
+@pytest.mark.parametrize("end_reason", ["", "ended by SIGTERM"])
 def test_a_guard_stuck_in_the_kernel_is_not_waited_for(
-    monkeypatch: pytest.MonkeyPatch, told: str
+    monkeypatch: pytest.MonkeyPatch, end_reason: str
 ) -> None:
-    """The pins rest at once, and once more when it is gone: it may still have written."""
+    """Pins are put to rest at once, and again after the guard exits, since it may have written."""
     attempts: list[int | None] = []
     guard = _Stuck(looks=4)
 
@@ -261,16 +261,16 @@ def test_a_guard_stuck_in_the_kernel_is_not_waited_for(
 
     monkeypatch.setattr(supervisor, "make_safe", safe)
     monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
-    with _supervisor(told) as one:
+    with _supervisor(end_reason) as one:
         one._stop(guard, _Daemon(looks=9))
     assert attempts == [None, None, None, -9]
     assert one._is_safe
 
 
-def test_a_guard_that_never_ends_is_given_up_when_told_to_end(
+def test_a_guard_that_never_exits_is_given_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """And the outputs are not said to be safe."""
+    """On SIGTERM the supervisor stops waiting, and does not report the outputs as safe."""
     monkeypatch.setattr(supervisor, "make_safe", lambda plan, hardware: [])
     monkeypatch.setattr(supervisor, "_AGAIN_S", 0.0)
     monkeypatch.setattr(supervisor, "_UNSAFE_S", 0.01)
@@ -279,8 +279,8 @@ def test_a_guard_that_never_ends_is_given_up_when_told_to_end(
     assert not one._is_safe
 
 
-def test_garbage_is_counted_and_refused_in_words(tmp_path: Path) -> None:
-    """A datagram that is no order never ends the guard."""
+def test_garbage_is_counted_and_refused(tmp_path: Path) -> None:
+    """Invalid datagrams do not end the guard."""
     garbage = ["{", "[]", '{"kind": "command", "values": [1e999]}', "x" * 20_000]
     with running(tmp_path, garbage=garbage) as robot:
         robot.drive()
@@ -289,8 +289,8 @@ def test_garbage_is_counted_and_refused_in_words(tmp_path: Path) -> None:
     assert "4 datagrams were no orders" in _log(tmp_path)
 
 
-def test_what_cannot_be_started_is_said_in_a_line(tmp_path: Path) -> None:
-    """A driver that does not exist ends the supervisor before anything moves."""
+def test_an_unknown_driver_ends_the_supervisor(tmp_path: Path) -> None:
+    """The log names the driver, and the exit code is 2."""
     plan = quick_car(LimitPlan())
     plan = replace(plan, outputs=(replace(plan.outputs[0], driver="magic"),), sensors=())
     with running(tmp_path, plan) as robot:

@@ -1,4 +1,4 @@
-"""What daemon and guard say to each other survives, and nothing else is understood."""
+"""Encoding and strict decoding of the messages between daemon and guard."""
 
 import json
 from dataclasses import asdict, replace
@@ -22,8 +22,8 @@ _STATE = GuardState(
 )
 
 
-def test_orders_and_states_come_back_as_they_were() -> None:
-    """Both ways."""
+def test_orders_and_states_round_trip() -> None:
+    """Decoding an encoded message returns an equal one."""
     assert decode_order(encode(_ORDER)) == _ORDER
     assert decode_state(encode(_STATE)) == _STATE
 
@@ -50,15 +50,15 @@ def test_orders_and_states_come_back_as_they_were() -> None:
         ("other", 1),
     ],
 )
-def test_what_is_no_order_is_refused(field: str, value: object) -> None:
-    """Each field has its type, and numbers are finite, so that limits can be compared."""
+def test_an_invalid_order_is_refused(field: str, value: object) -> None:
+    """Each field is checked for its type, and numbers must be finite."""
     data = json.dumps(asdict(_ORDER) | {field: value}).encode()
     with pytest.raises(ValueError, match=r"^Invalid order: "):
         decode_order(data)
 
 
-def test_a_state_with_the_longest_words_fits_into_a_datagram() -> None:
-    """What cannot be written is replaced, never an error in the guard."""
+def test_a_state_with_long_reasons_fits_into_a_datagram() -> None:
+    """Characters that cannot be encoded are replaced."""
     words = "\N{GRINNING FACE}" * 250
     state = replace(_STATE, stop_reason=words, refused=words + "\ud800")
     assert len(encode(state)) < MAX_DATAGRAM // 4
@@ -66,16 +66,16 @@ def test_a_state_with_the_longest_words_fits_into_a_datagram() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff", b"[]", b"1", b"[" * 16_000, b"{}", b"\x00"])
-def test_what_is_no_json_object_is_refused(data: bytes) -> None:
-    """By both decoders, with the one error that is promised."""
+def test_anything_but_a_json_object_is_refused(data: bytes) -> None:
+    """Both decoders raise ValueError."""
     for decode in (decode_order, decode_state):
         with pytest.raises(ValueError, match=r"."):
             decode(data)
 
 
 @given(st.binary(max_size=200))
-def test_bytes_are_an_order_or_a_value_error(data: bytes) -> None:
-    """Nothing else comes out."""
+def test_decoding_bytes_gives_an_order_or_a_value_error(data: bytes) -> None:
+    """No other exception is raised."""
     try:
         assert isinstance(decode_order(data), Order)
     except ValueError:
@@ -92,8 +92,8 @@ def test_bytes_are_an_order_or_a_value_error(data: bytes) -> None:
         ),
     )
 )
-def test_objects_are_an_order_or_a_value_error(fields: dict[str, object]) -> None:
-    """The rules may trust every field of what comes out."""
+def test_decoding_objects_gives_an_order_or_a_value_error(fields: dict[str, object]) -> None:
+    """The values of a decoded order are finite."""
     try:
         order = decode_order(json.dumps({"kind": "command"} | fields).encode())
     except ValueError:

@@ -1,4 +1,4 @@
-"""The guide to profiles against what the code reads."""
+"""The guide to profiles matches the schema."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ GUIDE = (Path(__file__).parents[3] / "docs" / "profiles.md").read_text()
 
 
 def test_vehicle_of_the_guide_is_a_profile() -> None:
-    """What the guide shows can be copied."""
+    """The example of the guide is a valid profile."""
     (text,) = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)
     assert read(text).body == "hovercraft"
 
 
 @pytest.mark.parametrize("name", [n for n in vars(schema) if n.endswith(("KEYS", "SETTINGS"))])
 def test_every_key_is_in_the_guide(name: str) -> None:
-    """A key, the names it may be and its default are told."""
+    """The guide lists each key with its choices and its default."""
     table = getattr(schema, name)
     keys: list[ProfileKey] = (
         [k for ks in table.values() for k in ks] if "SETTINGS" in name else [*table]
@@ -36,7 +36,7 @@ def test_every_key_is_in_the_guide(name: str) -> None:
 
 
 def test_every_table_and_profile_is_in_the_guide() -> None:
-    """Nobody must read the code to find a table."""
+    """The guide lists each table and each shipped profile."""
     for table in schema.TABLES:
         assert re.search(rf"^### `\[+{table}[\].]", GUIDE, re.MULTILINE), table
     for name in shipped_profiles():

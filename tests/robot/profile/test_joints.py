@@ -1,4 +1,4 @@
-"""What a profile says of encoders at joints."""
+"""Joint encoders in a profile."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _SENSOR = _TEXT[_TEXT.index("[sensor.joints]") : _TEXT.index("[limits]")]
 _HEAD = _SENSOR[: _SENSOR.index("[sensor.joints.MCP_flexion]")]
 
 
-def test_the_guard_is_given_lists_in_the_order_of_the_file() -> None:
-    """As plain numbers, which cross as JSON."""
+def test_encoder_settings_are_lists_in_file_order() -> None:
+    """The guard's settings are plain numbers, which round-trip through JSON."""
     plan = load_profile(shipped_profiles()["finger"]).guard_plan()
     sensor = plan.sensors[-1]
     assert (sensor.driver, sensor.measures) == ("as5600", "joints")
@@ -36,7 +36,7 @@ def test_the_guard_is_given_lists_in_the_order_of_the_file() -> None:
 
 
 def test_the_state_has_an_angle_of_each_joint() -> None:
-    """In rad, within half a turn, after lengths, speeds and tensions."""
+    """Angles are in rad within half a turn, after lengths, speeds and tensions."""
     state = load_profile(shipped_profiles()["finger"]).state_layout()
     angle = state["MCP_abduction/angle"]
     assert (angle.unit, angle.low, angle.high) == ("rad", -math.pi, math.pi)
@@ -45,15 +45,15 @@ def test_the_state_has_an_angle_of_each_joint() -> None:
     )
 
 
-def test_a_finger_without_encoders_is_one_as_well() -> None:
-    """Its state is that of its servos."""
+def test_a_finger_without_encoders_is_valid() -> None:
+    """Its state then has no angles."""
     profile = read(_TEXT.replace(_SENSOR, ""))
     assert [sensor.name for sensor in profile.sensors] == ["tendons"]
     assert not [name for name in profile.state_layout().names if name.endswith("/angle")]
 
 
-def test_a_zero_can_be_written_into_the_file(tmp_path: Path) -> None:
-    """As `robot home` does; comments stay."""
+def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
+    """`rewrite` sets the zero as `robot home` does, and keeps comments."""
     path = write_profile("finger", tmp_path / "mine.toml", "mine")
     profile = rewrite(path, {"sensor.joints.PIP_flexion.zero": 1234})
     assert profile.sensors[-1].settings["zeros"] == [0, 0, 1234, 0]
@@ -82,7 +82,7 @@ def test_a_zero_can_be_written_into_the_file(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_encoders_that_cannot_be_are_refused(text: str, words: str) -> None:
-    """In one sentence, with the line."""
+def test_invalid_encoders_are_refused(text: str, words: str) -> None:
+    """The error names the line and the problem."""
     with pytest.raises(ProfileError, match=f"line [0-9]+: .*{words}"):
         read(text)

@@ -1,4 +1,4 @@
-"""Where things stand in a TOML text."""
+"""Line numbers of the keys of a TOML text."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ v = 2
 
 
 def test_lines_of_every_kind_of_statement() -> None:
-    """Texts, lists and comments over several lines hide no statement and make none."""
+    """Multi-line strings, arrays and comments neither hide statements nor add any."""
     assert lines_of(TEXT) == {
         ("top",): 2,
         ("a",): 3,
@@ -70,7 +70,7 @@ NAMES = st.sampled_from(["a", "b", "c-d", '"e f"', "'g.h'"])
     )
 )
 def test_every_key_is_found_on_its_line(tables: dict[str, dict[str, str]]) -> None:
-    """Each key of a text stands on the line that is told, and there are no others."""
+    """Each key is reported on the line it stands on, and no other keys are reported."""
     text = "".join(
         f"[{table}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()) + "\n"
         for table, keys in tables.items()
@@ -86,6 +86,6 @@ def test_every_key_is_found_on_its_line(tables: dict[str, dict[str, str]]) -> No
 
 
 @given(st.text(alphabet="[]{}\"'#=.\\\n a1", max_size=60))
-def test_any_text_comes_to_an_end(text: str) -> None:
-    """The scanner never hangs, not even on what is no TOML."""
+def test_the_scanner_ends_for_any_text(text: str) -> None:
+    """The scanner does not hang on invalid TOML."""
     lines_of(text)

@@ -1,4 +1,4 @@
-"""Finding and reading files of profiles."""
+"""Finding and reading profile files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.robot.profile.texts import EVERYTHING
 
 
 def test_names_and_paths() -> None:
-    """A shipped profile has a name; everything else is a path."""
+    """Names of shipped profiles resolve to their files; everything else is a path."""
     assert find_profile("car") == shipped_profiles()["car"]
     assert find_profile("car.toml") == Path("car.toml")
     assert find_profile("robots/car") == Path("robots/car")
@@ -21,10 +21,10 @@ def test_names_and_paths() -> None:
         find_profile("tnak")
 
 
-def test_a_profile_of_this_folder_has_a_name_too(
+def test_a_profile_in_the_working_folder_has_a_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """But a shipped one of that name comes first, and a folder is no profile."""
+    """Shipped profiles take precedence, and folders are ignored."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rover.toml").write_text(EVERYTHING)
     (tmp_path / "car.toml").write_text(EVERYTHING)
@@ -58,15 +58,15 @@ def test_a_misspelt_name_finds_files_too(tmp_path: Path, monkeypatch: pytest.Mon
         find_profile("my-cra")
 
 
-def test_a_mark_and_windows_lines_are_read(tmp_path: Path) -> None:
-    """What an editor of Windows adds is no part of a profile."""
+def test_bom_and_crlf_are_accepted(tmp_path: Path) -> None:
+    """A byte order mark and CRLF line ends are ignored."""
     path = tmp_path / "car.toml"
     path.write_bytes(b"\xef\xbb\xbf" + EVERYTHING.replace("\n", "\r\n").encode())
     assert load_profile(path).name == "rover"
 
 
-def test_files_that_are_no_profile(tmp_path: Path) -> None:
-    """Missing, a folder, no text, too long, not to be read: each in words."""
+def test_unreadable_files_are_refused(tmp_path: Path) -> None:
+    """Missing files, folders, binary, oversized and unreadable files raise clear errors."""
     with pytest.raises(ProfileError, match=r"There is no file .*gone\.toml\."):
         load_profile(tmp_path / "gone.toml")
     with pytest.raises(ProfileError, match="is a folder, not a profile"):

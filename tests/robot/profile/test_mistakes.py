@@ -1,4 +1,4 @@
-"""Each mistake in a profile is one sentence: the file, the line, what is wrong, what exists."""
+"""Each mistake in a profile gives one sentence: file, line, problem and alternatives."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from shapechanger.errors import ProfileError
 from shapechanger.robot.profile import shipped_profiles
 from tests.robot.profile.texts import EVERYTHING, changed, read
 
-# What is replaced in the profile with everything, and by what; how the line begins that is named,
-# and what is said.
+# Text to replace in EVERYTHING, its replacement, start of the reported line, part of the message.
 MISTAKES = [
-    # Tables and keys that nobody knows.
+    # Unknown tables and keys.
     (
         "[limits]",
         "[limit]",
@@ -193,7 +192,7 @@ MISTAKES = [
         "[reset]",
         "written [[reset]], with two",
     ),
-    # A unit that is missing or another one.
+    # Missing and wrong units.
     ("stop_distance_m", "stop_distance", "stop_distance = 0.3", "write 'stop_distance_m' (metres)"),
     (
         "stop_distance_m",
@@ -346,7 +345,7 @@ MISTAKES = [
         "[output.pump]",
         "lacks the key 'pin', a BCM pin",
     ),
-    # Actions that make no sense.
+    # Invalid actions.
     (
         "low = -0.5",
         "low = 0.5\nhigh = 0.5",
@@ -414,7 +413,7 @@ MISTAKES = [
         "[action.7]",
         "the name '7' must begin with a letter and have at most 32",
     ),
-    # Outputs that make no sense.
+    # Invalid outputs.
     (
         "mix = { arm = 1.0 }",
         "mix = {}",
@@ -500,7 +499,7 @@ MISTAKES = [
         "start = 0.5",
         "start of [output.brush] must be below full",
     ),
-    # Stops, limits and the rest.
+    # Stops, limits and others.
     (
         "deadline_ms = 200",
         "deadline_ms = 1001",
@@ -574,7 +573,7 @@ MISTAKES = [
         "hold_ms = 10",
         "must be a whole number from 30 to 1000 (milliseconds)",
     ),
-    # No TOML at all.
+    # Invalid TOML.
     (
         'name = "rover"',
         'name = "rover',
@@ -604,7 +603,7 @@ MISTAKES = [
     ids=lambda value: str(value)[:40] if isinstance(value, str) else "",
 )
 def test_mistake_is_named(old: str, new: str, begin: str, words: str) -> None:
-    """The line leads to the mistake, and the words out of it."""
+    """The error gives the line of the mistake and how to fix it."""
     text = changed(old, new)
     with pytest.raises(ProfileError) as caught:
         read(text)
@@ -621,26 +620,26 @@ def test_mistake_is_named(old: str, new: str, begin: str, words: str) -> None:
         ["", "0", "-1", "nan", "[", "]", "{}", '"', "=", "\n", ".", "x", "true", "é"]
     ),
 )
-def test_no_text_is_a_crash(cut: int, length: int, put: str) -> None:
-    """Whatever slips in or falls out, it is a profile or one sentence."""
-    said = ""
+def test_any_edit_gives_a_profile_or_one_sentence(cut: int, length: int, put: str) -> None:
+    """Any small edit of a profile reads, or raises one sentence."""
+    message = ""
     try:
         read(EVERYTHING[:cut] + put + EVERYTHING[cut + length :])
     except ProfileError as error:
-        said = str(error)
-    assert re.fullmatch(r"|rover\.toml, line [0-9]+: [^\n]*\.", said)
+        message = str(error)
+    assert re.fullmatch(r"|rover\.toml, line [0-9]+: [^\n]*\.", message)
 
 
 def test_nested_too_deeply() -> None:
-    """Brackets without end are refused, not a crash."""
+    """Deep nesting raises ProfileError, not RecursionError."""
     with pytest.raises(
         ProfileError, match=r"rover\.toml is not a profile: it is nested too deeply\."
     ):
         read("x = " + "[" * 5000)
 
 
-def test_a_whole_table_is_missing() -> None:
-    """A robot must have a name, and something to command."""
+def test_a_missing_table_is_named() -> None:
+    """A robot needs a name and at least one action, and tables of the right type."""
     with pytest.raises(ProfileError, match=r"line 1: \[robot\] lacks the key 'name'"):
         read("")
     with pytest.raises(ProfileError, match="line 1: a robot needs an action"):
@@ -651,8 +650,8 @@ def test_a_whole_table_is_missing() -> None:
         read("reset = [true]\n" + EVERYTHING.split("[[reset]]", maxsplit=1)[0])
 
 
-def test_too_many_numbers() -> None:
-    """A command has at most 64 numbers."""
+def test_too_many_actions() -> None:
+    """A robot has at most 64 actions."""
     actions = "".join(f"[action.a{i}]\n" for i in range(65))
     with pytest.raises(ProfileError, match="a robot has at most 64 actions, not 65"):
         read('[robot]\nname = "x"\nbody = "y"\n' + actions)
@@ -660,7 +659,7 @@ def test_too_many_numbers() -> None:
 
 @pytest.mark.parametrize("key", ["hold_ms", "ramp_ms"])
 def test_a_stop_may_not_let_the_robot_drive_on(key: str) -> None:
-    """A track that is part steering may not keep its value, unless the steering propels, too."""
+    """A stop must not hold a propelling output, such as a track that mixes in steering."""
     tank = shipped_profiles()["tank"].read_text() + f"\n[stop]\n{key} = 100\n"
     read(tank)
     with pytest.raises(ProfileError, match=rf"{key} of \[stop\] would keep \[output.left\] driv"):

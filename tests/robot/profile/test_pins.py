@@ -1,4 +1,4 @@
-"""The table of the header against gpiozero's."""
+"""The table of header pins against gpiozero's."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from gpiozero.pins.data import PLUS_J8
 from shapechanger.robot.profile.pins import BCM_OF_BOARD, bcm
 
 
-def test_header_is_the_one_of_gpiozero() -> None:
-    """The places on the header, from a source of its own."""
+def test_the_header_matches_gpiozero() -> None:
+    """Each place on the header has the BCM number that gpiozero gives it."""
     pins: dict[int, dict[str, str]] = PLUS_J8[2]
     theirs = {
         place: int(names["gpio"].removeprefix("GPIO"))
@@ -19,6 +19,6 @@ def test_header_is_the_one_of_gpiozero() -> None:
 
 
 def test_the_pins_of_2017() -> None:
-    """BOARD 15/13 drive and 11/7 steer, which are BCM 22/27 and 17/4."""
+    """Places 15/13 and 11/7 of the 2017 car are BCM 22/27 and 17/4."""
     assert [bcm(f"BOARD{n}") for n in (15, 13, 11, 7)] == [22, 27, 17, 4]
     assert bcm("GPIO22") == bcm(22) == 22

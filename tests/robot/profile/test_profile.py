@@ -1,4 +1,4 @@
-"""What a profile becomes for the guard, the daemon and the workstation."""
+"""What guard, daemon and workstation read from a profile."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.robot.profile.texts import EVERYTHING, changed, read
 
 
 def test_everything_is_read() -> None:
-    """Each table arrives where it belongs, with its defaults."""
+    """Each table is read, with its defaults."""
     profile = read()
     assert (profile.name, profile.body, profile.control_hz) == ("rover", "car", 25.0)
     assert profile.calibrated == datetime.date(2026, 11, 3)
@@ -42,12 +42,12 @@ def test_everything_is_read() -> None:
         "stall": -1.0,
         "collision_ends_episode": 0.0,
     }
-    # What a step does not name is at rest.
+    # Actions that a step does not name are at rest.
     assert profile.reset == (((0.0, -0.4, 0.25), 1.0), ((0.0, 0.0, 0.5), 0.5))
 
 
 def test_drivers_find_all_their_settings() -> None:
-    """A driver finds every key that it has, and a pin always as a BCM number."""
+    """Each driver gets all of its keys, and pins as BCM numbers."""
     settings = {output.name: output.settings for output in read().outputs}
     assert settings["drive"] == {
         "forward": 22, "backward": 27, "enable": 26, "pwm_hz": 50, "start": 0.0, "full": 1.0,
@@ -66,22 +66,22 @@ def test_drivers_find_all_their_settings() -> None:
     assert sensors["wheel"][1] == {"a": 16, "b": 20, "counts_per_turn": 20.0, "wheel_m": 0.21}
 
 
-def test_what_one_output_says_of_its_chip_holds_for_all() -> None:
-    """A PCA9685 has one output-enable line, so it is said once."""
+def test_chip_settings_apply_to_all_its_outputs() -> None:
+    """The output-enable line of a PCA9685 is given once."""
     outputs = {output.name: output for output in read().outputs}
     assert outputs["steer"].settings["output_enable"] == 25
     assert outputs["arm"].settings["output_enable"] == 25
 
 
-def test_guard_plan_crosses_as_json() -> None:
-    """What the guard reads is what the profile says."""
+def test_guard_plan_round_trips() -> None:
+    """The guard plan is unchanged by JSON."""
     plan = read().guard_plan()
     assert GuardPlan.from_json(plan.to_json()) == plan
     assert (plan.enable_pin, plan.enable_hold_ms, plan.stop_pin) == (19, 50, 21)
 
 
 def test_layouts_name_every_number() -> None:
-    """Angles are in SI units, and the range is the whole one whatever the caps."""
+    """Gains are in SI units, and ranges ignore caps."""
     profile = read()
     assert profile.action_layout() == Layout(
         (
@@ -112,23 +112,23 @@ def test_layouts_name_every_number() -> None:
 
 
 def test_a_speed_may_come_from_the_profile() -> None:
-    """Without an encoder the state has a speed where the profile says how fast an action is."""
+    """Without an encoder, the state has a speed if the throttle has a gain in m/s."""
     car = shipped_profiles()["car"].read_text()
     assert "speed" not in load_profile(shipped_profiles()["car"]).state_layout()
-    told = read(changed("propels = true", 'propels = true\nunit = "m/s"\ngain = 1.5', car))
-    assert told.state_layout()["speed"].element == Element("actuator", "throttle")
-    assert told.action_layout()["throttle"].gain_unit == "m/s"
+    profile = read(changed("propels = true", 'propels = true\nunit = "m/s"\ngain = 1.5', car))
+    assert profile.state_layout()["speed"].element == Element("actuator", "throttle")
+    assert profile.action_layout()["throttle"].gain_unit == "m/s"
 
 
-def test_layout_of_a_tendon_has_one_side() -> None:
-    """A tendon cannot push."""
+def test_tendon_layouts_start_at_0() -> None:
+    """Tendons cannot push, so actions and states have a lower bound of 0."""
     finger = load_profile(shipped_profiles()["finger-pwm"])
     assert set(finger.action_layout().low) == {0.0}
     assert set(finger.state_layout().low) == {0.0}
 
 
-def test_a_robot_may_have_next_to_nothing() -> None:
-    """No camera, no sensor, no limits: the defaults are safe, and nothing is asked for."""
+def test_a_minimal_profile() -> None:
+    """Without camera, sensors and limits, the defaults are safe."""
     text = EVERYTHING.split("[action.steering]", maxsplit=1)[0]
     profile = read(
         text + '[action.turn]\n[output.turn]\ndriver = "hbridge"\nforward = 4\nbackward = 5\n'
@@ -141,13 +141,13 @@ def test_a_robot_may_have_next_to_nothing() -> None:
     assert profile.reset == ()
 
 
-def test_a_pin_may_be_left_unconnected_in_so_many_words() -> None:
+def test_pin_minus_1_means_unconnected() -> None:
     """-1 is the same as no key."""
     without, with_none = (read(changed("enable = 26\n", new)) for new in ("", "enable = -1\n"))
     assert without == with_none
 
 
 @pytest.mark.parametrize("ending", ["\r\n", "\n"])
-def test_lines_may_end_as_on_any_system(ending: str) -> None:
-    """A profile that was edited on Windows is the same profile."""
+def test_line_ends_do_not_matter(ending: str) -> None:
+    """CRLF and LF give the same profile."""
     assert read(EVERYTHING.replace("\n", ending)) == read()

@@ -1,4 +1,4 @@
-"""What a profile says of a servo bus."""
+"""The servo bus in a profile."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _SENSOR = _TEXT[_TEXT.index("[sensor.tendons]") : _TEXT.index("[sensor.joints]")
 _BUS = _TEXT[_TEXT.index("[servo_bus]") : _TEXT.index("[action.FDP]")]
 
 
-def test_every_output_knows_its_bus_and_the_sensor_its_tendons() -> None:
-    """The guard needs no table but theirs."""
+def test_outputs_include_the_bus_and_the_sensor_its_tendons() -> None:
+    """Settings of the bus are merged into the outputs, and tendon names into the sensor."""
     plan = load_profile(shipped_profiles()["finger"]).guard_plan()
     assert {str(output.settings["device"]) for output in plan.outputs} == {"/dev/ttyUSB0"}
     assert [output.settings["id"] for output in plan.outputs] == [1, 2, 3, 4, 5, 6, 7]
@@ -27,8 +27,8 @@ def test_every_output_knows_its_bus_and_the_sensor_its_tendons() -> None:
     assert GuardPlan.from_json(json.dumps(json.loads(plan.to_json()))) == plan
 
 
-def test_layouts_say_newtons_and_metres() -> None:
-    """From pretension, at 0, to the most, at 1; and length, speed and tension of each tendon."""
+def test_layouts_are_in_newtons_and_metres() -> None:
+    """Actions run from pretension at 0 to maximum at 1; states are length, speed and tension."""
     profile = load_profile(shipped_profiles()["finger"])
     action = profile.action_layout()["FDP"]
     assert (action.low, action.high, action.gain, action.gain_unit) == (0.0, 1.0, 14.0, "N")
@@ -71,7 +71,7 @@ def test_layouts_say_newtons_and_metres() -> None:
         ),
     ],
 )
-def test_a_bus_that_cannot_be_is_refused(text: str, words: str) -> None:
-    """In one sentence, with the line."""
+def test_an_invalid_bus_is_refused(text: str, words: str) -> None:
+    """The error names the problem, with the line where there is one."""
     with pytest.raises(ProfileError, match=words):
         read(text)

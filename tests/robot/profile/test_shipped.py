@@ -1,4 +1,4 @@
-"""The profiles that come with the package, and what they make of a command."""
+"""The shipped profiles, and how they map commands to outputs."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ SIDE = st.floats(-1.0, 1.0)
 
 
 def values(plan: GuardPlan, actions: Sequence[float]) -> dict[str, float]:
-    """The value of each output by name."""
+    """Return the value of each output by name."""
     names = [output.name for output in plan.outputs]
     return dict(zip(names, output_values(plan, actions), strict=True))
 
 
-def test_every_profile_is_there() -> None:
-    """Each body of the field has one, under its own name."""
+def test_every_body_has_a_profile() -> None:
+    """Each profile is named after its file."""
     assert tuple(shipped_profiles()) == NAMES
     assert {name: plan.name for name, plan in PLANS.items()} == {name: name for name in NAMES}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_comment_belongs_to_the_wiring(name: str) -> None:
-    """A person who wires the robot finds a comment on the top and one at the first output."""
+def test_profiles_are_commented(name: str) -> None:
+    """Each profile starts with a comment and has at least five."""
     text = shipped_profiles()[name].read_text()
     assert text.startswith("# ")
     assert len(re.findall(r"# .", text)) >= 5
@@ -46,13 +46,13 @@ def test_every_comment_belongs_to_the_wiring(name: str) -> None:
     "name", [name for name in NAMES if name not in ("cat", "finger", "finger-pwm")]
 )
 def test_vehicles_take_the_same_command(name: str) -> None:
-    """Steering first, then throttle, as everywhere in the field."""
+    """Actions start with steering and throttle."""
     assert [action.name for action in PLANS[name].actions][:2] == ["steering", "throttle"]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_drives_at_rest(name: str) -> None:
-    """At rest every motor is at 0, and a vehicle looks straight ahead."""
+    """At rest every motor is at 0 and the steering is straight."""
     plan = PLANS[name]
     at_rest = values(plan, [action.rest for action in plan.actions])
     propelling = {action.name for action in plan.actions if action.propels}
@@ -63,7 +63,7 @@ def test_nothing_drives_at_rest(name: str) -> None:
 
 @given(steering=SIDE, throttle=SIDE)
 def test_tracks_and_twin_propellers_mix(steering: float, throttle: float) -> None:
-    """It is left = clip(throttle + steering), right = clip(throttle - steering)."""
+    """Outputs are clip(throttle + steering) on the left, clip(throttle - steering) on the right."""
     expected = {
         "left": max(-1.0, min(1.0, throttle + steering)),
         "right": max(-1.0, min(1.0, throttle - steering)),
@@ -90,13 +90,13 @@ def test_cars_and_boats_keep_the_sign(steering: float, throttle: float) -> None:
 
 
 def test_full_power_of_2017() -> None:
-    """60 % on the drive and 40 % on the steering."""
+    """Caps are 60 % on the drive and 40 % on the steering."""
     assert values(PLANS["car"], [1.0, 1.0]) == {"drive": 0.6, "steer": 0.4}
     assert values(PLANS["car"], [-1.0, -1.0]) == {"drive": -0.6, "steer": -0.4}
 
 
 def test_a_cat_stands_as_in_2017() -> None:
-    """55, 92 and 55 degrees, four times."""
+    """The rest angles of each leg are 55, 92 and 55 degrees."""
     degrees = [85.0 + action.gain * action.rest for action in PLANS["cat"].actions]
     assert degrees == pytest.approx([55.0, 92.0, 55.0] * 4, abs=0.01)
     assert [output.settings["channel"] for output in PLANS["cat"].outputs] == list(range(12))
@@ -104,14 +104,14 @@ def test_a_cat_stands_as_in_2017() -> None:
 
 @given(pull=st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))
 def test_tendons_pull_one_to_one(pull: list[float]) -> None:
-    """Slack is one end of a servo's travel, taut the other one, and no tendon moves another."""
+    """Slack and taut are the two ends of a servo, and each tendon has its own servo."""
     outputs = values(PLANS["finger-pwm"], pull)
     assert list(outputs) == ["EIP", "DI", "PI", "FDP", "FDS", "LUM", "EDC"]
     assert list(outputs.values()) == pytest.approx([2.0 * p - 1.0 for p in pull])
 
 
-def test_a_vehicle_that_the_code_has_never_seen() -> None:
-    """A hovercraft is one TOML and no code."""
+def test_a_vehicle_defined_by_its_profile_alone() -> None:
+    """A hovercraft needs one TOML file and no code."""
     profile = read(HOVERCRAFT)
     plan = profile.guard_plan()
     assert profile.action_layout().names == ("steering", "throttle", "lift")
@@ -125,8 +125,8 @@ def test_a_vehicle_that_the_code_has_never_seen() -> None:
     assert set(values(plan, [0.0, 0.0, 0.0]).values()) == {0.0}
 
 
-def test_swapped_pins_are_another_plan() -> None:
-    """Which pin drives is what the profile says, and nothing else."""
+def test_swapped_pins_change_the_plan() -> None:
+    """The plan takes its pins from the profile alone."""
     text = shipped_profiles()["car"].read_text()
     swapped = changed("forward = 22", "forward = 27", text)
     with pytest.raises(ProfileError, match="GPIO27 is used twice"):
@@ -138,7 +138,7 @@ def test_swapped_pins_are_another_plan() -> None:
 
 
 def test_commented_sensors_of_the_car_work() -> None:
-    """Who takes the # away gets the sensors that the comment promises."""
+    """Uncommenting the sensors gives a valid profile."""
     text = shipped_profiles()["car"].read_text()
     lines = text.split("\n")
     begin = lines.index("# [sensor.wheel]")

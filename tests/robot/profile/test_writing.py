@@ -1,4 +1,4 @@
-"""Writing a first profile, and changing one."""
+"""Writing a first profile, and changing an existing one."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from tests.robot.profile.texts import EVERYTHING
 
 @pytest.fixture
 def rover(tmp_path: Path) -> Path:
-    """The file of a profile with everything."""
+    """The file of a profile with every table."""
     path = tmp_path / "rover.toml"
     path.write_text(EVERYTHING)
     return path
 
 
 @pytest.mark.parametrize("kind", shipped_profiles())
-def test_a_first_profile_differs_by_its_name(kind: str, tmp_path: Path) -> None:
-    """Everything else is as it was shipped, comments too."""
+def test_a_first_profile_differs_only_in_its_name(kind: str, tmp_path: Path) -> None:
+    """All other lines are those of the shipped file, including comments."""
     path = write_profile(kind, tmp_path / "new" / "my.toml", 'Ann\'s "7" \\ ü')
     profile = load_profile(path)
     assert profile.name == 'Ann\'s "7" \\ ü'
@@ -39,7 +39,7 @@ def test_a_first_profile_differs_by_its_name(kind: str, tmp_path: Path) -> None:
 
 
 def test_a_first_profile_overwrites_nothing(tmp_path: Path) -> None:
-    """Refused in words: a file that exists, a folder that cannot be, a name that is none."""
+    """Existing files, invalid paths, kinds and names raise errors."""
     path = tmp_path / "car.toml"
     path.write_text("mine")
     with pytest.raises(OutputError, match=r"Cannot write .*: it exists"):
@@ -59,7 +59,7 @@ def test_a_first_profile_overwrites_nothing(tmp_path: Path) -> None:
 
 
 def test_changes_keep_comments(rover: Path) -> None:
-    """What calibration writes is all that changes."""
+    """`rewrite` changes only the given keys, and keeps file mode and comments."""
     rover.chmod(0o640)
     profile = rewrite(
         rover,
@@ -87,8 +87,8 @@ def test_changes_keep_comments(rover: Path) -> None:
     assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]
 
 
-def test_a_comment_behind_a_value_stays(tmp_path: Path) -> None:
-    """A new number stands before the comment that explains it."""
+def test_a_comment_after_a_value_is_kept(tmp_path: Path) -> None:
+    """The new value is written before the comment."""
     path = write_profile("car", tmp_path / "car.toml", "car")
     rewrite(path, {"action.throttle.slew_per_s": 2.0, "output.drive.mix": {"throttle": 0.5}})
     text = path.read_text()
@@ -96,8 +96,8 @@ def test_a_comment_behind_a_value_stays(tmp_path: Path) -> None:
     assert "# Full throttle is 60 %" in text
 
 
-def test_a_change_through_a_link_changes_what_it_leads_to(rover: Path, tmp_path: Path) -> None:
-    """The link stays a link."""
+def test_a_change_through_a_link_changes_its_target(rover: Path, tmp_path: Path) -> None:
+    """The link remains a link."""
     link = tmp_path / "link.toml"
     link.symlink_to(rover)
     assert rewrite(link, {"robot.name": "new"}).name == "new"
@@ -106,7 +106,7 @@ def test_a_change_through_a_link_changes_what_it_leads_to(rover: Path, tmp_path:
 
 
 def test_a_change_that_breaks_the_profile_is_refused(rover: Path) -> None:
-    """The file stays as it was, and nothing else is left in the folder."""
+    """The file is unchanged, and no temporary file remains."""
     with pytest.raises(ProfileError, match="must lie between left_us and right_us"):
         rewrite(rover, {"output.steer.centre_us": 2400})
     with pytest.raises(UnknownName, match=r"No table of rover.toml matches 'stear'. Did you mean"):
@@ -121,7 +121,7 @@ def test_a_change_that_breaks_the_profile_is_refused(rover: Path) -> None:
 
 @pytest.mark.parametrize("step", ["fsync", "fchmod", "rename"])
 def test_a_full_disk_loses_nothing(step: str, rover: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever fails, the old file is there, whole, and alone."""
+    """After a failed write, the old file is intact and no temporary file remains."""
 
     def fails(*_: object) -> None:
         raise OSError(28, os.strerror(28))

@@ -1,4 +1,4 @@
-"""A profile with one of everything, to break in one place at a time."""
+"""A profile with every table, and helpers to change it."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ mix = { steering = 0.8 }
 
 
 def changed(old: str, new: str, text: str = EVERYTHING) -> str:
-    """A text with its only `old` replaced; at the end where `old` is empty."""
+    """Return a text with its only `old` replaced; `new` is appended where `old` is empty."""
     if not old:
         return text + new
     assert text.count(old) == 1, old
@@ -184,5 +184,5 @@ def changed(old: str, new: str, text: str = EVERYTHING) -> str:
 
 
 def read(text: str = EVERYTHING) -> Profile:
-    """The profile that a text says."""
+    """Parse the text of a profile."""
     return read_profile(text, PATH)

@@ -1,4 +1,4 @@
-"""Profile changes from a calibration."""
+"""Changes of a profile from a calibration."""
 
 import pytest
 
@@ -25,7 +25,7 @@ _MOTOR = OutputPlan("drive", "hbridge", mix={"throttle": 0.6}, settings={"full":
 
 @pytest.mark.parametrize(("left_us", "right_us"), [(1100, 1900), (1900, 1100)])
 def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
-    """Also for a servo mounted the other way round."""
+    """Works for reversed servos too."""
     settings = {"left_us": left_us, "centre_us": 1500, "right_us": right_us}
     wide = with_widest_pulses(OutputPlan("steer", "servo", settings=settings))
     seen = JogResult(-0.5, 0.1, 0.4)
@@ -41,37 +41,37 @@ def test_jogged_values_become_pulse_widths(left_us: int, right_us: int) -> None:
 
 
 def test_a_middle_outside_the_ends_is_refused() -> None:
-    """As after three times Enter in one place."""
+    """Three equal positions raise an error."""
     with pytest.raises(RobotError, match="must lie between"):
         pulse_changes(_SERVO, JogResult(0.2, 0.2, 0.2))
 
 
 def test_a_motor_that_turned_backward_gets_a_negative_mix() -> None:
-    """The pins stay as they are wired."""
+    """The pins of the profile do not change."""
     assert motor_changes(_MOTOR, "forward", 0.214) == {"output.drive.start": 0.21}
     assert motor_changes(_MOTOR, "backward", 0.2)["output.drive.mix"] == {"throttle": -0.6}
 
 
 @pytest.mark.parametrize("duty", [-0.1, 1.0, 2.0])
 def test_a_motor_starts_below_its_full_duty(duty: float) -> None:
-    """Otherwise its range would be empty."""
+    """A start duty outside of the range raises an error."""
     with pytest.raises(RobotError, match="must start at a duty"):
         motor_changes(_MOTOR, "forward", duty)
 
 
 def test_a_wheel_is_scaled_by_the_pushed_distance() -> None:
-    """An encoder that measured half a metre for one gets twice the distance per turn."""
+    """A measured 0.5 m for 1 m doubles the distance per turn."""
     assert wheel_changes("wheel", 0.21, 1.0, 0.5) == {"sensor.wheel.wheel_m": 0.42}
 
 
 @pytest.mark.parametrize("measured_m", [0.0, -0.8])
 def test_a_wheel_that_counts_nothing_or_backward_is_an_error(measured_m: float) -> None:
-    """A scale would hide wrong wires."""
+    """Zero and negative distances indicate wrong wiring."""
     with pytest.raises(RobotError, match="check its wires"):
         wheel_changes("wheel", 0.21, 1.0, measured_m)
 
 
 def test_an_output_is_described_in_its_own_units() -> None:
-    """Microseconds or duty."""
+    """Servos are described in microseconds, motors as a duty."""
     assert reading(_SERVO, 0.5) == "1700 µs"
     assert reading(OutputPlan("drive", "hbridge", settings={"full": 0.8}), -0.25) == "duty 0.20"

@@ -26,7 +26,7 @@ CAR = GuardPlan("car", (ActionPlan("throttle", propels=True),), (_MOTOR,))
 
 
 class _Camera:
-    """Gives one picture, an error, or nothing at all."""
+    """Returns a frame, raises an error, or blocks until closed."""
 
     def __init__(self, gives: Frame | RobotError | None) -> None:
         self._gives = gives
@@ -73,13 +73,13 @@ def _write(root: Path, name: str, text: str) -> None:
 def test_strict_gpiod_is_read_from_the_boot_configuration(
     tmp_path: Path, line: str, level: str
 ) -> None:
-    """Without it a pin stays high when the process that set it dies."""
+    """The option makes pins go low when their process dies."""
     _write(tmp_path, "boot/firmware/config.txt", f"# Bookworm\n{line}\n")
     assert _found(tmp_path)["strict_gpiod"].level == level
 
 
 def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path) -> None:
-    """A missing boot configuration is not an error there."""
+    """A missing boot configuration is not an error."""
     found = _found(tmp_path)
     assert (found["computer"].level, found["strict_gpiod"].level) == ("unknown", "unknown")
     assert "--twin" in found["computer"].sentence
@@ -100,7 +100,7 @@ def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path) -> None:
 def test_the_systemd_unit_must_restart_and_make_safe(
     tmp_path: Path, unit: str, level: str, says: str
 ) -> None:
-    """A unit that only starts the robot does not make its pins safe after a crash."""
+    """A unit needs Restart=always and an ExecStopPost that makes the pins safe."""
     _write(tmp_path, f"etc/systemd/system/{unit_name('car')}", f"[Service]\n{unit}")
     finding = _found(tmp_path)["systemd"]
     assert finding.level == level
@@ -108,14 +108,14 @@ def test_the_systemd_unit_must_restart_and_make_safe(
 
 
 def test_missing_safety_hardware_is_reported(tmp_path: Path) -> None:
-    """A servo board without OE and motors without a one-shot outlive their processes."""
+    """A servo board without OE and motors without a one-shot are reported."""
     found = _found(tmp_path, replace(CAR, outputs=(_SERVO,)))
     assert {found["enable line"].level, found["output enable"].level} == {"missing"}
     assert _found(tmp_path, replace(CAR, enable_pin=18))["enable line"].level == "good"
 
 
 def test_only_the_devices_of_the_outputs_are_checked(tmp_path: Path) -> None:
-    """A car on an H-bridge needs pins, and no bus."""
+    """A car on an H-bridge needs no I2C bus."""
     guard = replace(CAR, outputs=(_MOTOR, _SERVO))
     _write(tmp_path, "dev/gpiochip0", "")
     sentences = {
@@ -125,8 +125,8 @@ def test_only_the_devices_of_the_outputs_are_checked(tmp_path: Path) -> None:
     assert any("raspi-config" in sentence and "i2c-1" in sentence for sentence in sentences)
 
 
-def test_the_camera_is_tried(tmp_path: Path) -> None:
-    """A robot without frames stops."""
+def test_the_camera_is_opened(tmp_path: Path) -> None:
+    """The finding reports whether the camera returns a frame."""
     frame = Frame(b"\xff\xd8", 0)
     assert _found(tmp_path, camera=_CAMERA, gives=frame)["camera"].level == "good"
     broken = _found(tmp_path, camera=_CAMERA, gives=RobotError("It burns."))["camera"]
@@ -136,13 +136,13 @@ def test_the_camera_is_tried(tmp_path: Path) -> None:
 def test_a_camera_that_hangs_does_not_hang_the_doctor(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Cameras that stop feeding are common (picamera2#1004)."""
+    """Waiting for a frame times out (see picamera2#1004)."""
     monkeypatch.setattr("shapechanger.robot.setup.doctor._CAMERA_S", 0.01)
     assert "no frame" in _found(tmp_path, camera=_CAMERA)["camera"].sentence
 
 
-def test_a_port_in_use_is_named(tmp_path: Path) -> None:
-    """Two daemons on one port are a common mistake."""
+def test_a_port_in_use_is_reported(tmp_path: Path) -> None:
+    """A second daemon on the port would fail."""
     with socket.socket() as taken:
         taken.bind(("", 0))
         taken.listen()
@@ -152,7 +152,7 @@ def test_a_port_in_use_is_named(tmp_path: Path) -> None:
 
 
 def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
-    """Answers that come 16 ms late would count as silence."""
+    """A latency timer of 16 ms would make answers late."""
     rig = load_profile(find_profile("finger")).guard_plan()
     timer = "sys/bus/usb-serial/devices/ttyUSB0/latency_timer"
     assert _found(tmp_path, rig)["latency timer"].level == "unknown"

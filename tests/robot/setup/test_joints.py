@@ -1,4 +1,4 @@
-"""Zeros and checks of the encoders at the joints."""
+"""Zeros and checks of joint encoders."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ZEROS = [1234, 4095, 0, 2]
 
 
 class _Straight(DrivingWorld):
-    """Joints that somebody holds straight, with a hand that trembles."""
+    """Joints held straight by hand, with a tremor."""
 
     def __init__(self, tremble: float = 0.0) -> None:
         super().__init__({"tendon"}, (160, 120), seed=0)
@@ -36,7 +36,7 @@ class _Straight(DrivingWorld):
 
 
 def _board(tremble: float = 0.0) -> LocalBoard:
-    """Encoders that really stand at those zeros."""
+    """Encoders whose true zeros are `_ZEROS`."""
     sensors = tuple(
         replace(s, settings={**s.settings, "zeros": _ZEROS}) if s.driver == "as5600" else s
         for s in _PLAN.sensors
@@ -46,14 +46,14 @@ def _board(tremble: float = 0.0) -> LocalBoard:
 
 @pytest.mark.parametrize("tremble", [0.0, 0.02])
 def test_zeros_are_the_counts_of_straight_joints(tremble: float) -> None:
-    """By the names in the profile's tables, also around the count 0."""
+    """Zeros are keyed by joint, and averaged correctly around count 0."""
     zeros = find_joint_zeros(_PLAN, _board(tremble).hardware, lambda: None)
     names = ["MCP_flexion", "MCP_abduction", "PIP_flexion", "DIP_flexion"]
     assert zeros == {f"joints.{n}": zero for n, zero in zip(names, _ZEROS, strict=True)}
 
 
 def test_a_missing_magnet_is_an_error() -> None:
-    """It is named. A robot without encoders has no zeros."""
+    """The error names the encoder; a robot without encoders has no zeros."""
     board = _board()
     board.pins.encoder("DIP_flexion").set_magnet("gone")
     with pytest.raises(RobotError, match="DIP_flexion, on channel 3, detects no magnet"):
@@ -92,30 +92,30 @@ def root(tmp_path: Path) -> Path:
     ],
 )
 def test_the_doctor_checks_each_magnet(root: Path, how: Magnet, says: str) -> None:
-    """The others are good."""
+    """A missing, weak or strong magnet is reported for its joint only."""
     board = _board()
     board.pins.encoder("PIP_flexion").set_magnet(how)
-    said = _found(root, _PLAN, board)["encoders"]
-    assert said[2] == says
-    assert [one.partition(":")[0] for one in said[:2]] == ["good"] * 2
+    found = _found(root, _PLAN, board)["encoders"]
+    assert found[2] == says
+    assert [one.partition(":")[0] for one in found[:2]] == ["good"] * 2
 
 
 def test_the_doctor_names_a_chip_that_does_not_answer(root: Path) -> None:
-    """The multiplexer, for each joint behind it."""
+    """A dead multiplexer is reported for each joint behind it."""
     board = _board()
     board.pins.dead_chips.add((1, 0x70))
-    said = _found(root, _PLAN, board)["encoders"]
-    assert len(said) == 4
-    assert all("The multiplexer of sensor 'joints' at 0x70" in one for one in said)
+    found = _found(root, _PLAN, board)["encoders"]
+    assert len(found) == 4
+    assert all("The multiplexer of sensor 'joints' at 0x70" in one for one in found)
 
 
 def test_the_doctor_leaves_the_encoders_of_a_served_robot_alone(root: Path) -> None:
-    """A channel that it opens would give the guard the angle of another joint."""
+    """Selecting a channel would disturb the readings of a running guard."""
     with socket.socket() as taken:
         taken.bind(("", 0))
         taken.listen()
-        said = _found(root, _PLAN, _board(), port=taken.getsockname()[1])["encoders"]
-    assert said == ["unknown: The robot may be served now, and its encoders were left alone."]
+        found = _found(root, _PLAN, _board(), port=taken.getsockname()[1])["encoders"]
+    assert found == ["unknown: The robot may be served now, and its encoders were left alone."]
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_the_doctor_leaves_the_encoders_of_a_served_robot_alone(root: Path) -> N
     ],
 )
 def test_the_doctor_checks_the_bus_speed(root: Path, config: str, says: str) -> None:
-    """Only for a robot with encoders."""
+    """The check applies only to robots with encoders."""
     (root / "boot/config.txt").write_text(config)
     assert _found(root, _PLAN, _board())["I2C speed"][0].startswith(says)
     car = load_profile(find_profile("car")).guard_plan()

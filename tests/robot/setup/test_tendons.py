@@ -16,7 +16,7 @@ from shapechanger.twin.world.vehicle import DrivingWorld
 
 
 def _board(plan: GuardPlan) -> LocalBoard:
-    # Springs in place of a finger that somebody holds.
+    # Springs replace the finger.
     return LocalBoard(TwinWiring(plan), DrivingWorld({"tendon"}, (160, 120), seed=0))
 
 
@@ -38,7 +38,7 @@ def test_zeros_are_measured_with_taut_tendons() -> None:
 
 
 def test_a_loose_tendon_is_an_error() -> None:
-    """It is named, and all servos are released."""
+    """The error names the tendon, and all servos are released."""
     board = _board(_plan(0))
     assert board.pins.rig is not None
     board.pins.rig.break_servo("EIP", "snapped")
@@ -48,7 +48,7 @@ def test_a_loose_tendon_is_an_error() -> None:
 
 
 def test_a_car_has_no_tendons() -> None:
-    """It is an error."""
+    """A robot without a servo bus raises an error."""
     plan = load_profile(find_profile("car")).guard_plan()
     with pytest.raises(RobotError, match="car has no tendons on a servo bus"):
         find_zeros(plan, _board(_plan(0)).hardware, lambda: None)

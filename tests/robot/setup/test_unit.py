@@ -1,4 +1,4 @@
-"""systemd unit of a new robot."""
+"""The systemd unit of a new robot."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
 
 
 def test_the_doctor_accepts_the_unit_of_init(tmp_path: Path) -> None:
-    """Both agree on the settings."""
+    """The written unit passes the doctor's check, unless it is for another profile."""
     folder = tmp_path / "etc/systemd/system"
     folder.mkdir(parents=True)
     path, is_new = write_unit("car", folder / "car.toml")
@@ -35,8 +35,8 @@ def test_the_doctor_accepts_the_unit_of_init(tmp_path: Path) -> None:
     assert "is for another profile" in other.sentence
 
 
-def test_an_existing_unit_stays(tmp_path: Path) -> None:
-    """It may have other settings."""
+def test_an_existing_unit_is_kept(tmp_path: Path) -> None:
+    """An existing file is not overwritten."""
     path, _ = write_unit("car", tmp_path / "car.toml")
     path.write_text("mine")
     assert write_unit("car", tmp_path / "car.toml") == (path, False)

@@ -1,4 +1,4 @@
-"""Where the fingertip is: against the simulator, against differences, and by hand."""
+"""Fingertip position, compared with the simulator, finite differences and values by hand."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from shapechanger.tasks.finger import fingertip, fingertip_jacobian
 from tests.bodies.finger.commands import made
 
 _RIGHT = np.pi / 2
-# Any posture, also those that no human joint takes.
+# Any posture, joint limits exceeded.
 _ANGLES = st.tuples(*[st.floats(-2.0, 2.0)] * 4)
 
 
-def test_some_places_by_hand() -> None:
-    """Straight, each joint bent at a right angle, and spread to the thumb."""
+def test_fingertip_by_hand() -> None:
+    """Straight, each joint flexed to a right angle, and full abduction."""
     phalanges = (4.0, 2.0, 1.0)
     expected = {
         (0.0, 0.0, 0.0, 0.0): (7.0, 0.0, 0.0),
@@ -33,8 +33,8 @@ def test_some_places_by_hand() -> None:
         np.testing.assert_allclose(fingertip(angles, phalanges), place, atol=1e-12)
 
 
-def test_it_is_where_the_simulator_has_it() -> None:
-    """At random angles, many at once as one by one."""
+def test_fingertip_matches_the_simulator() -> None:
+    """The position equals that of the site in MuJoCo, one by one and batched."""
     model = made()
     data = mujoco.MjData(model)
     angles = np.random.default_rng(0).uniform(*JOINT_RANGE.T, (200, 4))
@@ -51,8 +51,8 @@ def test_it_is_where_the_simulator_has_it() -> None:
 
 
 @given(angles=_ANGLES)
-def test_the_jacobian_is_what_differences_say(angles: tuple[float, ...]) -> None:
-    """At any angles, to what central differences are good for."""
+def test_jacobian_matches_finite_differences(angles: tuple[float, ...]) -> None:
+    """The Jacobian equals central differences at any angles."""
     step = 1e-6
     moved = np.array(angles) + step * np.concatenate([np.eye(4), -np.eye(4)])
     there, back = fingertip(moved, PHALANX_LENGTH_M).reshape(2, 4, 3)
@@ -63,7 +63,7 @@ def test_the_jacobian_is_what_differences_say(angles: tuple[float, ...]) -> None
 
 @given(angles=_ANGLES)
 def test_no_posture_reaches_beyond_the_finger(angles: tuple[float, ...]) -> None:
-    """And flexing the knuckle turns the place around it."""
+    """The distance is at most the finger's length, and flexing the knuckle does not change it."""
     place = fingertip(angles, PHALANX_LENGTH_M)
     assert np.linalg.norm(place) <= sum(PHALANX_LENGTH_M) + 1e-12
     straight = fingertip((0.0, *angles[1:]), PHALANX_LENGTH_M)
@@ -71,8 +71,8 @@ def test_no_posture_reaches_beyond_the_finger(angles: tuple[float, ...]) -> None
     assert place[1] == straight[1]
 
 
-def test_jacobians_of_many_are_those_of_each() -> None:
-    """Shape (..., 3, 4)."""
+def test_jacobian_is_batched() -> None:
+    """Angles of shape (..., 4) give Jacobians of shape (..., 3, 4)."""
     angles = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 3, 4))
     found = fingertip_jacobian(angles, PHALANX_LENGTH_M)
     assert found.shape == (2, 3, 3, 4)

@@ -1,4 +1,4 @@
-"""What nearness is worth, and effort costs."""
+"""Reward terms of the fingertip: nearness and effort."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from shapechanger.errors import UnknownName
 from shapechanger.tasks.finger import FingertipReward
 
 
-def test_a_second_at_the_right_place_is_worth_its_weight() -> None:
-    """Without effort, however long the steps are."""
+def test_a_second_at_the_target_earns_the_weight() -> None:
+    """At the target, the reward per second is the weight at any control rate."""
     for dt in (0.02, 0.1):
         terms = FingertipReward().terms(0.0, 0.0, dt)
         assert terms == {"reward_nearness": pytest.approx(50.0 * dt), "reward_effort": 0.0}
 
 
-def test_nearer_is_always_better() -> None:
-    """From ten centimetres to nothing, and most of all in the last millimetres."""
+def test_reward_grows_as_the_distance_shrinks() -> None:
+    """Nearness grows monotonically, and fastest in the last millimetres."""
     distances = np.linspace(0.1, 0.0, 201)
     near = [FingertipReward().terms(d, 0.0, 0.02)["reward_nearness"] for d in distances]
     gains = np.diff(near)
@@ -26,15 +26,15 @@ def test_nearer_is_always_better() -> None:
     assert near[0] > 0.0
 
 
-def test_effort_costs_by_its_weight() -> None:
-    """And a weight of 0 turns it off."""
+def test_effort_is_weighted() -> None:
+    """Effort costs its weight; a weight of 0 disables it."""
     assert FingertipReward().terms(0.01, 0.5, 0.02)["reward_effort"] == pytest.approx(-0.01)
     free = FingertipReward.from_weights({"effort": 0})
     assert free.terms(0.01, 0.5, 0.02)["reward_effort"] == 0.0
     assert free.nearness == FingertipReward().nearness
 
 
-def test_a_weight_that_there_is_not_is_named() -> None:
-    """With the nearest spelling."""
+def test_an_unknown_weight_is_refused() -> None:
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"'nearnes'. Did you mean 'nearness'"):
         FingertipReward.from_weights({"nearnes": 1.0})

@@ -1,4 +1,4 @@
-"""What a finger senses, and what each of its numbers is called."""
+"""Numbers of a finger's observation and their features."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINTS, MOST_TENSION
 from shapechanger.tasks.finger import FingerSenses, features_of_senses
 
 
-def test_each_number_has_its_feature() -> None:
-    """In the same order: the name says what the number is."""
+def test_numbers_match_their_features() -> None:
+    """Numbers and features have the same order."""
     senses = FingerSenses(
         angles=np.arange(0.0, 4.0),
         velocities=np.arange(10.0, 14.0),
@@ -29,8 +29,8 @@ def test_each_number_has_its_feature() -> None:
     assert found["fingertip/z"] == 52.0
 
 
-def test_features_say_what_is_possible() -> None:
-    """Angles within their range, tensions up to their most, commands from -1 to 1; with units."""
+def test_features_have_units_and_bounds() -> None:
+    """Angles, tensions, commands and positions have units, bounds and elements."""
     features = features_of_senses(JOINTS, JOINT_RANGE, TENDONS, MOST_TENSION_N.tolist())
     by_name = {f.name: f for f in features}
     angle = by_name["PIP_flexion/angle"]

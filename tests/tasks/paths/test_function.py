@@ -1,4 +1,4 @@
-"""Paths that are functions: what is tried out when they are made, and what is not taken."""
+"""Paths from functions, and the checks when they are made."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Point = tuple[float, float, float]
 
 
 def swing(t: float) -> Point:
-    """Smooth, and never the same twice."""
+    """Return a smooth point that never repeats."""
     return 0.05 + 0.01 * math.sin(t), 0.005 * math.sin(math.sqrt(2.0) * t), -0.04
 
 
-def test_positions_are_the_functions_own() -> None:
-    """Nothing is rounded or interpolated, and the function sees plain numbers."""
+def test_positions_are_those_of_the_function() -> None:
+    """Positions are neither rounded nor interpolated; the function gets a float."""
     seen: list[object] = []
 
     def function(t: float) -> Point:
@@ -33,8 +33,8 @@ def test_positions_are_the_functions_own() -> None:
     assert set(seen) == {float}
 
 
-def test_the_function_is_never_asked_beyond_its_end() -> None:
-    """Not even by the last digit of a number, where a root might be of something below 0."""
+def test_function_is_not_called_beyond_its_end() -> None:
+    """Times are clipped exactly to the duration."""
     seen: list[float] = []
 
     def function(t: float) -> Point:
@@ -46,8 +46,8 @@ def test_the_function_is_never_asked_beyond_its_end() -> None:
     assert (min(seen), max(seen)) == (0.0, 0.018)
 
 
-def test_it_goes_on_for_ever_unless_told() -> None:
-    """A bare function has no end, and so no length."""
+def test_duration_is_infinite_by_default() -> None:
+    """A function has no end unless a duration or a period is given."""
     path = from_callable(swing)
     assert (path.duration_s, path.period_s, path.closed) == (math.inf, None, False)
     ending, repeating = from_callable(swing, 3.0), from_callable(lambda _: (0, 0, 0), period_s=3.0)
@@ -60,8 +60,8 @@ def test_it_goes_on_for_ever_unless_told() -> None:
     [(0.0, 0.0), 0.0, "abc", (0.0, 0.0, "z"), None, [[0.0, 0.0, 0.0]], (0, 0, 1j), [1, [2]]],
 )
 def test_a_point_is_three_numbers(given: object) -> None:
-    """What the function gave is in the sentence."""
-    function: Any = lambda _: given  # noqa: E731  # One line for all of them.
+    """Other return values raise an error that shows them."""
+    function: Any = lambda _: given  # noqa: E731  # One line for all cases.
     with pytest.raises(PathError) as caught:
         from_callable(function)
     assert str(caught.value) == (
@@ -71,8 +71,8 @@ def test_a_point_is_three_numbers(given: object) -> None:
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_numbers_are_finite_from_end_to_end(bad: float) -> None:
-    """A pole in the middle is found when the path is made, one after the trial when it is met."""
+def test_positions_must_be_finite(bad: float) -> None:
+    """A non-finite value raises when the path is made, or beyond the trial when it is evaluated."""
     with pytest.raises(
         PathError, match=r"three finite numbers .* at 3 s it returned \(0\.0, 0\.0, "
     ):
@@ -87,7 +87,7 @@ def test_numbers_are_finite_from_end_to_end(bad: float) -> None:
 @pytest.mark.parametrize("jump", [1e-5, 1e-3, 0.5, 1e308])
 @pytest.mark.parametrize("when", [0.0007, 1.23456, 3.999])
 def test_a_jump_is_found(jump: float, when: float) -> None:
-    """A hundredth of a millimetre, wherever it is; the sentence says where."""
+    """Jumps from 0.01 mm on are found at any time, and the error states where."""
 
     def function(t: float) -> Point:
         x, y, z = swing(t)
@@ -95,9 +95,9 @@ def test_a_jump_is_found(jump: float, when: float) -> None:
 
     with pytest.raises(PathError) as caught:
         from_callable(function, duration_s=4.0)
-    said = str(caught.value)
-    assert said.endswith("s, and no fingertip is faster than 2 m/s.")
-    assert abs(float(said.split()[1]) - when) < 3e-3
+    message = str(caught.value)
+    assert message.endswith("s, and no fingertip is faster than 2 m/s.")
+    assert abs(float(message.split()[1]) - when) < 3e-3
 
 
 @pytest.mark.parametrize(
@@ -109,21 +109,21 @@ def test_a_jump_is_found(jump: float, when: float) -> None:
         lambda t: np.array([0.01, math.floor(t * 100) * 1e-9, 0.0]),
     ],
 )
-def test_what_is_steep_or_has_corners_does_not_jump(function: Callable[[float], Any]) -> None:
-    """Corners are continuous, and steps of a nanometre are rounding."""
+def test_steep_slopes_and_corners_are_not_jumps(function: Callable[[float], Any]) -> None:
+    """Corners are continuous, and steps of 1 nm count as rounding."""
     path = from_callable(function, duration_s=2.0)
     np.testing.assert_array_equal(path.at(1.9), np.array(function(1.9)))
 
 
 @pytest.mark.parametrize("hz", [100.0, 3000.0])
-def test_too_fast_is_a_jump(hz: float) -> None:
-    """Smooth as it may be, also where whole waves fit between the times at which it is tried."""
+def test_a_path_that_is_too_fast_is_refused(hz: float) -> None:
+    """Fast oscillations are found, even where whole periods fit between the samples."""
     with pytest.raises(PathError, match="no fingertip is faster than 2 m/s"):
         from_callable(lambda t: (0.02 * math.sin(2 * math.pi * hz * t), 0.0, 0.0), duration_s=1.7)
 
 
-def test_a_period_brings_it_back() -> None:
-    """Within 0.1 mm, as a recording that counts as closed."""
+def test_a_period_must_return_to_the_start() -> None:
+    """The end of the period must be within 0.1 mm of the start."""
     with pytest.raises(PathError) as caught:
         from_callable(lambda t: (0.001 * t, 0.0, 0.0), period_s=3.0)
     assert str(caught.value) == (
@@ -148,14 +148,14 @@ def test_a_period_brings_it_back() -> None:
         ),
     ],
 )
-def test_times_make_sense(times: dict[str, float], message: str) -> None:
-    """It ends or it repeats, after some time."""
+def test_invalid_durations_are_refused(times: dict[str, float], message: str) -> None:
+    """Duration and period must be positive and finite, and exclude each other."""
     with pytest.raises(PathError) as caught:
         from_callable(swing, **times)
     assert str(caught.value) == message
 
 
-def test_what_the_function_raises_comes_through() -> None:
-    """Its own traceback says more than any sentence of ours."""
+def test_errors_of_the_function_propagate() -> None:
+    """Exceptions of the function are not wrapped."""
     with pytest.raises(ZeroDivisionError):
         from_callable(lambda t: (1 / t, 0.0, 0.0))

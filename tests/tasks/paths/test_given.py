@@ -1,4 +1,4 @@
-"""A path as a user gives it: by name, with settings, as a file, as a function, or as it is."""
+"""Paths as users give them: names, settings, files, functions and paths."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shapechanger.tasks.paths import KINDS, as_path, circle, curve_3d, figure_ei
 
 
 def test_every_shape_has_a_name() -> None:
-    """A name gives the shape as it is without settings."""
+    """A name gives the shape with default settings."""
     shapes = [circle(), figure_eight(), line(), curve_3d()]
     assert [as_path(name) for name in KINDS] == shapes
     assert KINDS == ("circle", "figure-eight", "line", "curve")
@@ -30,7 +30,7 @@ def test_every_shape_has_a_name() -> None:
     ],
 )
 def test_settings_are_arguments(settings: dict[str, Any], path: object) -> None:
-    """As JSON has them, lists and all; the mapping itself stays as it is."""
+    """A mapping gives the arguments, as JSON types, and is not modified."""
     before = dict(settings)
     assert as_path(settings) == path
     assert settings == before
@@ -38,20 +38,20 @@ def test_settings_are_arguments(settings: dict[str, Any], path: object) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_argument_is_a_setting(kind: str) -> None:
-    """The default of each, given by name, changes nothing."""
+    """Giving all defaults explicitly changes nothing."""
     function = {"circle": circle, "figure-eight": figure_eight, "line": line, "curve": curve_3d}
     defaults = {n: p.default for n, p in inspect.signature(function[kind]).parameters.items()}
     assert as_path({"kind": kind, **defaults}) == as_path(kind)
 
 
-def test_a_path_is_itself() -> None:
-    """Nothing is made anew."""
+def test_a_path_is_returned_unchanged() -> None:
+    """`as_path` returns the same object."""
     path = circle()
     assert as_path(path) is path
 
 
 def test_a_file_is_read(tmp_path: File) -> None:
-    """By its name as text or as a path, whatever the case of its ending."""
+    """File names are accepted as str or Path, with `.csv` in any case."""
     for name in ("a.csv", "b.CSV"):
         file = tmp_path / name
         file.write_text("t,x,y,z\n0,0,0,0\n0.1,0.01,0,0\n0.2,0.02,0,0\n")
@@ -59,15 +59,15 @@ def test_a_file_is_read(tmp_path: File) -> None:
             np.testing.assert_allclose(as_path(given).at(0.1), [0.01, 0, 0])
 
 
-def test_a_function_goes_on_for_ever() -> None:
-    """One that ends or repeats says so to `from_callable`."""
+def test_a_function_has_no_end() -> None:
+    """A function is a path of infinite duration."""
     path = as_path(lambda t: (0.01 * math.sin(t), 0.0, 0.0))
     assert path.duration_s == math.inf
     np.testing.assert_array_equal(path.at(100.0), [0.01 * math.sin(100.0), 0.0, 0.0])
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         (
             "figure_eight",
@@ -90,15 +90,15 @@ def test_a_function_goes_on_for_ever() -> None:
         ),
     ],
 )
-def test_unknown_names_come_with_the_nearest(given: Any, said: str) -> None:
-    """Of shapes and of their settings."""
+def test_unknown_names_are_refused(given: Any, message: str) -> None:
+    """Errors suggest the nearest shape or setting."""
     with pytest.raises(UnknownName) as caught:
         as_path(given)
-    assert str(caught.value) == said
+    assert str(caught.value) == message
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         (
             {"radius": 0.01},
@@ -117,8 +117,8 @@ def test_unknown_names_come_with_the_nearest(given: Any, said: str) -> None:
         ),
     ],
 )
-def test_what_is_no_path_is_said_in_a_sentence(given: Any, said: str) -> None:
-    """The sentence says what would be one."""
+def test_other_objects_are_refused(given: Any, message: str) -> None:
+    """The error lists what is accepted."""
     with pytest.raises(PathError) as caught:
         as_path(given)
-    assert str(caught.value) == said
+    assert str(caught.value) == message

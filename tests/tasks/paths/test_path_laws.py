@@ -1,4 +1,4 @@
-"""What holds for every path, whatever it is made of."""
+"""Properties of all paths."""
 
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ from shapechanger.tasks.paths import (
     sample,
 )
 
-# The same examples every time, so that a failure can be looked at twice.
 law = settings(max_examples=40)
 
 SIZES = st.floats(0.002, 0.04)
@@ -38,12 +37,12 @@ NORMALS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda n: math.hypot(*n)
 
 
 def wave(t: float) -> tuple[float, float, float]:
-    """Some function of time that repeats after 2 s."""
+    """Return a point that repeats after 2 s."""
     return 0.05 + 0.01 * math.sin(math.pi * t), 0.003 * math.cos(2 * math.pi * t), -0.04
 
 
 def recording(closed: bool, seed: int) -> FingertipPath:
-    """A walk with uneven steps of 8 to 30 ms."""
+    """Return a random walk with uneven steps of 8 to 30 ms."""
     rng = np.random.default_rng(seed)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.008, 0.03, 40))])
     points = np.cumsum(rng.normal(0.0, 1e-3, (41, 3)), axis=0)
@@ -78,7 +77,7 @@ ending_paths = st.one_of(
 @law
 @given(path=closed_paths, part=st.floats(0.0, 1.0), rounds=st.integers(-3, 50))
 def test_a_closed_path_repeats(path: FingertipPath, part: float, rounds: int) -> None:
-    """Round after round the point comes to the same places, before 0 s too."""
+    """Positions are periodic, before 0 s too."""
     assert path.period_s == path.duration_s
     t = part * path.period_s
     np.testing.assert_allclose(path.at(t + rounds * path.period_s), path.at(t), atol=1e-9)
@@ -86,8 +85,8 @@ def test_a_closed_path_repeats(path: FingertipPath, part: float, rounds: int) ->
 
 @law
 @given(path=closed_paths)
-def test_nothing_jerks_where_a_round_ends(path: FingertipPath) -> None:
-    """Across the seam position and velocity are continuous."""
+def test_a_closed_path_is_smooth_at_its_seam(path: FingertipPath) -> None:
+    """Position and velocity are continuous where a period ends."""
     h = 1e-6
     before, at, after = path.at([path.duration_s - h, path.duration_s, path.duration_s + h])
     np.testing.assert_allclose(before, after, atol=1e-5)
@@ -96,8 +95,8 @@ def test_nothing_jerks_where_a_round_ends(path: FingertipPath) -> None:
 
 @law
 @given(path=ending_paths, later=st.floats(0.01, 100.0))
-def test_a_path_that_ends_stays_where_it_ended(path: FingertipPath, later: float) -> None:
-    """The fingertip is to hold the last point, and waits at the first."""
+def test_an_open_path_is_constant_outside(path: FingertipPath, later: float) -> None:
+    """Before its start and after its end, an open path stays at the end points."""
     assert path.period_s is None
     for t, end in ((path.duration_s + later, path.duration_s), (-later, 0.0)):
         np.testing.assert_array_equal(path.at(t), path.at(end))
@@ -108,10 +107,8 @@ def test_a_path_that_ends_stays_where_it_ended(path: FingertipPath, later: float
     path=st.one_of(closed_paths, ending_paths),
     times=st.lists(st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), max_size=4),
 )
-def test_many_times_are_as_one_by_one(
-    path: FingertipPath, times: Sequence[Sequence[float]]
-) -> None:
-    """An env asks for one time, a check for thousands, in any shape."""
+def test_times_are_batched(path: FingertipPath, times: Sequence[Sequence[float]]) -> None:
+    """Times of any shape give the same positions as single times."""
     t = np.reshape(np.array(times, dtype=np.float64), (-1, 3))
     answer = path.at(t)
     assert (answer.shape, answer.dtype) == ((*t.shape, 3), np.float64)
@@ -124,17 +121,17 @@ def test_many_times_are_as_one_by_one(
 @law
 @given(path=shapes)
 def test_no_shape_is_too_fast(path: FingertipPath) -> None:
-    """What is refused of recordings is refused of shapes."""
+    """The speed of a shape is at most `FASTEST_MPS`."""
     velocity = path.position(np.linspace(0.0, path.duration_s, 500), 1)
     assert np.linalg.norm(velocity, axis=1).max() <= FASTEST_MPS + 1e-9
 
 
 @law
 @given(path=shapes, digits=st.sampled_from([6, 12]))
-def test_a_path_survives_a_csv(
+def test_a_shape_round_trips_through_csv(
     path: FingertipPath, digits: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """Written to whole micrometres and read back it is the same to 0.01 mm, and still closed."""
+    """Written with six digits and read back, a shape stays closed and within 0.01 mm."""
     times, points = sample(path, hz=100.0)
     rows = [
         ",".join(f"{value:.{digits}f}" for value in (t, *point))
@@ -149,8 +146,8 @@ def test_a_path_survives_a_csv(
 
 
 @pytest.mark.parametrize("path", [*map(as_path, KINDS), recording(True, 0), recording(False, 1)])
-def test_paths_cross_between_processes(path: FingertipPath) -> None:
-    """A vector env sends its arguments to its workers."""
+def test_paths_can_be_pickled(path: FingertipPath) -> None:
+    """A pickled path is the same path."""
     copy = pickle.loads(pickle.dumps(path))
     times = np.linspace(-1.0, 3.0, 50)
     np.testing.assert_array_equal(copy.at(times), path.at(times))
@@ -158,8 +155,8 @@ def test_paths_cross_between_processes(path: FingertipPath) -> None:
 
 
 @pytest.mark.parametrize("path", [circle(), recording(False, 2), from_callable(wave)])
-def test_answers_share_no_memory_with_the_path(path: FingertipPath) -> None:
-    """Whoever writes into an answer must not bend the path."""
+def test_positions_are_copies(path: FingertipPath) -> None:
+    """Writing to a result does not change the path."""
     before = path.at([0.0, 0.3])
     answer = path.at([0.0, 0.3])
     answer += 1.0
@@ -167,14 +164,14 @@ def test_answers_share_no_memory_with_the_path(path: FingertipPath) -> None:
 
 
 @pytest.mark.parametrize("t", [math.nan, math.inf, [0.0, -math.inf]])
-def test_times_are_finite(t: float | list[float]) -> None:
-    """A NaN in is an error, not a NaN in the reward."""
+def test_times_must_be_finite(t: float | list[float]) -> None:
+    """NaN and infinite times raise an error."""
     with pytest.raises(PathError, match=r"^Times of a path must be finite, got NaN"):
         circle().at(t)
 
 
-def test_equal_shapes_are_equal() -> None:
-    """Shapes are values: they can be compared and be keys; a recording is only itself."""
+def test_shapes_compare_by_value() -> None:
+    """Shapes are hashable and compare by value, recordings by identity."""
     assert circle(hz=1.0) == circle(hz=1.0) != circle(hz=1.1)
     assert len({line(), line(), figure_eight()}) == 2
     assert (same := recording(False, 3)) == same != recording(False, 3)

@@ -1,4 +1,4 @@
-"""The shapes: where they lie, where they begin, and which way they go."""
+"""Position, phase and direction of the shapes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DISTAL, RADIAL, DORSAL = np.eye(3)
     [((0, 1, 0), 1), ((0, 0, -3), 3), ((1, 0, 0), 1), ((2, 3, 6), 7), ((1e-200, 0, 0), 1e-200)],
 )
 def test_a_circle_is_round(normal: tuple[float, float, float], length: float) -> None:
-    """All points are a radius from the centre, in the plane, at one speed, the right way round."""
+    """Points are in the plane, at the radius, and turn counter-clockwise at constant speed."""
     path = circle(0.01, hz=2.0, normal=normal)
     t = np.linspace(0.0, 0.5, 100)
     arms, velocity = path.at(t) - CENTRE, path.position(t, 1)
@@ -30,8 +30,8 @@ def test_a_circle_is_round(normal: tuple[float, float, float], length: float) ->
     np.testing.assert_allclose(velocity, rate * np.cross(unit, arms), atol=1e-12)
 
 
-def test_a_circle_begins_distally_and_goes_palmar() -> None:
-    """Where a phase of 0 is, so that two fingers can be told to follow the same path."""
+def test_a_circle_starts_distally_and_goes_palmar() -> None:
+    """Phase 0 is the distal point; the direction is palmar."""
     np.testing.assert_allclose(circle().at(0.0), CENTRE + 0.012 * DISTAL)
     np.testing.assert_allclose(circle().at(0.5), CENTRE - 0.012 * DORSAL)
     np.testing.assert_allclose(circle(normal=(1, 0, 0)).at(0.0), CENTRE + 0.012 * DORSAL)
@@ -39,7 +39,7 @@ def test_a_circle_begins_distally_and_goes_palmar() -> None:
 
 
 def test_a_figure_eight_crosses_itself_once() -> None:
-    """It is in its middle twice a round, in two directions, and its loops turn opposite ways."""
+    """It passes its centre twice a period, and its loops turn in opposite directions."""
     path = figure_eight(0.02)
     np.testing.assert_allclose(path.at([0.0, 1.0]), [CENTRE, CENTRE], atol=1e-15)
     towards, back = path.position(np.array([0.0, 1.0]), 1)
@@ -55,8 +55,8 @@ def test_a_figure_eight_crosses_itself_once() -> None:
 
 @pytest.mark.parametrize("make", [circle, figure_eight, curve_3d])
 @pytest.mark.parametrize("phase", [-1.0, 0.3, 2.0])
-def test_a_phase_is_a_head_start(make: Callable[..., FingertipPath], phase: float) -> None:
-    """It changes when the point is where, and not where it goes."""
+def test_a_phase_is_a_shift_in_time(make: Callable[..., FingertipPath], phase: float) -> None:
+    """A phase shifts the path in time only."""
     t = np.linspace(0.0, 4.0, 50)
     ahead = phase / (2 * math.pi * 0.25)  # s
     np.testing.assert_allclose(
@@ -65,7 +65,7 @@ def test_a_phase_is_a_head_start(make: Callable[..., FingertipPath], phase: floa
 
 
 def test_a_line_rests_at_both_ends() -> None:
-    """There and back in one period, fastest in the middle."""
+    """A line goes there and back in one period, fastest in the middle."""
     path = line((0.06, 0.0, -0.04), (0.04, 0.0, -0.04), hz=0.25)
     np.testing.assert_allclose(
         path.at([0.0, 1.0, 2.0, 4.0])[:, 0], [0.06, 0.05, 0.04, 0.06], rtol=1e-12
@@ -77,7 +77,7 @@ def test_a_line_rests_at_both_ends() -> None:
 
 
 def test_a_curve_is_a_bent_figure_eight() -> None:
-    """Seen along the normal it is the figure eight; along it, it is as deep as it was told."""
+    """Seen along the normal it is the figure eight; along the normal it has the given depth."""
     t = np.linspace(0.0, 2.0, 2001)
     bent, flat = curve_3d(0.02, depth=0.006).at(t), figure_eight(0.02).at(t)
     np.testing.assert_allclose(bent[:, [0, 2]], flat[:, [0, 2]], atol=1e-12)
@@ -156,10 +156,8 @@ def test_a_curve_is_a_bent_figure_eight() -> None:
         ),
     ],
 )
-def test_what_cannot_be_is_refused_in_a_sentence(
-    make: Callable[[], FingertipPath], message: str
-) -> None:
-    """Each argument is checked, and the sentence says which one was wrong."""
+def test_invalid_arguments_are_refused(make: Callable[[], FingertipPath], message: str) -> None:
+    """Each argument is checked, and the error names it."""
     with pytest.raises(PathError) as caught:
         make()
     assert str(caught.value) == message

@@ -1,4 +1,4 @@
-"""Paths from CSV files: what is read, and the one sentence for what is not."""
+"""Paths from CSV files, and the errors for invalid files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GOOD = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0,0\n0.2,0.07,0.01,0\n0.3,0.08,0.01,0\n"
 
 @pytest.fixture
 def write(tmp_path: File) -> Callable[[str], File]:
-    """Puts a text into a file."""
+    """Return a function that writes a text to a CSV file."""
 
     def put(text: str) -> File:
         file = tmp_path / "path.csv"
@@ -37,10 +37,10 @@ def write(tmp_path: File) -> Callable[[str], File]:
         "z,t,y,x\n0,0,0,.05\n0,.1,0,6e-2\n0,.2,.01,.07\n0,.3,.01,.08",
         '"t","x","y","z"\n7.5,0.05,0,0\n7.6,0.06,0,0\n7.7,0.07,0.01,0\n7.8,0.08,0.01,0\n',
     ],
-    ids=["plain", "Windows", "empty lines", "mark", "spaces", "order", "later and quoted"],
+    ids=["plain", "CRLF", "empty lines", "BOM", "spaces", "order", "offset and quotes"],
 )
-def test_one_path_can_be_written_in_many_ways(write: Callable[[str], File], text: str) -> None:
-    """As editors, spreadsheets and trackers do; time counts from the first row."""
+def test_formats_of_csv(write: Callable[[str], File], text: str) -> None:
+    """Line ends, spaces, quotes, a BOM and the order of columns do not matter."""
     path = from_csv(str(write(text)))
     assert path.period_s is None
     assert path.duration_s == pytest.approx(0.3)
@@ -51,8 +51,8 @@ def test_one_path_can_be_written_in_many_ways(write: Callable[[str], File], text
     )
 
 
-def test_a_path_that_comes_back_repeats(write: Callable[[str], File]) -> None:
-    """An end within 0.1 mm of the beginning is the beginning, and both give way by half."""
+def test_a_path_that_returns_to_its_start_is_closed(write: Callable[[str], File]) -> None:
+    """Ends within 0.1 mm of each other close the path; both move to their mean."""
     rows = "t,x,y,z\n0,0.05,0,0\n0.1,0.06,0.01,0\n0.2,0.05,0.02,0\n0.3,{end},0,0\n"
     closed = from_csv(write(rows.format(end=0.05009)))
     assert closed.period_s == pytest.approx(0.3)
@@ -63,7 +63,7 @@ def test_a_path_that_comes_back_repeats(write: Callable[[str], File]) -> None:
 
 
 def test_three_rows_are_enough(write: Callable[[str], File]) -> None:
-    """Open or closed, with steps that differ by five times the median at most."""
+    """Three rows suffice, with time steps of up to five times the median."""
     ending = from_csv(write("t,x,y,z\n0,0,0,0\n0.1,0.1,0,0\n0.2,0.2,0,0\n"))
     np.testing.assert_allclose(ending.at(0.15), [0.15, 0, 0], atol=1e-12)
     closed = from_csv(write("t,x,y,z\n0,0,0,0\n0.1,0.1,0,0\n0.6,0,0,0\n"))
@@ -72,12 +72,12 @@ def test_three_rows_are_enough(write: Callable[[str], File]) -> None:
 
 
 def lines(*rows: str) -> str:
-    """A file with the usual first line."""
+    """Return a CSV text with the usual header."""
     return "\n".join(["t,x,y,z", *rows, ""])
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("", "{file} is empty: the columns are t, x, y and z."),
         ("\n\n", "{file} is empty: the columns are t, x, y and z."),
@@ -131,18 +131,16 @@ def lines(*rows: str) -> str:
         ),
     ],
 )
-def test_what_is_wrong_is_said_with_its_line(
-    write: Callable[[str], File], text: str, said: str
-) -> None:
-    """Whoever made the file finds the place."""
+def test_invalid_files_are_refused(write: Callable[[str], File], text: str, message: str) -> None:
+    """The error names the file and the line."""
     file = write(text)
     with pytest.raises(PathError) as caught:
         from_csv(file)
-    assert str(caught.value) == said.format(file=file)
+    assert str(caught.value) == message.format(file=file)
 
 
-def test_a_file_that_cannot_be_read_is_named(tmp_path: File) -> None:
-    """Not there, a folder, or no text."""
+def test_unreadable_files_are_refused(tmp_path: File) -> None:
+    """A missing file, a folder and binary data raise an error that names the file."""
     missing, noise = tmp_path / "none.csv", tmp_path / "noise.csv"
     noise.write_bytes(b"t,x,y,z\n\xff\xfe\n")
     with pytest.raises(PathError) as caught:

@@ -1,4 +1,4 @@
-"""Servos on a line: registers, locks, watchdog, faults."""
+"""Simulated servo bus: registers, locks, watchdog and faults."""
 
 import pytest
 
@@ -19,35 +19,35 @@ def _ask(line: SimulatedBus, servo_id: int, code: int, body: bytes = b"") -> Ser
 
 
 def _write(line: SimulatedBus, at: int, value: int, size: int = 1) -> int | None:
-    """The error of a write to servo 1."""
+    """Write a register of servo 1 and return the error of its reply."""
     data = at.to_bytes(2, "little") + value.to_bytes(size, "little", signed=value < 0)
     reply = _ask(line, 1, 3, data)
     return None if reply is None else reply.error
 
 
 def _read(line: SimulatedBus, at: int, size: int) -> ServoReply | None:
-    """Error and data of a read from servo 1."""
+    """Read a register of servo 1."""
     return _ask(line, 1, 2, at.to_bytes(2, "little") + size.to_bytes(2, "little"))
 
 
 def _pull(line: SimulatedBus, counts: int = 200) -> None:
-    """Let servo 1 pull."""
+    """Enable torque on servo 1 with a goal current."""
     errors = [_write(line, 11, 0), _write(line, 102, counts, 2), _write(line, 64, 1)]
     assert errors == [0, 0, 0]
 
 
 def test_a_ping_is_answered_with_model_and_firmware() -> None:
-    """By the servo that it addresses."""
+    """A ping returns the model number and firmware version of the addressed servo."""
     assert _line(3).execute(2, 1, b"") == {2: ServoReply(0, b"\xa6\x04\x34")}
 
 
-def test_nobody_answers_for_an_id_that_is_not_there() -> None:
-    """As on a real bus."""
+def test_a_ping_to_an_unknown_id_gets_no_reply() -> None:
+    """No servo replies to an id that is not on the bus."""
     assert _line().execute(9, 1, b"") == {}
 
 
-def test_servos_behind_a_silent_one_stay_silent() -> None:
-    """In a sync read each waits for the one before it."""
+def test_a_mute_servo_silences_those_after_it_in_a_sync_read() -> None:
+    """In a sync read, each servo waits for the reply of the one before it."""
     line = _line(3)
     line.servos[2].mute = True
     assert line.execute(0xFE, 0x82, b"\x40\x00\x01\x00\x01\x02\x03") == {1: ServoReply(0, b"\0")}
@@ -63,12 +63,12 @@ def test_servos_behind_a_silent_one_stay_silent() -> None:
         (102, 1, 1, 5),  # Half a register.
         (126, 1, 2, 7),  # Read only.
         (0, 1, 2, 7),
-        (99, 1, 1, 7),  # Nothing is there.
+        (99, 1, 1, 7),  # Unused address.
         (146, 1, 1, 7),
     ],
 )
-def test_what_cannot_be_written_is_refused(at: int, value: int, size: int, error: int) -> None:
-    """With the number that the manual gives it, and nothing changes."""
+def test_an_invalid_write_is_refused(at: int, value: int, size: int, error: int) -> None:
+    """An invalid write returns the error code of the manual and changes no register."""
     line = _line()
     before = bytes(line.servos[1].register(64).to_bytes(1, "little"))
     assert _write(line, at, value, size) == error
@@ -76,13 +76,13 @@ def test_what_cannot_be_written_is_refused(at: int, value: int, size: int, error
 
 
 def test_eeprom_is_locked_while_torque_is_on() -> None:
-    """And open again afterwards."""
+    """The EEPROM rejects writes while torque is on and accepts them once it is off."""
     line = _line()
     assert [_write(line, at, v) for at, v in ((64, 1), (9, 0), (64, 0), (9, 0))] == [0, 7, 0, 0]
 
 
 def test_a_goal_beyond_the_current_limit_is_refused() -> None:
-    """In both directions; the limit itself is not."""
+    """Goals beyond the current limit are refused in both directions; the limit is accepted."""
     line = _line()
     assert _write(line, 11, 0) == 0
     assert _write(line, 38, 100, 2) == 0
@@ -90,7 +90,7 @@ def test_a_goal_beyond_the_current_limit_is_refused() -> None:
 
 
 def test_a_change_of_the_mode_sets_the_goal_to_the_limit() -> None:
-    """The trap of the manual: enabling the torque then pulls with all of it."""
+    """Changing the operating mode resets the goal current to the limit, as the manual warns."""
     line = _line()
     assert _write(line, 102, 0, 2) == 0
     assert _write(line, 11, 0) == 0
@@ -98,7 +98,7 @@ def test_a_change_of_the_mode_sets_the_goal_to_the_limit() -> None:
 
 
 def test_a_silent_host_trips_the_watchdog() -> None:
-    """After its time the current is gone, goals are refused, and 0 clears it."""
+    """When the watchdog expires, current drops to 0 and goals are refused until it is cleared."""
     line = _line()
     _pull(line)
     assert _write(line, 98, 5) == 0
@@ -113,7 +113,7 @@ def test_a_silent_host_trips_the_watchdog() -> None:
 
 
 def test_any_instruction_feeds_the_watchdog() -> None:
-    """Assumed for instructions to others; see the module."""
+    """An instruction to another servo also resets the watchdog; see the module for why."""
     line = _line(2)
     _pull(line)
     assert _write(line, 98, 5) == 0
@@ -125,8 +125,8 @@ def test_any_instruction_feeds_the_watchdog() -> None:
     assert line.servos[1].pulls_a == 0.0
 
 
-def test_without_torque_the_watchdog_sleeps() -> None:
-    """It begins to count when torque comes."""
+def test_the_watchdog_does_not_run_without_torque() -> None:
+    """The watchdog starts to count when torque is enabled."""
     line = _line()
     assert _write(line, 98, 5) == 0
     line.advance(500 * MS)
@@ -136,8 +136,8 @@ def test_without_torque_the_watchdog_sleeps() -> None:
     assert line.servos[1].pulls_a > 0.0
 
 
-def test_an_error_of_the_hardware_takes_torque_until_a_reboot() -> None:
-    """Each answer carries the alert, and torque is refused."""
+def test_a_hardware_error_disables_torque_until_a_reboot() -> None:
+    """After a hardware error, each reply carries the alert bit and torque cannot be enabled."""
     line = _line()
     _pull(line)
     line.servos[1].overload()
@@ -147,14 +147,14 @@ def test_an_error_of_the_hardware_takes_torque_until_a_reboot() -> None:
     assert _write(line, 64, 1) == 0x84
     assert _ask(line, 1, 8) == (0, b"")
     line.advance(299 * MS)
-    assert _ask(line, 1, 1) is None  # It starts.
+    assert _ask(line, 1, 1) is None  # Still booting.
     line.advance(2 * MS)
     assert _read(line, 70, 1) == (0, b"\x00")
     assert _write(line, 64, 1) == 0
 
 
-def test_a_reboot_keeps_the_eeprom_and_forgets_turns() -> None:
-    """Mode and limits stay; torque, watchdog and the count of turns do not."""
+def test_a_reboot_keeps_the_eeprom_and_clears_the_turn_count() -> None:
+    """Mode and limits survive a power loss; torque, watchdog and turn count are reset."""
     line = SimulatedBus([ServoPlan(1, "XL330-M077", angle=100.0)])
     assert _write(line, 38, 123, 2) == 0
     assert _write(line, 98, 5) == 0
@@ -167,8 +167,8 @@ def test_a_reboot_keeps_the_eeprom_and_forgets_turns() -> None:
     assert (before - after) % 4096 == 0
 
 
-def test_lines_that_cannot_be_are_refused() -> None:
-    """Two servos of one id, or a model that does not exist."""
+def test_an_invalid_bus_is_refused() -> None:
+    """Two servos with one id and an unknown model raise an error."""
     with pytest.raises(RobotError, match="same id"):
         SimulatedBus([ServoPlan(1), ServoPlan(1)])
     with pytest.raises(UnknownName, match="Did you mean 'XL330-M288'"):

@@ -1,4 +1,4 @@
-"""How the simulated servo turns."""
+"""Dynamics of the simulated servo motor."""
 
 import math
 
@@ -19,8 +19,8 @@ def _run(
 
 
 @pytest.mark.parametrize("name", sorted(MODELS))
-def test_without_load_it_turns_as_fast_as_its_data_sheet_says(name: str) -> None:
-    """With all the current it can have."""
+def test_the_no_load_speed_matches_the_data_sheet(name: str) -> None:
+    """At the stall current limit and without load, the motor reaches its data-sheet speed."""
     model = MODELS[name]
     motor = SimulatedMotor(motor_model(name), Tendon(snapped=True))
     _run(motor, model.stall_a, model.volts, 3.0)
@@ -29,12 +29,10 @@ def test_without_load_it_turns_as_fast_as_its_data_sheet_says(name: str) -> None
 
 @pytest.mark.parametrize("name", sorted(MODELS))
 @pytest.mark.parametrize("direction", [1, -1])
-def test_at_a_stop_it_pulls_what_its_current_says_but_for_friction(
-    name: str, direction: int
-) -> None:
-    """A tendon that cannot move gets kt i / r, within the gears' friction to either side.
+def test_the_tension_at_a_stop_matches_the_current(name: str, direction: int) -> None:
+    """A blocked tendon has the tension kt i / r, within the friction of the gears.
 
-    It can be more than was asked for: the spool overshoots, and the gears hold it there.
+    The tension can exceed the goal: the spool overshoots, and friction holds it there.
     """
     model = MODELS[name]
     tendon = Tendon(direction=direction)
@@ -47,16 +45,16 @@ def test_at_a_stop_it_pulls_what_its_current_says_but_for_friction(
     assert motor.speed == 0.0
 
 
-def test_friction_holds_what_is_too_weak() -> None:
-    """The pretension alone may move nothing at all."""
+def test_friction_holds_a_torque_below_it() -> None:
+    """A motor torque below the friction of the gears moves nothing."""
     model = motor_model("XL330-M288")
     motor = SimulatedMotor(model, Tendon())
     _run(motor, 0.9 * model.friction_nm / model.servo.torque_constant, 5.0, 0.5)
     assert (motor.angle, motor.tension) == (0.0, 0.0)
 
 
-def test_a_tendon_is_never_pushed() -> None:
-    """Letting out makes it slack."""
+def test_a_tendon_carries_no_compression() -> None:
+    """Unwinding the spool makes the tendon slack."""
     motor = SimulatedMotor(motor_model("XL330-M077"), Tendon())
     _run(motor, -0.3, 5.0, 0.3)
     assert motor.angle < -1.0
@@ -64,7 +62,7 @@ def test_a_tendon_is_never_pushed() -> None:
 
 
 def test_a_pull_ends_at_the_stop_of_its_load() -> None:
-    """Spool and far end then differ by the stretch of the cable alone."""
+    """At the stop of the load, spool and load differ by the stretch of the cable alone."""
     load = EndStops(1, nearest_m=0.01)
     motor = SimulatedMotor(motor_model("XL330-M077"), Tendon())
     _run(motor, 0.5, 5.0, 2.0, load)
@@ -73,19 +71,19 @@ def test_a_pull_ends_at_the_stop_of_its_load() -> None:
     assert motor.angle * 0.005 == pytest.approx(0.01 + stretch, abs=1e-6)
 
 
-def test_it_gets_warm_with_the_square_of_its_current() -> None:
-    """And nears its end with its time constant."""
-    warm: list[float] = []
+def test_the_temperature_rises_with_the_square_of_the_current() -> None:
+    """The temperature rise is proportional to i^2 and follows the thermal time constant."""
+    rises: list[float] = []
     for share in (0.25, 0.5):
         motor = SimulatedMotor(motor_model("XL330-M077"), Tendon())
         motor.advance(share * 1.47, 5.0, 0.0, 120.0)
-        warm.append(motor.temperature - 25.0)
-    assert warm[1] == pytest.approx(4 * warm[0], rel=1e-9)
-    assert warm[1] == pytest.approx(30 * 3.401 * 0.735**2 * (1 - math.exp(-1)), rel=1e-3)
+        rises.append(motor.temperature - 25.0)
+    assert rises[1] == pytest.approx(4 * rises[0], rel=1e-9)
+    assert rises[1] == pytest.approx(30 * 3.401 * 0.735**2 * (1 - math.exp(-1)), rel=1e-3)
 
 
-def test_it_loses_its_current_with_its_voltage() -> None:
-    """A dip of the supply takes the top speed with it."""
+def test_a_lower_supply_voltage_lowers_the_top_speed() -> None:
+    """A drop of the supply voltage lowers the no-load speed."""
     speeds: list[float] = []
     for volts in (5.0, 2.5):
         motor = SimulatedMotor(motor_model("XL330-M077"), Tendon(snapped=True))

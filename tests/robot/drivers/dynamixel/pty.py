@@ -18,10 +18,10 @@ _HEADER: Final = 7
 
 
 class ServoPty:
-    """Answers at a pseudo-terminal from its own thread; the caller advances the time of the bus.
+    """Serve a simulated bus at a pseudo-terminal from a thread.
 
-    A packet without an answer, such as a sync write, is sure to have arrived once a later one was
-    answered. So read an answer before advancing the time.
+    The caller advances the time of the bus. A packet without an answer, such as a sync write, has
+    certainly arrived once a later one was answered, so read an answer before advancing the time.
 
     Args:
         bus: The bus; it must only be used through `advance`, or with `lock` held.
@@ -36,7 +36,7 @@ class ServoPty:
         self.bus = bus
         self.lock = threading.Lock()
         self._host, self._far = os.openpty()
-        tty.setraw(self._far)  # No echo, and no byte means anything.
+        tty.setraw(self._far)  # No echo and no special characters.
         os.set_blocking(self._host, False)
         self.device = os.ttyname(self._far)
         self._wake_in, self._wake_out = os.pipe()
@@ -49,7 +49,7 @@ class ServoPty:
             self.bus.advance(ns)
 
     def close(self) -> None:
-        """End the thread and the device."""
+        """Stop the thread and close the device."""
         if self._thread.is_alive():
             os.write(self._wake_out, b"x")
             self._thread.join()
@@ -77,10 +77,10 @@ class ServoPty:
             while len(data) >= _HEADER and len(data) >= (size := wire.size_of(data)):
                 with self.lock:
                     answers = wire.execute(self.bus, data[:size])
-                self._give(b"".join(answers.values()))
+                self._send(b"".join(answers.values()))
                 data = data[size:]
 
-    def _give(self, data: bytes) -> None:
+    def _send(self, data: bytes) -> None:
         """Send bytes; as on a serial line, unread ones are lost."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._host, data)

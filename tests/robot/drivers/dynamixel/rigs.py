@@ -1,4 +1,4 @@
-"""A rig of seven tendons on a simulated bus, and its driver."""
+"""A rig of seven tendons on a simulated bus, with its driver."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MODEL = "XL330-M077"
 
 
 def servo(name: str, **changes: Any) -> ServoSettings:
-    """The settings of one of the seven."""
+    """Return the settings of one servo."""
     plain = ServoSettings(
         name=name,
         id=NAMES.index(name) + 1,
@@ -40,7 +40,7 @@ def servo(name: str, **changes: Any) -> ServoSettings:
 
 
 def settings(**changes: Any) -> BusSettings:
-    """The settings of the bus."""
+    """Return the settings of the bus."""
     return replace(BusSettings("the twin", tuple(servo(name) for name in NAMES)), **changes)
 
 
@@ -71,11 +71,11 @@ class FaultyPort(PortHandler):
         self.received = 0
 
     def inject(self, data: bytes) -> None:
-        """Let bytes arrive that no servo has sent."""
+        """Add bytes to the receive buffer."""
         self._arrived += data
 
     def clearPort(self) -> None:
-        """Discard what has arrived."""
+        """Discard the receive buffer."""
         self.getBytesAvailable()
         self._arrived.clear()
 
@@ -87,14 +87,14 @@ class FaultyPort(PortHandler):
             for servo_id, answer in wire.execute(self._line, bytes(packet)).items():
                 if servo_id in self.late_ns:
                     self._late.append((self._line.now_ns + self.late_ns[servo_id], answer))
-                    break  # Servos behind it wait.
+                    break  # Later servos wait for this one.
                 damage = 0x55 if servo_id in self.damaged else 0
                 self._arrived += answer[:-1] + bytes([answer[-1] ^ damage])
                 self.received += len(answer)
         return len(packet)
 
     def readPort(self, length: int) -> bytes:
-        """Return at most `length` bytes of what has arrived."""
+        """Return at most `length` received bytes."""
         self.getBytesAvailable()
         data = bytes(self._arrived[: max(length, 0)])
         del self._arrived[: max(length, 0)]
@@ -117,16 +117,16 @@ class FaultyPort(PortHandler):
         return len(self._arrived)
 
     def closePort(self) -> None:
-        """Note that the port was closed."""
+        """Record that the port was closed."""
         self.is_closed = True
 
 
 class Rig:
-    """The simulated bus, the port and the driver, on one clock.
+    """A simulated bus, its port and its driver on one clock.
 
     Args:
-        bus: Its settings.
-        plans: Its servos; None for seven as in the settings.
+        bus: Settings of the bus.
+        plans: Simulated servos; None for one per servo of the settings.
     """
 
     def __init__(
@@ -140,18 +140,18 @@ class Rig:
         self.bus = ServoBus(self.settings, SerialServoPort(self.port, self.settings.device))
 
     def start(self) -> Rig:
-        """Set it up and hold it, with the zeros where the spools are."""
+        """Set up and hold the bus, with zeros at the present positions."""
         self.bus.set_up()
         self.bus.set_zeros({name: self.twin(name).register(132) for name in NAMES})
         self.bus.hold()
         return self
 
     def twin(self, name: str) -> SimulatedServo:
-        """The simulated servo of a tendon."""
+        """Return the simulated servo of a tendon."""
         return self.line.servos[NAMES.index(name) + 1]
 
     def run(self, tension: float | None, cycles: int = 1, **others: float) -> BusState:
-        """Pull all tendons with one tension, except `others`, and return the last state."""
+        """Command one tension for all tendons, except `others`, and return the last state."""
         assert cycles > 0
         for _ in range(cycles):
             tensions = None if tension is None else dict.fromkeys(NAMES, tension) | others

@@ -1,4 +1,4 @@
-"""The driver with seven servos that are well."""
+"""Bus driver with seven healthy servos."""
 
 import math
 
@@ -9,7 +9,7 @@ from shapechanger.twin.servos.servo import ServoPlan
 from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, servo, settings
 
 
-def test_all_that_are_missing_are_named() -> None:
+def test_all_missing_servos_are_named() -> None:
     """The error lists all missing servos at once."""
     rig = Rig()
     rig.twin("FDS").mute = rig.twin("PI").deaf = True
@@ -19,21 +19,21 @@ def test_all_that_are_missing_are_named() -> None:
 
 
 def test_another_model_is_refused() -> None:
-    """The wrong model would pull with the wrong strength."""
+    """A servo of another model is refused, since its torque constant differs."""
     plans = [ServoPlan(i, "XL330-M288" if i == 3 else MODEL) for i in range(1, 8)]
     with pytest.raises(RobotError, match=r"EIP \(id 3\) is not an XL330-M077.* is 1200, not 1190"):
         Rig(plans=plans).bus.set_up()
 
 
 def test_firmware_without_a_watchdog_is_refused() -> None:
-    """A servo that does not stop by itself is not let near a finger."""
+    """A servo that cannot stop by itself is refused."""
     bus = settings(servos=(servo("FDP", model="XM430-W210", pretension_n=2.0),))
     with pytest.raises(RobotError, match="firmware 37; its own watchdog needs 38"):
         Rig(bus, [ServoPlan(1, "XM430-W210", firmware=37)]).bus.set_up()
 
 
-def test_servos_are_ready_and_slack_before_they_have_torque() -> None:
-    """Mode, caps, goal and watchdog are there first, and a change of mode leaves no goal behind."""
+def test_setup_configures_servos_without_torque() -> None:
+    """Mode, limits, goal and watchdog are set before torque is enabled."""
     rig = Rig()
     rig.bus.set_up()
     for one in rig.line.servos.values():
@@ -45,8 +45,8 @@ def test_servos_are_ready_and_slack_before_they_have_torque() -> None:
     assert rig.pulls() == [0.0] * 7
 
 
-def test_the_torque_comes_last() -> None:
-    """Each servo gets its goal and its watchdog before its torque, whatever it had before."""
+def test_torque_is_enabled_last() -> None:
+    """`hold` writes goal and watchdog before it enables torque."""
     rig = Rig()
     rig.bus.set_up()
     rig.port.sent.clear()
@@ -56,8 +56,8 @@ def test_the_torque_comes_last() -> None:
         assert [at for one, at in written if one == servo_id] == [98, 102, 98, 64]
 
 
-def test_what_lasts_is_not_written_twice() -> None:
-    """EEPROM wears out: a second start writes none of it."""
+def test_eeprom_is_written_only_on_change() -> None:
+    """A second setup writes no EEPROM register, to spare its write cycles."""
     rig = Rig()
     rig.bus.set_up()
     rig.port.sent.clear()
@@ -67,28 +67,28 @@ def test_what_lasts_is_not_written_twice() -> None:
     assert all(at >= 64 for at in written)
 
 
-def test_nothing_is_held_before_it_is_set_up() -> None:
-    """The caps are not there yet."""
+def test_hold_requires_setup() -> None:
+    """`hold` raises before `set_up`, since no limits are in place."""
     with pytest.raises(RobotError, match="not held: they are not set up"):
         Rig().bus.hold()
 
 
-def test_a_cycle_pulls_and_tells() -> None:
-    """The tendon gets the tension that was asked for, to a count and the gears' friction."""
+def test_a_cycle_commands_and_reads_tensions() -> None:
+    """The tension matches the command to one count and the friction of the gears."""
     rig = Rig().start()
     state = rig.run(6.0, 150)
-    said = state.servos["EDC"]
+    reading = state.servos["EDC"]
     assert state.reason == ""
     assert set(state.servos) == set(NAMES)
-    assert said.goal_n == pytest.approx(6.0, abs=0.03)
-    assert said.tension_n == pytest.approx(6.0, abs=0.03)
+    assert reading.goal_n == pytest.approx(6.0, abs=0.03)
+    assert reading.tension_n == pytest.approx(6.0, abs=0.03)
     assert rig.twin("EDC").motor.tension == pytest.approx(6.0, abs=1.05)  # 1 N of friction.
-    assert said.length_m is not None
-    assert said.length_m == pytest.approx(-rig.twin("EDC").motor.tension / 300.0, abs=1e-3)
+    assert reading.length_m is not None
+    assert reading.length_m == pytest.approx(-rig.twin("EDC").motor.tension / 300.0, abs=1e-3)
 
 
-def test_a_spool_that_is_wound_the_other_way_pulls_too() -> None:
-    """Direction turns the current, the speed and the length round."""
+def test_a_reversed_spool() -> None:
+    """Direction -1 negates current, speed and length."""
     bus = settings(servos=tuple(servo(name, direction=-1) for name in NAMES))
     rig = Rig(bus)
     for one in rig.line.servos.values():
@@ -100,8 +100,8 @@ def test_a_spool_that_is_wound_the_other_way_pulls_too() -> None:
     assert (state.servos["PI"].length_m or 0.0) < -0.01
 
 
-def test_tensions_are_kept_between_pretension_and_cap() -> None:
-    """More is capped; less is the pretension."""
+def test_tensions_are_clipped() -> None:
+    """Tensions are clipped to the range from pretension to cap."""
     rig = Rig().start()
     state = rig.run(500.0, LUM=-3.0)
     assert state.servos["FDP"].goal_n == pytest.approx(20.0, abs=0.03)
@@ -109,8 +109,8 @@ def test_tensions_are_kept_between_pretension_and_cap() -> None:
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
-def test_what_is_no_number_moves_nothing(wrong: float) -> None:
-    """Not even the tendons before it in the list."""
+def test_a_non_finite_tension_changes_no_goal(wrong: float) -> None:
+    """A non-finite tension raises before any goal is sent, also for the other tendons."""
     rig = Rig().start()
     rig.run(4.0)
     before, sent = rig.pulls(), len(rig.port.sent)
@@ -118,11 +118,11 @@ def test_what_is_no_number_moves_nothing(wrong: float) -> None:
         rig.run(9.0, DI=wrong)
     assert (rig.pulls(), len(rig.port.sent)) == (before, sent)
     rig.run(None)
-    assert rig.pulls() == before  # Nor later.
+    assert rig.pulls() == before
 
 
-def test_a_tension_too_few_or_too_many_is_refused() -> None:
-    """A missing tendon, and one that does not exist."""
+def test_missing_and_unknown_tendons_are_refused() -> None:
+    """A missing and an unknown tendon raise errors."""
     rig = Rig().start()
     with pytest.raises(RobotError, match="no tension for EIP, EDC"):
         rig.bus.cycle(dict.fromkeys(("FDP", "FDS", "LUM", "DI", "PI"), 3.0), 0)
@@ -130,8 +130,8 @@ def test_a_tension_too_few_or_too_many_is_refused() -> None:
         rig.run(3.0, EDX=3.0)
 
 
-def test_a_stop_goes_down_to_the_pretension_and_lets_go() -> None:
-    """Within the time it was given, and never up."""
+def test_a_stop_ramps_down_and_releases() -> None:
+    """Goals fall to the pretension within the ramp time, then torque goes off."""
     rig = Rig().start()
     rig.run(12.0, 50)
     rig.bus.stop(rig.line.now_ns)
@@ -148,8 +148,8 @@ def test_a_stop_goes_down_to_the_pretension_and_lets_go() -> None:
     assert not any(one.has_torque for one in rig.line.servos.values())
 
 
-def test_a_stop_without_a_ramp_lets_go_at_once() -> None:
-    """A ramp of 0 ms is over in the first cycle."""
+def test_a_stop_without_a_ramp_releases_at_once() -> None:
+    """A ramp of 0 ms ends in the first cycle."""
     rig = Rig(settings(ramp_ms=0)).start()
     rig.run(12.0, 5)
     rig.bus.stop(rig.line.now_ns)
@@ -158,7 +158,7 @@ def test_a_stop_without_a_ramp_lets_go_at_once() -> None:
 
 
 def test_a_command_does_not_end_a_stop() -> None:
-    """Tensions that are requested after a stop have no effect."""
+    """Tensions requested after a stop have no effect."""
     rig = Rig().start()
     rig.run(12.0, 5)
     rig.bus.stop(rig.line.now_ns)
@@ -169,7 +169,7 @@ def test_a_command_does_not_end_a_stop() -> None:
 
 
 def test_a_stop_before_the_first_pull_does_not_pull() -> None:
-    """Slack tendons stay slack."""
+    """A stop leaves slack tendons slack."""
     rig = Rig().start()
     rig.bus.stop(rig.line.now_ns)
     rig.run(None, 5)
@@ -177,7 +177,7 @@ def test_a_stop_before_the_first_pull_does_not_pull() -> None:
 
 
 def test_it_can_be_held_again_after_a_stop() -> None:
-    """And then it pulls as before."""
+    """`hold` after a completed stop allows tensions again."""
     rig = Rig().start()
     rig.run(5.0, 5)
     rig.bus.stop(rig.line.now_ns)
@@ -188,7 +188,7 @@ def test_it_can_be_held_again_after_a_stop() -> None:
 
 
 def test_close_leaves_no_torque() -> None:
-    """And lets go of the port."""
+    """`close` disables torque and closes the port."""
     rig = Rig().start()
     rig.run(5.0, 5)
     rig.bus.close()
@@ -197,9 +197,10 @@ def test_close_leaves_no_torque() -> None:
 
 
 def test_a_cycle_costs_three_packets() -> None:
-    """Goals, present values and one register that shows whether they obey: 390 bytes or less.
+    """A cycle sends three packets, and takes less than 45 % of its period.
 
-    At 1 Mbaud these take 3.9 ms, so 100 cycles a second leave the bus some rest.
+    Goals, present values and one register for verification take at most 390 bytes, which are
+    3.9 ms at 1 Mbaud.
     """
     rig = Rig().start()
     rig.run(5.0)
@@ -211,8 +212,8 @@ def test_a_cycle_costs_three_packets() -> None:
     assert count / 4 * 10_000 < 0.45 * CYCLE_NS
 
 
-def test_what_is_told_acts_without_a_cycle() -> None:
-    """One packet, nothing asked; and only while the servos are held."""
+def test_send_writes_goals_without_a_cycle() -> None:
+    """`send` writes one packet without reading, and only while the bus is held."""
     rig = Rig()
     rig.bus.set_up()
     rig.port.sent.clear()

@@ -1,4 +1,4 @@
-"""Faults of a rig: their messages, and their effect on the tendons."""
+"""Messages of faults, and their effect on the tendons."""
 
 from collections.abc import Callable
 from typing import Literal
@@ -21,7 +21,7 @@ def _switched_off_by_heat(rig: Rig) -> None:
 
 
 def _low(rig: Rig) -> None:
-    # Its own limit is at 3.5 V too, but this one is told to bear less.
+    # Below the voltage limit of the servo, 3.5 V.
     rig.twin("EIP").volts = 3.4
 
 
@@ -63,8 +63,8 @@ def _snapped(rig: Rig) -> None:
         (_snapped, "has lost its tendon: it winds in at"),
     ],
 )
-def test_a_fault_of_one_stops_all(fault: Callable[[Rig], None], words: str) -> None:
-    """It is reported, the others ramp down, and in the end no servo pulls."""
+def test_a_fault_of_one_servo_stops_all(fault: Callable[[Rig], None], words: str) -> None:
+    """A fault is reported, the other servos ramp down, and finally no servo pulls."""
     rig = Rig(settings(most_missed=5)).start()
     rig.run(10.0, 20)
     fault(rig)
@@ -73,12 +73,12 @@ def test_a_fault_of_one_stops_all(fault: Callable[[Rig], None], words: str) -> N
     assert state.faults["EIP"].startswith("Servo EIP (id 3) ")
     assert words in state.faults["EIP"]
     rig.run(None)
-    # The one at fault pulls nothing any more; the others have only begun to go down.
+    # The faulty servo has released; the others have begun to ramp down.
     if not rig.twin("EIP").deaf:
         assert rig.twin("EIP").pulls_a == 0.0
     assert rig.twin("FDP").pulls_a > 0.3
     _until(rig, lambda s: s.mode in ("off", "silent"))
-    rig.line.advance(100_000_000)  # The watchdog of who cannot be reached.
+    rig.line.advance(100_000_000)  # The watchdogs of unreachable servos expire.
     assert rig.pulls() == [0.0] * 7
 
 
@@ -86,11 +86,11 @@ def _until(rig: Rig, holds: Callable[[BusState], bool], cycles: int = 120) -> Bu
     for _ in range(cycles):
         if holds(state := rig.run(10.0)):
             return state
-    raise AssertionError(f"It never came so far: {state}")
+    raise AssertionError(f"The condition was never met: {state}")
 
 
-def test_the_others_are_heard_while_one_is_silent() -> None:
-    """Servos behind a silent one are read again without it; old readings are never repeated."""
+def test_other_servos_are_read_while_one_is_mute() -> None:
+    """The servos after a mute one are read in a second packet; stale readings are not repeated."""
     rig = Rig().start()
     rig.run(4.0, 3)
     rig.twin("FDS").mute = True
@@ -99,8 +99,8 @@ def test_the_others_are_heard_while_one_is_silent() -> None:
     assert state.mode == "held"
 
 
-def test_a_silent_servo_costs_one_more_question_in_a_cycle() -> None:
-    """Each costs the wait for an answer, during which nothing can be stopped."""
+def test_a_mute_servo_costs_one_more_packet_in_a_cycle() -> None:
+    """Each retry waits for a timeout, during which the guard cannot stop anything."""
     rig = Rig(settings(most_missed=50)).start()
     rig.twin("FDS").mute = True
     rig.run(4.0)
@@ -109,8 +109,8 @@ def test_a_silent_servo_costs_one_more_question_in_a_cycle() -> None:
     assert [len(p) for p in rig.port.sent if p[7] == 0x82 and p[8] == 126] == [20, 15] * 4
 
 
-def test_a_short_silence_is_forgiven() -> None:
-    """A plug that shakes for three cycles stops nothing, and is forgotten."""
+def test_a_short_silence_is_tolerated() -> None:
+    """A loose plug that recovers within three cycles causes no stop."""
     rig = Rig().start()
     rig.twin("FDS").mute = True
     rig.run(4.0, 3)
@@ -120,8 +120,8 @@ def test_a_short_silence_is_forgiven() -> None:
     assert state.reason == ""
 
 
-def test_three_silent_servos_are_each_found() -> None:
-    """Whichever they are."""
+def test_three_mute_servos_are_each_found() -> None:
+    """All three are reported as faults."""
     rig = Rig().start()
     for name in ("FDP", "EDC", "PI"):
         rig.twin(name).mute = True
@@ -129,8 +129,8 @@ def test_three_silent_servos_are_each_found() -> None:
     assert set(state.faults) == {"FDP", "EDC", "PI"}
 
 
-def test_a_mute_servo_is_left_to_its_watchdog() -> None:
-    """It may still receive but does not confirm: so nothing is sent any more."""
+def test_an_unconfirmed_release_is_left_to_the_watchdog() -> None:
+    """If a servo does not confirm its release, the driver sends nothing, so watchdogs expire."""
     rig = Rig().start()
     rig.run(10.0, 5)
     rig.twin("EIP").deaf = True
@@ -148,8 +148,8 @@ def test_a_mute_servo_is_left_to_its_watchdog() -> None:
         (5, "does not answer, 5 cycles in a row"),
     ],
 )
-def test_a_dip_of_the_power_takes_the_zero(most_missed: int, words: str) -> None:
-    """Turns are lost with the power: no length from before is reported, not even once."""
+def test_a_power_dip_invalidates_the_zero(most_missed: int, words: str) -> None:
+    """The turn count is lost with power, so no length is reported afterwards."""
     rig = Rig(settings(most_missed=most_missed)).start()
     rig.run(4.0, 5)
     rig.twin("EIP").lose_power()
@@ -160,8 +160,8 @@ def test_a_dip_of_the_power_takes_the_zero(most_missed: int, words: str) -> None
     assert "FDP" in rig.bus.zeros
 
 
-def test_after_a_fault_nothing_is_held_until_it_is_set_up_again() -> None:
-    """And then all is as before."""
+def test_hold_after_a_fault_requires_setup() -> None:
+    """After setting up again, the bus works as before."""
     rig = Rig().start()
     rig.twin("EIP").mute = True
     _until(rig, lambda s: s.mode != "held")
@@ -173,8 +173,8 @@ def test_after_a_fault_nothing_is_held_until_it_is_set_up_again() -> None:
     assert rig.run(4.0, 10).reason == ""
 
 
-def test_who_switched_itself_off_needs_a_reboot() -> None:
-    """Setting up reports it, and a reboot repairs it."""
+def test_a_servo_with_a_hardware_error_needs_a_reboot() -> None:
+    """`set_up` reports the error, and `reboot` clears it."""
     rig = Rig().start()
     rig.twin("EIP").overload()
     _until(rig, lambda s: s.mode == "off")
@@ -188,16 +188,16 @@ def test_who_switched_itself_off_needs_a_reboot() -> None:
     assert rig.run(4.0, 10).reason == ""
 
 
-def test_nothing_is_rebooted_while_it_is_held() -> None:
-    """A tendon would be let go while the others pull."""
+def test_reboot_is_refused_while_held() -> None:
+    """A reboot would release one tendon while the others pull."""
     rig = Rig().start()
     with pytest.raises(RobotError, match="cannot be rebooted while the bus is held"):
         rig.bus.reboot("EIP")
 
 
 @pytest.mark.parametrize("on_trip", ["coast", "release"])
-def test_who_stops_calling_is_stopped_by_the_servos(on_trip: Literal["coast", "release"]) -> None:
-    """After 100 ms without a packet no servo pulls, and the next cycle reports the reason."""
+def test_servos_stop_without_cycles(on_trip: Literal["coast", "release"]) -> None:
+    """Servos release after 100 ms without a packet, and the next cycle reports the reason."""
     plans = [ServoPlan(i, MODEL, on_trip=on_trip) for i in range(1, 8)]
     rig = Rig(plans=plans).start()
     rig.run(10.0, 20)
@@ -213,8 +213,8 @@ def test_who_stops_calling_is_stopped_by_the_servos(on_trip: Literal["coast", "r
     assert _until(rig, lambda s: s.mode == "off").mode == "off"
 
 
-def test_a_cut_cable_ends_in_the_watchdogs() -> None:
-    """No packet can arrive, and none has to."""
+def test_a_cut_cable_trips_the_watchdogs() -> None:
+    """Without any packet, the watchdogs release all servos."""
     rig = Rig().start()
     rig.run(10.0, 20)
     rig.port.is_cut = True
@@ -222,8 +222,8 @@ def test_a_cut_cable_ends_in_the_watchdogs() -> None:
     assert rig.pulls() == [0.0] * 7
 
 
-def test_a_device_that_is_gone_is_said_and_ends_in_the_watchdogs() -> None:
-    """An adapter that was pulled out raises in everything."""
+def test_an_unplugged_adapter_is_reported_and_trips_the_watchdogs() -> None:
+    """When the serial device raises on every call, the cycle reports it and does not raise."""
     rig = Rig().start()
     rig.run(10.0, 20)
     rig.port.is_gone = True
@@ -237,8 +237,8 @@ def test_a_device_that_is_gone_is_said_and_ends_in_the_watchdogs() -> None:
     assert state.mode == "silent"
 
 
-def test_a_goal_that_a_servo_does_not_take_is_noticed() -> None:
-    """A sync write has no answer; so the goals are read back now and then."""
+def test_a_goal_that_was_not_applied_is_reported() -> None:
+    """Sync writes have no reply, so the driver reads goals back periodically."""
     rig = Rig().start()
     rig.run(4.0, 4)
     servo = rig.twin("PI")

@@ -1,4 +1,4 @@
-"""Whatever bytes are on the bus, the driver does not break."""
+"""The driver survives arbitrary bytes on the bus."""
 
 import math
 
@@ -11,7 +11,7 @@ from tests.robot.drivers.dynamixel.rigs import Rig
 from tests.robot.drivers.dynamixel.wire import pack, status
 
 _ids = st.integers(0, 255)
-# Bytes alone rarely look like a packet; so also packets with anything in them, and cut ones.
+# Random bytes rarely form a packet, so include valid packets with random content and cut ones.
 _noise = st.one_of(
     st.binary(max_size=60),
     st.builds(pack, _ids, st.integers(0, 255), st.binary(max_size=40)),
@@ -25,29 +25,29 @@ _slow = examples(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 @_slow
 @given(noise=st.lists(_noise, max_size=5), tension=st.floats(-50, 50))
 def test_noise_never_breaks_the_driver_or_its_caps(noise: list[bytes], tension: float) -> None:
-    """The driver continues, and no servo ever gets more than its cap."""
+    """With noise on the bus, cycles do not raise and no goal exceeds its cap."""
     rig = Rig().start()
     cap = 683e-3
     for data in noise:
         rig.port.inject(data)
         state = rig.run(tension)
         assert all(0.0 <= one <= cap for one in rig.pulls())
-        for said in state.servos.values():
-            assert math.isfinite(said.tension_n)
+        for reading in state.servos.values():
+            assert math.isfinite(reading.tension_n)
     rig.bus.close()
 
 
 @_slow
 @given(noise=st.lists(_noise, max_size=2))
-def test_noise_never_breaks_the_start(noise: list[bytes]) -> None:
-    """It starts, or raises an error with a reason."""
+def test_setup_with_noise_succeeds_or_raises(noise: list[bytes]) -> None:
+    """`set_up` succeeds or raises RobotError, and succeeds once the noise ends."""
     rig = Rig()
-    said: list[str] = []
+    errors: list[str] = []
     for data in noise:
         rig.port.inject(data)
         try:
             rig.bus.set_up()
         except RobotError as error:
-            said.append(str(error))
-    assert all(one.endswith(".") for one in said)
-    rig.bus.set_up()  # Without noise it does.
+            errors.append(str(error))
+    assert all(one.endswith(".") for one in errors)
+    rig.bus.set_up()

@@ -1,4 +1,4 @@
-"""Finding zeros."""
+"""Homing: finding the zero of each tendon."""
 
 import pytest
 
@@ -14,8 +14,8 @@ def _home(rig: Rig, homing: Homing, cycles: int = 400) -> None:
             return
 
 
-def test_zeros_are_where_gentle_tension_leaves_the_tendons() -> None:
-    """3 N less 1 N of friction hold 300 N/m at 6.7 mm, wherever the spools were before."""
+def test_homing_finds_the_position_at_the_homing_tension() -> None:
+    """3 N minus 1 N of friction stretch 300 N/m by 6.7 mm, wherever the spools started."""
     rig = Rig()
     rig.bus.set_up()
     rig.bus.hold()
@@ -32,8 +32,8 @@ def test_zeros_are_where_gentle_tension_leaves_the_tendons() -> None:
     assert length == pytest.approx(0.0, abs=1e-4)
 
 
-def test_a_tendon_that_meets_nothing_is_named() -> None:
-    """It is wound in for so far and no further."""
+def test_a_tendon_without_load_is_named() -> None:
+    """A snapped tendon is wound in to the travel limit and then named."""
     rig = Rig()
     rig.twin("EDC").plan.tendon.snapped = True
     rig.bus.set_up()
@@ -42,11 +42,11 @@ def test_a_tendon_that_meets_nothing_is_named() -> None:
     _home(rig, homing)
     assert homing.zeros is None
     assert "Servo EDC (id 4) has no zero: it was wound in by 3" in homing.failure
-    assert homing.tensions["EDC"] == 2.0  # The pretension: it pulls no more.
+    assert homing.tensions["EDC"] == 2.0  # Back to the pretension.
 
 
-def test_there_is_a_limit_to_the_time() -> None:
-    """The error names the tendon that keeps moving."""
+def test_homing_times_out() -> None:
+    """The error names the tendons that still move."""
     rig = Rig()
     rig.bus.set_up()
     rig.bus.hold()
@@ -55,8 +55,8 @@ def test_there_is_a_limit_to_the_time() -> None:
     assert homing.failure == f"No zero: {', '.join(NAMES)} still moved after 0.1 s."
 
 
-def test_a_fault_ends_it() -> None:
-    """And it is named."""
+def test_a_fault_ends_homing() -> None:
+    """Homing fails with the message of the fault."""
     rig = Rig()
     rig.bus.set_up()
     rig.bus.hold()
@@ -66,8 +66,8 @@ def test_a_fault_ends_it() -> None:
     assert homing.failure.startswith("No zero: Servo PI (id 7) does not answer")
 
 
-def test_gears_that_hold_against_it_are_refused() -> None:
-    """Else a slack tendon would stand still at once, and be called homed."""
+def test_a_homing_tension_below_the_friction_is_refused() -> None:
+    """A tension below the friction would find a zero for a slack tendon."""
     servos = (servo("FDP", model="XL330-M288"), servo("FDS"))
     with pytest.raises(
         RobotError, match=r"FDP .* with 3 N: .* about 3.6 N. Set homing_n, to 5.4 N"

@@ -9,7 +9,7 @@ MS = 1_000_000
 
 
 def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
-    """A quick flick of the finger is no snapped tendon; a pause restarts the time."""
+    """A short flick of the finger is not a snapped tendon; a pause restarts the timer."""
     slack = SlackDetector(0.1 / 0.7)
     assert slack.see(None, -0.2, 0) == ""
     assert slack.see(None, -0.2, 99 * MS) == ""
@@ -18,19 +18,19 @@ def test_a_fast_tendon_is_slack_only_after_a_while() -> None:
     assert "winds in at 200 mm/s" in slack.see(None, -0.2, 210 * MS)
 
 
-def test_a_tendon_that_is_let_out_fast_is_not_slack() -> None:
-    """Only winding in without a load counts."""
+def test_unwinding_fast_is_not_slack() -> None:
+    """Only winding in without load counts."""
     slack = SlackDetector(0.1 / 0.7)
     assert [slack.see(0.01, 0.5, t * MS) for t in (0, 500)] == ["", ""]
 
 
 def test_a_tendon_shorter_than_the_finger_allows_is_slack_at_once() -> None:
-    """Nothing else can have happened."""
+    """A length outside the finger's range is reported immediately."""
     assert "wound in by 61 mm" in SlackDetector(0.1 / 0.7).see(-0.061, 0.0, 0)
 
 
-def test_present_values_are_read_with_their_signs() -> None:
-    """-3 counts of velocity are FD FF FF FF, the bytes that protocol 2.0 must stuff."""
+def test_present_values_are_signed() -> None:
+    """Velocity -3 is FD FF FF FF, which protocol 2.0 must stuff."""
     data = bytes.fromhex("ffff fdffffff 00f0ffff 00000000 00000000 3200 1f".replace(" ", ""))
     present = decode_present(data)
     assert present.current == -1
@@ -40,7 +40,7 @@ def test_present_values_are_read_with_their_signs() -> None:
     assert present.temperature == 31.0
 
 
-def test_each_hardware_error_has_its_words() -> None:
-    """Bit 1 means nothing, the others do."""
+def test_each_hardware_error_has_a_description() -> None:
+    """Bit 1 is unused."""
     assert hardware_errors(0x24) == ("it is overheated", "it is overloaded")
     assert hardware_errors(0x02) == ()

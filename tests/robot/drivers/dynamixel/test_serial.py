@@ -1,4 +1,4 @@
-"""Through a pseudo-terminal: `dynamixel_sdk` and pyserial as they come, and the driver on top."""
+"""`dynamixel_sdk`, pyserial and the driver over a pseudo-terminal."""
 
 from collections.abc import Iterator
 
@@ -14,13 +14,13 @@ from shapechanger.twin.servos.servo import ServoPlan
 from tests.robot.drivers.dynamixel.pty import ServoPty
 from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, settings
 
-# So long that a busy machine is never taken for a silent servo.
+# Long enough that a busy machine does not look like a mute servo.
 _PATIENT_MS = 20_000.0
 
 
 @pytest.fixture
 def pty() -> Iterator[ServoPty]:
-    """Seven servos behind a terminal; the first stands at -3 counts."""
+    """Seven servos behind a terminal; the first is at -3 counts."""
     plans = [ServoPlan(i, MODEL, angle=-0.004 if i == 1 else 2.0 * i) for i in range(1, 8)]
     with ServoPty(SimulatedBus(plans)) as line:
         yield line
@@ -35,7 +35,7 @@ def _open(bus: BusSettings) -> ServoBus:
 
 
 def test_the_plain_sdk_pings_and_reads(pty: ServoPty) -> None:
-    """Nothing of ours is between the SDK and the bytes."""
+    """The unmodified SDK talks to the simulated servos."""
     port, sdk = PortHandler(pty.device), PacketHandler(2.0)
     assert port.setBaudRate(1_000_000)
     # Its own 34 ms would be too short on a busy machine.
@@ -47,8 +47,8 @@ def test_the_plain_sdk_pings_and_reads(pty: ServoPty) -> None:
     port.closePort()
 
 
-def test_stuffed_bytes_come_back_as_they_were(pty: ServoPty) -> None:
-    """FD FF FF FF behind FF FF cannot go over the bus as it is: position -3 behind velocity -1."""
+def test_byte_stuffing_round_trips(pty: ServoPty) -> None:
+    """FF FF FD in the data of a reply is stuffed on the wire and restored by the SDK."""
     port, sdk = PortHandler(pty.device), PacketHandler(2.0)
     assert port.setBaudRate(1_000_000)
     port.setPacketTimeout = lambda _: port.setPacketTimeoutMillis(_PATIENT_MS)
@@ -57,8 +57,8 @@ def test_stuffed_bytes_come_back_as_they_were(pty: ServoPty) -> None:
     port.closePort()
 
 
-def test_the_driver_pulls_over_a_real_serial_port(pty: ServoPty) -> None:
-    """From the first ping to the last byte."""
+def test_the_driver_works_over_a_real_serial_port(pty: ServoPty) -> None:
+    """Set up, hold, cycle and close through pyserial."""
     bus = _open(_settings(pty))
     bus.set_up()
     bus.hold()
@@ -71,8 +71,8 @@ def test_the_driver_pulls_over_a_real_serial_port(pty: ServoPty) -> None:
     bus.close()
 
 
-def test_a_silent_servo_is_named_over_a_real_serial_port(pty: ServoPty) -> None:
-    """The wait for an answer that never comes has an end."""
+def test_a_mute_servo_is_named_over_a_real_serial_port(pty: ServoPty) -> None:
+    """Waiting for a missing answer times out."""
     with pty.lock:
         pty.bus.servos[3].mute = True
     with pytest.raises(RobotError, match=r"no servo answers as EIP \(id 3\); those that do: FDP"):
@@ -80,19 +80,19 @@ def test_a_silent_servo_is_named_over_a_real_serial_port(pty: ServoPty) -> None:
 
 
 class _Noise:
-    """A serial device from which bytes come without end."""
+    """A serial device that returns bytes without end."""
 
     def __init__(self) -> None:
         self.taken = 0
 
     def read(self, length: int) -> bytes:
-        """So many of them."""
+        """Return `length` bytes."""
         self.taken += length
         return b"\xff" * length
 
 
-def test_noise_without_end_does_not_hold_the_driver() -> None:
-    """The SDK looks at its time only where nothing has come, and would read for ever."""
+def test_endless_noise_does_not_block_the_driver() -> None:
+    """The SDK checks its timeout only when no byte is available; `PromptPort` bounds the read."""
     port = PromptPort("noise", 0.0)
     port.ser = noise = _Noise()
     port.setPacketTimeoutMillis(0.0)
@@ -101,13 +101,13 @@ def test_noise_without_end_does_not_hold_the_driver() -> None:
     assert noise.taken == 1024
 
 
-def test_a_device_that_is_not_there_has_its_sentence() -> None:
-    """Instead of a trace from pyserial."""
+def test_a_missing_device_is_named() -> None:
+    """RobotError replaces the exception of pyserial."""
     with pytest.raises(RobotError, match="The bus at /dev/nowhere cannot be opened: "):
         open_serial_port(settings(device="/dev/nowhere"))
 
 
-def test_a_speed_that_the_sdk_does_not_know_has_its_sentence(pty: ServoPty) -> None:
-    """4.5 Mbaud is one of the XM430, and not of the SDK."""
+def test_an_unsupported_baud_rate_is_refused(pty: ServoPty) -> None:
+    """The XM430 supports 4.5 Mbaud, but the SDK does not."""
     with pytest.raises(RobotError, match="cannot have 4500000 baud; 57600"):
         open_serial_port(settings(device=pty.device, baud=4_500_000))

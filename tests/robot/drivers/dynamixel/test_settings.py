@@ -1,4 +1,4 @@
-"""Settings that cannot be."""
+"""Validation of bus and servo settings."""
 
 from typing import Any
 
@@ -25,14 +25,14 @@ _NAN = float("nan")
         ({"homing_n": 30.0}, "its tension for homing must be 0.029 to 20 N, not 30 N"),
     ],
 )
-def test_a_servo_that_cannot_be_is_refused(changes: dict[str, Any], words: str) -> None:
-    """Each mistake has its sentence, before anything moves."""
+def test_an_invalid_servo_is_refused(changes: dict[str, Any], words: str) -> None:
+    """Each invalid value raises an error that names it."""
     with pytest.raises(RobotError, match=words):
         servo("FDP", **changes)
 
 
-def test_an_unknown_model_names_the_nearest() -> None:
-    """A slip of the pen is put right."""
+def test_an_unknown_model_suggests_the_nearest() -> None:
+    """The error suggests a model with a similar name."""
     with pytest.raises(UnknownName, match="Did you mean 'XL330-M077'"):
         servo("FDP", model="XL330-M77")
 
@@ -50,12 +50,12 @@ def test_an_unknown_model_names_the_nearest() -> None:
         ({"answer_ms": _NAN}, "answer_ms must be 0.1 or more, not nan"),
     ],
 )
-def test_a_bus_that_cannot_be_is_refused(changes: dict[str, Any], words: str) -> None:
-    """A bus without a watchdog must not hold a finger."""
+def test_an_invalid_bus_is_refused(changes: dict[str, Any], words: str) -> None:
+    """Each invalid value raises an error, including a disabled watchdog."""
     with pytest.raises(RobotError, match=words):
         settings(**changes)
 
 
-def test_the_watchdog_cannot_be_forgotten() -> None:
-    """By default there is one."""
+def test_the_watchdog_is_on_by_default() -> None:
+    """The default watchdog is 100 ms."""
     assert BusSettings("x", (servo("FDP"),)).watchdog_ms == 100

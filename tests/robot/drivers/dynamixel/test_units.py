@@ -1,4 +1,4 @@
-"""Tensions and lengths as counts."""
+"""Conversion of tensions and lengths to counts."""
 
 import math
 
@@ -30,8 +30,8 @@ def _servos(draw: st.DrawFn) -> ServoSettings:
 
 
 @given(one=_servos(), tension=st.floats())
-def test_no_command_pulls_more_than_the_cap_or_lets_out(one: ServoSettings, tension: float) -> None:
-    """Whatever number comes, the servo pulls between nothing and its cap, or it is refused."""
+def test_goals_stay_between_zero_and_the_cap(one: ServoSettings, tension: float) -> None:
+    """Any finite tension maps to a goal between 0 and the cap; non-finite ones raise."""
     if not math.isfinite(tension):
         with pytest.raises(RobotError, match="cannot pull"):
             one.goal_count(tension)
@@ -45,15 +45,15 @@ def test_no_command_pulls_more_than_the_cap_or_lets_out(one: ServoSettings, tens
 
 
 @given(one=_servos(), share=st.floats(0.0, 1.0))
-def test_a_tension_comes_back_less_than_one_count_smaller(one: ServoSettings, share: float) -> None:
-    """It is rounded towards slack, and never by more than the servo's own step."""
+def test_a_tension_is_rounded_down_by_less_than_a_count(one: ServoSettings, share: float) -> None:
+    """Tensions are rounded toward slack, by less than one count."""
     wanted = share * one.most_counts * one.newton_per_count
     got = one.tension_n(one.goal_count(wanted))
     assert got <= wanted + 1e-6
     assert wanted - got <= one.newton_per_count * (1 + 1e-6)
 
 
-def test_the_numbers_of_a_known_spool() -> None:
+def test_a_known_spool() -> None:
     """An XL330-M288 with 5 mm pulls 0.071 N a count: 0.52 N·m / 1.47 A / 5 mm / 1000."""
     one = servo("FDP", model="XL330-M288")
     assert one.newton_per_count == pytest.approx(0.0708, abs=1e-4)
@@ -62,8 +62,8 @@ def test_the_numbers_of_a_known_spool() -> None:
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_winding_in_makes_the_tendon_shorter(direction: int) -> None:
-    """One turn is the circumference of the spool, whichever way it turns."""
+def test_winding_in_shortens_the_tendon(direction: int) -> None:
+    """One turn changes the length by the circumference of the spool, in either direction."""
     one = servo("FDP", direction=direction)
     turn = 2 * math.pi * 0.005
     assert one.length_m(100 + direction * 4096, 100) == pytest.approx(-turn)

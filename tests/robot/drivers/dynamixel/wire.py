@@ -1,4 +1,4 @@
-"""Bytes on the wire of a simulated bus, packed and unpacked by the SDK."""
+"""Packets of a simulated bus, packed and unpacked by the SDK."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def size_of(data: bytes | bytearray) -> int:
 
 
 def execute(bus: SimulatedBus, packet: bytes) -> dict[int, bytes]:
-    """Let the servos execute a packet, and return their status packets."""
+    """Execute a packet on the bus and return the status packets by servo id."""
     plain = _SDK.removeStuffing(list(packet))
     replies = bus.execute(plain[4], plain[7], bytes(plain[8 : size_of(bytes(plain[:7])) - 2]))
     return {one: status(one, reply.error, reply.data) for one, reply in replies.items()}
