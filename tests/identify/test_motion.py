@@ -15,6 +15,7 @@ from shapechanger.identify.kinematics import ARMS, Kinematics
 from shapechanger.identify.motion import (
     FACTORS,
     MOTOR_KG,
+    _MotionFit,
     cut_windows,
     fit_dynamics,
     steps_per_period,
@@ -70,6 +71,20 @@ def test_joints_and_friction_are_found() -> None:
     assert set(found.sd) == set(FACTORS)
     assert all(1e-3 < sd < 0.2 for sd in found.sd.values())
     np.testing.assert_array_equal(found.arms, NOMINAL.arms)
+
+
+def test_the_covariance_has_the_correction_for_few_windows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two windows with opposite errors: a sandwich, times two windows over one."""
+    fit = _MotionFit.__new__(_MotionFit)
+    fit._prior_sd = np.ones(1)
+    parts = [np.array([3.0]), np.array([-3.0]), np.zeros(1)]
+    monkeypatch.setattr(_MotionFit, "residual", lambda *_: (parts, None, None))
+    monkeypatch.setattr(_MotionFit, "parameters", lambda _: None)
+    found = fit.covariance(np.zeros(1), np.array([[1.0], [2.0], [1.0]]))
+    bread, filling = 1.0 / 6.0, 1.0 + 3.0**2 + 6.0**2
+    assert found[0, 0] == pytest.approx(2.0 * bread**2 * filling)
 
 
 def test_arms_can_be_fitted_with_the_motion() -> None:
