@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib
 
 import numpy as np
 import pytest
 
 from shapechanger.bodies.finger import JOINTS, NOMINAL, FingerParameters
 from shapechanger.errors import MissingExtra
-from shapechanger.identify import FingerLog, motion
+from shapechanger.identify import FingerLog
 from shapechanger.identify.kinematics import ARMS, Kinematics
 from shapechanger.identify.motion import (
     FACTORS,
@@ -141,6 +142,6 @@ def test_motors_are_those_known_or_else_those_found() -> None:
 
 def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without its dependencies, `mujoco.sysid` can be imported but is empty."""
-    monkeypatch.setattr(motion.importlib, "import_module", lambda name: object())
+    monkeypatch.setattr(importlib, "import_module", lambda name: object())
     with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
         fit_dynamics(short()[0], exact(), motors())
