@@ -142,6 +142,7 @@ def test_motors_are_those_known_or_else_those_found() -> None:
 
 def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without its dependencies, `mujoco.sysid` can be imported but is empty."""
+    log, kinematics = short()[0], exact()  # Their env is imported before the patch.
     monkeypatch.setattr(importlib, "import_module", lambda name: object())
     with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
-        fit_dynamics(short()[0], exact(), motors())
+        fit_dynamics(log, kinematics, motors())
