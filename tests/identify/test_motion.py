@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib
 
 import numpy as np
 import pytest
 
 from shapechanger.bodies.finger import JOINTS, NOMINAL, FingerParameters
 from shapechanger.errors import MissingExtra
-from shapechanger.identify import FingerLog, motion
+from shapechanger.identify import FingerLog
 from shapechanger.identify.kinematics import ARMS, Kinematics
 from shapechanger.identify.motion import (
     FACTORS,
     MOTOR_KG,
+    _MotionFit,
     cut_windows,
     fit_dynamics,
     steps_per_period,
@@ -72,6 +74,20 @@ def test_joints_and_friction_are_found() -> None:
     np.testing.assert_array_equal(found.arms, NOMINAL.arms)
 
 
+def test_the_covariance_has_the_correction_for_few_windows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two windows with opposite errors: a sandwich, times two windows over one."""
+    fit = _MotionFit.__new__(_MotionFit)
+    fit._prior_sd = np.ones(1)
+    parts = [np.array([3.0]), np.array([-3.0]), np.zeros(1)]
+    monkeypatch.setattr(_MotionFit, "residual", lambda *_: (parts, None, None))
+    monkeypatch.setattr(_MotionFit, "parameters", lambda _: None)
+    found = fit.covariance(np.zeros(1), np.array([[1.0], [2.0], [1.0]]))
+    bread, filling = 1.0 / 6.0, 1.0 + 3.0**2 + 6.0**2
+    assert found[0, 0] == pytest.approx(2.0 * bread**2 * filling)
+
+
 def test_arms_can_be_fitted_with_the_motion() -> None:
     """Fitting the motion reduces errors of the arms."""
     log, _ = short()
@@ -126,6 +142,7 @@ def test_known_motors_take_precedence() -> None:
 
 def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty `mujoco.sysid`, as without its dependencies, raises MissingExtra."""
-    monkeypatch.setattr(motion.importlib, "import_module", lambda name: object())
+    log, kinematics = short()[0], exact()  # Their env is imported before the patch.
+    monkeypatch.setattr(importlib, "import_module", lambda name: object())
     with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
-        fit_dynamics(short()[0], exact(), motors())
+        fit_dynamics(log, kinematics, motors())

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers import pca9685
 from shapechanger.robot.drivers.pca9685 import prescale_for
 from shapechanger.robot.drivers.pulse import PulseRange, SysfsPwm
 from tests.robot.drivers.fakes import MS, FakeHardware
@@ -141,6 +142,20 @@ def test_chip_is_set_up_asleep_and_woken() -> None:
         (0x00, [0x20]),
         (0x06 + 12, [0, 0, 0, 0x10]),
     ]
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_a_simulated_chip_wakes_up_without_a_pause(
+    monkeypatch: pytest.MonkeyPatch, simulated: bool
+) -> None:
+    """A real oscillator needs 500 us; in simulated time nothing sleeps."""
+    slept: list[float] = []
+    monkeypatch.setattr(pca9685.time, "sleep", slept.append)
+    hardware = FakeHardware({0x40: _asleep()})
+    if simulated:
+        monkeypatch.setattr(hardware, "clock", object())
+    hardware.output("servo", **_SERVO | _ON_CHIP, channel=3)
+    assert slept == ([] if simulated else [500e-6])
 
 
 def test_a_running_chip_is_not_put_to_sleep() -> None:

@@ -15,7 +15,7 @@ from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.hardware import Hardware
+from shapechanger.robot.hardware import Hardware, RealClock
 
 _MODE1: Final = 0x00
 _MODE2: Final = 0x01
@@ -127,7 +127,7 @@ class Pca9685:
             bus.write_byte_data(address, _PRESCALE, self._prescale)
         bus.write_byte_data(address, _MODE2, _TOTEM_POLE)
         bus.write_byte_data(address, _MODE1, _AUTO_INCREMENT)
-        if asleep:
+        if asleep and isinstance(self._hardware.clock, RealClock):
             time.sleep(_WAKE_UP_S)
         self._must_start = False
 
