@@ -31,7 +31,7 @@ _LENGTH_BYTES: Final = 8
 _MAX_HEADER_BYTES: Final = 2**24
 
 UNREADABLE: Final = (OSError, LookupError, ValueError, SafetensorError, msgspec.MsgspecError)
-"""What `read_tensors` raises for files that are missing, damaged or something else."""
+"""Exceptions of `read_tensors` for files that are missing, damaged or something else."""
 
 
 def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes, kind: str = "") -> bytes:

@@ -66,6 +66,18 @@ def test_a_process_that_is_killed_is_reported() -> None:
         Processes(1).run([Job("vanish", jobs.vanish, ())], lambda *_: None)
 
 
+def test_a_script_without_a_guarded_start_is_reported(tmp_path: Path) -> None:
+    """Its workers end before they read their jobs, which resets the connections."""
+    script = tmp_path / "unguarded.py"
+    script.write_text(
+        "from shapechanger.transfer.executor import Job, Processes\n"
+        "Processes(1).run([Job('sum', sum, ([],))], lambda *_: None)\n"
+    )
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True)
+    last = done.stderr.splitlines()[-1]
+    assert "StudyError: The process of sum ended by itself with exit code 1" in last
+
+
 def test_no_workers_are_refused() -> None:
     """Zero workers are refused."""
     with pytest.raises(StudyError, match="at least one worker, got 0"):

@@ -138,6 +138,10 @@ def asked(env: gym.Env[Any, Any], ability: str) -> Any:
 def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
     """Make an env and close it afterwards.
 
+    Args:
+        env: The env.
+        more: Arguments besides its own.
+
     Raises:
         UnknownName: If the id, or a name in its body, is unknown.
     """

@@ -76,8 +76,8 @@ class Transfer:
     target_options: str = ""
     """The same of the target, such as '{"gap": "real-like"}' for a finger."""
     measure: str = ""
-    """What policies are compared by: a measure of the target such as "forward speed", a reward term
-    such as reward_forward, or return; the target's default if not given."""
+    """Quantity that policies are compared by: a measure of the target such as "forward speed", a
+    reward term such as reward_forward, or return; the target's default if not given."""
     learner: str | None = None
     """Name of the learner's settings, a TOML file of them, or a class or function of yours as
     module:name; those tuned for the target if not given."""

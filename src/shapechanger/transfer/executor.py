@@ -157,18 +157,17 @@ class _Worker:
 
     def begin(self, job: Job) -> None:
         self.job_name, self.steps = job.name, 0
-        self.connection.send((job.function, job.arguments))
+        try:
+            self.connection.send((job.function, job.arguments))
+        except ConnectionError:
+            raise self._ended() from None
 
     def receive(self) -> bool:
         """Receive one message; return whether the job has ended."""
         try:
             kind, content = self.connection.recv()
-        except EOFError:
-            self._process.join()
-            raise StudyError(
-                f"The process of {self.job_name} ended by itself with exit code "
-                f"{self._process.exitcode}; runs that had ended are kept."
-            ) from None
+        except (EOFError, ConnectionError):  # The latter if it has not read its job.
+            raise self._ended() from None
         if kind == "failed":
             raise content
         if kind == "crashed":
@@ -176,6 +175,13 @@ class _Worker:
         if kind == "steps":
             self.steps = content
         return kind == "ended"
+
+    def _ended(self) -> StudyError:
+        self._process.join()
+        return StudyError(
+            f"The process of {self.job_name} ended by itself with exit code "
+            f"{self._process.exitcode}; runs that had ended are kept."
+        )
 
     def end(self) -> None:
         self._process.terminate()

@@ -135,12 +135,14 @@ def test_wind_counts_only_in_a_medium() -> None:
 
 @pytest.mark.parametrize(("density", "viscosity"), [(1.2, 0.0), (0.0, 0.1)])
 def test_density_or_viscosity_makes_a_medium(density: float, viscosity: float) -> None:
-    """Each alone pushes shapes by the ellipsoid model."""
-    model = everything()
-    model.opt.density, model.opt.viscosity = density, viscosity
-    still = effective_model(model)
-    model.geom_fluid[:, 3] = 7.0
-    assert effective_model(model) != still
+    """In each alone, wind blows, and shapes are pushed by the ellipsoid model."""
+    for edit in (lambda m: m.opt.wind.fill(3.0), lambda m: m.geom_fluid[:, 3].fill(7.0)):
+        model = everything()
+        model.opt.wind[:] = 0.0
+        model.opt.density, model.opt.viscosity = density, viscosity
+        still = effective_model(model)
+        edit(model)
+        assert effective_model(model) != still
 
 
 def test_empty_bodies_are_left_out() -> None:

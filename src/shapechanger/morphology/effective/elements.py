@@ -111,7 +111,12 @@ def _fill(names: list[str], default: Callable[[int], str]) -> None:
 
 
 def is_any(values: NDArray[np.generic], *members: SupportsInt) -> NDArray[np.bool_]:
-    """Return which of `values` are among some members of a MuJoCo enumeration."""
+    """Return which of `values` are among some members of a MuJoCo enumeration.
+
+    Args:
+        values: Values of the enumeration, any shape.
+        members: Its members to look for.
+    """
     return np.isin(values, [int(member) for member in members])
 
 

@@ -491,7 +491,12 @@ class Section:
         return name in self.table
 
     def mistake(self, words: str, *at: str | int) -> ProfileError:
-        """Return the error for a mistake in this table, or in one of its keys."""
+        """Return the error for a mistake in this table, or in one of its keys.
+
+        Args:
+            words: What is wrong, without the place.
+            at: Keys and indices from this table to the mistake.
+        """
         return self.source.mistake((*self.place, *at), words)
 
     def section(self, name: str) -> Section:
