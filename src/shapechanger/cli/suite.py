@@ -30,6 +30,7 @@ from shapechanger.cli.console import (
 from shapechanger.cli.env_arguments import (
     ClusterAddress,
     ExecutorKind,
+    allow_own_modules,
     default_learner,
     driven,
     env_ref,
@@ -247,6 +248,7 @@ class RunSuite:
             suite, **{name: value for name, value in given.items() if value is not None}
         )
         require_seed(chosen.seed)
+        allow_own_modules(suite.learner, *suite.arms)
         tasks = dict(suite_tasks(suite))
         for name in self.only:
             if name not in tasks:
@@ -342,6 +344,7 @@ class MergeSuites:
         from shapechanger.transfer.suite import merge_study
 
         suite = load_suite(self.name)
+        allow_own_modules(suite.learner, *suite.arms)
         tasks = dict(suite_tasks(suite))
         out = self.out or Path("results", Path(self.name).stem)
         if out.resolve() in [folder.resolve() for folder in self.folders]:
