@@ -8,7 +8,8 @@ import re
 import sys
 import time
 import tomllib
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
@@ -42,7 +43,7 @@ from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.files import read_json, write_json
+from shapechanger.transfer.files import place_of, read_json, write_json
 from shapechanger.transfer.learners.settings import resolve_learner
 from shapechanger.transfer.plan import SOURCE, Plan, TransferTask
 
@@ -159,6 +160,18 @@ def _explain(text: str, reason: str) -> str:
     return f", line {at}: a suite has no key {key!r}.{meant} Keys: {', '.join(known)}."
 
 
+@contextmanager
+def _placed(name: str) -> Generator[None]:
+    """Begin the message of an error about a name in a suite's file with the file and the line."""
+    try:
+        yield
+    except (StudyError, UnknownName) as error:
+        path = Path(name)
+        if where := path.is_file() and place_of(path.read_text(encoding="utf-8"), error):
+            raise StudyError(f"{path}{where}: {error}") from error
+        raise
+
+
 def suite_tasks(suite: SuiteFile) -> list[tuple[str, TransferTask]]:
     """Return the name and the task of each study of a suite.
 
@@ -249,7 +262,8 @@ class RunSuite:
         )
         require_seed(chosen.seed)
         allow_own_modules(suite.learner, *suite.arms)
-        tasks = dict(suite_tasks(suite))
+        with _placed(self.name):
+            tasks = dict(suite_tasks(suite))
         for name in self.only:
             if name not in tasks:
                 raise UnknownName("study", name, tasks)
@@ -258,8 +272,9 @@ class RunSuite:
         failed: list[str] = []
         page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in self.only or tasks:
-            traits = inspect_task(tasks[name])
-            plan = _plan(chosen, tasks[name], traits)
+            with _placed(self.name):
+                traits = inspect_task(tasks[name])
+                plan = _plan(chosen, tasks[name], traits)
             try:
                 folder = open_study_folder(plan, out, name)
                 with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
