@@ -113,7 +113,7 @@ class Train:
                 policy = Sb3Learner(
                     learner, settings, tensorboard=self.tensorboard, threads=None
                 ).train(env, steps, self.seed, on_evaluation=_print_evaluation, on_steps=on_steps)
-                save_policy(policy, out)
+                save_policy(policy.described(command=command_line()), out)
                 return
             name = f"{env.id.split('/')[-1]}-{self.seed}.npz"
             demonstrations = Path("results", "demonstrations", name)
