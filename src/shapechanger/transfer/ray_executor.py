@@ -165,7 +165,7 @@ class _Schedule:
 
     def _report(self) -> None:
         try:
-            found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_CONNECT_S)
+            found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_ANSWER_S)
         except RayError:  # The board is being restarted; a study goes on without progress.
             return
         running = {job.name for job in self._running.values()}
