@@ -30,7 +30,7 @@ except ImportError as error:
 
 _ATTEMPTS: Final = 3
 _CONNECT_S: Final = 2.0
-_ANSWER_S: Final = 6.0
+_ANSWER_S: Final = 8.0
 _REPORT_EVERY_S: Final = 0.5
 _ray: Any = ray
 
@@ -80,7 +80,7 @@ def _require_answer(address: str) -> None:
 
     Raises:
         StudyError: If it is not an address, nothing listens there within two seconds, or nothing
-            answers within six more.
+            answers within eight more.
     """
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit() or "/" in host:
