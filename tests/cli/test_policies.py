@@ -42,17 +42,23 @@ def test_a_clone_is_shown_and_listed(capsys: pytest.CaptureFixture[str]) -> None
     assert sum("cloning" in line for line in lines) == len(CLONES)
 
 
-def test_a_zip_of_stable_baselines3_is_converted(tmp_path: Path) -> None:
-    """The same actions, from a file that cannot run code."""
+def test_a_zip_of_stable_baselines3_is_converted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same actions, from a file that cannot run code and says which command wrote it."""
     model = _zip(tmp_path / "mine.zip", policy_kwargs={"net_arch": [8, 8]})
     out = tmp_path / "mine.safetensors"
     convert = ["policies", "convert", str(tmp_path / "mine.zip"), "InvertedPendulum"]
+    monkeypatch.setattr("sys.argv", ["shapechanger", "policies", "convert", "mine.zip"])
     main([*convert, "--out", str(out), "--trust"])
     policy = load_policy(out)
     seen = np.random.default_rng(0).normal(size=(20, 4))
     np.testing.assert_array_equal(policy.act(seen), model.predict(seen, deterministic=True)[0])
     assert policy.card.env.id == "shapechanger/InvertedPendulum-v1"
     assert policy.card.settings.net_arch == (8, 8)
+    capsys.readouterr()
+    main(["policies", "show", str(out)])
+    assert "command      shapechanger policies convert mine.zip\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -58,21 +58,31 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
         ("envs = [", "is not valid TOML"),
         ("envs = ['Ant']\nsources = ['Ant']\ntargets = ['BigAnt']\n", "in one way"),
         ("sources = ['Ant']\n", "in one way"),
-        ("envs = ['Ant', 'Bigant', 'Hopper']\n", "Did you mean"),
+        ("envs = ['Ant',\n'Bigant', 'Hopper']\n", "mine.toml, line 2: No env"),
         (
             "pairs = [['Ant', {env = 'Ant', body = 'BigAnt'}], ['Ant', 'Ant']]\n",
             "called Ant-to-Ant",
         ),
         (
             "envs = ['Ant', 'BigAnt']\nlearner = 'ppo-run'\n[settings]\nlearning_rte = 1.0\n",
-            "Did you mean 'learning_rate'?",
+            "mine.toml, line 4: No setting of ppo-run matches 'learning_rte'. Did you mean",
         ),
         (
             "envs = ['Ant', 'BigAnt']\nlearner = 'ppo-run'\n[settings]\nlearning_rate = 'x'\n",
-            "Expected `float`, got `str`",
+            "mine.toml, line 4: The settings of ppo-run are wrong: Expected `float`, got `str`",
         ),
-        ("envs = ['Ant', 'BigAnt']\nmeasure = 'forward sped'\n", "Did you mean 'forward speed'?"),
-        ("envs = ['Ant', 'BigAnt']\narms = ['scratch', 'fine-tun']\n", "Did you mean 'fine-tune'?"),
+        (
+            "envs = ['Ant', 'BigAnt']\nlearner = 'ppo-rum'\n",
+            "mine.toml, line 2: No learner matches 'ppo-rum'. Did you mean 'ppo-run'?",
+        ),
+        (
+            "envs = ['Ant', 'BigAnt']\nmeasure = 'forward sped'\n",
+            "mine.toml, line 2: No measure matches 'forward sped'. Did you mean 'forward speed'?",
+        ),
+        (
+            "envs = ['Ant', 'BigAnt']\n# 'fine-tun'\narms = ['scratch', 'fine-tune', 'fine-tun']\n",
+            "mine.toml, line 3: No method matches 'fine-tun'. Did you mean 'fine-tune'?",
+        ),
     ],
 )
 def test_a_wrong_file_gets_one_sentence(

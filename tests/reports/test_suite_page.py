@@ -61,11 +61,25 @@ def test_methods_are_compared_by_target_and_over_all() -> None:
     assert "all targets fine-tune 30" in words
 
 
+@pytest.mark.parametrize("seeds", [2, 5])
+def test_no_interval_that_is_none(seeds: int) -> None:
+    """Two runs, or runs that are all better, give no interval of a bootstrap."""
+    better, worse = rising(900.0, 950.0, 3e3), rising(0.0, 100.0, 3e3, seed=1)
+    study = make_study(scratch=worse[:seeds], fine_tune=better[:seeds])
+    words = Reader(suite_html("a", {"a": study}, seeds=seeds)).words
+    assert "1 (no interval)" in words
+    assert "1 [1, 1]" not in words
+    assert (words.count("(no interval)") > 2) == (seeds == 2)
+
+
 def test_declared_seeds_are_stated() -> None:
     """The page states whether all declared seeds ran, and earlier looks at the results."""
     assert "declares 5 seeds, and every study has them." in suite_html("a", _pairs(), seeds=5)
     interim = suite_html("a", _pairs(), seeds=8)
     assert "the studies have 5, so these are interim results" in interim
+    more = suite_html("a", _pairs(), seeds=3)
+    assert "The suite declares 3 seeds; the studies have 5." in more
+    assert "interim" not in more
     grown = suite_html("a", _pairs(looks=(3, 5)), seeds=5)
     assert "Results were also computed on the way, with 3 seeds" in grown
     assert "Results were also" not in suite_html("a", _pairs(looks=(5,)), seeds=5)

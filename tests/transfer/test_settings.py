@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -42,6 +43,22 @@ def test_wrong_settings_are_refused(
     """The message names the setting."""
     with pytest.raises(kind, match=words):
         resolve_learner("ppo-run", changed)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('preset = "sac"\n\nlearning_rat = 1e-3\n', "line 3: No setting of sac matches"),
+        ('preset = "sac"\ngamma = "much"\n', "line 2: The settings of sac are wrong"),
+        ('# sak\npreset = "sak"\n', "line 2: No learner matches 'sak'. Did you mean 'sac'?"),
+        ('preset = "sac"\nn_envs = 0\n', "mine.toml: The settings .* and one episode\\.$"),
+    ],
+)
+def test_a_wrong_file_has_a_line(text: str, words: str, tmp_path: Path) -> None:
+    """Where the message is about one of its lines."""
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(StudyError, match=words):
+        resolve_learner(str(tmp_path / "mine.toml"), {})
 
 
 def test_every_learner_says_what_it_was_tuned_on() -> None:

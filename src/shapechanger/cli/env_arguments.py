@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import tomllib
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
@@ -73,10 +74,26 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
         # Third-party envs count too, as `module:id` or once registered; `make` checks again.
         if not _has_module(env_id) and env_id not in gym.registry:
             raise
+        allow_own_modules(env_id)
         full = env_id
     if body and full not in CATALOGUE:
         raise MorphologyError(f"{full} takes no body; these do: {', '.join(CATALOGUE)}.")
     return EnvRef(full, {"body": body} if body else {})
+
+
+def allow_own_modules(*names: str | None) -> None:
+    """Let names such as `my_methods:warm-start` import modules of the current folder.
+
+    Only names that the user gives may do so: the name of a class in a policy's file must not find a
+    module that lies beside it.
+
+    Args:
+        names: Names of envs, learners or methods; learners may be TOML files.
+    """
+    here = str(Path.cwd())
+    own = any(name and (":" in name or name.endswith(".toml")) for name in names)
+    if own and here not in sys.path:
+        sys.path.append(here)  # Worker processes take over the path.
 
 
 def default_learner(env: EnvRef) -> str:

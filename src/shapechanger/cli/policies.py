@@ -11,7 +11,7 @@ import msgspec
 import tyro
 from rich.table import Table
 
-from shapechanger.cli.console import print_table, say
+from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import EnvId, env_ref, opened
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
@@ -50,6 +50,7 @@ class Show:
             lines = {
                 **_card_lines(card),
                 "version": card.version,
+                "command": card.command or "not in this file",
                 "normalised": "no" if policy.normalisation is None else "yes",
                 "observation": ", ".join(card.observation.names),
                 "action": ", ".join(card.action.names),
@@ -264,6 +265,7 @@ class Convert:
             int(model.num_timesteps),
             int(model.seed or 0),
             shapechanger.__version__,
+            command_line(),
         )
         save_policy(TrainedPolicy(model, None, card), self.out)
         say(f"wrote {self.out}")

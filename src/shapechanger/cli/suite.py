@@ -8,7 +8,8 @@ import re
 import sys
 import time
 import tomllib
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
@@ -30,6 +31,7 @@ from shapechanger.cli.console import (
 from shapechanger.cli.env_arguments import (
     ClusterAddress,
     ExecutorKind,
+    allow_own_modules,
     default_learner,
     driven,
     env_ref,
@@ -41,7 +43,7 @@ from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.files import read_json, write_json
+from shapechanger.transfer.files import place_of, read_json, write_json
 from shapechanger.transfer.learners.settings import resolve_learner
 from shapechanger.transfer.plan import SOURCE, Plan, TransferTask
 
@@ -158,6 +160,18 @@ def _explain(text: str, reason: str) -> str:
     return f", line {at}: a suite has no key {key!r}.{meant} Keys: {', '.join(known)}."
 
 
+@contextmanager
+def _placed(name: str) -> Generator[None]:
+    """Begin the message of an error about a name in a suite's file with the file and the line."""
+    try:
+        yield
+    except (StudyError, UnknownName) as error:
+        path = Path(name)
+        if where := path.is_file() and place_of(path.read_text(encoding="utf-8"), error):
+            raise StudyError(f"{path}{where}: {error}") from error
+        raise
+
+
 def suite_tasks(suite: SuiteFile) -> list[tuple[str, TransferTask]]:
     """Return the name and the task of each study of a suite.
 
@@ -247,7 +261,9 @@ class RunSuite:
             suite, **{name: value for name, value in given.items() if value is not None}
         )
         require_seed(chosen.seed)
-        tasks = dict(suite_tasks(suite))
+        allow_own_modules(suite.learner, *suite.arms)
+        with _placed(self.name):
+            tasks = dict(suite_tasks(suite))
         for name in self.only:
             if name not in tasks:
                 raise UnknownName("study", name, tasks)
@@ -256,8 +272,9 @@ class RunSuite:
         failed: list[str] = []
         page = _Page(suite, Path(self.name).stem, out, tasks)
         for name in self.only or tasks:
-            traits = inspect_task(tasks[name])
-            plan = _plan(chosen, tasks[name], traits)
+            with _placed(self.name):
+                traits = inspect_task(tasks[name])
+                plan = _plan(chosen, tasks[name], traits)
             try:
                 folder = open_study_folder(plan, out, name)
                 with StudyProgress(run_steps(plan, unfinished_runs(plan, folder))) as progress:
@@ -342,6 +359,7 @@ class MergeSuites:
         from shapechanger.transfer.suite import merge_study
 
         suite = load_suite(self.name)
+        allow_own_modules(suite.learner, *suite.arms)
         tasks = dict(suite_tasks(suite))
         out = self.out or Path("results", Path(self.name).stem)
         if out.resolve() in [folder.resolve() for folder in self.folders]:

@@ -12,6 +12,7 @@ from shapechanger.cli.console import Interrupted, StudyProgress, command_line, s
 from shapechanger.cli.env_arguments import (
     Body,
     EnvId,
+    allow_own_modules,
     default_learner,
     driven,
     env_ref,
@@ -66,6 +67,7 @@ class Train:
         from shapechanger.transfer.learners.sb3 import use_one_thread
 
         require_seed(self.seed)
+        allow_own_modules(self.learner)
         env = driven(env_ref(self.env, self.body))
         out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
         steps, training = (
@@ -113,7 +115,7 @@ class Train:
                 policy = Sb3Learner(
                     learner, settings, tensorboard=self.tensorboard, threads=None
                 ).train(env, steps, self.seed, on_evaluation=_print_evaluation, on_steps=on_steps)
-                save_policy(policy, out)
+                save_policy(policy.described(command=command_line()), out)
                 return
             name = f"{env.id.split('/')[-1]}-{self.seed}.npz"
             demonstrations = Path("results", "demonstrations", name)

@@ -15,6 +15,7 @@ from shapechanger.cli.console import Interrupted, StudyProgress, command_line, p
 from shapechanger.cli.env_arguments import (
     ClusterAddress,
     ExecutorKind,
+    allow_own_modules,
     default_learner,
     driven,
     env_ref,
@@ -111,6 +112,7 @@ class Transfer:
         )
 
         self._require_sense()
+        allow_own_modules(self.learner, *self.arms)
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
         task = self._task()

@@ -27,6 +27,8 @@ _HELPED: Final = (0, 114, 178)
 _HURT: Final = (213, 94, 0)
 # Share of the full colour that black text can be read on.
 _STRONGEST: Final = 0.55
+# Runs of a study below which the page gives no intervals of a bootstrap.
+_LEAST_RUNS: Final = 3
 
 
 class FilmStrip(NamedTuple):
@@ -144,7 +146,8 @@ def _looks(studies: Mapping[str, Study], declared: int) -> str:
     if now == {declared}:
         text += ", and every study has them."
     else:
-        text += f"; the studies have {_listed(sorted(now))}, so these are interim results."
+        text += f"; the studies have {_listed(sorted(now))}"
+        text += ", so these are interim results." if min(now) < declared else "."
     if grown:
         text += (
             " Results were also computed on the way, with "
@@ -244,13 +247,25 @@ def _method_rows(
         better = "baseline"
         if arm != "scratch" and len(groups) == n_studies:
             chance = probability_of_improvement(groups, scores["scratch"], rng=rng)
-            better = estimate_text(chance)
+            better = _pooled_text(chance, groups)
         elif arm != "scratch":
             better = f"only in {len(groups)} of {n_studies} studies"
-        mean = estimate_text(interquartile_mean(groups, rng=rng))
+        mean = _pooled_text(interquartile_mean(groups, rng=rng), groups)
         runs = str(sum(group.size for group in groups))
         rows.append((target, arm, runs, mean, better))
     return rows
+
+
+def _pooled_text(estimate: Estimate, groups: Sequence[NDArray[np.float64]]) -> str:
+    """Format an estimate, without an interval where resampling the runs cannot give one.
+
+    That is so with fewer than three runs in each study, and where all resamples are equal, as where
+    every run beats every run of scratch.
+    """
+    few = max(group.size for group in groups) < _LEAST_RUNS
+    if few or estimate.low == estimate.high:
+        estimate = Estimate(estimate.value)
+    return estimate_text(estimate)
 
 
 def _settings(studies: Mapping[str, Study]) -> list[tuple[str, str]]:

@@ -3,14 +3,33 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
-from shapechanger.errors import CorruptStudy, OutputError
+from shapechanger.errors import CorruptStudy, OutputError, UnknownName
 
 _T = TypeVar("_T")
+
+
+def place_of(text: str, error: Exception) -> str:
+    """Return where a TOML file has the name or the setting that an error is about.
+
+    Args:
+        text: The file's content.
+        error: An unknown name, or an error whose message holds the path of msgspec, `$.gamma`.
+
+    Returns:
+        `, line 3`, or an empty string if the file does not hold it.
+    """
+    setting = re.search(r"\$\.(\w+)", str(error))
+    name = error.name if isinstance(error, UnknownName) else setting and setting[1]
+    word = re.compile(rf"(?<![\w-]){re.escape(name)}(?![\w-])") if name else None
+    lines = enumerate(text.splitlines(), 1)
+    found = next((at for at, line in lines if word and word.search(line.partition("#")[0])), None)
+    return f", line {found}" if found else ""
 
 
 def make_folder(folder: Path) -> None:

@@ -8,6 +8,7 @@ only its users can reach.
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 import traceback
@@ -28,7 +29,8 @@ except ImportError as error:
     raise MissingExtra("ray", "ray") from error
 
 _ATTEMPTS: Final = 3
-_CONNECT_S: Final = 8.0
+_CONNECT_S: Final = 2.0
+_ANSWER_S: Final = 8.0
 _REPORT_EVERY_S: Final = 0.5
 _ray: Any = ray
 
@@ -77,14 +79,19 @@ def _require_answer(address: str) -> None:
     """Refuse an address at which no Ray answers; Ray itself would try for half a minute.
 
     Raises:
-        StudyError: If it is not an address, or nothing answers within eight seconds.
+        StudyError: If it is not an address, nothing listens there within two seconds, or nothing
+            answers within eight more.
     """
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit() or "/" in host:
         raise StudyError(f"The address of a Ray cluster is HOST:PORT or auto, not {address!r}.")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECT_S).close()
+    except (OSError, OverflowError) as error:
+        raise _no_answer(address, "nothing listens there") from error
     command = [sys.executable, "-m", "ray.scripts.scripts", "health-check", "--address", address]
     try:
-        subprocess.run(command, check=True, capture_output=True, timeout=_CONNECT_S)
+        subprocess.run(command, check=True, capture_output=True, timeout=_ANSWER_S)
     except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
         raise _no_answer(address, "nothing there is healthy") from error
 
@@ -158,7 +165,7 @@ class _Schedule:
 
     def _report(self) -> None:
         try:
-            found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_CONNECT_S)
+            found: dict[str, int] = _ray.get(self._board.take.remote(), timeout=_ANSWER_S)
         except RayError:  # The board is being restarted; a study goes on without progress.
             return
         running = {job.name for job in self._running.values()}

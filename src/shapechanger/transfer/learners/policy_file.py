@@ -1,15 +1,15 @@
 """Trained policies in files.
 
 A file holds safetensors: the weights, the normalisation statistics and the bounds of the spaces; in
-its metadata a JSON card (env, learner, settings, steps, seed, version, both layouts) and a hash of
-the tensors. Loading a file only reads numbers and JSON, so it cannot run code.
+its metadata a JSON card (env, learner, settings, steps, seed, version, command, both layouts) and a
+hash of the tensors. Loading a file only reads numbers and JSON, so it cannot run code.
 """
 
 from __future__ import annotations
 
 import random
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -57,6 +57,7 @@ class PolicyCard(msgspec.Struct, frozen=True):
         steps: Env steps of training.
         seed: Seed of the training.
         version: Version of Shapechanger.
+        command: The command that wrote it; empty in a study, where `study.json` holds it.
     """
 
     env: EnvRef
@@ -67,6 +68,7 @@ class PolicyCard(msgspec.Struct, frozen=True):
     steps: int
     seed: int
     version: str
+    command: str = ""
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,10 @@ class TrainedPolicy:
     def act(self) -> Act:
         """The policy's mean actions for observations of shape (n, ...)."""
         return actor(self.model, self.normalisation)
+
+    def described(self, *, command: str) -> TrainedPolicy:
+        """Return the policy with the command that made it."""
+        return replace(self, card=msgspec.structs.replace(self.card, command=command))
 
 
 def actor(

@@ -12,6 +12,7 @@ import msgspec
 
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError, UnknownName
+from shapechanger.transfer.files import place_of
 
 
 class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
@@ -479,7 +480,8 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Sett
 def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, Settings]:
     """Read a TOML file that names a preset or an algorithm, and changes some of its settings."""
     try:
-        given = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        given = tomllib.loads(text)
     except FileNotFoundError:
         raise UnknownName("learner", str(path), LEARNERS) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -493,7 +495,7 @@ def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, Settings
     try:
         _, settings = resolve_learner(start, {**given, **changed})
     except (StudyError, UnknownName) as error:
-        raise StudyError(f"{path}: {error}") from error
+        raise StudyError(f"{path}{place_of(text, error)}: {error}") from error
     return path.stem, settings
 
 
@@ -521,4 +523,4 @@ def _converted(name: str, kind: type[_Kind], values: dict[str, Any]) -> _Kind:
     try:
         return msgspec.convert(values, kind, strict=True)
     except msgspec.ValidationError as error:
-        raise StudyError(f"The settings of {name} are wrong: {error}.") from None
+        raise StudyError(f"The settings of {name} are wrong: {str(error).rstrip('.')}.") from None

@@ -1,0 +1,96 @@
+"""Envs, learners and methods in a module of the current folder."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+
+LEARNER = "def build(envs, seed):\n    raise NotImplementedError\n"
+METHOD = """
+from shapechanger.errors import StudyError
+from shapechanger.transfer.methods import Method, register
+
+
+@register
+class Reluctant(Method):
+    name = "reluctant"
+
+    def require(self, source, target, settings):
+        raise StudyError("reluctant was asked.")
+"""
+ENV = """
+import gymnasium as gym
+
+
+class Bare(gym.Env):
+    observation_space = gym.spaces.Box(0.0, 1.0, (1,))
+    action_space = gym.spaces.Box(0.0, 1.0, (1,))
+
+
+gym.register("Bare-v0", Bare)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, which an installed program does not search for modules."""
+    found = [path for path in sys.path if path not in ("", str(Path.cwd()))]
+    monkeypatch.setattr(sys, "path", found)
+    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("module", "content", "arguments", "words"),
+    [
+        (
+            "my_learner",
+            LEARNER,
+            ["train", "InvertedPendulum", "--learner", "my_learner:build", "--steps", "10"],
+            "A budget of 10 steps is smaller than one evaluation",
+        ),
+        (
+            "my_method",
+            METHOD,
+            ["transfer", "Ant", "BigAnt", "--arms", "scratch", "my_method:reluctant"],
+            "reluctant was asked.",
+        ),
+        ("my_env", ENV, ["train", "my_env:Bare-v0"], "publishes no observation_layout"),
+    ],
+)
+def test_a_module_of_the_current_folder_is_found(
+    module: str,
+    content: str,
+    arguments: list[str],
+    words: str,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """As the documentation of a user's own methods and learners promises."""
+    (folder / f"{module}.py").write_text(content)
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert words in capsys.readouterr().err
+
+
+def test_a_suite_finds_one_too(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The file of the suite names it."""
+    (folder / "suite_method.py").write_text(METHOD)
+    (folder / "mine.toml").write_text(
+        "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\n"
+    )
+    with pytest.raises(SystemExit):
+        main(["suite", "run", "mine.toml"])
+    assert "reluctant was asked." in capsys.readouterr().err
+
+
+def test_names_of_ours_leave_the_path_alone(folder: Path) -> None:
+    """A module beside a policy's file cannot be imported by naming one of our learners."""
+    with pytest.raises(SystemExit):
+        main(["train", "Ant", "--learner", "ppo-run", "--steps", "10"])
+    assert str(folder) not in sys.path
