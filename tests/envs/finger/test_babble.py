@@ -1,4 +1,4 @@
-"""A finger that moves its joints about."""
+"""Babbling of a finger's joints."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tests.identify.logs import recorded
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
 @pytest.mark.parametrize("finger_seed", [0, 7])
 def test_every_joint_moves_far_and_on_its_own(actions: str, finger_seed: int) -> None:
-    """Through half of its range and more, also where the finger is not the nominal one."""
+    """Joints cover half of their range and move independently, for any finger of the gap."""
     log, _ = recorded(10.0, gap="real-like", finger_seed=finger_seed, actions=actions)
     low, high = np.percentile(log.angles, [5.0, 95.0], axis=0)
     assert ((high - low) > 0.5 * (JOINT_RANGE[:, 1] - JOINT_RANGE[:, 0])).all()
     correlation = np.corrcoef(log.angles.T) - np.eye(4)
     assert np.abs(correlation).max() < 0.8
-    assert (log.tensions > 1.0).mean() > 0.9  # No tendon hangs slack for long.
+    assert (log.tensions > 1.0).mean() > 0.9  # Tendons are rarely slack.
 
 
-def test_a_seed_is_a_motion() -> None:
-    """The same seed leads the same way, another one elsewhere."""
+def test_the_seed_determines_the_motion() -> None:
+    """Equal seeds give equal motions, other seeds other motions."""
     layout = Layout(tuple(Feature(f"{name}/angle", "rad") for name in JOINTS))
     first, same, other = (FingerBabble(layout, seed=seed) for seed in (1, 1, 2))
     still = np.zeros(4)
@@ -37,6 +37,6 @@ def test_a_seed_is_a_motion() -> None:
 
 
 def test_another_layout_is_refused() -> None:
-    """The angle that is missing is named."""
+    """The error names the missing angle."""
     with pytest.raises(UnknownName, match="MCP_flexion/angle"):
         FingerBabble(Layout((Feature("thigh/angle", "rad"),)))

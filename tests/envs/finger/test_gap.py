@@ -1,4 +1,4 @@
-"""Fingers that differ: drawn from what is stated, and always able to hold themselves."""
+"""Random fingers: their ranges, and that they can hold every posture."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def _but(**changes: Any) -> Gap:
 
 
 @pytest.mark.parametrize("name", GAPS)
-def test_each_number_is_drawn_from_its_range(name: str) -> None:
-    """All of it: the ends of wide ranges are approached, and none is passed."""
+def test_parameters_are_drawn_from_their_ranges(name: str) -> None:
+    """Values stay within their ranges and cover them."""
     gap = GAPS[name]
     rng = np.random.default_rng(0)
     drawn = [gap.draw(rng) for _ in range(100)]
@@ -52,15 +52,15 @@ def test_each_number_is_drawn_from_its_range(name: str) -> None:
         assert abs(np.log(factors).mean()) < 0.1
     nominal = NOMINAL.arms
     arms = np.array([f.arms for f in drawn])
-    # Where a tendon passes no joint, it passes none in any finger.
+    # A tendon crosses the same joints in every finger.
     assert (arms[:, nominal == 0.0] == 0.0).all()
     errors = arms[:, nominal != 0.0] / nominal[nominal != 0.0] - 1.0
     assert (np.abs(errors) <= gap.arm_error + 1e-12).all()
     assert np.abs(errors).max() > 0.95 * gap.arm_error
 
 
-def test_a_draw_that_could_not_hold_itself_is_drawn_again() -> None:
-    """With arms off by up to 60 % most could not; each that comes out can."""
+def test_draws_span_all_torques() -> None:
+    """Draws whose arms do not span all torques are repeated."""
     gap = _but(arm_error=0.6)
     rng = np.random.default_rng(0)
     assert all(spans_all_torques(gap.draw(rng).arms) for _ in range(40))
@@ -68,23 +68,23 @@ def test_a_draw_that_could_not_hold_itself_is_drawn_again() -> None:
     assert 0.02 < np.mean([spans_all_torques(arms) for arms in raw]) < 0.9
 
 
-def test_a_gap_in_which_hardly_any_finger_holds_itself_says_so(
+def test_a_gap_without_valid_fingers_raises(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After its tries, with the number to make smaller."""
+    """After several tries the error names the setting to reduce."""
     monkeypatch.setattr("shapechanger.envs.finger.gap.spans_all_torques", lambda _: False)
     with pytest.raises(FingerError, match=r"off by 90%, hardly any .* make arm_error smaller"):
         _but(arm_error=0.9).draw(np.random.default_rng(0))
 
 
-def test_the_same_numbers_give_the_same_finger() -> None:
-    """And others another."""
+def test_the_generator_determines_the_finger() -> None:
+    """Equal generators give equal fingers, other generators other fingers."""
     one, two, other = (_REAL_LIKE.draw(np.random.default_rng(s)) for s in (5, 5, 6))
     assert one == two != other
 
 
-def test_a_finger_seed_is_one_finger() -> None:
-    """Whatever the seeds of episodes, in every env; another seed is another finger."""
+def test_a_finger_seed_fixes_the_finger() -> None:
+    """The finger does not depend on the episode's seed; other finger seeds give other fingers."""
     one = FingerReachEnv(gap="real-like", finger_seed=3)
     before = one.parameters
     one.reset(seed=1)
@@ -96,7 +96,7 @@ def test_a_finger_seed_is_one_finger() -> None:
 
 
 def test_without_a_finger_seed_each_episode_has_another_finger() -> None:
-    """By the seed of the episode alone."""
+    """The finger follows from the seed of the episode alone."""
     env, other = FingerReachEnv(gap="wide"), FingerReachEnv(gap="wide")
     drawn = []
     for seed in (1, 2, None):
@@ -108,8 +108,8 @@ def test_without_a_finger_seed_each_episode_has_another_finger() -> None:
     assert other.parameters == drawn[0]
 
 
-def test_a_gap_is_given_in_three_ways() -> None:
-    """By name, as it is, and as its ranges."""
+def test_a_gap_is_given_by_name_value_or_mapping() -> None:
+    """Names, gaps and mappings of ranges are accepted."""
     assert resolve_gap("real-like") is _REAL_LIKE
     assert resolve_gap(_REAL_LIKE) is _REAL_LIKE
     assert resolve_gap(msgspec.to_builtins(_REAL_LIKE)) == _REAL_LIKE
@@ -129,16 +129,16 @@ def test_a_gap_is_given_in_three_ways() -> None:
         ({"motor_kg": (0.0, 1.0)}, "motor_kg: the range .* must begin above zero"),
     ],
 )
-def test_ranges_that_are_none_are_refused(changes: dict[str, Any], sentence: str) -> None:
-    """Whether they come as numbers or as a mapping: by name, with what was given."""
+def test_invalid_ranges_are_refused(changes: dict[str, Any], sentence: str) -> None:
+    """Invalid ranges raise an error with name and value, also in mappings."""
     with pytest.raises(FingerError, match=sentence):
         Gap(**{**msgspec.structs.asdict(_REAL_LIKE), **changes})
     with pytest.raises(FingerError, match=sentence):
         resolve_gap({**msgspec.to_builtins(_REAL_LIKE), **changes})
 
 
-def test_what_is_no_gap_is_refused() -> None:
-    """A name of none, a mapping that lacks a range, or has one too much, and a number."""
+def test_invalid_gaps_are_refused() -> None:
+    """Unknown names, incomplete mappings and other types raise an error."""
     with pytest.raises(UnknownName, match=r"'reallike'. Did you mean 'real-like'"):
         resolve_gap("reallike")
     with pytest.raises(FingerError, match="missing required field `joint_factor`"):

@@ -1,4 +1,4 @@
-"""Angles for a point: exact where there are any, and honest where there are none."""
+"""Inverse kinematics of the fingertip."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def _is_within(angles: np.ndarray) -> bool:
     return bool(((angles >= _LOW) & (angles <= _HIGH)).all())
 
 
-def test_points_that_can_be_reached_are() -> None:
-    """Those of postures to hold, within 0.01 mm, from rest as from a posture nearby."""
+def test_fingertips_of_balanced_postures_are_reached() -> None:
+    """They are reached within 0.01 mm, from the resting posture and from nearby ones."""
     rng = np.random.default_rng(0)
     for _ in range(150):
         posture = draw_posture(rng)
@@ -32,7 +32,7 @@ def test_points_that_can_be_reached_are() -> None:
 
 
 def test_points_of_any_posture_are_reached() -> None:
-    """Also of those that no tendons hold, up to the ends of all joints."""
+    """Fingertips of all postures within the joint limits are reached."""
     rng = np.random.default_rng(1)
     postures = rng.uniform(_LOW, _HIGH, (80, 4))
     postures[::4] = np.where(rng.random((20, 4)) < 0.5, _LOW, _HIGH)
@@ -53,10 +53,10 @@ def test_points_of_any_posture_are_reached() -> None:
     ],
     ids=["just beyond", "far beyond", "beside", "behind", "above"],
 )
-def test_a_point_out_of_reach_is_never_said_to_be_near(
+def test_the_error_of_unreachable_points_is_correct(
     place: tuple[float, float, float], least_mm: float
 ) -> None:
-    """What is said to be missing is what those angles miss, and at least what has to be missing."""
+    """The reported distance is that of the angles, and at least the true minimum."""
     angles, off = angles_for(np.array(place))
     assert _is_within(angles)
     assert off == pytest.approx(
@@ -65,8 +65,8 @@ def test_a_point_out_of_reach_is_never_said_to_be_near(
     assert off >= 1e-3 * least_mm - 1e-9
 
 
-def test_angles_stay_near_to_those_before() -> None:
-    """A point that moves by a tenth of a millimetre moves the joints by a degree or two."""
+def test_angles_are_continuous() -> None:
+    """A displacement of 0.1 mm changes the angles by less than 3 degrees."""
     rng = np.random.default_rng(1)
     for _ in range(30):
         posture = draw_posture(rng)

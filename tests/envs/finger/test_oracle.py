@@ -1,4 +1,4 @@
-"""The controller that knows the finger: what no learner need better, and a test of the env."""
+"""The controller with a model of the finger: an upper bound for learners."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from shapechanger.bodies.finger import DRIVES, NOMINAL
 from shapechanger.envs.finger import FingerReachEnv, FingerTrackEnv
 from shapechanger.envs.finger.oracle import FingerOracle
 
-# Steps after which it has arrived: 1.2 s, of the 2 s that an episode lasts.
+# Steps until the target is reached: 1.2 s of an episode of 2 s.
 _ARRIVES = 60
 
 
 def _reached(actions: str, episodes: int, **arguments: Any) -> tuple[int, list[float]]:
-    """How many targets were reached, and how far from each the fingertip was at last, m."""
+    """Return the number of successes and the final distances, m."""
     env = FingerReachEnv(actions=actions, **arguments)
     oracle = FingerOracle(env.observation_layout, actions)
     successes, distances = 0, []
@@ -31,16 +31,16 @@ def _reached(actions: str, episodes: int, **arguments: Any) -> tuple[int, list[f
 
 
 @pytest.mark.parametrize("actions", DRIVES)
-def test_it_reaches_every_target(actions: str) -> None:
-    """40 of 40 in each mode, and in the middle within a tenth of a millimetre."""
+def test_the_oracle_reaches_every_target(actions: str) -> None:
+    """All 40 targets are reached in each mode, with a median distance below 0.1 mm."""
     successes, distances = _reached(actions, 40)
     assert successes == 40
     assert np.median(distances) < 1e-4
 
 
 @pytest.mark.parametrize("actions", DRIVES)
-def test_it_follows_a_circle(actions: str) -> None:
-    """Of 12 mm, once a second, within 3 mm root mean square."""
+def test_the_oracle_follows_a_circle(actions: str) -> None:
+    """A circle of 12 mm at 1 Hz is followed within 3 mm RMS."""
     env = FingerTrackEnv(actions=actions, path={"kind": "circle", "radius": 0.012, "hz": 1.0})
     oracle = FingerOracle(env.observation_layout, actions)
     for seed in range(2):
@@ -52,8 +52,8 @@ def test_it_follows_a_circle(actions: str) -> None:
         assert info["is_success"]
 
 
-def test_a_finger_that_it_does_not_know_is_harder() -> None:
-    """What it is told of the finger is what it goes by: arms that are off cost accuracy."""
+def test_a_wrong_model_is_less_accurate() -> None:
+    """Errors of the assumed arms increase the distance."""
     arms = NOMINAL.arms * np.random.default_rng(1).uniform(0.85, 1.15, (7, 4))
     other = NOMINAL.replace(moment_arms=tuple(map(tuple, arms.tolist())))
     env = FingerReachEnv(parameters=other)
@@ -71,8 +71,8 @@ def test_a_finger_that_it_does_not_know_is_harder() -> None:
     assert found["right"] < 1e-4 < found["wrong"]
 
 
-def test_its_actions_are_actions() -> None:
-    """Within -1 to 1 however far the target is, and the same for the same observation."""
+def test_actions_of_the_oracle_are_valid() -> None:
+    """Actions are in the action space for distant targets, and deterministic."""
     env = FingerReachEnv()
     seen, _ = env.reset(seed=0, options={"target": (0.3, 0.3, 0.3)})
     first, second = (FingerOracle(env.observation_layout)(seen) for _ in range(2))

@@ -1,4 +1,4 @@
-"""Frames and pictures of a finger: what is on them, and that drawing moves nothing."""
+"""Frames and pictures of a finger."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ _SIZE = {"width": 160, "height": 120}
 
 @pytest.fixture
 def finger() -> Iterator[Any]:
-    """A finger that draws frames."""
+    """A finger env that renders frames."""
     with gym.make("shapechanger/Finger-v1", render_mode="rgb_array", **_SIZE) as env:
         env.reset(seed=0, options={"posture": JOINT_REST.tolist()})
         yield env
 
 
 def _differs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Which pixels differ by more than rounding."""
+    """Return the pixels that differ by more than rounding."""
     return np.any(np.abs(one.astype(int) - other.astype(int)) > 4, axis=2)
 
 
 def test_a_frame_is_bright_and_shows_the_finger(finger: Any) -> None:
-    """Of the size asked for, light at its border, and the finger takes a part of it."""
+    """Frames have the requested size, a light border, and a dark finger."""
     frame = finger.render()
     assert (frame.shape, frame.dtype) == ((120, 160, 3), np.uint8)
     border = np.concatenate([frame[0], frame[-1], frame[:, 0], frame[:, -1]])
@@ -40,8 +40,8 @@ def test_a_frame_is_bright_and_shows_the_finger(finger: Any) -> None:
     np.testing.assert_array_equal(finger.render(), frame)
 
 
-def test_a_frame_shows_how_the_finger_moves(finger: Any) -> None:
-    """And where it should be."""
+def test_a_frame_follows_finger_and_target(finger: Any) -> None:
+    """Frames change with the posture and with the target."""
     frame = finger.render()
     finger.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
     finger.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
@@ -54,8 +54,8 @@ def test_a_frame_shows_how_the_finger_moves(finger: Any) -> None:
     assert 0.001 < _differs(*frames).mean() < 0.1
 
 
-def test_a_target_that_is_reached_is_seen(finger: Any) -> None:
-    """It is as large as what counts as reached, and the fingertip does not hide it."""
+def test_a_reached_target_is_visible(finger: Any) -> None:
+    """The target is drawn larger than the fingertip and stays visible."""
     rest = JOINT_REST.tolist()
     finger.reset(seed=0, options={"posture": rest, "target": rest})
     reached = finger.render().astype(int)
@@ -68,8 +68,8 @@ def test_a_target_that_is_reached_is_seen(finger: Any) -> None:
     assert green.sum() > still_green.sum() + 20
 
 
-def test_each_tendon_is_seen(finger: Any) -> None:
-    """From this side or the other: taking it away changes a frame."""
+def test_each_tendon_is_visible(finger: Any) -> None:
+    """Hiding a tendon changes the frame."""
     finger.render()
     env = finger.unwrapped
     model = env._figure.model
@@ -81,11 +81,11 @@ def test_each_tendon_is_seen(finger: Any) -> None:
         if _differs(finger.render(), frame).sum() < 5:
             hidden.append(name)
         model.tendon_rgba[course, 3] = 1.0
-    assert set(hidden) <= {"PI"}  # On the other side of the finger.
+    assert set(hidden) <= {"PI"}  # PI is on the far side of the finger.
 
 
 def test_tension_makes_a_tendon_thick(finger: Any) -> None:
-    """At the same posture, a tendon that pulls takes more of the picture."""
+    """Tendons are drawn thicker under tension."""
     env = finger.unwrapped
     frames = []
     for tension in (0.0, 1.0):
@@ -94,8 +94,8 @@ def test_tension_makes_a_tendon_thick(finger: Any) -> None:
     assert _differs(*frames).mean() > 0.005
 
 
-def test_drawing_moves_nothing() -> None:
-    """An episode that is drawn is bit by bit that which is not."""
+def test_rendering_does_not_change_the_episode() -> None:
+    """Observations with and without rendering are equal."""
     found = []
     for mode in (None, "rgb_array"):
         with gym.make("shapechanger/Finger-v1", render_mode=mode, **_SIZE) as env:
@@ -111,8 +111,8 @@ def test_drawing_moves_nothing() -> None:
     np.testing.assert_array_equal(*found)
 
 
-def test_a_picture_holds_the_whole_finger(finger: Any) -> None:
-    """Hand and fingertip, and no target: it compares bodies."""
+def test_a_picture_shows_the_whole_finger(finger: Any) -> None:
+    """Pictures show hand and fingertip, without the target."""
     env = finger.unwrapped
     rest = JOINT_REST.tolist()
     pictures = []
@@ -127,8 +127,8 @@ def test_a_picture_holds_the_whole_finger(finger: Any) -> None:
     assert np.ptp(columns) > 0.25 * 160
 
 
-def test_another_finger_is_drawn_in_the_same_window() -> None:
-    """With another finger at each reset the renderer stays, and so would its window."""
+def test_the_renderer_is_kept_across_fingers() -> None:
+    """Resets with another finger keep the renderer."""
     arguments = {"render_mode": "rgb_array", "gap": "wide", **_SIZE}
     with gym.make("shapechanger/Finger-v1", **arguments) as env:
         env.reset(seed=0)
@@ -139,11 +139,11 @@ def test_another_finger_is_drawn_in_the_same_window() -> None:
         assert env.unwrapped._renderer is renderer
 
 
-def test_depths_are_those_of_the_finger() -> None:
-    """Nearer where it is than behind it."""
+def test_depth_frames_show_the_finger() -> None:
+    """Depth is smaller at the finger than at the background."""
     with gym.make("shapechanger/FingerTrack-v1", render_mode="depth_array", **_SIZE) as env:
         env.reset(seed=0)
         depth = env.render()
         assert (depth.shape, depth.dtype) == ((120, 160), np.float32)
-        # As OpenGL has them: 1 is infinitely far, and 0.995 some 30 cm.
+        # OpenGL depths: 1 is infinity, and 0.995 about 30 cm.
         assert 0.02 < (depth < 0.995).mean() < 0.5

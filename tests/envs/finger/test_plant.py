@@ -1,4 +1,4 @@
-"""A finger that is driven and sensed."""
+"""The simulated plant of a finger."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from shapechanger.bodies.finger.anatomy import JOINT_REST
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 
 
-def test_no_tendon_pulls_less_than_its_least() -> None:
-    """A rig's pretension is more than the nominal finger's, also from the first moment on."""
+def test_tensions_are_at_least_the_pretension() -> None:
+    """The pretension holds from the first moment on."""
     parameters = NOMINAL.replace(least_tension=1.5)
     plant = FingerPlant(parameters, drive_of("tension", NOMINAL), CONTROL_DT)
     rng = np.random.default_rng(0)

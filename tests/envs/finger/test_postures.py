@@ -1,4 +1,4 @@
-"""Targets that can be held, and starts."""
+"""Postures for targets and starts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LOW, _HIGH = JOINT_RANGE.T
 
 
 def test_postures_are_away_from_limits_and_can_be_held() -> None:
-    """A tenth of each joint's range, for targets as for starts; and no two are the same."""
+    """Targets and starts are 10 % of the range from the limits, balanced and varied."""
     rng = np.random.default_rng(0)
     inner = 0.1 * (_HIGH - _LOW) - 1e-12
     for draw in (draw_posture, draw_start):
@@ -34,8 +34,8 @@ def test_postures_are_away_from_limits_and_can_be_held() -> None:
         assert (np.ptp(postures, axis=0) > 0.1).all()
 
 
-def test_tensions_that_hold_a_posture_hold_it() -> None:
-    """In the simulator, with its weight: after a second each joint is where it was."""
+def test_balanced_tensions_hold_a_posture() -> None:
+    """In the simulator, each joint stays for a second under the computed tensions."""
     model = made()
     rng = np.random.default_rng(0)
     most = np.array(MOST_TENSION_N)
@@ -52,8 +52,8 @@ def test_tensions_that_hold_a_posture_hold_it() -> None:
         np.testing.assert_allclose(data.qpos, posture, atol=np.radians(0.5))
 
 
-def test_torques_are_those_that_move_it() -> None:
-    """Given to the joints without friction, they accelerate them as was asked."""
+def test_moving_torque_gives_the_acceleration() -> None:
+    """The computed torques give the requested accelerations in the simulator."""
     model = made()
     model.dof_frictionloss[:] = 0.0
     rng = np.random.default_rng(0)
@@ -72,7 +72,7 @@ def test_torques_are_those_that_move_it() -> None:
 
 
 def test_every_posture_of_the_joints_can_be_held() -> None:
-    """Up to all limits; what its tissue pulls harder at than all tendons do cannot."""
+    """Postures within the limits can be held; one beyond the strength of the tendons cannot."""
     rng = np.random.default_rng(0)
     assert all(can_hold(angles) for angles in rng.uniform(_LOW, _HIGH, (200, 4)))
     assert all(can_hold(np.array(corner)) for corner in itertools.product(*JOINT_RANGE))

@@ -1,4 +1,4 @@
-"""`Finger-v1`: what an episode is, what it tells, and what it refuses."""
+"""`Finger-v1`: episodes, observations, rewards and errors."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _state(env: FingerReachEnv) -> np.ndarray:
 
 
 def test_targets_can_be_held_away_from_limits() -> None:
-    """Each is the fingertip of a posture a tenth of the ranges from every limit."""
+    """Targets are fingertips of balanced postures away from the limits."""
     env = FingerReachEnv()
     low, high = JOINT_RANGE.T
     margin = 0.1 * (high - low)
@@ -42,7 +42,7 @@ def test_targets_can_be_held_away_from_limits() -> None:
         _, info = env.reset(seed=seed)
         angles, off = angles_for(info["target"])
         assert off < 1e-5
-        # One finger reaches a point in more than one way: this is one that can be held.
+        # A point has several postures; this one can be held.
         assert can_hold(angles)
         assert (angles > low + 0.3 * margin).all()
         assert (angles < high - 0.3 * margin).all()
@@ -53,8 +53,8 @@ def test_targets_can_be_held_away_from_limits() -> None:
     assert (np.ptp(targets, axis=0) > 0.03).all()
 
 
-def test_success_is_to_stay_for_a_fifth_of_a_second() -> None:
-    """Ten steps without a break within 5 mm, and not nine; leaving ends it."""
+def test_success_needs_ten_steps_at_the_target() -> None:
+    """Success is ten consecutive steps within 5 mm, and ends when the fingertip leaves."""
     env = FingerReachEnv()
     env.reset(seed=0)
     oracle = FingerOracle(env.observation_layout)
@@ -72,8 +72,8 @@ def test_success_is_to_stay_for_a_fifth_of_a_second() -> None:
     assert not env.reset(seed=0)[1]["is_success"]
 
 
-def test_observations_are_what_their_names_say() -> None:
-    """Of the finger itself where it is nominal: angles, speeds, tensions, places."""
+def test_observations_match_their_names() -> None:
+    """Without noise, observations equal the simulator's state."""
     env = FingerReachEnv()
     env.reset(seed=1)
     rng = np.random.default_rng(0)
@@ -94,7 +94,7 @@ def test_observations_are_what_their_names_say() -> None:
 
 
 def test_the_reward_is_the_sum_of_its_terms() -> None:
-    """Nearness to the target, minus the mean square of tensions over their largest."""
+    """Effort is the weighted mean square of the tensions over their limits."""
     env = FingerReachEnv(reward={"nearness": 10.0})
     env.reset(seed=0)
     _, reward, _, _, info = env.step(_NOTHING)
@@ -105,8 +105,8 @@ def test_the_reward_is_the_sum_of_its_terms() -> None:
     assert "diverged" not in info
 
 
-def test_goals_are_rewarded_as_compute_reward_does() -> None:
-    """By each step, and by all of them at once; 0 within 5 mm and -1 elsewhere."""
+def test_goal_rewards_match_compute_reward() -> None:
+    """`step` and the batched `compute_reward` agree: 0 within 5 mm, else -1."""
     env = FingerReachEnv(goal=True)
     plain = FingerReachEnv()
     plain.reset(seed=0)
@@ -133,8 +133,8 @@ def test_goals_are_rewarded_as_compute_reward_does() -> None:
     assert env.compute_reward(np.zeros(3), np.array([0.0051, 0.0, 0.0]), None) == -1.0
 
 
-def test_goals_and_numbers_tell_the_same() -> None:
-    """What a Dict holds is what the Box holds."""
+def test_dict_and_box_observations_agree() -> None:
+    """The parts of the Dict equal the slices of the Box."""
     box, goal = FingerReachEnv(), FingerReachEnv(goal=True)
     numbers, _ = box.reset(seed=4)
     parts, _ = goal.reset(seed=4)
@@ -153,8 +153,8 @@ def test_goals_and_numbers_tell_the_same() -> None:
         (np.array(["a"] * 7), "takes numbers as actions"),
     ],
 )
-def test_what_is_no_action_moves_nothing(action: Any, sentence: str) -> None:
-    """It is refused by the tendon's name, and the episode goes on as if it had not been."""
+def test_invalid_actions_are_refused(action: Any, sentence: str) -> None:
+    """The error names the tendon, and the state does not change."""
     env = FingerReachEnv()
     env.reset(seed=0)
     env.step(_NOTHING)
@@ -165,13 +165,13 @@ def test_what_is_no_action_moves_nothing(action: Any, sentence: str) -> None:
 
 
 def test_a_step_needs_a_reset() -> None:
-    """As everywhere in Gymnasium."""
+    """A step before the first reset raises ResetNeeded."""
     with pytest.raises(gym.error.ResetNeeded, match=r"Call reset\(\)"):
         FingerReachEnv().step(_NOTHING)
 
 
-def test_options_say_where_to_start_and_where_to_go() -> None:
-    """In angles or as a place; what is left out is drawn."""
+def test_options_set_start_and_target() -> None:
+    """The target is a point or angles; options left out are drawn."""
     env = FingerReachEnv()
     _, info = env.reset(seed=0, options={"posture": [0.5, 0.1, 0.6, 0.3]})
     np.testing.assert_array_equal(env.plant.angles, [0.5, 0.1, 0.6, 0.3])
@@ -196,10 +196,10 @@ def test_options_say_where_to_start_and_where_to_go() -> None:
         ({"target": [0.1, np.nan, 0.0]}, FingerError, "three finite numbers, m"),
     ],
 )
-def test_options_that_are_none_are_refused(
+def test_invalid_options_are_refused(
     options: dict[str, Any], error: type[Exception], sentence: str
 ) -> None:
-    """With what there is, and what was given."""
+    """Errors state what is valid and what was given."""
     with pytest.raises(error, match=sentence):
         FingerReachEnv().reset(seed=0, options=options)
 
@@ -216,10 +216,10 @@ def test_options_that_are_none_are_refused(
         ({"render_mode": "rgb"}, UnknownName, "No render mode matches 'rgb'"),
     ],
 )
-def test_arguments_that_are_none_are_refused(
+def test_invalid_arguments_are_refused(
     arguments: dict[str, Any], error: type[Exception], sentence: str
 ) -> None:
-    """By name, with the nearest spelling where one is near."""
+    """Errors name the argument and suggest the nearest spelling."""
     with pytest.raises(error, match=sentence):
         FingerReachEnv(**arguments)
 
@@ -234,7 +234,7 @@ def test_arguments_that_are_none_are_refused(
     ids=["parameters", "by name", "JSON"],
 )
 def test_a_spec_makes_the_env_again(parameters: Any) -> None:
-    """As JSON, as whoever records data or makes a vector of envs writes it down."""
+    """Specs round trip through JSON for all forms of `parameters`."""
     wanted = NOMINAL.replace(tendon_friction=1.0)
     with gym.make("shapechanger/Finger-v1", parameters=parameters, actions="length") as env:
         assert env.unwrapped.parameters == wanted
@@ -244,8 +244,8 @@ def test_a_spec_makes_the_env_again(parameters: Any) -> None:
         assert again.spec.kwargs["actions"] == "length"
 
 
-def test_a_gap_survives_in_a_spec() -> None:
-    """A spec is JSON, whatever the gap was given as; a finger_seed without a gap means nothing."""
+def test_a_gap_round_trips_in_a_spec() -> None:
+    """A gap in a spec is kept through JSON; `finger_seed` without a gap is refused."""
     with gym.make("shapechanger/Finger-v1", gap=GAPS["wide"], finger_seed=2) as env:
         parameters = env.unwrapped.parameters
         spec = EnvSpec.from_json(env.spec.to_json())
@@ -255,8 +255,8 @@ def test_a_gap_survives_in_a_spec() -> None:
         FingerReachEnv(finger_seed=2)
 
 
-def test_noise_is_in_what_is_sensed_and_not_in_where_it_is() -> None:
-    """Angles are off by the standard deviation that the finger has; its distance is true."""
+def test_noise_affects_observations_only() -> None:
+    """Angles and tensions have the given standard deviations; the distance is exact."""
     env = FingerReachEnv(parameters={"joint_noise": 0.02, "tension_noise": 0.3})
     env.reset(seed=0)
     off, tensions = [], []
@@ -271,8 +271,8 @@ def test_noise_is_in_what_is_sensed_and_not_in_where_it_is() -> None:
 
 
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
-def test_an_episode_begins_at_rest_however_late_commands_come(actions: str) -> None:
-    """Until the first one arrives each tendon is just taut; no episode knows of the last one."""
+def test_an_episode_starts_at_rest_with_any_delay(actions: str) -> None:
+    """Until the first command acts, tendons are just taut, whatever the last episode did."""
     for parameters in ({}, {"command_delay": 0.040}):
         env = FingerReachEnv(actions=actions, parameters=parameters)
         for _ in range(2):

@@ -1,4 +1,4 @@
-"""`FingerTrack-v1`: paths that can be followed, those that cannot, and how well it went."""
+"""`FingerTrack-v1`: paths, observations and errors."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from shapechanger.tasks.finger import fingertip
 from shapechanger.tasks.paths import KINDS, circle, from_callable, from_csv
 
 _NOTHING = np.zeros(7, np.float32)
-# 1.5 s along x, at a place that can be reached.
+# A reachable path of 1.5 s along x.
 _TABLE = "t,x,y,z\n" + "".join(
     f"{0.1 * i:.1f},{0.045 + 0.001 * i:.4f},0,-0.045\n" for i in range(16)
 )
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_shape_can_be_followed_as_it_comes(kind: str) -> None:
-    """And the finger starts on it, at rest."""
+def test_default_shapes_can_be_followed(kind: str) -> None:
+    """Each shape is reachable with default settings, and the finger starts on it at rest."""
     env = FingerTrackEnv(path=kind)
     _, info = env.reset(seed=1)
     assert info["distance"] < 1e-5
@@ -36,7 +36,7 @@ def test_each_shape_can_be_followed_as_it_comes(kind: str) -> None:
 
 
 def test_observations_look_ahead() -> None:
-    """The end of the next step, and 0.06, 0.12 and 0.20 s from now, as ways from the fingertip."""
+    """Observations have the path after 0.02, 0.06, 0.12 and 0.20 s, relative to the fingertip."""
     env = FingerTrackEnv()
     seen, info = env.reset(seed=0)
     begins = info["target"]
@@ -57,8 +57,8 @@ def test_observations_look_ahead() -> None:
         np.testing.assert_allclose(info["target"], point, atol=1e-12)
 
 
-def test_the_error_is_the_root_mean_square_after_half_a_second() -> None:
-    """None before, and from then on that of the distances since; below 3 mm it is a success."""
+def test_the_rms_error_starts_after_half_a_second() -> None:
+    """`rms` is infinite for 0.5 s, then the RMS distance since; below 3 mm is a success."""
     env = FingerTrackEnv()
     _, info = env.reset(seed=0)
     assert info["rms"] == math.inf
@@ -86,20 +86,20 @@ def test_the_error_is_the_root_mean_square_after_half_a_second() -> None:
 def test_a_path_that_leaves_the_workspace_is_refused(
     place: tuple[float, float, float], beyond: tuple[float, float]
 ) -> None:
-    """Where, when and by how much; a millimetre is one in the message."""
+    """The error states where, when and by how much."""
     path = circle(0.012, place, hz=1.5)
     with pytest.raises(PathError, match="The path leaves the finger's reach: at ") as caught:
         FingerTrackEnv(path=path)
     words = str(caught.value).split()
-    said = float(words[words.index("beyond.") - 2])
-    assert beyond[0] < said < beyond[1]
+    beyond_mm = float(words[words.index("beyond.") - 2])
+    assert beyond[0] < beyond_mm < beyond[1]
     at = float(words[words.index("s") - 1])
     x, y, z = (float(word.strip("(),")) for word in words[words.index("mm,") - 3 :][:3])
     np.testing.assert_allclose([x, y, z], 1e3 * path.at(at), atol=1.0)
 
 
 def test_a_path_that_is_too_fast_is_refused() -> None:
-    """When, and what is missing; a slower one is well."""
+    """The error states when and which torque is missing; a slower path is accepted."""
     with pytest.raises(
         PathError, match=r"too weak .* at \d.\d\d s a joint lacks .* Make it slower"
     ):
@@ -107,8 +107,8 @@ def test_a_path_that_is_too_fast_is_refused() -> None:
     require_reachable(circle(hz=1.5))
 
 
-def test_the_angles_that_begin_a_path_begin_it() -> None:
-    """Their fingertip is its first point."""
+def test_the_start_angles_are_on_the_path() -> None:
+    """The fingertip of the start angles is the first point of the path."""
     path = circle(phase=1.0)
     angles = require_reachable(path)
     place = fingertip(angles, PHALANX_LENGTH_M)
@@ -116,7 +116,7 @@ def test_the_angles_that_begin_a_path_begin_it() -> None:
 
 
 def test_a_file_can_be_followed(tmp_path: File) -> None:
-    """From its beginning to its end, where the point stays."""
+    """The target follows the file and stays at its last point."""
     file = tmp_path / "tip.csv"
     file.write_text(_TABLE)
     env = FingerTrackEnv(path=str(file))
@@ -136,10 +136,8 @@ def test_a_file_can_be_followed(tmp_path: File) -> None:
         (("t,x,y,z", "t,x,y"), "lacks z"),
     ],
 )
-def test_a_file_with_gaps_or_time_running_backwards_is_refused(
-    tmp_path: File, change: tuple[str, str], sentence: str
-) -> None:
-    """With its name and line, before there is an env."""
+def test_invalid_files_are_refused(tmp_path: File, change: tuple[str, str], sentence: str) -> None:
+    """Errors of the file name the line, and are raised when the env is made."""
     file = tmp_path / "tip.csv"
     assert change[0] in _TABLE
     file.write_text(_TABLE.replace(*change))
@@ -148,7 +146,7 @@ def test_a_file_with_gaps_or_time_running_backwards_is_refused(
 
 
 def test_a_file_in_millimetres_is_refused(tmp_path: File) -> None:
-    """As beyond reach or as too fast, and the sentence says what the unit is."""
+    """The error names the expected unit."""
     rows = [f"{0.1 * i:.1f},{45 + i},0,-45" for i in range(16)]
     file = tmp_path / "tip.csv"
     file.write_text("\n".join(["t,x,y,z", *rows]))
@@ -157,24 +155,24 @@ def test_a_file_in_millimetres_is_refused(tmp_path: File) -> None:
 
 
 def test_a_function_of_time_can_be_followed() -> None:
-    """Also one that goes on for ever; one that leaves is refused where it is farthest out."""
+    """Endless functions are accepted; one that leaves the workspace is refused."""
 
-    def sways(t: float) -> tuple[float, float, float]:
+    def swaying(t: float) -> tuple[float, float, float]:
         return 0.05 + 0.005 * math.sin(t), 0.0, -0.045
 
-    env = FingerTrackEnv(path=sways)
+    env = FingerTrackEnv(path=swaying)
     _, info = env.reset(seed=0)
     np.testing.assert_allclose(info["target"], [0.05, 0.0, -0.045])
 
-    def leaves(t: float) -> tuple[float, float, float]:
+    def leaving(t: float) -> tuple[float, float, float]:
         return 0.05 + 0.1 * t, 0.0, -0.045
 
     with pytest.raises(PathError, match=r"at 0.60 s it is at \(110.0, 0.0, -45.0\) mm"):
-        FingerTrackEnv(path=from_callable(leaves, duration_s=0.6))
+        FingerTrackEnv(path=from_callable(leaving, duration_s=0.6))
 
 
 def test_another_path_can_be_given_at_a_reset() -> None:
-    """It is kept from then on; one that cannot be followed leaves the present one."""
+    """A new path is kept until the next; an invalid one leaves the old path."""
     env = FingerTrackEnv()
     env.reset(seed=0)
     first = env.path
@@ -195,7 +193,7 @@ def test_another_path_can_be_given_at_a_reset() -> None:
 
 @pytest.mark.slow
 def test_random_paths_differ_and_can_be_followed() -> None:
-    """Another at each reset, by its seed; all of the shape, size and pace that is stated."""
+    """Random paths follow from the seed, are reachable, and have the documented durations."""
     env = FingerTrackEnv(path="random")
     found = []
     for seed in (1, 2, 1):
@@ -216,7 +214,7 @@ def test_random_paths_differ_and_can_be_followed() -> None:
 
 @pytest.mark.parametrize("path", ["line", {"kind": "circle", "radius": 0.008, "hz": 1.0}])
 def test_a_spec_makes_the_env_again(path: Any) -> None:
-    """As JSON, where the path is a name, with settings or without."""
+    """Specs with a named path round trip through JSON."""
     with gym.make("shapechanger/FingerTrack-v1", path=path) as env:
         spec = EnvSpec.from_json(env.spec.to_json())
         wanted = env.unwrapped.path.at([0.0, 0.2])
@@ -224,8 +222,8 @@ def test_a_spec_makes_the_env_again(path: Any) -> None:
         np.testing.assert_array_equal(again.unwrapped.path.at([0.0, 0.2]), wanted)
 
 
-def test_a_table_is_a_path_too(tmp_path: File) -> None:
-    """Read beforehand, it needs no file any more."""
+def test_a_loaded_file_is_a_path(tmp_path: File) -> None:
+    """A path read from a file does not need the file any more."""
     file = tmp_path / "tip.csv"
     file.write_text(_TABLE)
     path = from_csv(file)

@@ -1,4 +1,4 @@
-"""Velocities of joints whose angles are measured."""
+"""Velocities from measured joint angles."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from shapechanger.bodies.finger.anatomy import JOINT_REST
 from shapechanger.envs.finger.plant import FingerPlant, JointVelocities
 
 
-def test_a_steady_speed_is_found_with_a_lag_of_40_ms() -> None:
-    """After each period of 20 ms what is missing is exp(-1/2) of what it was."""
+def test_velocities_have_a_lag_of_40_ms() -> None:
+    """The error of a constant speed shrinks by exp(-1/2) per period of 20 ms."""
     velocities = JointVelocities(0.020)
-    said = [velocities.of(np.array([0.02 * i, -0.04 * i])) for i in range(4)]
+    found = [velocities.of(np.array([0.02 * i, -0.04 * i])) for i in range(4)]
     left = [math.exp(-i / 2) for i in range(4)]
-    np.testing.assert_allclose(said, [[1.0 - x, -2.0 * (1.0 - x)] for x in left], atol=1e-12)
+    np.testing.assert_allclose(found, [[1.0 - x, -2.0 * (1.0 - x)] for x in left], atol=1e-12)
     velocities.forget()
     np.testing.assert_array_equal(velocities.of(np.array([9.0, 9.0])), np.zeros(2))
 
 
-def test_what_is_given_is_not_changed_later() -> None:
-    """Whoever hands in an array may use it again."""
+def test_inputs_are_copied() -> None:
+    """Changing the given array later has no effect."""
     velocities, angles = JointVelocities(0.020), np.zeros(1)
     first = velocities.of(angles)
     angles[:] = 1.0
@@ -31,8 +31,8 @@ def test_what_is_given_is_not_changed_later() -> None:
     assert second[0] > 0.0
 
 
-def test_a_finger_with_noisy_joints_has_these_velocities() -> None:
-    """So simulation and rig say the same of the same angles."""
+def test_noisy_joints_have_filtered_velocities() -> None:
+    """Simulated fingers with joint noise use the filter of rigs."""
     noisy = NOMINAL.replace(joint_noise=0.01)
     plant = FingerPlant(noisy, drive_of("tension", noisy), 0.020)
     velocities, rng = JointVelocities(0.020), np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""A twin that an env serves for itself."""
+"""Twins that an env serves itself."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from shapechanger.errors import FingerError, UnknownName
 RIG = "shapechanger/RemoteFinger-v1"
 
 
-def test_there_is_no_such_twin() -> None:
-    """With what there is, and the nearest; nothing is started."""
+def test_an_unknown_twin_is_refused() -> None:
+    """The error suggests the nearest name, and nothing is started."""
     with pytest.raises(UnknownName, match="real-like"):
         gym.make(RIG, twin="real-lik")
 
 
 @pytest.mark.parametrize("twin", ["", "nominal"])
-def test_a_finger_of_no_gap_has_no_seed(twin: str) -> None:
-    """As for `Finger-v1`."""
+def test_finger_seed_needs_a_gap(twin: str) -> None:
+    """`finger_seed` without a gap is refused, as for `Finger-v1`."""
     with pytest.raises(FingerError, match="selects a finger of a gap"):
         gym.make(RIG, twin=twin, finger_seed=3)
 
 
-def test_a_finger_with_gears_is_one_of_the_gap() -> None:
-    """Its bones stay; what its servos are like is within the ranges."""
+def test_a_geared_finger_is_within_its_gap() -> None:
+    """Arms stay nominal, and the motors are within the ranges of the gap."""
     geared = with_gears(NOMINAL)
     gap = GAPS["geared"]
     assert geared.moment_arms == NOMINAL.moment_arms

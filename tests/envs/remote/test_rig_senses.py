@@ -1,4 +1,4 @@
-"""What a rig says, in the terms of `Finger-v1`."""
+"""Observations of a rig in the terms of `Finger-v1`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _senses_of(profile: Profile) -> RigSenses:
 
 
 def _senses() -> RigSenses:
-    """Of a rig without encoders at its joints."""
+    """Return the senses of a rig without joint encoders."""
     text = find_profile("finger").read_text()
     begin, end = text.index("[sensor.joints]"), text.index("[limits]")
     return _senses_of(read_profile(text[:begin] + text[end:], Path("it.toml")))
@@ -48,12 +48,12 @@ def _state(angles: NDArray[np.float64], tensions: NDArray[np.float64]) -> NDArra
 
 
 def _measured(angles: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The state of a rig with encoders, at rest and without stretch."""
+    """Return the state of a rig with encoders, at rest and without stretch."""
     return np.concatenate([-arms @ angles, np.zeros(14), angles, np.zeros(7)])
 
 
 def test_angles_follow_from_lengths_and_stretch() -> None:
-    """Exactly, where the arms are the nominal ones."""
+    """Angles are exact for nominal arms."""
     tensions = np.linspace(2.0, 20.0, 7)
     seen = _senses().read(_state(JOINT_REST, tensions), (), np.zeros(7))
     np.testing.assert_allclose(seen.angles, JOINT_REST, atol=1e-12)
@@ -61,8 +61,8 @@ def test_angles_follow_from_lengths_and_stretch() -> None:
     np.testing.assert_array_equal(seen.tensions, tensions)
 
 
-def test_what_nothing_measured_keeps_its_value() -> None:
-    """A servo that was not heard once does not throw the finger about."""
+def test_missing_readings_keep_their_value() -> None:
+    """A missing reading of one servo keeps its last value."""
     senses = _senses()
     first = senses.read(_state(JOINT_REST, np.full(7, 2.0)), (), np.zeros(7))
     later = _state(JOINT_REST, np.full(7, 2.0))
@@ -71,8 +71,8 @@ def test_what_nothing_measured_keeps_its_value() -> None:
     np.testing.assert_array_equal(kept.lengths, first.lengths)
 
 
-def test_lengths_of_no_finger_are_refused() -> None:
-    """A servo that forgot a turn is a centimetre off and more; a stiff cord is not."""
+def test_inconsistent_lengths_are_refused() -> None:
+    """An offset of one turn of a spool is refused; 4 mm of stretch is not."""
     senses = _senses()
     state = _state(JOINT_REST, np.full(7, 2.0))
     state[3] += 0.004
@@ -82,8 +82,8 @@ def test_lengths_of_no_finger_are_refused() -> None:
         senses.require_fit(senses.read(state, (), np.zeros(7)))
 
 
-def test_tensions_become_shares_of_what_each_tendon_may_pull() -> None:
-    """Below the pretension 0, above the most 1."""
+def test_tensions_become_shares_of_their_range() -> None:
+    """The pretension and less is 0, the maximum and more is 1."""
     senses = _senses()
     np.testing.assert_array_equal(senses.values(np.zeros(7)), np.zeros(7))
     np.testing.assert_array_equal(senses.values(np.full(7, 99.0)), np.ones(7))
@@ -92,8 +92,8 @@ def test_tensions_become_shares_of_what_each_tendon_may_pull() -> None:
     assert (senses.most <= MOST_TENSION_N + 1e-9).all()
 
 
-def test_the_order_is_the_rigs(tmp_path: Path) -> None:
-    """Whatever order a profile has its tendons in."""
+def test_the_order_is_that_of_the_rig(tmp_path: Path) -> None:
+    """Values are in the order of the profile's tendons."""
     text = find_profile("finger").read_text()
     begin, end = text.index("[action.FDP]"), text.index("[action.FDS]")
     moved = text[:begin] + text[end:] + "\n" + text[begin:end]
@@ -106,13 +106,13 @@ def test_the_order_is_the_rigs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["car", "finger-pwm"])
 def test_other_robots_are_refused(name: str) -> None:
-    """They have no tendons, or do not measure them."""
+    """Robots without tendons, or without their measurement, are refused."""
     with pytest.raises(RobotRefused, match="it is not a finger"):
         _senses_of(load_profile(find_profile(name)))
 
 
-def test_encoders_know_where_the_fingertip_is_whatever_the_arms() -> None:
-    """With arms off by 20 % lengths alone would say something else."""
+def test_encoders_give_the_fingertip_for_any_arms() -> None:
+    """With arms off by 20 %, encoders are exact and lengths are not."""
     rng = np.random.default_rng(1)
     arms = MOMENT_ARMS * (1.0 + rng.uniform(-0.2, 0.2, MOMENT_ARMS.shape))
     angles = np.array([0.9, -0.1, 1.1, 0.6])
@@ -125,7 +125,7 @@ def test_encoders_know_where_the_fingertip_is_whatever_the_arms() -> None:
 
 
 def test_velocities_are_smoothed_differences_of_the_encoders() -> None:
-    """Those of a finger in simulation with noisy joints; an episode begins at rest."""
+    """Velocities equal those of the simulation with joint noise, and start at zero."""
     senses, differences = _encoders(), JointVelocities(0.02)
     fastest = 0.0
     for i in range(5):
@@ -140,7 +140,7 @@ def test_velocities_are_smoothed_differences_of_the_encoders() -> None:
 
 
 def test_an_encoder_that_was_not_read_keeps_its_angle() -> None:
-    """The others go on."""
+    """Other encoders are still updated."""
     senses = _encoders()
     senses.read(_measured(JOINT_REST, MOMENT_ARMS), (), np.zeros(7))
     later = _measured(JOINT_REST + 0.1, MOMENT_ARMS)
@@ -148,8 +148,8 @@ def test_an_encoder_that_was_not_read_keeps_its_angle() -> None:
     np.testing.assert_allclose(seen.angles, JOINT_REST + np.array([0.1, 0.1, 0.0, 0.1]))
 
 
-def test_a_lost_turn_is_told_from_arms_that_are_off() -> None:
-    """At any posture, for any tendon, in either direction; spools have 31 mm a turn and more."""
+def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
+    """A lost turn of any spool is detected with arms off by up to 20 %."""
     rng = np.random.default_rng(0)
     senses, (low, high) = _encoders(), JOINT_RANGE.T
     for _ in range(300):
