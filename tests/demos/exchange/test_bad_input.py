@@ -74,7 +74,7 @@ def _pipe(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "says"),
+    ("spoil", "expected"),
     [
         (lambda f: (f / SECOND).unlink(), f"line 2 names '{SECOND}', which is not in"),
         (_edit(SECOND, lambda jpeg: jpeg[:-300]), "is damaged"),
@@ -102,12 +102,12 @@ def _pipe(folder: Path) -> None:
     ],
 )
 def test_a_damaged_folder_of_2017(
-    tmp_path: Path, spoil: Callable[[Path], object], says: str
+    tmp_path: Path, spoil: Callable[[Path], object], expected: str
 ) -> None:
     """The error names the file or line, and the remedy."""
     folder = keys_folder(tmp_path / "keys")
     spoil(folder)
-    assert says in refused(folder, tmp_path / "data")
+    assert expected in refused(folder, tmp_path / "data")
 
 
 def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
@@ -121,7 +121,7 @@ _GOOD = [{"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 50 * n} for 
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("change", "expected"),
     [
         ({"user/angle": 1.5}, "user/angle is 1.5"),
         ({"user/angle": "left"}, "user/angle is 'left'"),
@@ -132,11 +132,11 @@ _GOOD = [{"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 50 * n} for 
         ({"_timestamp_ms": 500}, "Time runs backwards"),
     ],
 )
-def test_a_damaged_tub(tmp_path: Path, change: dict[str, object], says: str) -> None:
+def test_a_damaged_tub(tmp_path: Path, change: dict[str, object], expected: str) -> None:
     """The error names the catalog and the line."""
     records = [*_GOOD[:1], _GOOD[1] | change, *_GOOD[2:]]
     text = refused(tub_folder(tmp_path / "tub", records), tmp_path / "data")
-    assert says in text
+    assert expected in text
     assert "catalog_0.catalog, line 2" in text
 
 
@@ -170,7 +170,7 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "says"),
+    ("spoil", "expected"),
     [
         (lambda f: (f / "header.json").unlink(), "There is no header.json"),
         (_edit("header.json", lambda t: t[:40]), "is not valid JSON"),
@@ -192,12 +192,12 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
         (_edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)), "8 x 8 pixels, and not 40"),
     ],
 )
-def test_damaged_csv(tmp_path: Path, spoil: Callable[[Path], object], says: str) -> None:
+def test_damaged_csv(tmp_path: Path, spoil: Callable[[Path], object], expected: str) -> None:
     """Damage by a spreadsheet or an incomplete copy is named."""
     drive(tmp_path / "recorded")
     export_recording(tmp_path / "recorded", tmp_path / "csv", "csv")
     spoil(tmp_path / "csv")
-    assert says in refused(tmp_path / "csv", tmp_path / "data")
+    assert expected in refused(tmp_path / "csv", tmp_path / "data")
 
 
 def _in_file(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
@@ -222,7 +222,7 @@ def _spoilt(file: h5py.File) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "says"),
+    ("spoil", "expected"),
     [
         (lambda f: (f / "data/main_data.hdf5").unlink(), "which is not in"),
         (_edit("data/main_data.hdf5", lambda b: b[:3000]), "is not an intact HDF5 file"),
@@ -236,13 +236,13 @@ def _spoilt(file: h5py.File) -> None:
     ],
 )
 def test_a_damaged_minari_dataset(
-    tmp_path: Path, spoil: Callable[[Path], object], says: str
+    tmp_path: Path, spoil: Callable[[Path], object], expected: str
 ) -> None:
     """The error names what is missing, and no other file is opened."""
     drive(tmp_path / "recorded")
     export_recording(tmp_path / "recorded", tmp_path / "set-v0", "minari")
     spoil(tmp_path / "set-v0")
-    assert says in refused(tmp_path / "set-v0", tmp_path / "data")
+    assert expected in refused(tmp_path / "set-v0", tmp_path / "data")
 
 
 def test_folders_of_unknown_format(tmp_path: Path) -> None:
@@ -291,7 +291,7 @@ def test_invalid_outputs(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "changes", "says"),
+    ("name", "changes", "expected"),
     [
         ("2017", {}, "steering, throttle, and those of the format of 2017"),
         ("minari", {"control_hz": 10.0}, "20, and .* 10: a Minari dataset has one kind"),
@@ -299,18 +299,18 @@ def test_invalid_outputs(tmp_path: Path) -> None:
     ],
 )
 def test_recordings_that_do_not_fit_a_format(
-    tmp_path: Path, name: str, changes: dict[str, object], says: str
+    tmp_path: Path, name: str, changes: dict[str, object], expected: str
 ) -> None:
     """Other actions, mixed rates and mixed image sizes are refused."""
     drive(tmp_path / "data")
     drive(tmp_path / "data", **changes)
-    with pytest.raises(DemosError, match=says):
+    with pytest.raises(DemosError, match=expected):
         export_recording(tmp_path / "data", tmp_path / "out-v0", name)
     assert [path.name for path in tmp_path.iterdir()] == ["data"]
 
 
 @pytest.mark.parametrize(
-    ("jpeg", "says"),
+    ("jpeg", "expected"),
     [
         (picture(1)[:-200], "is damaged"),
         (huge(), "claims 60000 x 60000"),
@@ -318,14 +318,14 @@ def test_recordings_that_do_not_fit_a_format(
         (picture(1, grey=True), "is grey, and the first one is not"),
     ],
 )
-def test_frames_that_minari_cannot_read(tmp_path: Path, jpeg: bytes, says: str) -> None:
+def test_frames_that_minari_cannot_read(tmp_path: Path, jpeg: bytes, expected: str) -> None:
     """Minari decodes all frames of an episode at once, so one bad frame is refused."""
     steps = [
         (Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0)), data)
         for data in (picture(0), jpeg)
     ]
     record(tmp_path / "data", header(), steps)
-    with pytest.raises(DemosError, match=says):
+    with pytest.raises(DemosError, match=expected):
         export_recording(tmp_path / "data", tmp_path / "out-v0", "minari")
     assert [path.name for path in tmp_path.iterdir()] == ["data"]
 
