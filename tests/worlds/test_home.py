@@ -7,7 +7,7 @@ from shapechanger.worlds.course import HOME
 from shapechanger.worlds.layout import WORLDS
 
 
-def test_every_vehicle_is_at_home_somewhere() -> None:
+def test_every_vehicle_has_a_default_world() -> None:
     """`HOME` lists every vehicle with an existing world."""
     assert set(HOME) == set(VEHICLES)
     assert set(HOME.values()) == set(WORLDS)
