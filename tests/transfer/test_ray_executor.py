@@ -127,16 +127,16 @@ def test_a_job_that_fails_is_reported_and_the_rest_goes_on(cluster: Any, tmp_pat
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:9", "nowhere", "ray://127.0.0.1:9"])
-def test_an_address_that_does_not_answer_is_one_sentence(address: str) -> None:
-    """An address without an answer is refused within ten seconds."""
+def test_an_address_without_an_answer_is_refused(address: str) -> None:
+    """The error comes within ten seconds."""
     began = time.monotonic()
     with pytest.raises(StudyError, match=r"does not answer|HOST:PORT"):
         RayCluster(address).run([], lambda *_: None)
     assert time.monotonic() - began < 10.0
 
 
-def test_what_listens_but_is_no_ray_is_one_sentence() -> None:
-    """Another program at the address is refused."""
+def test_another_program_at_the_address_is_refused() -> None:
+    """One sentence, without a traceback."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         began = time.monotonic()

@@ -44,7 +44,7 @@ def test_wrong_settings_are_refused(
         resolve_learner("ppo-run", changed)
 
 
-def test_every_learner_says_what_it_was_tuned_on() -> None:
+def test_every_learner_states_its_tuning_envs() -> None:
     """The envs exist, and the text states whether an env is one of them."""
     assert set(TUNED_ON) == set(LEARNERS)
     for names in TUNED_ON.values():
