@@ -1,4 +1,4 @@
-"""What changing a body costs, compared with loading it, on whatever machine this is."""
+"""Cost of editing a body relative to loading it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PATH = os.path.join(ASSETS, "ant.xml")
 
 
 def _fastest(work: Callable[[], object], rounds: int = 15) -> float:
-    """The shortest of several runs, s: what the work costs when nothing disturbs it."""
+    """Return the shortest duration of several runs, s."""
     durations: list[float] = []
     for _ in range(rounds):
         start = time.perf_counter()
@@ -26,7 +26,7 @@ def _fastest(work: Callable[[], object], rounds: int = 15) -> float:
 
 
 def test_an_extended_ant_costs_a_few_plain_ones() -> None:
-    """Load, edit and compile the largest named body: less than six times the plain ant."""
+    """Loading, editing and compiling it takes less than six plain ants."""
     plain = _fastest(lambda: mujoco.MjSpec.from_file(_PATH).compile())
     extended = _fastest(lambda: compile_body(ANT.load(_PATH), ANT.body("ExtendedAnt")))
     assert extended < 6.0 * plain
