@@ -83,9 +83,9 @@ def test_adapted_sources_are_saved(study: tuple[Study, Path, list[Any]]) -> None
 def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
     """Every arm reports success, and so does the source policy in the source."""
     made, _, _ = study
-    said = {row.kind: row.success for row in arm_rows(made)}
-    assert set(said) == {"source", "random", "zero-action", *_EVERY}
-    assert said["randomised"].startswith("0 % [0 %, 0 %]")
+    successes = {row.kind: row.success for row in arm_rows(made)}
+    assert set(successes) == {"source", "random", "zero-action", *_EVERY}
+    assert successes["randomised"].startswith("0 % [0 %, 0 %]")
     assert made.plan.measure == "success"
     assert any("whose finger_seed is the index of the seed" in words for words in caveats(made))
 

@@ -47,7 +47,7 @@ def test_a_state_is_mirrored_with_its_image() -> None:
         (Layout((Feature("speed", "1", shape=(3,)),)), "array speed"),
     ],
 )
-def test_a_layout_without_a_mirror_says_why(layout: Layout, name: str) -> None:
+def test_a_layout_without_a_mirror_is_refused(layout: Layout, name: str) -> None:
     """The error names the feature."""
     with pytest.raises(CloningError, match=f"the mirror image of .*{name}"):
         mirror_of(layout)

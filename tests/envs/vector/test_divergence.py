@@ -45,8 +45,8 @@ def test_other_envs_are_unaffected(name: str, mode: str, threads: int) -> None:
     assert terminated.tolist() == [False, True, False]
     assert rewards[1] == 0.0
     assert np.isfinite(observations).all()
-    told = infos["final_info"] if mode == "SameStep" else infos
-    assert told["diverged"].tolist() == told["_diverged"].tolist() == [False, True, False]
+    final = infos["final_info"] if mode == "SameStep" else infos
+    assert final["diverged"].tolist() == final["_diverged"].tolist() == [False, True, False]
     if mode == "Disabled":
         broken.reset(options={"reset_mask": terminated})
     for _ in range(5):

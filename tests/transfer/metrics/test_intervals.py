@@ -129,7 +129,7 @@ def test_same_generator_same_interval() -> None:
         (ARM[:1], SCRATCH, "at least two seeds"),
         (ARM, SCRATCH[:1], "at least two seeds"),
         (np.full(3, 0.2), np.full(4, 0.1), "all seeds equal"),
-        # Equal up to rounding, which is no spread either.
+        # Equal up to rounding, which counts as no spread.
         (np.array([0.3, 0.1 + 0.2]), np.full(4, 0.1), "all seeds equal"),
         # Differences too small for a variance.
         (np.array([0.0, 1e-280]), np.full(4, 0.1), "all seeds equal"),

@@ -62,7 +62,7 @@ def test_progress_counts_laps_and_counts_down() -> None:
     assert metres == pytest.approx(-1.0, abs=0.2)
 
 
-def test_standing_still_is_no_progress() -> None:
+def test_standing_still_makes_no_progress() -> None:
     """A vehicle at rest makes no progress."""
     course = ring(1)
     progress = CourseProgress(course)
