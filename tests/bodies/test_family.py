@@ -21,7 +21,7 @@ def test_bodies_are_found_by_name() -> None:
     assert FAMILY.body("LongLeg") == (Stretch("thigh", 2.0),)
 
 
-def test_a_name_that_is_not_there_is_named() -> None:
+def test_an_unknown_name_is_refused() -> None:
     """The error names the family and the nearest body."""
     with pytest.raises(
         UnknownName, match=r"No body of the family Leg matches 'LongLegs'\. Did you"
@@ -31,7 +31,7 @@ def test_a_name_that_is_not_there_is_named() -> None:
         FAMILY.body("")
 
 
-def test_bodies_may_be_edits_or_their_json() -> None:
+def test_bodies_can_be_edits_or_json() -> None:
     """Edits and JSON are accepted as well as names."""
     edits = (Stretch("thigh", 2.0), Mass("shin", scale=2.0))
     text = to_json(edits)
@@ -42,8 +42,8 @@ def test_bodies_may_be_edits_or_their_json() -> None:
 
 
 @pytest.mark.parametrize("value", ["[1]", "{}", "[", 3, None, ["LongLeg"]])
-def test_what_is_no_body_is_refused(value: Any) -> None:
-    """Invalid bodies raise an error."""
+def test_invalid_bodies_are_refused(value: Any) -> None:
+    """Other values raise MorphologyError."""
     with pytest.raises(MorphologyError):
         FAMILY.body(value)
 

@@ -1,4 +1,4 @@
-"""The case to show: a policy of the ant in the extended ant, and back, for PPO and SAC."""
+"""Transfer of Ant policies to ExtendedAnt and back, for PPO and SAC."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ STEPS = 30
 
 @pytest.fixture(scope="module")
 def ants() -> tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap]:
-    """Both envs, and the map that moves each foot as its ankle."""
+    """Both envs, and the map that drives each foot like its ankle."""
     ant, extended = gym.make("shapechanger/Ant-v1"), gym.make("shapechanger/ExtendedAnt-v1")
     return ant, extended, body_map(ant, extended, rules={"foot_*/motor": "copy ankle_*/motor"})
 
 
-def opinionated(kind: type[PPO] | type[SAC], env: gym.Env[Any, Any]) -> Any:
-    """An untrained model whose weights are large enough to matter."""
+def perturbed_model(kind: type[PPO] | type[SAC], env: gym.Env[Any, Any]) -> Any:
+    """Return an untrained model with weights large enough to matter."""
     settings: dict[str, Any] = {"n_steps": 64, "batch_size": 64} if kind is PPO else {}
     model = kind("MlpPolicy", env, device="cpu", seed=0, **settings)
     generator = torch.Generator().manual_seed(1)
@@ -35,8 +35,8 @@ def opinionated(kind: type[PPO] | type[SAC], env: gym.Env[Any, Any]) -> Any:
     return model
 
 
-def walk(model: Any, env: gym.Env[Any, Any]) -> list[NDArray[np.float64]]:
-    """What the env shows while a policy acts in it."""
+def rollout(model: Any, env: gym.Env[Any, Any]) -> list[NDArray[np.float64]]:
+    """Return the observations of a rollout."""
     observation, _ = env.reset(seed=3)
     seen = [observation]
     for _ in range(STEPS):
@@ -49,14 +49,14 @@ def walk(model: Any, env: gym.Env[Any, Any]) -> list[NDArray[np.float64]]:
 
 
 @pytest.mark.parametrize("kind", [PPO, SAC])
-def test_the_transplanted_policy_does_what_the_mapped_one_does(
+def test_the_transplanted_policy_acts_like_the_mapped_one(
     ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap], kind: type[PPO] | type[SAC]
 ) -> None:
-    """On observations of real rollouts the actions of both agree to 1e-6, motor by motor."""
+    """Actions on rollout observations agree to 1e-6."""
     ant, extended, crossing = ants
-    source = opinionated(kind, ant)
+    source = perturbed_model(kind, ant)
     target = transplant(source, crossing, extended)
-    seen = walk(target, extended)
+    seen = rollout(target, extended)
     assert len(seen) > 5
     for observation in seen:
         ours, _ = target.predict(observation, deterministic=True)
@@ -68,16 +68,16 @@ def test_the_transplanted_policy_does_what_the_mapped_one_does(
 def test_values_agree_on_real_observations(
     ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap], kind: type[PPO] | type[SAC]
 ) -> None:
-    """V and Q judge in the target as in the source, in double precision to 1e-6."""
+    """V and Q agree between source and target to 1e-6, in double precision."""
     ant, extended, crossing = ants
-    source = opinionated(kind, ant)
+    source = perturbed_model(kind, ant)
     source.policy.double()
     target = transplant(source, crossing, extended)
-    seen = torch.as_tensor(np.stack(walk(opinionated(kind, extended), extended)))
+    seen = torch.as_tensor(np.stack(rollout(perturbed_model(kind, extended), extended)))
     adapted = torch.as_tensor(crossing.adapt_observation(seen.numpy()))
     with torch.no_grad():
         if kind is PPO:
-            # `predict_values` would round the observations to single precision first.
+            # `predict_values` would first round the observations to single precision.
             ours, theirs = (
                 model.policy.value_net(model.policy.mlp_extractor.forward_critic(observations))
                 for model, observations in ((target, seen), (source, adapted))
@@ -92,15 +92,15 @@ def test_values_agree_on_real_observations(
 
 
 @pytest.mark.parametrize("kind", [PPO, SAC])
-def test_the_way_back_gives_the_ant_its_policy_again(
+def test_transplanting_back_restores_the_policy(
     ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap], kind: type[PPO] | type[SAC]
 ) -> None:
-    """Ant to ExtendedAnt to Ant acts as the ant's own policy did."""
+    """Ant to ExtendedAnt to Ant acts like the original policy."""
     ant, extended, crossing = ants
-    source = opinionated(kind, ant)
+    source = perturbed_model(kind, ant)
     there = transplant(source, crossing, extended)
     back = transplant(there, crossing.inverse(), ant)
-    for observation in walk(source, ant):
+    for observation in rollout(source, ant):
         ours, _ = back.predict(observation, deterministic=True)
         theirs, _ = source.predict(observation, deterministic=True)
         np.testing.assert_allclose(ours, theirs, atol=1e-6)
@@ -109,9 +109,9 @@ def test_the_way_back_gives_the_ant_its_policy_again(
 def test_an_ants_policy_runs_unchanged_on_the_wrapped_extended_ant(
     ants: tuple[gym.Env[Any, Any], gym.Env[Any, Any], BodyMap],
 ) -> None:
-    """The wrapped target has the source's spaces, and the policy needs nothing else."""
+    """The wrapped target has the spaces of the source."""
     ant, extended, crossing = ants
     wrapped = MappedEnv(extended, crossing)
     assert wrapped.action_space == ant.action_space
     assert cast("Any", wrapped.observation_space).shape == (105,)
-    assert len(walk(opinionated(PPO, ant), wrapped)) > 5
+    assert len(rollout(perturbed_model(PPO, ant), wrapped)) > 5

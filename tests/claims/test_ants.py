@@ -1,4 +1,4 @@
-"""What the docstrings say of ants: where they start, when they are healthy, how they are built."""
+"""Documented properties of the ants: starts, health and bodies."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _FLIPPED = [0.0, 1.0, 0.0, 0.0]
 
 
 def _random_body(seed: int) -> Body:
-    """Legs of all lengths and ranges, a stump, another segment, another leg, any start height."""
+    """Return a body with random legs, ranges, stump, segment, extra leg and start height."""
     rng = np.random.default_rng(seed)
 
     def factor() -> float:
@@ -60,14 +60,14 @@ def _random_body(seed: int) -> Body:
 
 
 def _stretched(seed: int) -> Body:
-    """The ant with thighs and shanks of other lengths."""
+    """Return an ant with other lengths of thighs and shanks."""
     rng = np.random.default_rng(seed)
     thighs, shanks = rng.uniform(0.5, 2.5, 2)
     return Stretch("aux_*", float(thighs)), Stretch("shank_*", float(shanks))
 
 
 def _bodies(*bodies: tuple[str, Body]) -> Any:
-    """Each ant of the catalogue as it is, and ants of these bodies."""
+    """Parametrize over each ant of the catalogue, and ants of these bodies."""
     cases = [pytest.param(env_id, {}, id=env_id) for env_id in _ANTS]
     passive = {"actuated_extension": False}
     cases.append(pytest.param("shapechanger/ExtendedAnt-v1", passive, id="passive feet"))
@@ -94,7 +94,7 @@ def ant(request: pytest.FixtureRequest) -> Iterator[Any]:
 
 
 def _place(env: Any, height: float, quaternion: list[float] | None = None) -> None:
-    """Put the trunk at a height, turned."""
+    """Set the height and orientation of the trunk."""
     pose = env.init_qpos.copy()
     pose[2] = height
     pose[3:7] = quaternion or [1.0, 0.0, 0.0, 0.0]
@@ -102,13 +102,13 @@ def _place(env: Any, height: float, quaternion: list[float] | None = None) -> No
 
 
 def _depth(env: Any) -> float:
-    """How deep a geom is in the floor, m, by MuJoCo's own list of contacts."""
+    """Return the deepest penetration of the floor, m, from MuJoCo's contacts."""
     floor = env.model.geom("floor").id
     return max((-c.dist for c in env.data.contact if floor in c.geom), default=0.0)
 
 
 def _lowest(env: Any) -> float:
-    """How high the lowest point of the spheres and capsules is, m."""
+    """Return the height of the lowest point of spheres and capsules, m."""
     model, data = env.model, env.data
     heights = []
     for geom in np.flatnonzero(model.geom_bodyid > 0):
@@ -127,7 +127,7 @@ def _lowest(env: Any) -> float:
 def test_no_ant_starts_outside_its_limits_or_in_the_floor(
     env_id: str, arguments: dict[str, Any], noise: float
 ) -> None:
-    """Fifty starts of each: a joint beyond its limit or a foot in the floor is shot out of it."""
+    """Fifty starts of each body: joints are within limits, and no geom is in the floor."""
     with gym.make(env_id, reset_noise_scale=noise, **arguments) as made:
         env: Any = made.unwrapped
         limited = np.flatnonzero(env.model.jnt_limited)
@@ -143,8 +143,8 @@ def test_no_ant_starts_outside_its_limits_or_in_the_floor(
 
 
 @_any_ant
-def test_a_start_is_as_near_to_the_models_as_may_be(env_id: str, arguments: dict[str, Any]) -> None:
-    """Each joint a tenth of its range inside its limits, the trunk no lower than its feet need."""
+def test_a_start_is_close_to_the_models_pose(env_id: str, arguments: dict[str, Any]) -> None:
+    """Joints keep a tenth of their range from limits, and the trunk is only raised as needed."""
     with gym.make(env_id, reset_noise_scale=0.0, **arguments) as made:
         made.reset(seed=0)
         env: Any = made.unwrapped
@@ -166,7 +166,7 @@ def test_a_start_is_as_near_to_the_models_as_may_be(env_id: str, arguments: dict
 def test_the_standing_height_is_where_the_lowest_point_touches(
     env_id: str, arguments: dict[str, Any]
 ) -> None:
-    """With each joint in the middle of its range and the trunk upright."""
+    """Joints are in the middle of their ranges, and the trunk is upright."""
     with gym.make(env_id, **arguments) as made:
         env: Any = made.unwrapped
         limited = np.flatnonzero(env.model.jnt_limited)
@@ -182,7 +182,7 @@ def test_the_standing_height_is_where_the_lowest_point_touches(
 
 @_ants_that_stand
 def test_an_ant_without_torque_stays_healthy(env_id: str, arguments: dict[str, Any]) -> None:
-    """It does not end its episode by lying down, at whatever height it comes to rest."""
+    """An ant that lies down does not end its episode."""
     with gym.make(env_id, **arguments) as made:
         env: Any = made.unwrapped
         made.reset(seed=11)
@@ -197,7 +197,7 @@ def test_an_ant_without_torque_stays_healthy(env_id: str, arguments: dict[str, A
 
 
 def test_a_flipped_ant_is_unhealthy_at_once(ant: Any) -> None:
-    """Though its height is one that an ant may have."""
+    """A flipped ant is unhealthy although its height is in range."""
     low, high = ant.healthy_z_range
     for height in (0.27, ant.standing_height):
         assert low <= height <= high
@@ -210,7 +210,7 @@ def test_a_flipped_ant_is_unhealthy_at_once(ant: Any) -> None:
 
 
 def test_a_flipped_ant_rests_where_one_lies_down(ant: Any) -> None:
-    """At 0.27 m, so a lower height cannot tell the two apart."""
+    """Both rest at 0.27 m, so the height cannot distinguish them."""
     _place(ant, 0.5, _FLIPPED)
     for _ in range(200):
         ant.step(np.zeros(ant.model.nu))
@@ -220,8 +220,8 @@ def test_a_flipped_ant_rests_where_one_lies_down(ant: Any) -> None:
 
 
 @pytest.mark.parametrize("lean_deg", [0.0, 60.0, 89.0, 91.0, 120.0, 180.0])
-def test_up_is_where_the_trunk_points(ant: Any, lean_deg: float) -> None:
-    """The cosine of its lean, whichever way it leans and faces; below zero it is unhealthy."""
+def test_up_is_the_cosine_of_the_lean(ant: Any, lean_deg: float) -> None:
+    """An ant with a negative value is unhealthy."""
     for heading in (0.0, 1.0, -2.5):
         lean = math.radians(lean_deg)
         quaternion, turn = np.zeros(4), np.zeros(4)
@@ -236,7 +236,7 @@ def test_up_is_where_the_trunk_points(ant: Any, lean_deg: float) -> None:
 
 
 def test_a_thrown_ant_is_unhealthy(ant: Any) -> None:
-    """Above 1.9 times the height at which it stands."""
+    """The upper limit is 1.9 times the standing height."""
     assert ant.healthy_z_range == (-math.inf, 1.9 * ant.standing_height)
     for factor, healthy in ((1.89, True), (1.91, False)):
         _place(ant, factor * ant.standing_height)
@@ -245,13 +245,13 @@ def test_a_thrown_ant_is_unhealthy(ant: Any) -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_an_ant_that_exploded_is_unhealthy(ant: Any, value: float) -> None:
-    """A state that is no number ends the episode."""
+    """A state that is not finite ends the episode."""
     ant.data.qvel[7] = value
     assert not ant.is_healthy
 
 
-def test_heights_that_are_given_hold() -> None:
-    """For those who want Ant-v5's; a flipped ant is unhealthy all the same, on any body."""
+def test_healthy_z_range_can_be_set() -> None:
+    """The range of Ant-v5 applies to any body; a flipped ant is still unhealthy."""
     with gym.make("shapechanger/Ant-v1", healthy_z_range=(0.2, 1.0)) as made:
         env: Any = made.unwrapped
         for body in ("Ant", "BigAnt"):
@@ -264,8 +264,8 @@ def test_heights_that_are_given_hold() -> None:
             assert not env.is_healthy
 
 
-def test_an_unhealthy_ant_may_go_on() -> None:
-    """As in Ant-v5, if asked to."""
+def test_termination_can_be_disabled() -> None:
+    """With `terminate_when_unhealthy=False`, as in Ant-v5."""
     with gym.make("shapechanger/Ant-v1", terminate_when_unhealthy=False) as made:
         env: Any = made.unwrapped
         made.reset(seed=0)
@@ -279,7 +279,7 @@ def test_an_unhealthy_ant_may_go_on() -> None:
 
 
 def test_the_ant_has_105_numbers_and_8_motors() -> None:
-    """In the order of Gymnasium's motors: leg 4 first."""
+    """Motors are in Gymnasium's order, leg 4 first."""
     with gym.make("shapechanger/Ant-v1") as env:
         assert env.observation_space.shape == (105,)
         names = env.unwrapped.action_layout.names
@@ -298,8 +298,8 @@ def test_the_extended_ant_has_its_feet_last() -> None:
         assert env.observation_space.shape == (137,)
 
 
-def test_the_extended_ant_of_2017_has_no_motors_there() -> None:
-    """The same body with the ant's own eight motors."""
+def test_the_extended_ant_of_2017_has_passive_feet() -> None:
+    """The same body with the ant's eight motors."""
     with gym.make("shapechanger/ExtendedAnt-v1", actuated_extension=False) as env:
         assert env.action_space.shape == (8,)
         assert env.observation_space.shape == (137,)
@@ -307,7 +307,7 @@ def test_the_extended_ant_of_2017_has_no_motors_there() -> None:
 
 
 def test_the_extended_ant_starts_at_1_25_m() -> None:
-    """As in the 2017 release, and its feet need no more."""
+    """The start height equals that of the 2017 release."""
     for arguments in ({}, {"actuated_extension": False}):
         with gym.make("shapechanger/ExtendedAnt-v1", **arguments) as env:
             assert env.unwrapped.init_qpos[2] == 1.25

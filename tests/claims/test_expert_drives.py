@@ -1,4 +1,4 @@
-"""The expert drives every vehicle fast and hits nothing, on courses that nobody learned on."""
+"""The expert drives every vehicle fast and without collisions on held-out courses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shapechanger.worlds.course import HELD_OUT
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_the_expert_is_fast_and_safe(vehicle: str) -> None:
-    """At 60 % of the top speed and more, from rest, through the whole robot."""
+    """The mean speed from rest is at least 60 % of the top speed."""
     with closing(VehicleEnv(vehicle, image=False, put_back=True)) as env:
         pilot = ExpertDriver(env.world)
         score = DriveScore.of([drive(env, pilot, course=c, metres=15.0) for c in HELD_OUT[:2]])

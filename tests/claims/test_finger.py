@@ -1,4 +1,4 @@
-"""What is said of the finger, on few episodes each; `python -m benchmarks.run` does many."""
+"""Documented properties of the finger, on few episodes; `python -m benchmarks.run` has more."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_polic
 
 FINGER = "shapechanger/Finger-v1"
 TRACK = "shapechanger/FingerTrack-v1"
-# Far from those that anything was learned or tried on.
+# Outside of the seeds used for training and tuning.
 FIRST_SEED = 2_000_000
 _CIRCLE = {"kind": "circle", "radius": 0.012, "hz": 0.5}
 
 
 class _Policy:
-    """A policy that acts for one env."""
+    """A policy that acts in a single env."""
 
     def __init__(self, policy: TrainedPolicy) -> None:
         self._policy = policy
@@ -33,7 +33,7 @@ class _Policy:
 
 
 def _ends(act: Any, env: str, episodes: int, **arguments: Any) -> list[dict[str, Any]]:
-    """The last info of each episode."""
+    """Return the last info of each episode."""
     infos: list[dict[str, Any]] = []
     with gym.make(env, **arguments) as made:
         for i in range(episodes):
@@ -53,30 +53,30 @@ def _oracle(env: str, mode: str, **arguments: Any) -> FingerOracle:
 
 
 @pytest.mark.parametrize("mode", DRIVES)
-def test_who_knows_the_finger_reaches_every_target(mode: str) -> None:
-    """With whatever an action commands; half of the errors are below a tenth of a millimetre."""
+def test_the_oracle_reaches_every_target(mode: str) -> None:
+    """In each action mode, the median error is below 0.1 mm."""
     infos = _ends(_oracle(FINGER, mode), FINGER, 20, actions=mode)
     assert all(info["is_success"] for info in infos)
     assert np.median([info["distance"] for info in infos]) < 1e-4
 
 
-def test_who_knows_the_finger_follows_a_circle() -> None:
-    """Of 12 mm, once a second, by less than 3 mm."""
+def test_the_oracle_follows_a_circle() -> None:
+    """A circle of 12 mm at 1 Hz is followed within 3 mm RMS."""
     path = {**_CIRCLE, "hz": 1.0}
     infos = _ends(_oracle(TRACK, "impedance"), TRACK, 2, path=path)
     assert max(info["rms"] for info in infos) < 3e-3
 
 
-def test_the_policy_that_ships_reaches() -> None:
-    """Nine of ten targets, and its card says of which env and version it is."""
+def test_the_shipped_policy_reaches() -> None:
+    """It reaches nine of ten targets, and its card names the env."""
     policy = load_policy(POLICIES["reach"])
     assert policy.card.env.id == FINGER
     infos = _ends(_Policy(policy), FINGER, 30)
     assert np.mean([info["is_success"] for info in infos]) >= 0.9
 
 
-def test_the_policy_that_ships_follows() -> None:
-    """A circle at half a turn a second, at most twice as far off as who knows the finger."""
+def test_the_shipped_policy_follows() -> None:
+    """Its RMS error on a circle at 0.5 Hz is at most twice that of the oracle."""
     policy = load_policy(POLICIES["track"])
     assert policy.card.env.id == TRACK
     infos = _ends(_Policy(policy), TRACK, 3, path=_CIRCLE)
@@ -85,8 +85,8 @@ def test_the_policy_that_ships_follows() -> None:
     assert errors[0] <= 2.0 * errors[1]
 
 
-def test_another_finger_is_no_mild_change() -> None:
-    """Moved as it is to fingers of the gap, the policy keeps less than half of its success."""
+def test_the_gap_halves_the_success() -> None:
+    """On real-like fingers, the shipped policy keeps less than half of its success."""
     act = _Policy(load_policy(POLICIES["reach"]))
     infos: list[dict[str, Any]] = []
     for finger in range(3):

@@ -1,4 +1,4 @@
-"""SIGKILL at 200 random moments while recording: every complete step is there after repair."""
+"""After SIGKILL at 200 random moments, `repair` recovers every complete step."""
 
 import os
 import random
@@ -20,7 +20,7 @@ _ROOT = Path(__file__).parents[2]
 
 
 def test_no_complete_step_is_lost_to_sigkill(tmp_path: Path) -> None:
-    """What the recorder had said is on the disk is there, with its picture, and in order."""
+    """Every reported step is on the disk with its frame, in order."""
     chance = random.Random(0)
     command = [sys.executable, "-m", "tests.demos.episodes.recorder", str(tmp_path)]
     kept_in_all = 0
@@ -35,26 +35,26 @@ def test_no_complete_step_is_lost_to_sigkill(tmp_path: Path) -> None:
         for trial in range(_TRIALS):
             runner.stdin.write(b"\n")
             pid = int(runner.stdout.readline())
-            said = 0
+            reported = 0
             for _ in range(chance.randrange(1, 40)):
-                said += len(os.read(steps, 1))
-            for _ in range(chance.randrange(3000)):  # Some microseconds, more or fewer each time.
+                reported += len(os.read(steps, 1))
+            for _ in range(chance.randrange(3000)):  # Wait for a random time.
                 pass
             os.kill(pid, signal.SIGKILL)
             assert runner.stdout.readline() == b"dead\n"
             while select.select([steps], [], [], 0.0)[0]:
-                said += len(os.read(steps, 4096))
+                reported += len(os.read(steps, 4096))
             (episode,) = episodes_of(tmp_path / str(trial))
-            kept_in_all += _kept(episode, said)
+            kept_in_all += _kept(episode, reported)
         runner.stdin.close()
     assert kept_in_all > _TRIALS
 
 
-def _kept(path: Path, said: int) -> int:
-    """How many steps there are after repair, which are all that were said to be there."""
+def _kept(path: Path, reported: int) -> int:
+    """Return the number of steps after repair, which is at least the number reported."""
     done = repair(path)
     episode = read_episode(path)
-    assert done.kept >= said
+    assert done.kept >= reported
     assert [step.index for step in episode.steps] == list(range(done.kept))
     assert all(episode.jpeg(step) == picture(step.index) * 20 for step in episode.steps)
     return done.kept

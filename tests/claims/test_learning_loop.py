@@ -1,4 +1,4 @@
-"""Record, train, drive, correct, train again: one loop, by the commands that a user types."""
+"""Record, train, drive, correct and train again, with CLI commands."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from shapechanger.demos.episodes import episodes_of, read_episode
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_the_loop_goes_round(tmp_path: Path) -> None:
-    """What the expert corrected is learned from, and changes what the policy does."""
+def test_corrections_improve_the_policy(tmp_path: Path) -> None:
+    """Training on the corrections reduces the error on all data."""
     shown, corrected, both = (str(tmp_path / name) for name in ("shown", "corrected", "both"))
     first, second = (str(tmp_path / name) for name in ("first.safetensors", "second.safetensors"))
     drive = ["demos", "record", "Car", "--minutes", "0.5", "--episode-s", "10", "--put-back"]

@@ -1,4 +1,4 @@
-"""What many envs take of the memory, on whatever machine this is."""
+"""Memory of many envs."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import pytest
 _PEER = Path(__file__).parents[2] / "benchmarks" / "vector_peer.py"
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="Linux says what is resident")
+@pytest.mark.skipif(sys.platform != "linux", reason="Needs resident memory of Linux")
 def test_an_ant_takes_less_than_a_megabyte() -> None:
-    """Each of 256, under way; the benchmark asks 1,024."""
+    """Each of 256 running envs; the benchmark measures 1,024."""
     command = [sys.executable, str(_PEER), "memory", "256", "1"]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     assert float(run.stdout) < 1e6

@@ -1,7 +1,7 @@
-"""The bodies of the 2017 Shapechanger release, to the last bit.
+"""The bodies of the 2017 Shapechanger release, bit for bit.
 
-The release wrote each body as a model file of its own. Here the same files are made from
-Gymnasium's by replacing the numbers in their text, and compiled by MuJoCo without any edit.
+The release had a model file for each body. Here the same files are made from Gymnasium's by text
+replacement, and compiled by MuJoCo without edits.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from tests.morphology.scenes import ASSETS
 _ANT = (Path(ASSETS) / "ant.xml").read_text()
 _PENDULUM = (Path(ASSETS) / "inverted_pendulum.xml").read_text()
 
-# The sides that the legs point to: signs of x and y.
+# Directions of the legs: signs of x and y.
 _SIDES = {1: ("", ""), 2: ("-", ""), 3: ("-", "-"), 4: ("", "-")}
 
 
 def _replaced(text: str, old: str, new: str, times: int) -> str:
-    """The text with a pattern replaced, which must be there as often as expected."""
+    """Replace a pattern in a text, which must occur a given number of times."""
     result, count = re.subn(old, new, text)
     assert count == times
     return result
 
 
 def _extended_ant(*, motors: bool) -> str:
-    """The release's extended_ant.xml, with motors for the third segments or without."""
+    """Return the release's extended_ant.xml, with or without motors for the third segments."""
     text = _replaced(_ANT, 'name="torso" pos="0 0 0.75"', 'name="torso" pos="0 0 1.25"', 1)
     text = _replaced(text, 'range="30 70"', 'range="30 50"', 2)
     text = _replaced(text, 'range="-70 -30"', 'range="-50 -30"', 2)
@@ -76,7 +76,7 @@ _RELEASED = {
 
 
 def _edited(name: str) -> mujoco.MjModel:
-    """The body of this name as the edits make it."""
+    """Return the body of this name, made by edits."""
     family = PENDULUM if "Pendulum" in name else ANT
     source = "inverted_pendulum.xml" if "Pendulum" in name else "ant.xml"
     return compile_body(family.load(Path(ASSETS) / source), family.bodies[name])
@@ -84,12 +84,12 @@ def _edited(name: str) -> mujoco.MjModel:
 
 @pytest.mark.parametrize("name", _RELEASED)
 def test_edits_make_the_bodies_of_the_release(name: str) -> None:
-    """Every array of the compiled models is the same, bit for bit."""
+    """All arrays of the compiled models are equal bit for bit."""
     assert differing(mujoco.MjModel.from_xml_string(_RELEASED[name]), _edited(name)) == []
 
 
 def test_every_named_body_is_compared() -> None:
-    """A body that is added to a family needs its model here."""
+    """A body added to a family needs its model here."""
     assert {*ANT.bodies, *PENDULUM.bodies} == {*_RELEASED}
 
 
@@ -101,7 +101,7 @@ def test_every_named_body_is_compared() -> None:
     ],
 )
 def test_masses_of_the_ants(name: str, kilograms: float) -> None:
-    """The total masses that the documents give."""
+    """The total masses are those in the documentation."""
     assert _edited(name).body_mass.sum() == pytest.approx(kilograms, abs=5e-4)
 
 

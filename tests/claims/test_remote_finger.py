@@ -1,4 +1,4 @@
-"""`RemoteFinger-v1` over the real thing: link, daemon, guard, driver, bytes, and a twin's bones."""
+"""`RemoteFinger-v1` through connection, daemon, guard and drivers to a simulated finger."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 @pytest.fixture(scope="module")
 def rig() -> Iterator[RunningRobot]:
-    """The shipped rig on its twin's clock."""
+    """The shipped rig on the twin's clock."""
     with run_robot(find_profile("finger"), clock="twin") as robot:
         yield robot
 
@@ -54,7 +54,7 @@ def env(rig: RunningRobot) -> Iterator[Env]:
 
 
 def _script(env: Env) -> dict[str, Any]:
-    """What somebody writes for `Finger-v1`: it holds the finger where it starts."""
+    """Run a script written for `Finger-v1`, which holds the finger at its start."""
     unwrapped: Any = env.unwrapped
     names = unwrapped.observation_layout.names
     observation, info = env.reset(seed=4)
@@ -68,7 +68,7 @@ def _script(env: Env) -> dict[str, Any]:
 
 
 def test_one_script_runs_on_both_ids(rig: RunningRobot, env: Env) -> None:
-    """The same layouts, the same target, a whole episode, and much the same reward."""
+    """Layouts, spaces and target are equal, and the return is similar."""
     with gym.make("shapechanger/Finger-v1") as simulated:
         there, here = _script(env), _script(simulated)
         ours: Any = env.unwrapped
@@ -84,8 +84,8 @@ def test_one_script_runs_on_both_ids(rig: RunningRobot, env: Env) -> None:
     assert set(here["info"]) <= set(there["info"])
 
 
-def test_what_is_sensed_is_near_the_truth(env: Env) -> None:
-    """Angles to a count of the encoders, and the fingertip to a fraction of a millimetre."""
+def test_sensed_values_are_near_the_truth(env: Env) -> None:
+    """Angles agree within a count, and the fingertip within a fraction of a millimetre."""
     env.reset(seed=1)
     pull = np.array([0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
     info: dict[str, Any] = {}
@@ -93,12 +93,12 @@ def test_what_is_sensed_is_near_the_truth(env: Env) -> None:
     for _ in range(60):
         observation, *_, info = env.step(pull)
     np.testing.assert_allclose(observation[:4], info["true_angles"], atol=0.001)
-    assert observation[0] > 0.6  # It has bent.
+    assert observation[0] > 0.6  # The finger is bent.
     assert info["distance"] == pytest.approx(info["true_distance"], abs=0.0002)
 
 
-def test_a_finger_with_other_arms_knows_where_its_fingertip_is() -> None:
-    """By its encoders, up to their noise; it comes to its start, and its lengths are let pass."""
+def test_encoders_locate_the_fingertip_of_another_finger() -> None:
+    """With other moment arms, angles are accurate up to the noise of the encoders."""
     other = ("--gap", "real-like", "--finger-seed", "3")
     with run_robot(find_profile("finger"), clock="twin", arguments=other) as robot:
         env = _env(robot)
@@ -115,8 +115,8 @@ def test_a_finger_with_other_arms_knows_where_its_fingertip_is() -> None:
         env.close()
 
 
-def test_a_rig_without_encoders_goes_by_its_lengths(tmp_path: Path) -> None:
-    """Angles to a few degrees, and the fingertip to millimetres, with the nominal arms."""
+def test_a_rig_without_encoders_uses_tendon_lengths(tmp_path: Path) -> None:
+    """Angles are accurate to a few degrees, with the nominal moment arms."""
     text = find_profile("finger").read_text()
     path = tmp_path / "finger.toml"
     path.write_text(text[: text.index("[sensor.joints]")] + text[text.index("[limits]") :])
@@ -133,8 +133,8 @@ def test_a_rig_without_encoders_goes_by_its_lengths(tmp_path: Path) -> None:
         env.close()
 
 
-def test_a_magnet_that_comes_off_ends_the_motion() -> None:
-    """As a servo that fails."""
+def test_a_lost_magnet_ends_the_episode() -> None:
+    """The rig is disarmed and releases its tendons, as after a failed servo."""
     with run_robot(find_profile("finger"), clock="twin") as robot:
         env = _env(robot)
         env.reset(seed=0)
@@ -157,7 +157,7 @@ def test_a_magnet_that_comes_off_ends_the_motion() -> None:
 
 @pytest.mark.parametrize("actions", ["tension", "length", "impedance"])
 def test_every_mode_of_action_moves_the_finger(rig: RunningRobot, actions: str) -> None:
-    """Flexors bend, extensors straighten."""
+    """Flexors bend and extensors straighten."""
     env = _env(rig, actions=actions)
     flex = np.array([0.6, 0.6, -1.0, -1.0, 0.0, -0.5, -0.5], np.float32)
     env.reset(seed=2)
@@ -172,7 +172,7 @@ def test_every_mode_of_action_moves_the_finger(rig: RunningRobot, actions: str) 
 
 
 def test_a_start_is_that_of_the_simulation(env: Env) -> None:
-    """After an episode that left the finger bent it is brought back."""
+    """Reset returns a bent finger to the start."""
     env.reset(seed=0)
     for _ in range(30):
         env.step(np.array([1, 1, -1, -1, 0, 0, 0], np.float32))
@@ -184,7 +184,7 @@ def test_a_start_is_that_of_the_simulation(env: Env) -> None:
 
 
 def test_the_same_seed_gives_the_same_episode(rig: RunningRobot) -> None:
-    """On the twin's clock nothing depends on the machine."""
+    """On the twin's clock, episodes are deterministic."""
     ends: list[Any] = []
     for _ in range(2):
         with run_robot(find_profile("finger"), clock="twin") as robot:
@@ -198,8 +198,8 @@ def test_the_same_seed_gives_the_same_episode(rig: RunningRobot) -> None:
     np.testing.assert_array_equal(ends[0], ends[1])
 
 
-def test_goals_are_there_too(rig: RunningRobot) -> None:
-    """As learners with hindsight take them."""
+def test_goal_observations(rig: RunningRobot) -> None:
+    """`goal=True` gives goal observations and `compute_reward`."""
     env = _env(rig, goal=True)
     observation, info = env.reset(seed=0)
     assert env.observation_space.contains(observation)
@@ -211,8 +211,8 @@ def test_goals_are_there_too(rig: RunningRobot) -> None:
     env.close()
 
 
-def test_what_is_no_action_is_refused(env: Env) -> None:
-    """Before anything is sent."""
+def test_invalid_actions_are_refused(env: Env) -> None:
+    """No command is sent."""
     env.reset(seed=0)
     unwrapped: Any = env.unwrapped
     with pytest.raises(BadAction):
@@ -222,8 +222,8 @@ def test_what_is_no_action_is_refused(env: Env) -> None:
 
 
 @pytest.mark.parametrize(("how", "words"), [("mute", "does not answer"), ("hot", "FDS")])
-def test_a_servo_that_fails_ends_the_motion(how: str, words: str) -> None:
-    """The tensions go down to the pretension and then to nothing; the twin's line judges it."""
+def test_a_failed_servo_ends_the_episode(how: str, words: str) -> None:
+    """Tensions ramp down to the pretension and then to zero, measured at the twin."""
     with run_robot(find_profile("finger"), clock="twin") as robot:
         env = _env(robot)
         env.reset(seed=0)
@@ -249,8 +249,8 @@ def test_a_servo_that_fails_ends_the_motion(how: str, words: str) -> None:
 
 
 @pytest.mark.parametrize("program", ["daemon", "guard"])
-def test_a_program_that_is_killed_lets_the_finger_go(program: Literal["daemon", "guard"]) -> None:
-    """Without a daemon the guard takes the tensions down; without a guard the servos' watchdogs."""
+def test_a_killed_process_releases_the_finger(program: Literal["daemon", "guard"]) -> None:
+    """Without a daemon the guard releases; without a guard the servo watchdogs do."""
     with run_robot(find_profile("finger"), clock="real") as robot:
         env = _env(robot)
         env.reset(seed=0)
@@ -264,8 +264,8 @@ def test_a_program_that_is_killed_lets_the_finger_go(program: Literal["daemon", 
         env.close()
 
 
-def test_a_twin_of_its_own_is_the_judge_and_ends_with_the_env() -> None:
-    """What is observed stays what is sensed; reward and success are by what the twin knows."""
+def test_an_own_twin_defines_the_reward() -> None:
+    """Observations are sensed, the reward uses the truth, and the twin ends with the env."""
     env = gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=1)
     own: Any = env.unwrapped
     supervisor = own._own.supervisor
@@ -275,8 +275,8 @@ def test_a_twin_of_its_own_is_the_judge_and_ends_with_the_env() -> None:
         observation, _, _, _, info = env.step(env.action_space.sample())
         assert info["distance"] == pytest.approx(info["true_distance"], abs=1e-6)
         off.append(float(np.abs(observation[:4] - info["true_angles"]).max()))
-    assert 0.002 < np.median(off) < 0.1  # An encoder's noise of a degree, and no more.
-    # A servo that an episode has made too hot has cooled before the next.
+    assert 0.002 < np.median(off) < 0.1  # Encoder noise of about a degree.
+    # Reset cools servos down.
     own._operator.break_servo("EDC", "hot")
     _, info = env.reset(seed=1)
     assert info["armed"]
@@ -285,8 +285,8 @@ def test_a_twin_of_its_own_is_the_judge_and_ends_with_the_env() -> None:
     assert supervisor.poll() is not None
 
 
-def test_each_seed_of_a_study_meets_another_rig() -> None:
-    """Where the gap is told and the finger is not."""
+def test_each_seed_of_a_study_gets_another_rig() -> None:
+    """Applies when the gap is given without a finger seed."""
     with gym.make("shapechanger/RemoteFinger-v1", twin="real-like") as many:
         own: Any = many.unwrapped
         assert own.individual == "finger_seed"
@@ -294,8 +294,8 @@ def test_each_seed_of_a_study_meets_another_rig() -> None:
         assert not own.side_by_side
 
 
-def test_ten_seconds_tell_what_finger_is_on_a_rig() -> None:
-    """Its arms to a twentieth, where those of the nominal finger are off by a fifth; its joints."""
+def test_ten_seconds_identify_the_finger() -> None:
+    """Moment arms are identified within 5 %, where the nominal ones are off by more than 15 %."""
     with gym.make("shapechanger/Finger-v1", gap="real-like", finger_seed=0) as simulated:
         truth: FingerParameters = simulated.get_wrapper_attr("parameters")
     with gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=0) as rig:

@@ -1,4 +1,4 @@
-"""The same drives on the twin's clock and in real time: exact there, and soon enough here."""
+"""The same drives on the twin's clock and in real time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ DEADLINE_MS = 250
 STALE_MS = 500
 TICK_MS = 10.0
 LATE_MS = {"twin": TICK_MS, "real": 200.0}
-"""What comes on top of a limit: a tick of the guard, or ten times 20 ms on a busy machine."""
+"""Tolerance of a limit: a tick of the guard, or ten times 20 ms on a busy machine."""
 
 DRIVE = (*[(0.0, 1.0)] * 15, *[(1.0, 0.5)] * 10, *[(-1.0, -0.5)] * 10, *[(0.0, 0.0)] * 5)
 """Steering and throttle of 40 commands."""
@@ -31,48 +31,48 @@ DRIVE = (*[(0.0, 1.0)] * 15, *[(1.0, 0.5)] * 10, *[(-1.0, -0.5)] * 10, *[(0.0, 0
 
 @pytest.fixture(scope="module")
 def profile(tmp_path_factory: pytest.TempPathFactory) -> Profile:
-    """The car with everything."""
+    """The car with all sensors."""
     return write_profile(tmp_path_factory.mktemp("profile"))
 
 
 @pytest.fixture(scope="module", params=["twin", "real"])
 def clock(request: pytest.FixtureRequest) -> Clock:
-    """Where time comes from."""
+    """The kind of clock."""
     return request.param
 
 
 @pytest.fixture(scope="module")
 def robot(profile: Profile, clock: Clock) -> Iterator[RunningRobot]:
-    """One robot for each clock."""
+    """One robot per clock."""
     with run_robot(profile, clock=clock, arguments=IN_A_ROOM) as running:
         yield running
 
 
 @pytest.fixture
 def car(robot: RunningRobot, clock: Clock) -> Iterator[Served]:
-    """The robot at its start, armed."""
+    """The armed robot at its start."""
     with driving(robot, clock) as served:
         yield served
 
 
 @pytest.fixture(scope="module")
 def wiring(profile: Profile) -> TwinWiring:
-    """What is attached, without the one-shot, which would hide that a pin is late."""
+    """Wiring without the one-shot, which would hide late pins."""
     return TwinWiring(profile.guard_plan(), None)
 
 
 def stands(seen: Observation) -> bool:
-    """Whether nothing propels."""
+    """Return whether the throttle is at rest."""
     return seen.action_applied[1] == 0.0
 
 
 def drives(seen: Observation) -> bool:
-    """Whether it goes forward."""
+    """Return whether the robot drives forward."""
     return seen.action_applied[1] > 0.0
 
 
 def test_forty_commands(car: Served, clock: Clock) -> None:
-    """Each is obeyed, in order; the wheels turn as the encoder says."""
+    """Commands are applied in order, and the encoder matches the speed of the wheels."""
     start = car.operator.where()
     times: list[int] = []
     right: list[bool] = []
@@ -90,7 +90,7 @@ def test_forty_commands(car: Served, clock: Clock) -> None:
             assert seen.action_applied == (-1.0, -0.5)
             assert car.operator.where().travelled_m - start.travelled_m > 0.3
     periods = [after - before for before, after in pairwise(times)]
-    # In real time a busy machine holds up the board, and with it what the encoder counts.
+    # In real time, a busy machine delays the board and its encoder counts.
     assert any(right)
     if clock == "twin":
         assert right[-1]
@@ -98,8 +98,10 @@ def test_forty_commands(car: Served, clock: Clock) -> None:
     assert min(periods) > 0
 
 
-def test_silence_ends_at_the_deadline(car: Served, clock: Clock, wiring: TwinWiring) -> None:
-    """By the ledger: not before the deadline of the last command, and at rest just after it."""
+def test_without_commands_the_robot_stops_at_the_deadline(
+    car: Served, clock: Clock, wiring: TwinWiring
+) -> None:
+    """By the ledger, not before the deadline of the last command, and shortly after it."""
     seen = car.drive(0.0, 1.0, steps=6)
     assert seen.command_ns is not None
     went_on_ms = (car.rest_ns(wiring) - seen.command_ns) / 1e6
@@ -107,7 +109,7 @@ def test_silence_ends_at_the_deadline(car: Served, clock: Clock, wiring: TwinWir
 
 
 def test_an_emergency_stop_latches(car: Served, clock: Clock) -> None:
-    """Until somebody who has seen it arms again."""
+    """Arming after having seen the stop clears it."""
     car.drive(0.0, 1.0, steps=3)
     car.client.emergency_stop("a dog")
     took = car.drive_until(lambda seen: seen.emergency and stands(seen), 0.0, 1.0)
@@ -122,7 +124,7 @@ def test_an_emergency_stop_latches(car: Served, clock: Clock) -> None:
 
 
 def test_the_emergency_button_latches(car: Served) -> None:
-    """It cannot be armed while it is pressed, and is not armed when it comes up."""
+    """Arming is refused while the button is pressed, and releasing it does not arm."""
     car.drive(0.0, 1.0, steps=3)
     car.operator.press_stop()
     car.drive_until(lambda seen: seen.emergency and stands(seen), 0.0, 1.0)
@@ -134,8 +136,8 @@ def test_the_emergency_button_latches(car: Served) -> None:
     car.drive_until(drives, 0.0, 1.0)
 
 
-def test_the_bumper_keeps_it_from_going_forward_only(car: Served, clock: Clock) -> None:
-    """Backward it may go, and forward again once nothing is touched."""
+def test_the_bumper_prevents_driving_forward_only(car: Served, clock: Clock) -> None:
+    """Backward is allowed, and forward once the bumper is free."""
     car.drive(0.0, 1.0, steps=3)
     car.operator.press_bumper()
     took = car.drive_until(stands, 0.0, 1.0)
@@ -147,8 +149,8 @@ def test_the_bumper_keeps_it_from_going_forward_only(car: Served, clock: Clock) 
     car.drive_until(drives, 0.0, 1.0)
 
 
-def test_blind_means_stop(car: Served, clock: Clock, wiring: TwinWiring) -> None:
-    """When the newest picture is stale, though commands still come."""
+def test_a_stale_frame_stops_the_robot(car: Served, clock: Clock, wiring: TwinWiring) -> None:
+    """The robot stops although commands continue."""
     car.drive(0.0, 0.4, steps=3)
     car.operator.break_camera("off")
     car.drive_until(stands, 0.0, 0.4)
@@ -161,8 +163,8 @@ def test_blind_means_stop(car: Served, clock: Clock, wiring: TwinWiring) -> None
     car.drive_until(drives, 0.0, 0.4)
 
 
-def test_a_low_battery_keeps_it_at_rest_until_it_is_armed_again(car: Served) -> None:
-    """A battery recovers as soon as nothing moves, so that alone says nothing."""
+def test_a_low_battery_stops_the_robot_until_rearmed(car: Served) -> None:
+    """A recovered voltage alone does not clear the stop."""
     car.drive(0.0, 0.4, steps=3)
     car.operator.set_battery(6.0)
     car.drive_until(stands, 0.0, 0.4)
@@ -175,14 +177,14 @@ def test_a_low_battery_keeps_it_at_rest_until_it_is_armed_again(car: Served) -> 
 
 
 def test_the_distance_ahead(car: Served) -> None:
-    """An echo of 1.2 m is 1.2 m."""
+    """The reported distance is that of the echo."""
     car.operator.set_distance(1.2)
     car.drive_until(lambda _: abs(car.state("distance") - 1.2) < 0.02, 0.0, 0.0)
     car.operator.set_distance(None)
 
 
 def recorded(profile: Profile, seed: int, folder: Path) -> tuple[list[str], list[bytes]]:
-    """Ledger and pictures of the forty commands."""
+    """Return the ledger and the frames of the forty commands."""
     pictures: list[bytes] = []
     with (
         run_robot(profile, clock="twin", seed=seed, folder=folder, arguments=IN_A_ROOM) as robot,
@@ -195,8 +197,8 @@ def recorded(profile: Profile, seed: int, folder: Path) -> tuple[list[str], list
     return lines, pictures
 
 
-def test_the_twins_clock_repeats_itself(profile: Profile, tmp_path: Path) -> None:
-    """The same seed gives the same transitions at the same times, and the same pictures."""
+def test_the_twins_clock_is_deterministic(profile: Profile, tmp_path: Path) -> None:
+    """The same seed gives equal transitions, times and frames."""
     folders = [tmp_path / name for name in ("a", "b", "c")]
     for folder in folders:
         folder.mkdir()

@@ -1,4 +1,4 @@
-"""A full disk takes the robot's words away, and nothing else."""
+"""A full disk costs the robot its log, and nothing else."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 
 def test_a_full_disk(tmp_path: Path) -> None:
-    """It serves, drives, and stops on silence, though nothing can be written down."""
+    """The robot serves, drives and stops at its deadline without a log."""
     profile = write_profile(tmp_path)
     with (
         Path("/dev/full").open("wb") as full,
@@ -23,9 +23,9 @@ def test_a_full_disk(tmp_path: Path) -> None:
         driving(robot, "real") as car,
     ):
         car.drive_until(lambda seen: seen.action_applied[1] == 1.0, 0.0, 1.0)
-        told_ns = car.seen.command_ns
-        assert told_ns is not None
+        command_ns = car.seen.command_ns
+        assert command_ns is not None
         rest_ns = car.rest_ns(TwinWiring(profile.guard_plan(), None))
-        assert (rest_ns - told_ns) / 1e6 <= 250 + 200
-        car.client.arm()  # It still obeys, and says so.
+        assert (rest_ns - command_ns) / 1e6 <= 250 + 200
+        car.client.arm()  # It still responds.
         assert robot.supervisor.poll() is None

@@ -1,4 +1,4 @@
-"""`RemoteVehicle-v1` over the real thing: link, daemon, guard, drivers, and a twin below them."""
+"""`RemoteVehicle-v1` through connection, daemon, guard and drivers to a twin."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STILL = np.zeros(2, np.float32)
 
 
 def env_of(robot: RunningRobot, **options: Any) -> Env:
-    """The env of a robot, in lockstep."""
+    """Make the env of a robot, in lockstep."""
     known = robot.known
     access = {"robot": known.address, "key": known.key, "fingerprint": known.fingerprint}
     options = {"pace": "lockstep"} | options
@@ -38,7 +38,7 @@ def env_of(robot: RunningRobot, **options: Any) -> Env:
 
 @pytest.fixture(scope="module")
 def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
-    """The car with everything, on the twin's clock."""
+    """The car with all sensors, on the twin's clock."""
     with run_robot(
         write_profile(tmp_path_factory.mktemp("car")), clock="twin", arguments=IN_A_ROOM
     ) as robot:
@@ -47,7 +47,7 @@ def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
 
 @pytest.fixture
 def serve() -> Iterator[Callable[[Profile], RunningRobot]]:
-    """Serve a robot on the twin's clock; it ends with the test."""
+    """Serve a robot on the twin's clock until the end of the test."""
     with ExitStack() as stack:
         yield lambda profile: stack.enter_context(
             run_robot(profile, clock="twin", arguments=IN_A_ROOM)
@@ -56,7 +56,7 @@ def serve() -> Iterator[Callable[[Profile], RunningRobot]]:
 
 @pytest.fixture
 def env(car: RunningRobot) -> Iterator[Env]:
-    """The car at its start."""
+    """The env of the car at its start."""
     with car.operator() as operator:
         operator.place(0)
     made = env_of(car)
@@ -64,8 +64,8 @@ def env(car: RunningRobot) -> Iterator[Env]:
     made.close()
 
 
-def test_the_reward_says_where_it_comes_from(car: RunningRobot, env: Env) -> None:
-    """Metres forward by the encoder, and the twin agrees."""
+def test_the_reward_is_the_distance_by_the_encoder(car: RunningRobot, env: Env) -> None:
+    """`info` names the sensors, and the distance agrees with the twin."""
     seen, info = env.reset(seed=0)
     assert seen.shape == (120, 160, 3)
     assert seen.dtype == np.uint8
@@ -88,7 +88,7 @@ def test_the_reward_says_where_it_comes_from(car: RunningRobot, env: Env) -> Non
 
 
 def test_a_wall_ends_the_episode(env: Env) -> None:
-    """With the reward of a collision, and the next episode begins."""
+    """The episode terminates with the collision term, and the next one starts."""
     env.reset(seed=0)
     for _ in range(200):
         _, reward, terminated, truncated, info = env.step(FORWARD)
@@ -96,7 +96,7 @@ def test_a_wall_ends_the_episode(env: Env) -> None:
         if terminated:
             break
     else:
-        pytest.fail("It never reached a wall.")
+        pytest.fail("The car did not reach a wall.")
     assert info["reward_collision"] == -10.0
     assert float(reward) < -9.0
     env.reset(seed=1)
@@ -106,7 +106,7 @@ def test_a_wall_ends_the_episode(env: Env) -> None:
 
 
 def test_the_size_of_2017(car: RunningRobot) -> None:
-    """Pictures of 128 x 128, and the state beside them."""
+    """Images of 128 x 128, with the state."""
     env = env_of(car, size=(128, 128), state=True)
     seen, _ = env.reset(seed=0)
     assert env.observation_space.contains(seen)
@@ -123,7 +123,7 @@ def test_four_keys(car: RunningRobot) -> None:
     wanted = {"forward": (0, 1), "backward": (0, -1), "right": (1, 0), "left": (-1, 0)}
     info: dict[str, Any] = {}
     for number, way in enumerate(FOUR_WAYS):
-        for _ in range(20):  # What the bumper touched before may still count.
+        for _ in range(20):  # An earlier bump may still have an effect.
             *_, info = env.step(np.int64(number))
             if tuple(info["action_applied"]) == wanted[way]:
                 break
@@ -132,7 +132,7 @@ def test_four_keys(car: RunningRobot) -> None:
 
 
 def test_a_lost_link_truncates(tmp_path: Path, serve: Callable[[Profile], RunningRobot]) -> None:
-    """In words; the next reset says that there is nobody, and names what to look at."""
+    """The info gives the reason, and the next reset raises an error that says what to check."""
     robot = serve(write_profile(tmp_path))
     env = env_of(robot, reset_timeout_s=1.0)
     env.reset(seed=0)
@@ -143,10 +143,10 @@ def test_a_lost_link_truncates(tmp_path: Path, serve: Callable[[Profile], Runnin
     for _ in range(100):
         *_, terminated, truncated, info = env.step(FORWARD)
         assert not terminated
-        # The guard may have time to say that it disarms, as it must.
+        # The guard may first report that it disarmed.
         if truncated and not info["truncated_because"].startswith("The robot was disarmed"):
             break
-    # On a twin the daemon may live long enough to say what it lost itself.
+    # On a twin, the daemon may first report the loss of the board.
     lost = ("The link to the robot is lost", "The twin's board is gone")
     assert info["truncated_because"].startswith(lost)
     with pytest.raises(gym.error.ResetNeeded):
@@ -159,7 +159,7 @@ def test_a_lost_link_truncates(tmp_path: Path, serve: Callable[[Profile], Runnin
 def test_without_sensors_the_reward_is_absent(
     tmp_path: Path, serve: Callable[[Profile], RunningRobot]
 ) -> None:
-    """Nothing is made up."""
+    """No term is estimated."""
     env = env_of(serve(write_profile(tmp_path, BLIND_CAR)))
     env.reset(seed=0)
     *_, reward, terminated, _, info = env.step(FORWARD)
@@ -174,19 +174,19 @@ def test_without_sensors_the_reward_is_absent(
 def test_bodies_that_do_not_drive(
     serve: Callable[[Profile], RunningRobot], name: str, actions: int
 ) -> None:
-    """The same class moves legs and tendons, each by what it was told."""
+    """The same env class moves legs and tendons, each to its command."""
     profile = load_profile(find_profile(name))
     wiring = TwinWiring(profile.guard_plan(), None)
     robot = serve(profile)
     env = env_of(robot)
     env.reset(seed=0)
     assert env.action_space.shape == (actions,)
-    # Within every cap, and another one for each.
-    told = np.linspace(0.2, 0.6, actions, dtype=np.float32)
-    assert env.action_space.contains(told)
+    # Different values, within all caps.
+    action = np.linspace(0.2, 0.6, actions, dtype=np.float32)
+    assert env.action_space.contains(action)
     info: dict[str, Any] = {}
     for _ in range(100):
-        *_, truncated, info = env.step(told)
+        *_, truncated, info = env.step(action)
         assert not truncated, info["truncated_because"]
     applied = dict(zip((a.name for a in profile.actions), info["action_applied"], strict=True))
     assert len(set(applied.values())) > 1
@@ -198,10 +198,10 @@ def test_bodies_that_do_not_drive(
     env.close()
 
 
-def test_a_vehicle_that_no_code_has_ever_seen(
+def test_a_vehicle_defined_by_its_profile_alone(
     tmp_path: Path, serve: Callable[[Profile], RunningRobot]
 ) -> None:
-    """A hovercraft is one file: its fans and rudders follow, and it goes."""
+    """The fans and rudders of a hovercraft follow their commands."""
     profile = write_profile(tmp_path, HOVERCRAFT)
     wiring = TwinWiring(profile.guard_plan(), None)
     robot = serve(profile)
@@ -213,7 +213,7 @@ def test_a_vehicle_that_no_code_has_ever_seen(
             return wiring.read(operator.levels(), operator.where().t)
 
         start = operator.where()
-        for _ in range(80):  # The controller of its fan wants neutral for a while.
+        for _ in range(80):  # The fan's controller first needs neutral.
             *_, truncated, info = env.step(np.array([0.5, 0.8, 0.6], np.float32))
             assert not truncated, info["truncated_because"]
         values = {name: output.value for name, output in outputs().items()}

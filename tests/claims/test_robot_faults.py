@@ -1,4 +1,4 @@
-"""Whatever goes wrong, the robot stops: each fault is made on a twin, and its ledger is judged."""
+"""The robot stops in time after each fault, judged by the ledger of a twin."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from tests.robots import write_profile
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 TOLERANCE = 10.0
-"""How much longer than promised a stop may take on a machine that does other things too."""
+"""Factor on the promised time of a stop, for a busy machine."""
 
 TRIALS = 2
 
 
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
-    """A robot for all faults; one that ends it is followed by a new one."""
+    """A robot for all faults, replaced when a fault ends it."""
     with Trial(write_profile(tmp_path_factory.mktemp("faults"))) as made:
         yield made
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_the_robot_stops(trial: Trial, name: str) -> None:
-    """In time, and never drives without a fresh command of the one who may."""
+    """The stop is in time, and the robot never drives without a fresh command."""
     fault = FAULTS[name]
     drove = 0
-    # A robot that a busy machine had stopped before the fault says nothing of the fault.
+    # Repeat trials in which the robot had stopped before the fault.
     for _ in range(2 * TRIALS):
         result = trial.run(fault)
         drove += result.drove
@@ -47,7 +47,7 @@ def test_the_robot_stops(trial: Trial, name: str) -> None:
 
 
 def frozen(ledger: list[Transition], pins: tuple[int, ...]) -> dict[int, float]:
-    """The levels at which pins stay, of which their process is gone."""
+    """Return the final levels of pins whose process died."""
     gone = [line.pid for line in ledger if line.kind == "gone"]
     return {
         line.pin: line.duty
@@ -60,9 +60,9 @@ def frozen(ledger: list[Transition], pins: tuple[int, ...]) -> dict[int, float]:
     }
 
 
-def test_without_the_one_shot_the_pins_stay_as_they_were(tmp_path: Path) -> None:
-    """The weakness that is published: nobody is left, and no hardware takes the power away."""
-    # The robot is looked at afterwards, which a trial would have removed.
+def test_without_the_one_shot_pins_keep_their_level(tmp_path: Path) -> None:
+    """The documented weakness: without processes and hardware protection, power stays on."""
+    # Keep the robot after the trial, to inspect it.
     fault = replace(FAULTS["guard and supervisor killed"], then="goes on")
     with Trial(write_profile(tmp_path), one_shot=False) as trial:
         result = trial.run(fault)
@@ -70,5 +70,5 @@ def test_without_the_one_shot_the_pins_stay_as_they_were(tmp_path: Path) -> None
     assert result.drove
     assert levels[22] in {0.0, 1.0}
     assert levels[27] == 0.0
-    # Software PWM stops at the level of its moment: high means full power, for ever.
+    # Software PWM freezes at its present level: high is full power for ever.
     assert math.isinf(result.stopped_ms) == (levels[22] == 1.0)

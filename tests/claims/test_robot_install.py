@@ -1,4 +1,4 @@
-"""What `pip install "shapechanger[robot]"` brings to a Pi, and what it spares it."""
+"""`pip install "shapechanger[robot]"` in a fresh environment."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The command of a fresh environment that has the robot's side only."""
+    """The command in a fresh environment with the robot extra only."""
     folder = tmp_path_factory.mktemp("fresh") / "venv"
     subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True, timeout=120)
     install = [str(folder / "bin" / "python"), "-m", "pip", "install", "--quiet"]
@@ -38,13 +38,15 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def variables(tmp_path: Path) -> dict[str, str]:
-    """An environment in which nothing of this one is seen."""
+    """Environment variables that hide the present environment."""
     kept = {name: os.environ[name] for name in ("PATH", "HOME", "LANG") if name in os.environ}
     return kept | {"XDG_CONFIG_HOME": str(tmp_path)}
 
 
-def test_what_is_spared(program: Path, variables: dict[str, str], tmp_path: Path) -> None:
-    """No simulator, no network, no plots."""
+def test_heavy_packages_are_not_installed(
+    program: Path, variables: dict[str, str], tmp_path: Path
+) -> None:
+    """No simulator, learning or plotting package."""
     names = ", ".join(repr(name) for name in SPARED)
     code = f"import importlib.util as u; print([n for n in ({names},) if u.find_spec(n)])"
     found = subprocess.run(
@@ -59,7 +61,7 @@ def test_what_is_spared(program: Path, variables: dict[str, str], tmp_path: Path
 
 
 def test_doctor(program: Path, variables: dict[str, str], tmp_path: Path) -> None:
-    """It says what is missing, and that the packages are there."""
+    """The doctor reports what is missing, and that packages are installed."""
     done = subprocess.run(
         [str(program), "robot", "doctor", "car"],
         check=False,
@@ -75,7 +77,7 @@ def test_doctor(program: Path, variables: dict[str, str], tmp_path: Path) -> Non
 
 
 def test_serving_a_twin(program: Path, variables: dict[str, str], tmp_path: Path) -> None:
-    """All the way until it listens, and to its end."""
+    """A twin starts, listens, and stops on SIGTERM."""
     ready = tmp_path / "ready.json"
     command = [str(program), "robot", "serve", "car", "--twin", "--port", "0", "--no-announce"]
     command += ["--world", "room"]

@@ -42,8 +42,8 @@ def wall_clock_reads(source: str) -> list[str]:
     return found
 
 
-def test_the_search_finds_what_it_looks_for() -> None:
-    """Every spelling of a wall-clock read is found, and `monotonic` is not one."""
+def test_the_search_finds_each_spelling() -> None:
+    """Each spelling of a wall-clock read is found, and `monotonic` is not."""
     assert wall_clock_reads("import time\ntime.time()") == ["2: time.time"]
     assert wall_clock_reads("from time import time") == ["1: time"]
     assert wall_clock_reads("datetime.datetime.now()") == ["1: datetime.now"]

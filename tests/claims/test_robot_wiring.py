@@ -1,4 +1,4 @@
-"""Two pins that are swapped in a profile are noticed: the wrong motor of the twin turns."""
+"""Swapped pins in a profile drive the wrong motor of the twin."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 
 def driven(folder: Path, text: str) -> tuple[Whereabouts, Whereabouts, float]:
-    """Where a car is before and after full throttle, and what its encoder says of its speed.
+    """Return where a car is before and after full throttle, and the speed by its encoder.
 
     Args:
         folder: An empty folder.
-        text: The profile that is served; what is wired is the true car.
+        text: The profile served; the wiring is that of the correct profile.
     """
     (folder / "wired").mkdir()
     wired = write_profile(folder / "wired")
@@ -33,22 +33,22 @@ def driven(folder: Path, text: str) -> tuple[Whereabouts, Whereabouts, float]:
         return before, car.operator.where(), car.state("speed")
 
 
-def test_the_true_profile_drives_forward(tmp_path: Path) -> None:
-    """Along its nose, by the truth and by its encoder."""
+def test_the_correct_profile_drives_forward(tmp_path: Path) -> None:
+    """Position and encoder agree."""
     before, after, speed = driven(tmp_path, CAR)
     assert after.travelled_m - before.travelled_m > 0.1
     assert speed > 0.3
 
 
 def test_forward_and_backward_swapped(tmp_path: Path) -> None:
-    """It drives backward, and the encoder says so."""
+    """The car drives backward, and the encoder shows it."""
     before, after, speed = driven(tmp_path, SWAPPED_WAYS)
     assert after.travelled_m - before.travelled_m < -0.1
     assert speed < -0.3
 
 
 def test_drive_and_steering_swapped(tmp_path: Path) -> None:
-    """It steers on the spot."""
+    """The car steers without moving."""
     before, after, speed = driven(tmp_path, SWAPPED_ROLES)
     assert after.travelled_m == pytest.approx(before.travelled_m, abs=0.01)
     assert speed == pytest.approx(0.0, abs=0.01)

@@ -1,4 +1,4 @@
-"""What the README says of vehicles in simulated worlds."""
+"""Documented properties of vehicles in simulated worlds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _COURSE, _START = 5, 11
 
 
 def test_swapped_pins_drive_a_car_backward(tmp_path: Path) -> None:
-    """Between an action and the wheels are the robot's own pins, also where nothing is served."""
+    """In-process robots also act through the pins of their profile."""
     path = find_profile("lab-car")
     text = Path(path).read_text()
     forward, backward = "forward = 22 ", "backward = 27 "
@@ -44,29 +44,29 @@ def test_swapped_pins_drive_a_car_backward(tmp_path: Path) -> None:
 
 
 def _actions() -> list[tuple[float, ...]]:
-    """Five seconds of driving that hits nothing."""
+    """Return five seconds of actions without a collision."""
     rng = np.random.default_rng(3)
     drawn = rng.uniform((-0.3, 0.2), (0.3, 0.7), (100, 2)).astype(np.float32)
     return [tuple(action.tolist()) for action in drawn]
 
 
-def test_a_car_in_this_process_is_the_car_that_is_served() -> None:
-    """The same course, start and actions end at the same place, to the last bit.
+def test_the_in_process_car_equals_the_served_car() -> None:
+    """With the same course, start and actions, all poses are bitwise equal.
 
-    One is a guard, a daemon and a board in processes of their own, driven over TLS.
+    The served car has guard, daemon and board in separate processes, driven over TLS.
     """
     _compare(image=False)
 
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_a_car_that_sees_is_the_same_car() -> None:
-    """Drawing pictures takes no time of the twin's clock."""
+def test_rendering_does_not_change_the_drive() -> None:
+    """Rendering takes no time on the twin's clock."""
     _compare(image=True)
 
 
 def _compare(*, image: bool) -> None:
-    """Drive both cars, and see that they are at the same place after each action."""
+    """Drive both cars, and compare their poses after each action."""
     served = _drive_served(_actions(), image)
     with closing(VehicleEnv("car", image=image)) as env:
         _, info = env.reset(options={"course": _COURSE, "start": _START})
@@ -80,7 +80,7 @@ def _compare(*, image: bool) -> None:
 
 
 def _drive_served(actions: Sequence[Sequence[float]], image: bool) -> list[Whereabouts]:
-    """Where a served car is at its start and after each action."""
+    """Return the poses of a served car at its start and after each action."""
     profile = load_profile(find_profile("lab-car"))
     with (
         run_robot(profile, clock="twin", arguments=("--world", "corridor")) as robot,
@@ -101,32 +101,32 @@ def _drive_served(actions: Sequence[Sequence[float]], image: bool) -> list[Where
 
 
 def _until_it_bumps(env: VehicleEnv) -> tuple[float, bool]:
-    """Reward and end of the step in which the car hits the wall at the next bend."""
+    """Return the reward and termination of the step that hits the wall at the next bend."""
     env.reset(options={"course": _COURSE, "start": _START})
     for _ in range(400):
         _, _, terminated, truncated, info = env.step(np.array([-0.3, 0.6], np.float32))
         assert not truncated
         if info["collisions"]:
             return info["reward_collision"], terminated
-    raise AssertionError("It hit nothing.")
+    raise AssertionError("The car hit nothing.")
 
 
 def test_a_bumped_wall_costs_ten_and_ends_the_episode() -> None:
-    """Unless somebody puts the car back: then it goes on."""
+    """With `put_back`, the episode continues."""
     with closing(VehicleEnv("car", image=False)) as env:
         assert _until_it_bumps(env) == (-10.0, True)
     with closing(VehicleEnv("car", image=False, put_back=True)) as env:
         assert _until_it_bumps(env) == (-10.0, False)
         before = env.world.progress_m
-        for _ in range(30):  # The guard keeps it from going forward for a while.
+        for _ in range(30):  # The guard prevents driving forward for a while.
             _, _, terminated, _, info = env.step(np.array([0.0, 0.4], np.float32))
             assert not terminated
         assert info["collisions"] == 1
         assert info["progress"] > before + 0.1
 
 
-def test_nobody_is_judged_on_a_course_to_learn_on() -> None:
-    """The two kinds of courses share no seed, and an env that holds out draws the other kind."""
+def test_training_and_held_out_courses_are_disjoint() -> None:
+    """After `hold_out`, an env draws held-out courses only."""
     assert not set(TRAINING) & set(HELD_OUT)
     with closing(VehicleEnv("car", image=False, courses=(1, 2, 3))) as env:
         assert env.reset(seed=0)[1]["course"] in (1, 2, 3)

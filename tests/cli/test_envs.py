@@ -1,4 +1,4 @@
-"""`shapechanger envs`: what it prints, and what it says to nonsense."""
+"""`shapechanger envs`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.layout import Element, Feature, Layout
 
 
-def said(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """What a command prints."""
+def output_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Return the standard output of a command."""
     main(arguments)
     return capsys.readouterr().out
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The one sentence with which a command is refused."""
+    """Return the one-sentence error of a command."""
     with pytest.raises(SystemExit) as stop:
         main(arguments)
     assert stop.value.code == 2
@@ -32,43 +32,45 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 
 def test_list_names_every_env(capsys: pytest.CaptureFixture[str]) -> None:
-    """Each id of the catalogue is a line."""
-    text = said(capsys, "envs", "list")
+    """Each id of the catalogue is listed."""
+    text = output_of(capsys, "envs", "list")
     assert all(env_id in text for env_id in (*CATALOGUE, *VEHICLE_ENVS))
 
 
 def test_show_prints_the_layout_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:
-    """Names, units, ranges, what each number belongs to and what an action gives."""
-    text = said(capsys, "envs", "show", "BigInvertedPendulum")
+    """Names, units, ranges, elements and gains."""
+    text = output_of(capsys, "envs", "show", "BigInvertedPendulum")
     for word in ("hinge/velocity", "rad/s", "-1.571", "joint slider", "100 N", "slide/motor"):
         assert word in text
-    text = said(capsys, "envs", "show", "Ant", "--body", "BigAnt")
+    text = output_of(capsys, "envs", "show", "Ant", "--body", "BigAnt")
     assert "standing height: 0.9467 m" in text
 
 
-def test_compare_says_what_changes(capsys: pytest.CaptureFixture[str]) -> None:
-    """The certificate of the shift, in words and numbers."""
-    text = said(capsys, "envs", "compare", "Ant", "AmputatedAnt")
+def test_compare_prints_the_certificate(capsys: pytest.CaptureFixture[str]) -> None:
+    """The changes of the body, with values."""
+    text = output_of(capsys, "envs", "compare", "Ant", "AmputatedAnt")
     assert "shank_4: length 0.5657 m -> 0.1414 m (x0.25)" in text
 
 
 def test_compare_refuses_a_shift_that_changes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    """A foot's friction below that of the floor does nothing, and that is said."""
+    """A foot's friction below that of the floor has no effect."""
     body = '[{"edit":"friction","element":"*ankle_geom","scale":0.2}]'
     message = refused(capsys, "envs", "compare", "Ant", "Ant", "--target-body", body)
     assert "nothing to transfer across" in message
 
 
-def test_check_goes_through_the_promises(capsys: pytest.CaptureFixture[str]) -> None:
-    """Each promise that is kept is a line."""
-    assert said(capsys, "envs", "check", "SmallInvertedPendulum").count("kept") == 7
+def test_check_lists_each_promise(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each check that passes is a line."""
+    assert output_of(capsys, "envs", "check", "SmallInvertedPendulum").count("kept") == 7
 
 
 @pytest.mark.gl
-def test_render_writes_a_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """A PNG file of the size asked for."""
+def test_render_writes_an_image(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The PNG has the requested size."""
     out = tmp_path / "new" / "ant.png"
-    said(capsys, "envs", "render", "Ant", "--out", str(out), "--width", "160", "--height", "120")
+    output_of(
+        capsys, "envs", "render", "Ant", "--out", str(out), "--width", "160", "--height", "120"
+    )
     assert iio.imread(out).shape == (120, 160, 3)
 
 
@@ -76,14 +78,14 @@ def test_render_writes_a_picture(capsys: pytest.CaptureFixture[str], tmp_path: P
 def test_render_refuses_a_place_that_cannot_be_written(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """A file where a folder should be."""
+    """A file in place of a folder raises an error."""
     (tmp_path / "file").touch()
     out = str(tmp_path / "file" / "ant.png")
     assert "Cannot write" in refused(capsys, "envs", "render", "Ant", "--out", out)
 
 
 class Bracketed(gym.Env[np.ndarray, np.ndarray]):
-    """An env whose names look like markup, and like emoji."""
+    """An env whose names look like Rich markup and emoji."""
 
     observation_space = gym.spaces.Box(-1.0, 1.0, (1,))
     action_space = gym.spaces.Box(-1.0, 1.0, (1,))
@@ -95,10 +97,10 @@ class Bracketed(gym.Env[np.ndarray, np.ndarray]):
 
 
 def test_names_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
-    """Brackets are no markup."""
+    """Names are not interpreted as markup."""
     gym.register("Bracketed-v0", Bracketed, disable_env_checker=True)
     try:
-        text = said(capsys, "envs", "show", "Bracketed-v0")
+        text = output_of(capsys, "envs", "show", "Bracketed-v0")
     finally:
         del gym.registry["Bracketed-v0"]
     for name in ("[/x]", "body a/b[c]", "[red]a", ":ant:", "body: [/y]"):
@@ -134,17 +136,17 @@ def test_names_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> No
         (("render", "Ant", "--out", "x.png", "--width", "100000000"), "1 to 8192 pixels"),
     ],
 )
-def test_nonsense_gets_one_sentence(
+def test_mistakes_give_one_sentence(
     capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
 ) -> None:
-    """What exists and the nearest spelling, exit code 2, no traceback."""
+    """The error suggests what exists; exit code 2, no traceback."""
     message = refused(capsys, "envs", *arguments)
     assert message.startswith("error: ")
     assert message.count("\n") == 1
     assert words in message
 
 
-def test_an_unknown_command_lists_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
-    """The commands, and exit code 2."""
+def test_an_unknown_command_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    """The exit code is 2."""
     assert "compare" in refused(capsys, "envs", "shwo")
     assert "transfer" in refused(capsys, "trasnfer")

@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
 
 def test_every_policy_is_filmed(tmp_path: Path) -> None:
-    """The source in its own body, then each arm in the target, and scratch last."""
+    """The source in its own body, each arm in the target, and scratch last."""
     plan = tiny_plan(steps=32, source_steps=32)
     study = run_study(plan, tmp_path / "study", executor=Serial())
     film = tmp_path / "film.mp4"
@@ -37,8 +37,8 @@ def test_every_policy_is_filmed(tmp_path: Path) -> None:
     assert film.stat().st_size > 1000
 
 
-def test_drivers_by_camera_are_not_filmed(tmp_path: Path) -> None:
-    """Their envs show what the robot sees, not the robot."""
+def test_camera_policies_are_not_filmed(tmp_path: Path) -> None:
+    """Their envs render what the robot sees, not the robot."""
     study = make_study()
     plan = msgspec.structs.replace(study.plan, settings=learner_settings("cloning"))
     assert film_study(msgspec.structs.replace(study, plan=plan), tmp_path) == []

@@ -1,4 +1,4 @@
-"""What the machine, the environment variables and Ctrl-C do to any command."""
+"""Behaviour common to all commands: encoding, rendering backends, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def test_ctrl_c_while_loading_is_one_word(name: str) -> None:
     assert done.stderr == "Stopped.\n"
 
 
-def test_an_encoding_without_the_letters_is_no_error() -> None:
-    """A table in ASCII, with question marks where letters are missing."""
+def test_ascii_output_replaces_missing_letters() -> None:
+    """Tables are ASCII, with question marks for missing characters."""
     arguments = ["envs", "show", "InvertedPendulum"]
     done = run_python(COMMAND.format(arguments=arguments), PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
@@ -44,7 +44,7 @@ def test_an_encoding_without_the_letters_is_no_error() -> None:
     assert message.startswith("error: No environment matches '?'")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="Elsewhere there is always a screen.")
+@pytest.mark.skipif(sys.platform != "linux", reason="Other systems always have a display.")
 @pytest.mark.parametrize(
     ("arguments", "variables", "words"),
     [
@@ -68,14 +68,14 @@ def test_an_encoding_without_the_letters_is_no_error() -> None:
         ),
     ],
 )
-def test_what_cannot_draw_is_one_sentence(
+def test_rendering_failures_give_one_sentence(
     arguments: list[str],
     variables: dict[str, str],
     words: str,
     tmp_path: os.PathLike[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Neither a traceback nor the end of the process by GLFW."""
+    """No traceback, and no abort by GLFW."""
     monkeypatch.chdir(tmp_path)
     done = run_python(COMMAND.format(arguments=arguments), **variables)
     assert done.returncode == 2, done.stderr
@@ -85,8 +85,8 @@ def test_what_cannot_draw_is_one_sentence(
     assert not os.listdir(tmp_path)
 
 
-def test_an_env_of_others_that_cannot_draw_is_one_sentence(tmp_path: os.PathLike[str]) -> None:
-    """Gymnasium's classic control draws with pygame, which we do not bring."""
+def test_a_missing_pygame_gives_one_sentence(tmp_path: os.PathLike[str]) -> None:
+    """Gymnasium's classic control renders with pygame, which is not a dependency."""
     code = (
         "import sys; sys.modules['pygame'] = None\n"
         "from shapechanger.cli import main\n"
@@ -118,7 +118,7 @@ def test_a_misspelt_command_has_a_nearest_spelling(
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Here no disk is always full.")
 def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
-    """No traceback, neither at once nor at Python's end."""
+    """No traceback, neither on write nor at interpreter exit."""
     code = COMMAND.format(arguments=["robot", "doctor", "car", "--port", "0"])
     with open("/dev/full", "w") as full:
         done = subprocess.run(

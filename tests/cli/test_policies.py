@@ -1,4 +1,4 @@
-"""`shapechanger policies`: cards, and policies that Stable-Baselines3 has written."""
+"""`shapechanger policies`: cards, and conversion of Stable-Baselines3 files."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ def _zip(path: Path, env: str = "shapechanger/InvertedPendulum-v1", **arguments:
 
 
 def test_a_card_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
-    """Where it learned, and what it senses."""
+    """The card gives training env, steps and inputs."""
     main(["policies", "show", str(POLICIES["reach"])])
-    said = capsys.readouterr().out
-    assert "shapechanger/Finger-v1" in said
-    assert "307,200" in said
-    assert "PIP_flexion" in said or "angle" in said
+    output = capsys.readouterr().out
+    assert "shapechanger/Finger-v1" in output
+    assert "307,200" in output
+    assert "PIP_flexion" in output or "angle" in output
 
 
 def test_a_clone_is_shown_and_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    """It is a policy as any other, with a card of its own."""
+    """Clones are shown and listed like other policies."""
     main(["policies", "show", str(CLONES["car"])])
-    said = capsys.readouterr().out
-    assert "steering, throttle" in said
-    assert "shapechanger train Car" in said
+    output = capsys.readouterr().out
+    assert "steering, throttle" in output
+    assert "shapechanger train Car" in output
     main(["policies", "list", str(CLONES["car"].parent)])
     lines = capsys.readouterr().out.splitlines()
     assert sum("cloning" in line for line in lines) == len(CLONES)
@@ -76,7 +76,7 @@ def test_a_zip_of_stable_baselines3_is_converted(
         (None, "InvertedPendulum", True, "There is no policy file"),
     ],
 )
-def test_what_cannot_be_converted_gets_one_sentence(
+def test_unsuitable_policies_give_one_sentence(
     arguments: dict[str, object] | None,
     env: str,
     trust: bool,
@@ -84,7 +84,7 @@ def test_what_cannot_be_converted_gets_one_sentence(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """And nothing is written."""
+    """No file is written."""
     if arguments is not None:
         _zip(tmp_path / "mine.zip", **arguments)
     out = tmp_path / "mine.safetensors"
@@ -100,7 +100,7 @@ def test_what_cannot_be_converted_gets_one_sentence(
 
 @pytest.fixture
 def trained(tmp_path: Path) -> Path:
-    """A policy of a pendulum, in a folder of its own."""
+    """A pendulum policy in its own folder."""
     _zip(tmp_path / "mine.zip", policy_kwargs={"net_arch": [8]})
     out = tmp_path / "policies" / "mine.safetensors"
     out.parent.mkdir()
@@ -110,34 +110,34 @@ def trained(tmp_path: Path) -> Path:
 
 
 def test_a_folder_is_listed(trained: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A file that is no policy gets its reason, and an empty folder a sentence."""
+    """Invalid files are listed with the reason; an empty folder is an error."""
     (trained.parent / "other.safetensors").write_text("no")
     main(["policies", "list", str(trained.parent)])
-    said = capsys.readouterr().out
-    assert "mine.safetensors" in said
-    assert "shapechanger/InvertedPendulum-v1" in said
-    assert "is not a policy" in said
+    output = capsys.readouterr().out
+    assert "mine.safetensors" in output
+    assert "shapechanger/InvertedPendulum-v1" in output
+    assert "is not a policy" in output
     (trained.parent / "empty").mkdir()
     with pytest.raises(SystemExit):
         main(["policies", "list", str(trained.parent / "empty")])
     assert "There is no policy in" in capsys.readouterr().err
 
 
-def test_an_exported_policy_does_the_same(
+def test_an_exported_policy_evaluates_the_same(
     trained: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Evaluated in its own env and in another, from both files."""
+    """In its own env and in another."""
     exported = trained.with_suffix(".onnx")
     main(["policies", "export", str(trained), "--out", str(exported)])
     capsys.readouterr()
     for env in ([], ["--env", "BigInvertedPendulum"]):
-        said: list[str] = []
+        output: list[str] = []
         for file in (trained, exported):
             main(["policies", "evaluate", str(file), "--episodes", "2", *env])
-            said.append(capsys.readouterr().out)
-        assert said[0] == said[1]
-        assert said[0].startswith("return ")
-        assert "steps" in said[0]
+            output.append(capsys.readouterr().out)
+        assert output[0] == output[1]
+        assert output[0].startswith("return ")
+        assert "steps" in output[0]
     with pytest.raises(SystemExit):
         main(["policies", "evaluate", str(exported), "--episodes", "0"])
     assert "at least one episode" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The progress of long work on a terminal."""
+"""Progress of long studies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from shapechanger.cli.console import StudyProgress
 
 
 def test_a_terminal_shows_a_bar_with_the_time_left() -> None:
-    """How many runs have ended, how much is done, and how long the rest takes."""
+    """Completed runs, steps and remaining time."""
     screen = io.StringIO()
     console = Console(force_terminal=True, file=screen, width=120, legacy_windows=False)
     with StudyProgress({"scratch-0": 100, "scratch-1": 100}, console) as progress:
@@ -25,8 +25,8 @@ def test_a_terminal_shows_a_bar_with_the_time_left() -> None:
     assert "\x1b" in shown
 
 
-def test_elsewhere_it_is_lines() -> None:
-    """Without control characters, and with names as they are."""
+def test_without_a_terminal_it_prints_lines() -> None:
+    """Lines have no control characters, and names are not markup."""
     file = io.StringIO()
     with StudyProgress({"[/x]": 100, "b": 300}, Console(file=file, markup=False)) as progress:
         progress("[/x]", 100, True)

@@ -1,4 +1,4 @@
-"""`shapechanger suite` as a user runs it, on lanes in place of vehicles."""
+"""`shapechanger suite` with small lane envs in place of vehicles."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 pytestmark = pytest.mark.system
 
 _SUITE = ["suite", "run", "vehicles", "--seeds", "2"]
-# The target of one is the target of another, and so with the sources.
+# Sources and targets are shared between pairs.
 _PAIRS = [f"{a}-to-{b}" for a, b in (("Dry", "Wet"), ("Dry", "Icy"), ("Wet", "Dry"))]
 _PAIRS += [f"{a}-to-{b}" for a, b in (("Wet", "Icy"), ("Icy", "Dry"), ("Icy", "Wet"))]
 
 
 class _Counting(Serial):
-    """Remembers what it did, and may stop before its end.
+    """Executor that records jobs and can stop early.
 
     Attributes:
         done: Names of the jobs, in order.
 
     Args:
-        stops_after: Jobs after which somebody presses Ctrl-C; None for never.
+        stops_after: Number of jobs after which Ctrl-C is raised; None for never.
     """
 
     def __init__(self, stops_after: int | None = None) -> None:
@@ -44,7 +44,7 @@ class _Counting(Serial):
         self._stops_after = stops_after
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Do them one by one."""
+        """Run the jobs one by one."""
         for job in jobs:
             if len(self.done) == self._stops_after:
                 raise KeyboardInterrupt
@@ -54,7 +54,7 @@ class _Counting(Serial):
 
 @pytest.fixture(scope="module", autouse=True)
 def lanes() -> Iterator[None]:
-    """Three lanes in place of four vehicles, and clones that are made in no time."""
+    """Three lane envs in place of four vehicles, and fast clones."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     with pytest.MonkeyPatch.context() as patch:
@@ -68,13 +68,13 @@ def lanes() -> Iterator[None]:
 def _run(
     out: Path, counting: _Counting, *more: str, arguments: Sequence[str] = _SUITE
 ) -> tuple[int, str, str]:
-    """Exit code, and what was said on the standard output and on the standard error."""
+    """Return exit code, standard output and standard error."""
     typed = [*arguments, "--out", str(out), *more]
-    said, complained, code = io.StringIO(), io.StringIO(), 0
+    output, errors, code = io.StringIO(), io.StringIO(), 0
     with (
         pytest.MonkeyPatch.context() as patch,
-        contextlib.redirect_stdout(said),
-        contextlib.redirect_stderr(complained),
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(errors),
     ):
         patch.setattr(env_arguments, "Processes", lambda workers: counting)
         patch.setattr(sys, "argv", ["shapechanger", *typed])
@@ -82,38 +82,38 @@ def _run(
             main(typed)
         except SystemExit as stop:
             code = int(stop.code or 0)
-    return code, said.getvalue(), complained.getvalue()
+    return code, output.getvalue(), errors.getvalue()
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, _Counting, str]:
-    """A suite that nobody stopped: its folder, what was done for it, and what it printed."""
+def complete_suite(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, _Counting, str]:
+    """A complete suite: its folder, executor and output."""
     out, counting = tmp_path_factory.mktemp("suite") / "all", _Counting()
-    code, said, complained = _run(out, counting)
-    assert code == 0, complained
-    return out, counting, said
+    code, output, errors = _run(out, counting)
+    assert code == 0, errors
+    return out, counting, output
 
 
-def test_a_suite_is_one_command(undisturbed: tuple[Path, _Counting, str]) -> None:
-    """A report for each pair, a line of the table for each, and one sentence on them all."""
-    out, _, said = undisturbed
-    lines = [line.strip() for line in said.splitlines()]
+def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> None:
+    """A report and a table row for each pair, and a summary sentence."""
+    out, _, output = complete_suite
+    lines = [line.strip() for line in output.splitlines()]
     header = next(i for i, line in enumerate(lines) if line.startswith("study"))
     assert lines[header].startswith("study")
     assert "zero-shot" in lines[header]
     assert lines[header].endswith("gain at the end")
     assert [line.split()[0] for line in lines[header + 1 : header + 7]] == _PAIRS
     for name in _PAIRS:
-        assert f"wrote {out / name / 'report.html'}" in said
+        assert f"wrote {out / name / 'report.html'}" in output
         assert (out / name / "report.html").stat().st_size > 10_000
         command = json.loads((out / name / "study.json").read_text())["command"]
         assert command == f"shapechanger suite run vehicles --seeds 2 --out {out}"
-    assert "of 6 fine-tuning came to what scratch ends with in less than half of" in said
+    assert "of 6 fine-tuning came to what scratch ends with in less than half of" in output
 
 
-def test_the_summary_holds_what_the_table_says(undisturbed: tuple[Path, _Counting, str]) -> None:
-    """suite.json has a value for each pair, in steps, from the studies beside it."""
-    out, _, said = undisturbed
+def test_suite_json_matches_the_table(complete_suite: tuple[Path, _Counting, str]) -> None:
+    """suite.json has the values of each study."""
+    out, _, output = complete_suite
     found = json.loads((out / "suite.json").read_text())
     assert [crossing["name"] for crossing in found] == _PAIRS
     for crossing in found:
@@ -125,17 +125,17 @@ def test_the_summary_holds_what_the_table_says(undisturbed: tuple[Path, _Countin
         ]
         assert crossing["final"] == pytest.approx(sum(ends) / 2)
         assert 0.0 <= crossing["scratch_steps"] <= 40.0
-        (row,) = (line for line in said.splitlines() if f" {crossing['name']} " in line)
+        (row,) = (line for line in output.splitlines() if f" {crossing['name']} " in line)
         assert row.split()[1:3] == ["return", f"{crossing['final']:.4g}"]
         assert ("never" in row) == (crossing["fine_tune_steps"] is None)
     tuned = [(c["fine_tune_steps"], c["scratch_steps"]) for c in found]
     halves = sum(steps is not None and steps < scratch / 2 for steps, scratch in tuned)
-    assert f"On {halves} of 6 fine-tuning" in said
+    assert f"On {halves} of 6 fine-tuning" in output
 
 
-def test_each_training_is_done_once(undisturbed: tuple[Path, _Counting, str]) -> None:
-    """Three sources and three targets, whoever needs them; two arms for each of six pairs."""
-    done = [name.rpartition("-")[0] for name in undisturbed[1].done]
+def test_each_training_is_done_once(complete_suite: tuple[Path, _Counting, str]) -> None:
+    """Sources and scratch runs are shared; two arms for each of six pairs."""
+    done = [name.rpartition("-")[0] for name in complete_suite[1].done]
     assert {kind: done.count(kind) for kind in done} == {
         "source": 3 * 2,
         "random": 3 * 2,
@@ -146,19 +146,19 @@ def test_each_training_is_done_once(undisturbed: tuple[Path, _Counting, str]) ->
     }
 
 
-def test_a_suite_that_was_stopped_goes_on_to_the_same_numbers(
-    undisturbed: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_stopped_suite_resumes_to_the_same_numbers(
+    complete_suite: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C in the second study: the same command does only what is left."""
-    # Drawing the reports takes longer than all the rest, and they are no part of what is said here.
+    """After Ctrl-C, the same command runs only what is left."""
+    # Reports are slow to draw, and not part of this test.
     monkeypatch.setattr(suite_command, "write_study_report", lambda study, folder: folder)
-    whole, all_of_it, _ = undisturbed
+    whole, all_of_it, _ = complete_suite
     out, before = tmp_path / "all", _Counting(stops_after=13)
-    code, said, complained = _run(out, before)
+    code, output, errors = _run(out, before)
     assert code == 130
     way_on = shlex.join(["shapechanger", *_SUITE, "--out", str(out)])
-    assert complained.splitlines()[-1] == f"Stopped. Go on with: {way_on}"
-    assert "report.html" in said
+    assert errors.splitlines()[-1] == f"Stopped. Go on with: {way_on}"
+    assert "report.html" in output
     assert len(json.loads((out / "suite.json").read_text())) == 1
     after = _Counting()
     assert _run(out, after)[0] == 0
@@ -170,11 +170,11 @@ def test_a_suite_that_was_stopped_goes_on_to_the_same_numbers(
 
 
 def test_folders_of_two_machines_are_merged(
-    undisturbed: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    complete_suite: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One study was done on one, two on the other, and one of them on both: the numbers agree."""
+    """Overlapping and incomplete folders merge to the same numbers."""
     monkeypatch.setattr(suite_command, "write_study_report", lambda study, folder: folder)
-    whole = undisturbed[0]
+    whole = complete_suite[0]
     parts = {"a": _PAIRS[:2], "b": _PAIRS[1:3]}
     for part, names in parts.items():
         for name in names:
@@ -182,45 +182,45 @@ def test_folders_of_two_machines_are_merged(
     # The other machine had been stopped in one of its studies.
     shutil.rmtree(tmp_path / "b" / _PAIRS[2] / "runs" / "fine-tune-1")
     merge = ["suite", "merge", "vehicles", str(tmp_path / "a"), str(tmp_path / "b")]
-    code, said, complained = _run(tmp_path / "ab", _Counting(), arguments=merge)
-    assert code == 0, complained
-    assert f"{_PAIRS[2]} lacks fine-tune-1." in said
+    code, output, errors = _run(tmp_path / "ab", _Counting(), arguments=merge)
+    assert code == 0, errors
+    assert f"{_PAIRS[2]} lacks fine-tune-1." in output
     found = json.loads((tmp_path / "ab" / "suite.json").read_text())
     alone = {one["name"]: one for one in json.loads((whole / "suite.json").read_text())}
     assert [one["name"] for one in found] == _PAIRS[:2]
     assert all(one == alone[one["name"]] for one in found)
 
 
-def test_what_cannot_be_merged_is_refused(
-    undisturbed: tuple[Path, _Counting, str], tmp_path: Path
+def test_conflicting_folders_are_refused(
+    complete_suite: tuple[Path, _Counting, str], tmp_path: Path
 ) -> None:
-    """Another result of the same run, another study, and the folder that is written."""
+    """Differing results, differing studies, and the output folder as an input."""
     name = _PAIRS[0]
     for part in ("a", "b"):
-        shutil.copytree(undisturbed[0] / name, tmp_path / part / name)
+        shutil.copytree(complete_suite[0] / name, tmp_path / part / name)
     result = tmp_path / "b" / name / "runs" / "random-0" / "run.json"
     content = json.loads(result.read_text())
     content["curve"][0]["mean_return"] += 1.0
     result.write_text(json.dumps(content))
     merge = ["suite", "merge", "vehicles", str(tmp_path / "a"), str(tmp_path / "b")]
-    code, _, complained = _run(tmp_path / "ab", _Counting(), arguments=merge)
+    code, _, errors = _run(tmp_path / "ab", _Counting(), arguments=merge)
     assert code == 2
-    assert "The result of random-0 in" in complained
+    assert "The result of random-0 in" in errors
     plan = tmp_path / "b" / name / "plan.json"
     plan.write_text(plan.read_text().replace('"seed": 0', '"seed": 7'))
-    code, _, complained = _run(tmp_path / "abc", _Counting(), arguments=merge)
+    code, _, errors = _run(tmp_path / "abc", _Counting(), arguments=merge)
     assert code == 2
-    assert "which differ in seed" in complained
-    code, _, complained = _run(tmp_path / "a", _Counting(), arguments=merge)
+    assert "which differ in seed" in errors
+    code, _, errors = _run(tmp_path / "a", _Counting(), arguments=merge)
     assert code == 2
-    assert "one of the folders to merge" in complained
+    assert "one of the folders to merge" in errors
 
 
 def test_a_suite_can_be_watched(
-    undisturbed: tuple[Path, _Counting, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    complete_suite: tuple[Path, _Counting, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its complete studies, and a run at work with its last evaluation."""
-    shutil.copytree(undisturbed[0], tmp_path / "all")
+    """Complete studies, and running ones with their last evaluation."""
+    shutil.copytree(complete_suite[0], tmp_path / "all")
     at_work = tmp_path / "all" / _PAIRS[0] / "runs" / "fine-tune-1"
     (at_work / "run.json").unlink()
     curve = at_work / "curve.jsonl"
@@ -239,13 +239,13 @@ def test_a_suite_can_be_watched(
 
 
 def test_another_suite_in_the_folder_is_refused(
-    undisturbed: tuple[Path, _Counting, str],
+    complete_suite: tuple[Path, _Counting, str],
 ) -> None:
-    """One sentence, and nothing is done."""
+    """One sentence, and no job is run."""
     counting = _Counting()
-    code, _, complained = _run(undisturbed[0], counting, "--seed", "1")
+    code, _, errors = _run(complete_suite[0], counting, "--seed", "1")
     assert code == 2
-    assert "holds another study, which differs in seed" in complained
+    assert "holds another study, which differs in seed" in errors
     assert counting.done == []
 
 
@@ -258,14 +258,14 @@ def test_another_suite_in_the_folder_is_refused(
         (["suite", "run", "vehicles", "--workers", "0"], "at least one worker"),
     ],
 )
-def test_nonsense_gets_one_sentence(
+def test_mistakes_give_one_sentence(
     arguments: list[str],
     words: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Exit code 2, no traceback, and nothing is written."""
+    """Exit code 2, no traceback, and no file is written."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as stop:
         main(arguments)

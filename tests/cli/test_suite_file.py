@@ -1,4 +1,4 @@
-"""Files of suites: those that ship, and what a mistake in one gets."""
+"""Suite files: those shipped, and mistakes in others."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from shapechanger.cli.suite import load_suite, shipped_suites, suite_tasks
 from shapechanger.transfer.plan import TransferTask
 
 
-def test_a_suite_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    """The message names those that are, and the nearest."""
+def test_an_unknown_suite_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """The error lists the suites and suggests the nearest."""
     with pytest.raises(SystemExit) as stop:
         main(["suite", "run", "vehicle"])
     assert stop.value.code == 2
@@ -29,7 +29,7 @@ def _pairs(name: str) -> list[tuple[str, str, str]]:
 
 
 def test_the_shipped_suites_are_those_of_the_docs() -> None:
-    """All ordered pairs, the car with each lens alone, nine shanks, and pairs of waypoints."""
+    """The number of pairs in each shipped suite."""
     counts = {name: len(_pairs(name)) for name in shipped_suites()}
     assert counts == {
         "ants": 12,
@@ -85,10 +85,10 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
         ),
     ],
 )
-def test_a_wrong_file_gets_one_sentence(
+def test_a_mistake_in_a_file_gives_one_sentence(
     text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With the line where there is one, what exists and the nearest spelling; nothing is done."""
+    """With line, alternatives and nearest spelling; nothing is run."""
     file = tmp_path / "mine.toml"
     file.write_text(text)
     with pytest.raises(SystemExit) as stop:

@@ -1,4 +1,4 @@
-"""`shapechanger train`, `play` and `transfer` as a user runs them."""
+"""`shapechanger train`, `play` and `transfer`."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ QUICK = ["transfer", "InvertedPendulum", "BigInvertedPendulum", "--quick"]
 
 
 def run(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
-    """A command in a process of its own."""
+    """Run a command in its own process."""
     return subprocess.run(  # type: ignore[call-overload]
         [*COMMAND, *arguments], capture_output=True, text=True, check=False, **options
     )
 
 
 def curves(out: Path) -> dict[str, list[tuple[int, float]]]:
-    """Every number of a study."""
+    """Return all learning curves of a study."""
     study = json.loads((out / "study.json").read_text())
     return {
         f"{r['run']['kind']}-{r['run']['index']}": [
@@ -47,7 +47,7 @@ def curves(out: Path) -> dict[str, list[tuple[int, float]]]:
 def quick(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """A quick study that nobody disturbed: its folder, and what it printed."""
+    """An uninterrupted quick study: its folder and process."""
     out = tmp_path_factory.mktemp("quick") / "study"
     return out, run(*QUICK, "--out", str(out))
 
@@ -55,7 +55,7 @@ def quick(
 def test_a_study_is_one_command(
     quick: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
-    """A table on the terminal, study.json, and a report that needs no other file."""
+    """A table, study.json, and a self-contained report."""
     out, done = quick
     assert done.returncode == 0, done.stderr
     assert "Jumpstart" in done.stdout
@@ -71,7 +71,7 @@ def test_a_study_is_one_command(
 def test_progress_is_plain_lines_without_a_terminal(
     quick: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
-    """One line for each run that ends, with the time left, and no control characters."""
+    """One line per completed run, with the time left, and no control characters."""
     lines = quick[1].stderr.splitlines()
     assert sum(" ended; " in line for line in lines) == 11
     assert any("s left" in line for line in lines)
@@ -88,10 +88,10 @@ def _until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> Non
             pytest.fail(f"ended too early: {process.communicate()}")
 
 
-def test_a_study_that_was_killed_goes_on_to_the_same_numbers(
+def test_a_killed_study_resumes_to_the_same_numbers(
     quick: tuple[Path, subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:
-    """Ctrl-C while scratch learns, then a kill: the same command ends with the same numbers."""
+    """After Ctrl-C and a kill, the same command gives the same curves."""
     out = tmp_path / "study"
     for how, run_name in ((signal.SIGINT, "scratch-0"), (signal.SIGKILL, "fine-tune-0")):
         process = subprocess.Popen(
@@ -116,8 +116,8 @@ def test_a_study_that_was_killed_goes_on_to_the_same_numbers(
     assert curves(out) == curves(quick[0])
 
 
-def test_a_disk_that_runs_full_is_one_sentence(tmp_path: Path) -> None:
-    """Files may be no larger than 20 kB, and a policy is: what is kept is said."""
+def test_a_full_disk_gives_one_sentence(tmp_path: Path) -> None:
+    """With files limited to 20 kB, the error says what is kept."""
     done = run(
         *QUICK,
         "--out",
@@ -135,7 +135,7 @@ def test_a_disk_that_runs_full_is_one_sentence(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A policy of the pendulum, with its logs beside it, and what training it printed."""
+    """A pendulum policy with its logs, and the output of its training."""
     policy = tmp_path_factory.mktemp("trained") / "policy.safetensors"
     logs = policy.with_name("logs")
     files = ["--out", str(policy), "--tensorboard", str(logs)]
@@ -145,7 +145,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 
 def test_training_writes_a_policy_and_logs(trained: tuple[Path, str]) -> None:
-    """The file that was asked for, and TensorBoard's."""
+    """The policy file and TensorBoard logs exist."""
     policy, text = trained
     assert f"wrote {policy}" in text
     assert "train InvertedPendulum --steps 3072" in load_policy(policy).card.command
@@ -157,15 +157,15 @@ def test_training_writes_a_policy_and_logs(trained: tuple[Path, str]) -> None:
 def test_a_policy_is_played_in_its_body_and_in_another(
     trained: tuple[Path, str], env: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A film of the policy at work."""
+    """A film is written."""
     film = tmp_path / "film.mp4"
     main(["play", env, "--policy", str(trained[0]), "--max-steps", "5", "--out", str(film)])
     assert "episode 0: return" in capsys.readouterr().out
     assert film.stat().st_size > 0
 
 
-def test_a_policy_is_brought_along(trained: tuple[Path, str], tmp_path: Path) -> None:
-    """A study with it trains no source policies."""
+def test_a_given_source_policy_is_used(trained: tuple[Path, str], tmp_path: Path) -> None:
+    """No source policy is trained."""
     out = tmp_path / "study"
     arguments = ["--source-policy", str(trained[0]), "--steps", "3072", "--seeds", "2"]
     done = run("transfer", "InvertedPendulum", "BigInvertedPendulum", *arguments, "--out", str(out))
@@ -174,18 +174,18 @@ def test_a_policy_is_brought_along(trained: tuple[Path, str], tmp_path: Path) ->
     assert not (out / "runs" / "source-0").exists()
 
 
-def test_another_study_in_the_folder_is_not_counted(
+def test_another_study_in_the_folder_is_refused(
     quick: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
-    """The folder of one study is refused to another, without a word of runs that had ended."""
+    """Its runs are not counted as complete."""
     done = run(*QUICK, "--seed", "1", "--out", str(quick[0]))
     assert done.returncode == 2
     assert "holds another study" in done.stderr
     assert "had ended" not in done.stdout + done.stderr
 
 
-def test_a_study_in_a_file_is_refused_without_a_way_on(tmp_path: Path) -> None:
-    """Nothing is kept where no folder can be."""
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
+    """The error does not offer to resume."""
     (tmp_path / "file").touch()
     done = run(*QUICK, "--out", str(tmp_path / "file"))
     assert done.returncode == 2
@@ -194,10 +194,10 @@ def test_a_study_in_a_file_is_refused_without_a_way_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.gl
-def test_play_makes_a_film_where_there_is_no_screen(
+def test_play_writes_a_film_without_a_display(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A film file, and what the episode was worth."""
+    """The return of the episode is printed."""
     film = tmp_path / "ant.mp4"
     main(["play", "Ant", "--max-steps", "5", "--out", str(film)])
     assert film.stat().st_size > 0
@@ -258,14 +258,14 @@ def test_play_makes_a_film_where_there_is_no_screen(
         (["play", "Ant", "--out", "film.txt"], "a film ends with one of .avi"),
     ],
 )
-def test_nonsense_gets_one_sentence(
+def test_mistakes_give_one_sentence(
     arguments: list[str],
     words: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Exit code 2, no traceback, and nothing is written."""
+    """Exit code 2, no traceback, and no file is written."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as stop:
         main(arguments)
@@ -290,7 +290,7 @@ def test_a_file_where_a_folder_should_be_is_refused_before_the_work(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Nothing has been trained or played by then."""
+    """The error comes before training or playing."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     with pytest.raises(SystemExit) as stop:
@@ -303,10 +303,10 @@ def test_a_file_where_a_folder_should_be_is_refused_before_the_work(
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_of_what_the_encoder_says_the_first_line_is_told(
+def test_only_the_first_line_of_an_encoder_error_is_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """FFmpeg adds its command and a page of settings."""
+    """FFmpeg appends its command and settings."""
 
     def fail(*arguments: object, **options: object) -> None:
         raise OSError("\nNo space left.\n\nFFMPEG COMMAND:\nffmpeg -y")
@@ -345,7 +345,7 @@ main({arguments})
 def test_a_missing_extra_is_named_with_its_command(
     missing: str, extra: str, arguments: list[str]
 ) -> None:
-    """Which one, and what installs it; in one sentence."""
+    """One sentence names the extra and its install command."""
     code = BLOCKED.format(names={missing}, arguments=arguments)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode != 0

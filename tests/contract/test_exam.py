@@ -1,4 +1,4 @@
-"""Every env of the catalogue sits every exam."""
+"""Every env of the catalogue passes the checks of `shapechanger.testing`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from shapechanger.envs import CATALOGUE
 from shapechanger.envs.catalogue import FINGER_ENVS, RANGES_ENVS, VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.testing import PROMISES, MakeEnv, examine
 
-# Bodies that no id names, and arguments that change a space, keep the same promises.
+# Bodies without an id, and arguments that change a space.
 _VARIANTS: dict[str, MakeEnv] = {
     "passive feet": partial(gym.make, "shapechanger/ExtendedAnt-v1", actuated_extension=False),
     "place seen, contacts unseen": partial(
@@ -34,8 +34,8 @@ _VARIANTS: dict[str, MakeEnv] = {
     ),
 }
 _MAKERS: dict[str, MakeEnv] = {env_id: partial(gym.make, env_id) for env_id in CATALOGUE}
-# Vehicles that see nothing need nothing that draws. Where a truck is at home there is so much room
-# that its sensors say the same at each start.
+# Without images, no renderer is needed. A truck's default world is so open that its sensors read
+# the same at each start.
 _BLIND: dict[str, MakeEnv] = {
     env_id: partial(gym.make, env_id, image=False, world="corridor" if vehicle == "truck" else None)
     for env_id, (vehicle, _) in VEHICLE_ENVS.items()
@@ -68,7 +68,7 @@ _SEEING: dict[str, MakeEnv] = {
 @pytest.mark.parametrize("promise", PROMISES, ids=lambda promise: promise.__name__)
 @pytest.mark.parametrize("make", _ALL.values(), ids=_ALL.keys())
 def test_an_env_keeps_its_promise(make: MakeEnv, promise: Callable[[MakeEnv], None]) -> None:
-    """What learners and studies rely on holds for every body."""
+    """Each check holds for each env and body."""
     promise(make)
 
 
@@ -76,32 +76,32 @@ def test_an_env_keeps_its_promise(make: MakeEnv, promise: Callable[[MakeEnv], No
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize("promise", PROMISES, ids=lambda promise: promise.__name__)
 @pytest.mark.parametrize("make", _SEEING.values(), ids=_SEEING.keys())
-def test_an_env_with_pictures_keeps_its_promise(
+def test_an_env_with_images_keeps_its_promise(
     make: MakeEnv, promise: Callable[[MakeEnv], None]
 ) -> None:
-    """Pictures are as good as numbers: the same again, and nobody else's memory."""
+    """Image observations are deterministic and not shared."""
     promise(make)
 
 
-def test_the_exam_is_all_promises() -> None:
-    """Whoever brings an env is told each promise that was kept."""
+def test_examine_runs_every_check() -> None:
+    """One result is yielded per check that passes."""
     kept = list(examine(_MAKERS["shapechanger/InvertedPendulum-v1"]))
     assert len(kept) == len(PROMISES)
     assert kept[0] == "Passes Gymnasium's `check_env`."
 
 
-# Gymnasium's pendulum takes forces from -3 to 3, and ours are the same.
+# As in Gymnasium, the pendulum's forces are from -3 to 3.
 @pytest.mark.filterwarnings("ignore:We recommend you to use a symmetric and normalized:UserWarning")
 @pytest.mark.parametrize("env_id", CATALOGUE)
-def test_stable_baselines_takes_it(env_id: str) -> None:
-    """The learners of the studies have a checker of their own."""
+def test_stable_baselines3_accepts_the_env(env_id: str) -> None:
+    """Stable-Baselines3's own checker passes."""
     with gym.make(env_id) as env:
         check_env(env)
 
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
-def test_envs_come_in_vectors(env_id: str) -> None:
-    """Two of a kind step side by side, from starts of their own."""
+def test_envs_can_be_vectorized(env_id: str) -> None:
+    """Two envs of one kind step together, from different starts."""
     envs = gym.make_vec(env_id, num_envs=2)
     try:
         observations, _ = envs.reset(seed=0)
@@ -117,8 +117,8 @@ def test_envs_come_in_vectors(env_id: str) -> None:
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
 @pytest.mark.parametrize("env_id", VEHICLE_ENVS)
-def test_vehicles_come_in_vectors(env_id: str, mode: str) -> None:
-    """In this process, and in others."""
+def test_vehicles_can_be_vectorized(env_id: str, mode: str) -> None:
+    """In the same process, and in subprocesses."""
     _play(gym.make_vec(env_id, num_envs=2, vectorization_mode=mode, image=False))
 
 
@@ -127,8 +127,8 @@ def test_vehicles_come_in_vectors(env_id: str, mode: str) -> None:
 @pytest.mark.parametrize(
     ("mode", "options"), [("sync", {}), ("async", {"context": "spawn"})], ids=["sync", "async"]
 )
-def test_vehicles_with_pictures_come_in_vectors(mode: str, options: dict[str, str]) -> None:
-    """Whoever has drawn already must spawn the others; a fork of it is told so."""
+def test_vehicles_with_images_can_be_vectorized(mode: str, options: dict[str, str]) -> None:
+    """After rendering in the parent, subprocesses must be spawned, not forked."""
     _play(
         gym.make_vec(
             "shapechanger/Car-v1",
@@ -154,7 +154,7 @@ def _play(envs: gym.vector.VectorEnv[Any, Any, Any]) -> None:
 
 
 def test_a_vector_changes_its_bodies_at_reset() -> None:
-    """Options reach every env of the vector."""
+    """Options of reset reach every env of the vector."""
     envs = gym.make_vec("shapechanger/Ant-v1", num_envs=2)
     try:
         envs.reset(seed=0, options={"body": "BigAnt"})
@@ -164,7 +164,7 @@ def test_a_vector_changes_its_bodies_at_reset() -> None:
 
 
 def test_an_id_names_the_module_that_registers_it() -> None:
-    """A program that does not import us can still make our envs."""
+    """`module:id` works without importing the package."""
     script = (
         "import gymnasium as gym\n"
         "with gym.make('shapechanger:shapechanger/BigAnt-v1') as env:\n"

@@ -1,4 +1,4 @@
-"""A small env to record: a number that goes up, shown as a picture, as a state, or as both."""
+"""A small env to record, whose position is observed as an image, a state, or both."""
 
 from typing import Any, Literal
 
@@ -14,11 +14,11 @@ SIZE = (24, 32)
 
 
 class CorridorEnv(gym.Env[Any, NDArray[np.float32]]):
-    """Walk on by the throttle; the wall is 2 m away.
+    """Walk ahead by the throttle, up to a wall at 2 m.
 
     Attributes:
-        done: The actions that it was given.
-        more: What `info` holds besides what it always does.
+        done: Actions applied so far.
+        more: Additional entries of `info`.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "render_fps": 10}  # noqa: RUF012
@@ -47,13 +47,13 @@ class CorridorEnv(gym.Env[Any, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin; a seed of n begins n centimetres ahead."""
+        """Reset; a seed of n starts n centimetres ahead."""
         super().reset(seed=seed)
         self._way = 0.0 if seed is None else 0.01 * seed
         return self._seen(), {**self.more}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Walk on."""
+        """Advance by the throttle."""
         self.done.append([float(value) for value in action])
         self._way += 0.1 * float(action[1])
         hit = self._way >= 2.0
@@ -67,7 +67,7 @@ class CorridorEnv(gym.Env[Any, NDArray[np.float32]]):
         return self._seen(), sum(terms.values()), hit, False, info
 
     def demonstrator(self, seed: int) -> "AlwaysForward":
-        """Somebody who knows the way."""
+        """Return an expert."""
         return AlwaysForward()
 
     def _seen(self) -> Any:
@@ -80,11 +80,11 @@ class CorridorEnv(gym.Env[Any, NDArray[np.float32]]):
 
 
 class AlwaysForward:
-    """Means to drive straight on at half the throttle, and pulls to the right."""
+    """An expert that intends to go straight at half throttle, and executes a steering error."""
 
     def begin(self) -> None:
-        """Nothing is to be done."""
+        """Do nothing."""
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """What it means to do, and what it does."""
+        """Return the intended and the executed action."""
         return np.array([0.0, 0.5], np.float32), np.array([0.25, 0.5], np.float32)

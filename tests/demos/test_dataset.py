@@ -1,4 +1,4 @@
-"""Demonstrations as arrays: what counts, in order, and nothing that does not go together."""
+"""Recordings loaded as arrays."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ def _jpeg(number: int, width: int = 32, height: int = 24) -> bytes:
 
 
 def _recorded(recording: Path, steps: int = 6, **changes: Any) -> Path:
-    """An episode in which each second picture is a new one, and the policy drives the last step."""
+    """Record an episode with a new frame at every second step, whose last step is the policy's."""
     with EpisodeWriter.create(
         recording, header(**({"image_size": (32, 24)} | changes)), spare_bytes=0
     ) as writer:
@@ -30,8 +30,8 @@ def _recorded(recording: Path, steps: int = 6, **changes: Any) -> Path:
     return writer.path
 
 
-def test_steps_that_count_are_loaded_in_order(tmp_path: Path) -> None:
-    """Of two episodes, without the steps that were dropped and those of others than persons."""
+def test_kept_steps_of_persons_are_loaded_in_order(tmp_path: Path) -> None:
+    """Dropped steps and those of other drivers are skipped."""
     first, _ = _recorded(tmp_path), _recorded(tmp_path)
     drop(first, 1, 1, "bad")
     data = load_dataset(tmp_path)
@@ -48,8 +48,8 @@ def test_steps_that_count_are_loaded_in_order(tmp_path: Path) -> None:
     assert data.files[1].endswith("step 2")
 
 
-def test_a_picture_that_was_shared_stays_with_its_step(tmp_path: Path) -> None:
-    """A step of a person after one of a policy shows the picture that the policy saw first."""
+def test_a_shared_frame_is_kept_for_its_step(tmp_path: Path) -> None:
+    """A person's step after a policy's step has the frame that both share."""
     with EpisodeWriter.create(tmp_path, header(image_size=(32, 24)), spare_bytes=0) as writer:
         writer.add(step(0, driver="policy"), _jpeg(5))
         writer.add(step(1))
@@ -59,7 +59,7 @@ def test_a_picture_that_was_shared_stays_with_its_step(tmp_path: Path) -> None:
 
 
 def test_the_drivers_are_chosen_by_name(tmp_path: Path) -> None:
-    """A misspelt one is answered with the nearest."""
+    """A misspelt name gets a suggestion."""
     path = _recorded(tmp_path)
     assert load_dataset(path, drivers=["policy"]).episodes == (1,)
     with pytest.raises(UnknownName, match="Did you mean 'policy'"):
@@ -68,8 +68,8 @@ def test_the_drivers_are_chosen_by_name(tmp_path: Path) -> None:
         load_dataset(path, drivers=["expert"])
 
 
-def test_pictures_can_be_made_smaller_while_they_are_read(tmp_path: Path) -> None:
-    """Ten minutes of pictures in full need the memory of a small computer."""
+def test_images_can_be_shrunk_while_loading(tmp_path: Path) -> None:
+    """`shrink` limits the memory that is needed."""
     data = load_dataset(_recorded(tmp_path), shrink=lambda picture: picture[::2, ::2])
     assert data.pictures is not None
     assert data.pictures.shape == (5, 12, 16, 3)
@@ -87,7 +87,7 @@ def test_pictures_can_be_made_smaller_while_they_are_read(tmp_path: Path) -> Non
 def test_episodes_that_differ_are_not_mixed(
     tmp_path: Path, changes: dict[str, Any], what: str
 ) -> None:
-    """The sentence names both episodes, and in what they differ."""
+    """The error names both episodes and their difference."""
     first, second = _recorded(tmp_path), _recorded(tmp_path, **changes)
     with pytest.raises(
         DemosError, match=f"{second} has other {what} than {first}: learn from one kind"
@@ -95,23 +95,23 @@ def test_episodes_that_differ_are_not_mixed(
         load_dataset(tmp_path)
 
 
-def test_a_picture_of_another_size_is_named(tmp_path: Path) -> None:
-    """Also within an episode."""
+def test_a_frame_of_another_size_is_refused(tmp_path: Path) -> None:
+    """The error names the file and both sizes."""
     path = _recorded(tmp_path, image_size=(64, 24))
     with pytest.raises(DemosError, match=r"000000\.jpg has 32 x 24 pixels, but .* 64 x 24"):
         load_dataset(path)
 
 
-def test_a_picture_that_is_cut_off_is_named(tmp_path: Path) -> None:
-    """As it was received, so that only whoever decodes it can know."""
+def test_a_truncated_frame_is_refused(tmp_path: Path) -> None:
+    """Truncation is only detected on decoding."""
     with EpisodeWriter.create(tmp_path, header(image_size=(32, 24)), spare_bytes=0) as writer:
         writer.add(step(0), _jpeg(1)[:-40])
     with pytest.raises(DemosError, match=r"000000\.jpg is not a JPEG, or is damaged"):
         load_dataset(tmp_path)
 
 
-def test_a_picture_that_claims_to_be_huge_is_not_decoded() -> None:
-    """Its header alone is believed enough to be refused."""
+def test_an_oversized_frame_is_not_decoded() -> None:
+    """The size in the header is checked first."""
     jpeg = bytearray(_jpeg(1))
     place = jpeg.index(b"\xff\xc0") + 5
     jpeg[place : place + 4] = b"\xea\x60\xea\x60"  # 60,000 x 60,000.
@@ -119,8 +119,8 @@ def test_a_picture_that_claims_to_be_huge_is_not_decoded() -> None:
         decode_picture(bytes(jpeg), "x.jpg")
 
 
-def test_a_broken_episode_is_not_learned_from(tmp_path: Path) -> None:
-    """It says which command repairs it."""
+def test_a_damaged_episode_is_refused(tmp_path: Path) -> None:
+    """The error names the repair command."""
     path = _recorded(tmp_path)
     (path / "frames" / "000000.jpg").unlink()
     with pytest.raises(BrokenEpisode, match="demos repair"):

@@ -1,4 +1,4 @@
-"""Several recordings become one."""
+"""Merging recordings."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from shapechanger.errors import BrokenEpisode, DemosError
 from tests.demos.episodes.making import recorded
 
 
-def test_everything_is_copied_and_nothing_moved(tmp_path: Path) -> None:
-    """To the byte; names that are taken get the next number."""
+def test_episodes_are_copied_unchanged(tmp_path: Path) -> None:
+    """Files are equal byte for byte, and names in use get the next number."""
     one, two = recorded(tmp_path / "a"), recorded(tmp_path / "b", 3)
     shutil.move(two, two.with_name(one.name))
     two = two.with_name(one.name)
@@ -30,8 +30,8 @@ def test_everything_is_copied_and_nothing_moved(tmp_path: Path) -> None:
     assert len(read_episode(second).steps) == 3
 
 
-def test_nothing_is_there_twice(tmp_path: Path) -> None:
-    """Also not when somebody has judged its steps since; nothing is copied then."""
+def test_duplicates_are_refused(tmp_path: Path) -> None:
+    """An episode is recognized after its steps were judged; nothing is copied then."""
     one = recorded(tmp_path / "a")
     merge([one], tmp_path / "all")
     drop(one, 0, 1, "bad")
@@ -41,8 +41,8 @@ def test_nothing_is_there_twice(tmp_path: Path) -> None:
     assert len(episodes_of(tmp_path / "all")) == 1
 
 
-def test_what_is_not_whole_or_not_closed_is_refused(tmp_path: Path) -> None:
-    """With the command that helps."""
+def test_incomplete_episodes_are_refused(tmp_path: Path) -> None:
+    """The error names the command that repairs."""
     begun = recorded(tmp_path / "a", close=False)
     with pytest.raises(DemosError, match="demos repair"):
         merge([begun], tmp_path / "all")
@@ -54,7 +54,7 @@ def test_what_is_not_whole_or_not_closed_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "all").exists()
 
 
-def test_an_episode_is_no_place_for_others(tmp_path: Path) -> None:
+def test_an_episode_cannot_be_the_target(tmp_path: Path) -> None:
     """A recording is a folder of episodes."""
     one, two = recorded(tmp_path / "a"), recorded(tmp_path / "b")
     with pytest.raises(DemosError, match="is an episode"):

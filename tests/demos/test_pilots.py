@@ -1,4 +1,4 @@
-"""Who decides while it is recorded."""
+"""Pilots: who decides while an env is recorded."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from tests.demos.corridor_env import AlwaysForward, CorridorEnv
 AWAY = np.array([-1.0, 0.5], np.float32)
 
 
-def test_an_expert_is_recorded_by_what_it_meant(tmp_path: Path) -> None:
-    """The mistake is carried out; each episode has its own seed."""
+def test_an_expert_is_recorded_with_its_intention(tmp_path: Path) -> None:
+    """The executed action differs, and each episode has its own seed."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path) as env:
         record_steps(env, ExpertPilot(AlwaysForward()), 50, seed=5)
@@ -39,7 +39,7 @@ def test_an_expert_is_recorded_by_what_it_meant(tmp_path: Path) -> None:
 
 
 def test_only_corrections_are_learned_from(tmp_path: Path) -> None:
-    """A policy that is off is corrected from the third step on, and what it wanted is kept."""
+    """The expert corrects from the second step on, and the policy's action is kept as `wanted`."""
     gate = Gate(GateRule(apart=0.5, apart_s=0.15), 0.1)
     pilot = CorrectedPilot(lambda seen: AWAY, AlwaysForward(), gate)
     with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
@@ -50,13 +50,15 @@ def test_only_corrections_are_learned_from(tmp_path: Path) -> None:
     assert episode.steps[0].action == (-1.0, 0.5)
     assert episode.steps[1].action == (0.0, 0.5)
     assert episode.steps[1].wanted == (-1.0, 0.5)
-    assert episode.steps[1].applied == (0.0, 0.25), "no mistakes while it corrects"
+    assert episode.steps[1].applied == (0.0, 0.25), (
+        "the expert must not make mistakes while correcting"
+    )
     assert [mark.step for mark in episode.marks] == [1]
     assert len(load_dataset(tmp_path)) == 9
 
 
-def test_a_policy_alone_is_nothing_to_learn_from_by_default(tmp_path: Path) -> None:
-    """It has to be asked for."""
+def test_policy_steps_are_not_loaded_by_default(tmp_path: Path) -> None:
+    """They are loaded with `drivers`."""
     with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
         record_steps(env, PolicyPilot(lambda seen: AWAY), 4, seed=0)
     assert len(load_dataset(tmp_path, drivers=("policy",))) == 4
@@ -65,7 +67,7 @@ def test_a_policy_alone_is_nothing_to_learn_from_by_default(tmp_path: Path) -> N
 
 
 def test_ctrl_c_closes_the_episode(tmp_path: Path) -> None:
-    """Whatever was recorded by then is whole, and says why it ended."""
+    """The episode is complete, with the outcome "stopped"."""
 
     def act(seen: object) -> np.ndarray[tuple[int], np.dtype[np.float32]]:
         if env.steps == 3:

@@ -1,4 +1,4 @@
-"""Recording an env: what was decided, what came of it, and what happens when a disk fails."""
+"""Recording an env: decisions, outcomes, and failing disks."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FORWARD = np.array([0.5, 1.0], np.float32)
 
 
 def drive(env: gym.Env[Any, Any], steps: int, seed: int | None = None) -> None:
-    """Drive on for so many steps, over as many episodes as it takes."""
+    """Take a number of steps, over as many episodes as needed."""
     over = True
     for _ in range(steps):
         if over:
@@ -35,21 +35,21 @@ def drive(env: gym.Env[Any, Any], steps: int, seed: int | None = None) -> None:
         over = terminated or truncated
 
 
-def drive_on(env: gym.Env[Any, Any], steps: int) -> None:
-    """Drive on in an episode that has begun."""
+def take_steps(env: gym.Env[Any, Any], steps: int) -> None:
+    """Take a number of steps in the current episode."""
     for _ in range(steps):
         env.step(FORWARD)
 
 
 def only(recording: Path) -> Episode:
-    """The one episode."""
+    """Return the only episode."""
     (path,) = episodes_of(recording)
     return read_episode(path)
 
 
 @pytest.mark.parametrize("shows", ["picture", "state", "both"])
-def test_what_is_seen_is_paired_with_what_is_decided_on_it(shows: Shows, tmp_path: Path) -> None:
-    """Step n holds what was seen before action n, and the outcome and reward that came of it."""
+def test_observations_are_paired_with_actions(shows: Shows, tmp_path: Path) -> None:
+    """Step n holds the observation before action n, and the outcome and reward after it."""
     with RecordEpisodes(CorridorEnv(shows), tmp_path) as env:
         drive(env, 30, seed=3)
         env.end()
@@ -74,15 +74,15 @@ def test_what_is_seen_is_paired_with_what_is_decided_on_it(shows: Shows, tmp_pat
         picture = decode_picture(jpeg, "it")
         assert picture.shape == (*SIZE, 3)
         assert picture[-4, 4] == pytest.approx(round(100 * way), abs=4)
-        assert picture[4, 4, 0] == pytest.approx(250, abs=6), "red and blue change places"
+        assert picture[4, 4, 0] == pytest.approx(250, abs=6), "red and blue must not be swapped"
     assert first.steps[0].reward == pytest.approx(0.1)
     assert first.steps[-1].terms["reward_collision"] == -10.0
     assert first.header.image_size == (None if shows == "state" else (32, 24))
     assert len(load_dataset(tmp_path, drivers=("program",))) == 30
 
 
-def test_a_person_who_intervenes_is_the_one_who_decided(tmp_path: Path) -> None:
-    """What the program had passed is what it wanted."""
+def test_an_intervention_is_recorded_as_the_persons_action(tmp_path: Path) -> None:
+    """The program's action is kept as `wanted`."""
     inner = CorridorEnv()
     with RecordEpisodes(inner, tmp_path, driver="policy") as env:
         env.reset()
@@ -94,8 +94,8 @@ def test_a_person_who_intervenes_is_the_one_who_decided(tmp_path: Path) -> None:
     assert (after.driver, after.action, after.wanted) == ("person", (-1.0, 0.25), (0.5, 1.0))
 
 
-def test_what_is_meant_need_not_be_what_is_done(tmp_path: Path) -> None:
-    """Of a demonstrator with mistakes the intention is kept; it holds for one step."""
+def test_decide_records_the_intended_action(tmp_path: Path) -> None:
+    """The intention of a demonstrator applies to one step."""
     with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
         env.reset()
         env.decide([0.0, 0.5], "expert", [1.0, 1.0])
@@ -108,7 +108,7 @@ def test_what_is_meant_need_not_be_what_is_done(tmp_path: Path) -> None:
 
 
 def test_bytes_and_times_of_the_env_are_kept_as_they_are(tmp_path: Path) -> None:
-    """A robot's own JPEG is not encoded once more, a picture that is the same is kept once."""
+    """A robot's JPEG is not re-encoded, and a repeated frame is stored once."""
     inner: Any = CorridorEnv()
     inner.newest_jpeg = jpeg = _jpeg(inner)
     inner.record_clock = "twin"
@@ -129,8 +129,8 @@ def _jpeg(inner: CorridorEnv) -> bytes:
     return simplejpeg.encode_jpeg(inner.reset()[0]["image"], quality=50)
 
 
-def test_the_key_of_a_robot_stays_where_it_is(tmp_path: Path) -> None:
-    """A recording is given to others; the other arguments of the env are in it."""
+def test_the_key_of_a_robot_is_not_recorded(tmp_path: Path) -> None:
+    """The other arguments of the env are recorded."""
     inner = CorridorEnv("state")
     inner.spec = EnvSpec("x/Y-v0", kwargs={"key": "5ec2e7", "shows": "state", "path": tmp_path})
     with RecordEpisodes(inner, tmp_path) as env:
@@ -141,8 +141,8 @@ def test_the_key_of_a_robot_stays_where_it_is(tmp_path: Path) -> None:
     assert "5ec2e7" not in (episode.path / "episode.json").read_text()
 
 
-def test_how_an_episode_ends_is_told(tmp_path: Path) -> None:
-    """Time, a lost link in its own words, a reset in the midst."""
+def test_the_outcome_of_an_episode(tmp_path: Path) -> None:
+    """Time limit, truncation reason, or none after a reset."""
     inner = CorridorEnv("state")
     with RecordEpisodes(TimeLimit(inner, 2), tmp_path / "time") as env:
         drive(env, 2)
@@ -156,8 +156,8 @@ def test_how_an_episode_ends_is_told(tmp_path: Path) -> None:
     assert outcomes == ["time", "The robot was disarmed.", ""]
 
 
-def test_a_reset_alone_is_no_episode(tmp_path: Path) -> None:
-    """Nothing is left by who resets and goes."""
+def test_a_reset_alone_records_nothing(tmp_path: Path) -> None:
+    """No folder is created."""
     with RecordEpisodes(CorridorEnv("state"), tmp_path / "data") as env:
         env.reset()
         env.reset()
@@ -165,7 +165,7 @@ def test_a_reset_alone_is_no_episode(tmp_path: Path) -> None:
 
 
 def test_marks_and_undo(tmp_path: Path) -> None:
-    """Both are of the episode that is recorded now."""
+    """Both apply to the current episode."""
     with RecordEpisodes(CorridorEnv("state"), tmp_path) as env:
         with pytest.raises(DemosError, match="No episode is being recorded"):
             env.mark()
@@ -179,7 +179,7 @@ def test_marks_and_undo(tmp_path: Path) -> None:
 
 @contextmanager
 def small_files(size: int) -> Iterator[None]:
-    """No file becomes larger than so many bytes, as on a disk that is full."""
+    """Limit the size of files, to simulate a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -192,13 +192,13 @@ def small_files(size: int) -> Iterator[None]:
 def test_a_full_disk_ends_the_recording_and_brings_the_env_to_rest(
     size: int, tmp_path: Path
 ) -> None:
-    """The error names the file, the last action moves nothing, and no complete step is lost."""
+    """The env gets a zero action, the error names the file, and complete steps are kept."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path) as env:
         env.reset()
         env.step(FORWARD)
         with small_files(size), pytest.raises(OutputError, match=r"Cannot write .*steps"):
-            drive_on(env, 19)
+            take_steps(env, 19)
         assert inner.done[-1] == [0.0, 0.0]
         assert inner.done[-2] == [0.5, 1.0]
         with pytest.raises(gym.error.ResetNeeded):
@@ -211,8 +211,8 @@ def test_a_full_disk_ends_the_recording_and_brings_the_env_to_rest(
     assert len(episodes_of(tmp_path)) == 2
 
 
-def test_a_disk_that_is_full_already_moves_nothing(tmp_path: Path) -> None:
-    """It is told before the first action."""
+def test_a_full_disk_raises_before_the_first_action(tmp_path: Path) -> None:
+    """The env is not stepped."""
     inner = CorridorEnv("state")
     with RecordEpisodes(inner, tmp_path, spare_bytes=1 << 62) as env:
         env.reset()
@@ -222,7 +222,7 @@ def test_a_disk_that_is_full_already_moves_nothing(tmp_path: Path) -> None:
 
 
 def test_two_recorders_in_one_folder(tmp_path: Path) -> None:
-    """The second recorder is refused before the env moves."""
+    """The second recorder is refused before the env is stepped."""
     inner = CorridorEnv("state")
     with (
         EpisodeWriter.create(tmp_path, header(), spare_bytes=0),
@@ -235,7 +235,7 @@ def test_two_recorders_in_one_folder(tmp_path: Path) -> None:
 
 
 def test_an_env_that_fails_leaves_a_closed_episode(tmp_path: Path) -> None:
-    """What happened until then is there; Ctrl-C is told from a defect."""
+    """The outcome distinguishes Ctrl-C from an error."""
 
     class Failing(CorridorEnv):
         error: type[BaseException] = KeyboardInterrupt
@@ -260,7 +260,7 @@ def test_an_env_that_fails_leaves_a_closed_episode(tmp_path: Path) -> None:
 
 
 def test_time_that_runs_backwards_ends_the_recording(tmp_path: Path) -> None:
-    """A robot whose clock jumps is brought to rest, too."""
+    """The env gets a zero action."""
     inner = CorridorEnv("state")
     inner.more = {"captured_ns": 2_000}
     with RecordEpisodes(inner, tmp_path) as env:
@@ -273,8 +273,8 @@ def test_time_that_runs_backwards_ends_the_recording(tmp_path: Path) -> None:
     assert len(only(tmp_path).steps) == 2
 
 
-def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
-    """By what it shows, by what it does not say, and by a quality that is none."""
+def test_unsuitable_envs_are_refused(tmp_path: Path) -> None:
+    """Invalid observations, missing layouts and invalid quality raise errors."""
     with pytest.raises(DemosError, match="it must be a picture"):
         RecordEpisodes(gym.make("Taxi-v4"), tmp_path)
     with pytest.raises(DemosError, match="CartPole-v1 has no observation_layout"):

@@ -1,4 +1,4 @@
-"""The body as it is: what Gymnasium's env does, to the last bit."""
+"""Unedited bodies behave as in Gymnasium, bitwise."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def _same_info(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
         np.testing.assert_array_equal(ours[name], value, err_msg=name)
 
 
-def test_the_pendulum_is_gymnasiums() -> None:
-    """The same seed gives the same starts, observations, rewards, ends and infos."""
+def test_the_pendulum_equals_gymnasiums() -> None:
+    """Equal seeds give equal starts, observations, rewards, ends and infos."""
     rng = np.random.default_rng(3)
     episodes, over = 0, True
     with (
@@ -30,7 +30,7 @@ def test_the_pendulum_is_gymnasiums() -> None:
         assert ours.observation_space == theirs.observation_space
         for _ in range(300):
             if over:
-                # Every other episode goes on with the randomness of the one before.
+                # Every other episode continues the generator of the one before.
                 seed = None if episodes % 2 else 10 + episodes
                 (observation, info), (expected, expected_info) = (
                     env.reset(seed=seed) for env in (ours, theirs)
@@ -56,10 +56,10 @@ def test_the_pendulum_is_gymnasiums() -> None:
         {"exclude_current_positions_from_observation": False, "contact_force_range": (-5.0, 5.0)},
         {"include_cfrc_ext_in_observation": False, "forward_reward_weight": 2.0, "frame_skip": 2},
     ],
-    ids=["as it is", "place seen", "contacts unseen"],
+    ids=["defaults", "positions", "no contacts"],
 )
 def test_the_ant_steps_like_gymnasiums(arguments: dict[str, Any]) -> None:
-    """From the same state the same actions give the same numbers; names change no physics."""
+    """Equal states and actions give equal results: naming elements changes no physics."""
     more = arguments | {"healthy_z_range": (0.2, 1.0)}
     rng = np.random.default_rng(4)
     with gym.make("shapechanger/Ant-v1", **more) as made, gym.make("Ant-v5", **more) as other:
@@ -85,7 +85,7 @@ def test_the_ant_steps_like_gymnasiums(arguments: dict[str, Any]) -> None:
 
 
 def test_the_ant_starts_with_gymnasiums_noise() -> None:
-    """The same draws as in Ant-v5 about the start pose, but for what limits and floor forbid."""
+    """Starts have the noise of Ant-v5, except where limits or the floor forbid it."""
     with gym.make("shapechanger/Ant-v1") as made, gym.make("Ant-v5") as other:
         ours: Any = made.unwrapped
         theirs: Any = other.unwrapped
@@ -105,23 +105,23 @@ def test_the_ant_starts_with_gymnasiums_noise() -> None:
 _PLACE = {"exclude_current_positions_from_observation": False}
 _OTHERS: dict[str, tuple[str, dict[str, Any]]] = {
     "HalfCheetah": ("HalfCheetah", {}),
-    "HalfCheetah with its place": ("HalfCheetah", _PLACE | {"frame_skip": 2}),
+    "HalfCheetah with positions": ("HalfCheetah", _PLACE | {"frame_skip": 2}),
     "Hopper": ("Hopper", {}),
-    "Hopper with its place": ("Hopper", _PLACE | {"healthy_z_range": (1.2, 1.3)}),
+    "Hopper with positions": ("Hopper", _PLACE | {"healthy_z_range": (1.2, 1.3)}),
     "Walker2d": ("Walker2d", {}),
-    "Walker2d with its place": ("Walker2d", _PLACE | {"healthy_angle_range": (-0.1, 0.1)}),
+    "Walker2d with positions": ("Walker2d", _PLACE | {"healthy_angle_range": (-0.1, 0.1)}),
     "Swimmer": ("Swimmer", {}),
-    "Swimmer with its place": ("Swimmer", _PLACE | {"ctrl_cost_weight": 0.1}),
+    "Swimmer with positions": ("Swimmer", _PLACE | {"ctrl_cost_weight": 0.1}),
     "Humanoid": ("Humanoid", {}),
-    "Humanoid with its place": ("Humanoid", _PLACE | {"include_cvel_in_observation": False}),
+    "Humanoid with positions": ("Humanoid", _PLACE | {"include_cvel_in_observation": False}),
     "InvertedDoublePendulum": ("InvertedDoublePendulum", {}),
-    "InvertedDoublePendulum, paid": ("InvertedDoublePendulum", {"healthy_reward": 2.0}),
+    "InvertedDoublePendulum, healthy_reward": ("InvertedDoublePendulum", {"healthy_reward": 2.0}),
 }
 
 
 @pytest.mark.parametrize("case", _OTHERS)
 def test_the_others_step_like_gymnasiums(case: str) -> None:
-    """From the same states the same actions give the same numbers, to the end of the episode."""
+    """Equal states and actions give equal results until the end of an episode."""
     name, arguments = _OTHERS[case]
     rng = np.random.default_rng(5)
     with (
@@ -159,7 +159,7 @@ def test_the_others_step_like_gymnasiums(case: str) -> None:
 
 @pytest.mark.parametrize("name", dict(_OTHERS.values()))
 def test_the_others_start_like_gymnasiums(name: str) -> None:
-    """The same draws, but for what limits and floor forbid."""
+    """Starts have Gymnasium's noise, except where limits or the floor forbid it."""
     untouched = 0
     with gym.make(f"shapechanger/{name}-v1") as made, gym.make(f"{name}-v5") as other:
         ours: Any = made.unwrapped
@@ -188,12 +188,12 @@ def test_the_others_start_like_gymnasiums(name: str) -> None:
             np.testing.assert_array_equal(pose[same], drawn[same])
             np.testing.assert_array_less(low - 1e-12, pose[places])
             np.testing.assert_array_less(pose[places], high + 1e-12)
-    # Straight legs are at the limit of their knees, so noise bends half of them the wrong way.
+    # Straight knees are at their limit, so half of the noise is beyond it.
     assert untouched > 0 or name in ("Walker2d", "Humanoid")
 
 
-def test_the_arguments_are_gymnasiums() -> None:
-    """A reward weight means what it means there."""
+def test_reward_weights_have_gymnasiums_meaning() -> None:
+    """Weights scale the terms of the reward as in Gymnasium."""
     arguments = {"ctrl_cost_weight": 0.25, "healthy_reward": 3.0, "contact_cost_weight": 0.0}
     with gym.make("shapechanger/BigAnt-v1", **arguments) as env:
         env.reset(seed=0)

@@ -1,4 +1,4 @@
-"""The argument `body=`, and changing the body at a reset."""
+"""The argument `body=`, and changes of the body at a reset."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _OTHER = (Stretch("shank_*", 1.5), Cut("shank_4", 0.25), Gear("hip_1", to=40.0))
 
 
 def _compiled(model: mujoco.MjModel) -> bytes:
-    """Everything that a compiled model holds."""
+    """Return all numbers of a compiled model."""
     buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
     return buffer.tobytes()
@@ -60,7 +60,7 @@ def _model(env_id: str, **arguments: Any) -> mujoco.MjModel:
 
 
 def _everything(env: Any) -> dict[str, Any]:
-    """All that follows from a body, and the state that it is in."""
+    """Return all that follows from a body, and the state."""
     return {
         "body": env.body,
         "model": _compiled(env.model),
@@ -77,7 +77,7 @@ def _everything(env: Any) -> dict[str, Any]:
 
 
 def _episode(env: Any, seed: int) -> list[np.ndarray]:
-    """What is seen in twenty steps."""
+    """Return the observations of twenty steps."""
     observation, _ = env.reset(seed=seed)
     rng = np.random.default_rng(seed)
     seen = [observation]
@@ -88,7 +88,7 @@ def _episode(env: Any, seed: int) -> list[np.ndarray]:
 
 @pytest.fixture
 def ant() -> Iterator[Any]:
-    """An ant that has begun."""
+    """An ant after a reset."""
     with gym.make("shapechanger/Ant-v1") as env:
         env.reset(seed=5)
         yield env
@@ -111,15 +111,15 @@ def ant() -> Iterator[Any]:
     ids=["name", "edit", "tuple", "list", "JSON list", "JSON object", "iterator"],
 )
 def test_a_body_is_given_in_any_form(body: BodyLike) -> None:
-    """Its name, an edit, several, or their JSON make the same model."""
+    """Names, edits, iterables of edits and JSON give the same model."""
     with gym.make("shapechanger/Ant-v1", body=body) as env:
         assert env.unwrapped.body == _BIG
         model = env.unwrapped.model
     assert fingerprint(model) == fingerprint(_model("shapechanger/BigAnt-v1"))
 
 
-def test_no_edits_are_the_body_as_it_is() -> None:
-    """An empty list is a body too."""
+def test_an_empty_list_is_the_unedited_body() -> None:
+    """An empty list of edits is a valid body."""
     body = _compiled(_model("shapechanger/BigAnt-v1", body="[]"))
     assert body == _compiled(_model("shapechanger/Ant-v1"))
 
@@ -145,10 +145,10 @@ def test_no_edits_are_the_body_as_it_is() -> None:
         (Mass("shank_1", to=1e-18), BrokenModel, "MuJoCo does not compile the body .*mass"),
     ],
 )
-def test_a_body_that_cannot_be_is_refused(
+def test_an_invalid_body_is_refused(
     ant: Any, body: Any, error: type[Exception], sentence: str
 ) -> None:
-    """With the nearest name that exists; when it is made and when it is changed."""
+    """Errors at `make` and `reset` suggest the nearest name; the env does not change."""
     with pytest.raises(error, match=sentence):
         gym.make("shapechanger/Ant-v1", body=body)
     before = _everything(ant.unwrapped)
@@ -162,7 +162,7 @@ def test_a_body_that_cannot_be_is_refused(
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
 def test_the_spec_and_a_pickle_make_the_same_model(env_id: str) -> None:
-    """To the last bit, whichever body it was made with."""
+    """Copies by spec, pickle and deepcopy have bitwise the same model."""
     with gym.make(env_id) as env:
         same = _compiled(env.unwrapped.model)
         rebuilt = [
@@ -177,7 +177,7 @@ def test_the_spec_and_a_pickle_make_the_same_model(env_id: str) -> None:
 
 
 def test_the_spec_holds_the_body_as_json() -> None:
-    """Others can read it, and edits can be given as values."""
+    """Bodies given as edits are JSON in the spec."""
     with gym.make("shapechanger/Ant-v1", body=_OTHER, reset_noise_scale=0.0) as env:
         assert env.spec.kwargs == {"body": to_json(_OTHER), "reset_noise_scale": 0.0}
         model = env.unwrapped.model
@@ -187,16 +187,16 @@ def test_the_spec_holds_the_body_as_json() -> None:
     again.close()
 
 
-def test_specs_of_two_envs_are_apart() -> None:
-    """The registered spec stays as it was registered."""
+def test_specs_of_envs_are_independent() -> None:
+    """A change of one env's body changes neither other envs nor the registry."""
     with gym.make("shapechanger/BigAnt-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
         one.reset(seed=0, options={"body": "Ant"})
         assert other.unwrapped.spec.kwargs["body"] == to_json(_BIG)
     assert gym.spec("shapechanger/BigAnt-v1").kwargs == {"body": "BigAnt"}
 
 
-def test_a_spec_that_is_handed_over_stays_as_it_was() -> None:
-    """Wrappers and other programs set the spec of an env; theirs is not ours to change."""
+def test_an_assigned_spec_is_not_modified() -> None:
+    """A spec that is set on an env is copied before it is changed."""
     spec = gym.spec("shapechanger/BigAnt-v1")
     with gym.make("shapechanger/Ant-v1") as env:
         env.unwrapped.spec = spec
@@ -209,7 +209,7 @@ def test_a_spec_that_is_handed_over_stays_as_it_was() -> None:
 
 
 def test_all_arguments_are_rebuilt() -> None:
-    """A copy has the rewards, spaces and heights of the original."""
+    """Copies have the rewards, spaces and heights of the original."""
     arguments = {
         "healthy_z_range": (0.1, 3.0),
         "ctrl_cost_weight": 0.125,
@@ -235,7 +235,7 @@ def test_all_arguments_are_rebuilt() -> None:
 
 @pytest.mark.parametrize("body", ["BigAnt", "AmputatedAnt", _OTHER], ids=["big", "cut", "other"])
 def test_everything_follows_the_body(ant: Any, body: BodyLike) -> None:
-    """An env that changed its body is the env that was made with it."""
+    """An env that changed its body equals one that was made with it."""
     observation, _ = ant.reset(seed=6, options={"body": body})
     with gym.make("shapechanger/Ant-v1", body=body) as made:
         expected, _ = made.reset(seed=6)
@@ -248,7 +248,7 @@ def test_everything_follows_the_body(ant: Any, body: BodyLike) -> None:
 
 @pytest.mark.parametrize("factor", [0.3, 0.5, 0.75, 0.9])
 def test_small_ants_land_from_their_start(factor: float) -> None:
-    """They start as high as the others, and are healthy all the way down."""
+    """Short-legged ants stay healthy while they fall from their start."""
     with gym.make("shapechanger/Ant-v1", body=Stretch("shank_*", factor)) as env:
         env.action_space.seed(0)
         for seed in range(10):
@@ -258,7 +258,7 @@ def test_small_ants_land_from_their_start(factor: float) -> None:
 
 
 def test_heights_and_ranges_follow_the_body(ant: Any) -> None:
-    """What is derived from a body is derived again."""
+    """Heights, ranges and gains are derived again for a new body."""
     env = ant.unwrapped
     small, data, model = env.standing_height, env.data, env.model
     ant.reset(seed=0, options={"body": (*_BIG, JointRange("hip_1", -0.1, 0.2))})
@@ -274,7 +274,7 @@ def test_heights_and_ranges_follow_the_body(ant: Any) -> None:
 
 
 def test_a_pole_changes_its_length_too() -> None:
-    """Families without a trunk follow as well."""
+    """Families without a trunk can change their body too."""
     with gym.make("shapechanger/InvertedPendulum-v1") as env:
         env.reset(seed=0, options={"body": "BigInvertedPendulum"})
         big = _compiled(_model("shapechanger/BigInvertedPendulum-v1"))
@@ -282,7 +282,7 @@ def test_a_pole_changes_its_length_too() -> None:
 
 
 def test_a_new_body_starts_from_rest(ant: Any) -> None:
-    """Nothing of the old body's episode is left in the new one's."""
+    """No state of the old body's episode remains."""
     for _ in range(10):
         ant.step(np.ones(8, np.float32))
     first, _ = ant.reset(seed=3, options={"body": "BigAnt"})
@@ -294,7 +294,7 @@ def test_a_new_body_starts_from_rest(ant: Any) -> None:
 
 
 def test_the_body_stays_until_it_is_changed(ant: Any) -> None:
-    """Resets without a body keep it; the same body again is not compiled again."""
+    """Resets without a body keep it; an equal body is not compiled again."""
     ant.reset(options={"body": "BigAnt"})
     model = ant.unwrapped.model
     for options in (None, {}, {"body": "BigAnt"}, {"body": _BIG[0]}):
@@ -306,7 +306,7 @@ def test_the_body_stays_until_it_is_changed(ant: Any) -> None:
 
 
 def test_a_pickle_after_a_reset_has_the_new_body(ant: Any) -> None:
-    """And so has the spec."""
+    """Pickle and spec have the body of the last reset."""
     ant.reset(options={"body": "AmputatedAnt"})
     model = _compiled(ant.unwrapped.model)
     spec = ant.unwrapped.spec
@@ -322,7 +322,7 @@ def test_a_pickle_after_a_reset_has_the_new_body(ant: Any) -> None:
 
 
 def _pendulum_with_a_motor_on_its_hinge(folder: Path) -> str:
-    """A pendulum whose motor, and the hinge that it drives, bear the same name."""
+    """Write a pendulum whose motor has the name of the hinge that it drives."""
     assets = Path(gymnasium.envs.mujoco.__file__).parent / "assets"
     text = (assets / "inverted_pendulum.xml").read_text()
     changed = text.replace('joint="slider"', 'joint="hinge"').replace(
@@ -348,10 +348,10 @@ def _pendulum_with_a_motor_on_its_hinge(folder: Path) -> str:
             "space from 105 to 113 numbers .it gains shin/angle, shin/velocity, shin/contact/tx an",
         ),
     ],
-    ids=["more segments", "a leg less", "a joint less", "a joint more"],
+    ids=["more segments", "one leg less", "one joint less", "one joint more"],
 )
 def test_a_body_of_other_spaces_is_refused(ant: Any, body: BodyLike, sentence: str) -> None:
-    """The sentence names what is lost and gained; the env goes on as if nothing had been asked."""
+    """The error lists lost and gained features, and the env does not change."""
     before = _everything(ant.unwrapped)
     with pytest.raises(SpaceMismatch, match=sentence) as caught:
         ant.reset(seed=99, options={"body": body})
@@ -366,7 +366,7 @@ def test_a_body_of_other_spaces_is_refused(ant: Any, body: BodyLike, sentence: s
 
 
 def test_motors_that_come_or_go_are_refused() -> None:
-    """The observations are the same: only the action space would change."""
+    """A change of the action space alone is refused."""
     with gym.make("shapechanger/ExtendedAnt-v1") as env:
         env.reset(seed=0)
         with pytest.raises(
@@ -378,7 +378,7 @@ def test_motors_that_come_or_go_are_refused() -> None:
 
 
 def test_motors_in_another_order_are_refused() -> None:
-    """The names are the same, but a policy would pull the wrong joints."""
+    """Another order of motors is refused, since a policy would drive the wrong joints."""
     feet = [AddSegment(f"shank_{leg}", f"foot_{leg}", (0.1, 0.1, 0.0), gear=9.0) for leg in (1, 4)]
     with gym.make("shapechanger/Ant-v1", body=feet) as env:
         env.reset(seed=0)
@@ -390,7 +390,7 @@ def test_motors_in_another_order_are_refused() -> None:
 
 
 def test_motors_with_other_bounds_are_refused(tmp_path: Path) -> None:
-    """The same names in the same order, but controls of 3 would be clipped to 1."""
+    """Other bounds are refused, since controls would be clipped."""
     driven = _pendulum_with_a_motor_on_its_hinge(tmp_path)
     weaker = (
         Lock("hinge"),
@@ -404,8 +404,8 @@ def test_motors_with_other_bounds_are_refused(tmp_path: Path) -> None:
         assert env.unwrapped.action_layout["hinge/motor"].high == 3.0
 
 
-def test_a_model_of_ones_own_is_edited_like_ours(tmp_path: Path) -> None:
-    """`xml_file` names another model; bodies are edits of that one, also in a copy."""
+def test_a_custom_model_can_be_edited(tmp_path: Path) -> None:
+    """`xml_file` replaces the model that bodies edit, in copies too."""
     driven = _pendulum_with_a_motor_on_its_hinge(tmp_path)
     with gym.make("shapechanger/BigInvertedPendulum-v1", xml_file=driven) as env:
         assert env.unwrapped.action_layout.names == ("hinge/motor",)
@@ -416,7 +416,7 @@ def test_a_model_of_ones_own_is_edited_like_ours(tmp_path: Path) -> None:
 
 
 def test_interpolated_bodies_are_a_path_between_two_envs() -> None:
-    """At its ends are the bodies of the two."""
+    """The ends of the path are the bodies of both envs."""
     with gym.make("shapechanger/Ant-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
         ends = [
             interpolate(one.unwrapped.body, other.unwrapped.body, alpha) for alpha in (0.0, 1.0)
@@ -448,7 +448,7 @@ def test_an_unknown_option_of_reset_is_refused(ant: Any) -> None:
 def test_an_argument_of_another_type_is_refused(
     env_id: str, arguments: dict[str, Any], sentence: str
 ) -> None:
-    """One sentence names the env, the argument and the expected type."""
+    """The error names the env, the argument and the expected type."""
     with pytest.raises(EnvArgumentError, match=re.escape(sentence)):
         gym.make(f"shapechanger/{env_id}-v1", **arguments)
 
@@ -461,7 +461,7 @@ def test_an_unknown_argument_is_refused() -> None:
 
 @pytest.mark.parametrize("name", ["HalfCheetah", "Humanoid", "InvertedDoublePendulum"])
 def test_every_env_accepts_fast_model(name: str) -> None:
-    """It changes nothing in an env that has none, and its pickle keeps the argument."""
+    """`fast_model` has no effect in envs without one, and is kept by pickling."""
     with gym.make(f"shapechanger/{name}-v1", fast_model=False) as env:
         again = pickle.loads(pickle.dumps(env.unwrapped))
         assert again.fast_model is False

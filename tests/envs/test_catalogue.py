@@ -1,4 +1,4 @@
-"""The ids: that they are found, differ, and are what they say."""
+"""The catalogue of ids."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ def _model(env_id: str, **arguments: Any) -> Any:
         return env.unwrapped.model
 
 
-def test_no_two_ids_are_the_same_body() -> None:
-    """A transfer between any two crosses something."""
+def test_no_two_ids_have_the_same_body() -> None:
+    """All ids have different fingerprints."""
     prints = {env_id: fingerprint(_model(env_id)) for env_id in CATALOGUE}
     prints["passive"] = fingerprint(_model("shapechanger/ExtendedAnt-v1", actuated_extension=False))
     for (one, print_), (other, other_print) in itertools.combinations(prints.items(), 2):
         assert print_ != other_print, f"{one} and {other}"
 
 
-def test_a_body_has_the_same_fingerprint_each_time() -> None:
-    """Nothing random goes into a model, and an id is the body of its name."""
+def test_ids_have_the_bodies_of_their_names() -> None:
+    """An id gives the same model as its family's first id with that body."""
     for env_id, entry in CATALOGUE.items():
         first = f"shapechanger/{entry.family}-v1"
         assert fingerprint(_model(env_id)) == fingerprint(_model(first, body=entry.name))
@@ -38,28 +38,28 @@ def test_a_body_has_the_same_fingerprint_each_time() -> None:
     "name",
     ["BigAnt", "BigAnt-v1", "shapechanger/BigAnt-v1", "shapechanger:shapechanger/BigAnt-v1"],
 )
-def test_an_entry_is_found_by_what_one_types(name: str) -> None:
-    """The short name will do."""
+def test_an_entry_is_found_by_any_form_of_its_name(name: str) -> None:
+    """Short names, versions and module prefixes are accepted."""
     assert find(name) is CATALOGUE["shapechanger/BigAnt-v1"]
 
 
-def test_a_misspelt_name_is_told_what_there_is() -> None:
-    """With the nearest spelling first."""
+def test_an_unknown_name_is_refused() -> None:
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"'BigAnd'. Did you mean 'BigAnt'\? There are: .*Ant"):
         find("shapechanger/BigAnd-v1")
 
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
-def test_thresholds_and_clocks_are_gymnasiums(env_id: str) -> None:
-    """An episode of 1,000 steps, solved at the return that counts there."""
+def test_thresholds_and_limits_are_gymnasiums(env_id: str) -> None:
+    """Reward thresholds and time limits equal those of Gymnasium's v5."""
     entry, spec = CATALOGUE[env_id], gym.spec(env_id)
     theirs = gym.spec(f"{entry.family}-v5")
     assert spec.reward_threshold == entry.reward_threshold == theirs.reward_threshold
     assert spec.max_episode_steps == theirs.max_episode_steps == 1000
 
 
-def test_an_episode_ends_with_the_clock() -> None:
-    """Truncated, not terminated: the task itself goes on."""
+def test_an_episode_is_truncated_at_its_limit() -> None:
+    """The time limit truncates and does not terminate."""
     with gym.make("shapechanger/InvertedPendulum-v1", max_episode_steps=3) as env:
         env.reset(seed=0)
         ends = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(3)]
@@ -70,8 +70,8 @@ def test_an_episode_ends_with_the_clock() -> None:
     ("env_id", "factor"),
     [("InvertedPendulum", 1.0), ("SmallInvertedPendulum", 0.5), ("BigInvertedPendulum", 2.0)],
 )
-def test_poles_are_as_long_as_they_say(env_id: str, factor: float) -> None:
-    """0.6 m, half of it, twice of it; the lean of 1 mm is the same for all."""
+def test_poles_have_their_lengths(env_id: str, factor: float) -> None:
+    """Poles are 0.6 m times the factor, with a lean of 1 mm."""
     model = _model(f"shapechanger/{env_id}-v1")
     (pole,) = (g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name == "pole")
     length = 2.0 * model.geom_size[pole, 1]
@@ -88,8 +88,8 @@ def test_poles_are_as_long_as_they_say(env_id: str, factor: float) -> None:
         ("AmputatedAnt", {"shank_4": 0.25, "shank_1": 1.0, "shank_2": 1.0, "shank_3": 1.0}),
     ],
 )
-def test_shanks_are_as_long_as_they_say(env_id: str, lengths: dict[str, float]) -> None:
-    """A shank of the ant is 0.4 m along x and along y."""
+def test_shanks_have_their_lengths(env_id: str, lengths: dict[str, float]) -> None:
+    """Shanks are 0.4 m along x and along y, times the factor."""
     model = _model(f"shapechanger/{env_id}-v1")
     for name, factor in lengths.items():
         (geom,) = (g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body(name).id)

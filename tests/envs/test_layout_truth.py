@@ -1,4 +1,4 @@
-"""Each number is what its layout says: move one thing, and see which numbers move."""
+"""Layouts agree with the simulator: one change moves only the numbers named after it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _JOINTS = {
     for block in ("cinert", "cvel", "qfrc_actuator", "cfrc_ext")
 }
 _PLANAR = ("HalfCheetah", "Hopper", "Walker2d", "Swimmer")
-# The joints by which a trunk moves in the world have no limits.
+# Root joints, which have no limits.
 _ROOTS = {
     *("root", "rootx", "rootz", "rooty"),
     *("slider1", "slider2", "free_body_rot"),
@@ -37,7 +37,7 @@ _CASES: dict[str, tuple[str, dict[str, Any]]] = {
     **{
         env_id.removeprefix("shapechanger/"): (env_id, {})
         for env_id, entry in CATALOGUE.items()
-        # They see more than joints: test_layout_truth_of_blocks.py.
+        # These have more blocks; see test_layout_truth_of_blocks.py.
         if entry.family not in ("Humanoid", "InvertedDoublePendulum")
     },
     **{f"{name} with its place": (f"shapechanger/{name}-v1", _PLACE) for name in _PLANAR},
@@ -73,7 +73,7 @@ def _made(case: str) -> Iterator[Any]:
 
 @pytest.fixture(params=_CASES)
 def env(request: pytest.FixtureRequest) -> Iterator[Any]:
-    """An env at its start, as it is below all wrappers."""
+    """An unwrapped env after a reset."""
     yield from _made(request.param)
 
 
@@ -81,23 +81,23 @@ def env(request: pytest.FixtureRequest) -> Iterator[Any]:
     params=[case for case in _CASES if not case.startswith(_PLANAR) and "Pendulum" not in case]
 )
 def ant(request: pytest.FixtureRequest) -> Iterator[Any]:
-    """The same, of those whose trunk is free."""
+    """An unwrapped env with a free trunk, after a reset."""
     yield from _made(request.param)
 
 
 def _sensed(env: Any, pose: np.ndarray, velocity: np.ndarray) -> dict[str, float]:
-    """What the env senses in a state, by the name of the feature."""
+    """Return the observation in a state, by feature name."""
     env.set_state(pose, velocity)
     return dict(zip(env.observation_layout.names, env._get_obs(), strict=True))
 
 
 def _moved(before: dict[str, float], after: dict[str, float]) -> dict[str, float]:
-    """The features that changed, with what they are now."""
+    """Return the features that changed, with their new values."""
     return {name: value for name, value in after.items() if value != before[name]}
 
 
 def _state(env: Any) -> tuple[np.ndarray, np.ndarray]:
-    """A pose near the start, but high up and turned, and velocities; no two numbers are alike."""
+    """Return a lifted random pose near the start, and random velocities."""
     rng = np.random.default_rng(1)
     pose = env.init_qpos.copy()
     mujoco.mj_integratePos(env.model, pose, 0.05 * rng.normal(size=env.model.nv), 1.0)
@@ -105,7 +105,7 @@ def _state(env: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lifted(env: Any, pose: np.ndarray) -> np.ndarray:
-    """The pose where nothing touches the body; the pendulum's rail is high enough."""
+    """Return the pose raised until nothing touches the body."""
     result = pose.copy()
     lift = trunk_lift(env.model)
     if lift is not None:
@@ -114,18 +114,18 @@ def _lifted(env: Any, pose: np.ndarray) -> np.ndarray:
 
 
 def _in_the_air(env: Any) -> None:
-    """Start an episode where nothing touches the body."""
+    """Start an episode without contacts."""
     env.reset(seed=0)
     env.set_state(_lifted(env, env.data.qpos), env.data.qvel.copy())
 
 
 def _visible(env: Any, values: dict[str, float]) -> dict[str, float]:
-    """Those that the env shows: it may hide where its trunk is."""
+    """Return the values that are observed; the trunk's position may be hidden."""
     return {name: value for name, value in values.items() if name in env.observation_layout}
 
 
-def test_a_joint_moves_its_own_position(env: Any) -> None:
-    """Each hinge and slide is one number, in radians or metres, and no other number knows of it."""
+def test_a_joint_changes_its_own_position(env: Any) -> None:
+    """Each hinge and slide changes one number, in rad or m, and no other."""
     pose, velocity = _state(env)
     before = _sensed(env, pose, velocity)
     for j in range(env.model.njnt):
@@ -140,8 +140,8 @@ def test_a_joint_moves_its_own_position(env: Any) -> None:
         assert moved == _visible(env, own)
 
 
-def test_the_trunk_moves_its_own_place(ant: Any) -> None:
-    """Its height is always seen; where it is in the plane only if asked for."""
+def test_the_trunk_changes_its_own_position(ant: Any) -> None:
+    """The height is always observed, x and y only on request."""
     pose, velocity = _state(ant)
     before = _sensed(ant, pose, velocity)
     for place, axis in enumerate("xyz"):
@@ -152,8 +152,8 @@ def test_the_trunk_moves_its_own_place(ant: Any) -> None:
     assert "torso/z" in before
 
 
-def test_a_turn_of_the_trunk_moves_its_quaternion(ant: Any) -> None:
-    """Four numbers move together, w first, and no others."""
+def test_a_rotation_changes_the_quaternion(ant: Any) -> None:
+    """A rotation of the trunk changes the quaternion only, with w first."""
     pose, velocity = _state(ant)
     pose[3:7] = [1.0, 0.0, 0.0, 0.0]
     before = _sensed(ant, pose, velocity)
@@ -170,8 +170,8 @@ def test_a_turn_of_the_trunk_moves_its_quaternion(ant: Any) -> None:
     np.testing.assert_array_equal(list(moved.values()), changed[3:7])
 
 
-def test_a_velocity_moves_its_own_number(env: Any) -> None:
-    """Each degree of freedom is one number."""
+def test_a_velocity_changes_its_own_number(env: Any) -> None:
+    """Each degree of freedom changes one number."""
     pose, velocity = _state(env)
     before = _sensed(env, pose, velocity)
     for j in range(env.model.njnt):
@@ -188,7 +188,7 @@ def test_a_velocity_moves_its_own_number(env: Any) -> None:
 
 
 def test_velocities_are_rates(env: Any) -> None:
-    """A velocity of 1 changes the position by 1 per second: m/s of m, rad/s of rad."""
+    """Velocities are the rates of the positions, in matching units."""
     pose, velocity = _state(env)
     before = _sensed(env, pose, velocity)
     later, dt = pose.copy(), 1e-6
@@ -208,10 +208,11 @@ def test_velocities_are_rates(env: Any) -> None:
     assert checked >= 2
 
 
-def test_the_trunk_turns_about_its_own_axes(ant: Any) -> None:
-    """Angular velocities are in the trunk's frame: turned on its side, its z axis is the world's x.
+def test_angular_velocities_are_in_the_trunks_frame(ant: Any) -> None:
+    """Angular velocities are in the trunk's frame.
 
-    Velocities are in the world's frame all the same.
+    With the trunk on its side, its z axis is the world's x axis. Linear velocities are in the
+    world's frame.
     """
     pose, _ = _state(ant)
     mujoco.mju_axisAngle2Quat(pose[3:7], np.array([0.0, 1.0, 0.0]), math.pi / 2)
@@ -220,7 +221,7 @@ def test_the_trunk_turns_about_its_own_axes(ant: Any) -> None:
         velocity[3 + "xyz".index(axis)] = 1.0
         sensed = _sensed(ant, pose, velocity)
         assert sensed[f"torso/w{axis}"] == 1.0
-        # MuJoCo's own measure of the same: rotation first, in the axes of the world.
+        # MuJoCo's velocity of the body: rotation first, in the world's axes.
         six = np.zeros(6)
         mujoco.mj_objectVelocity(
             ant.model, ant.data, mujoco.mjtObj.mjOBJ_BODY, ant.data.body("torso").id, six, 0
@@ -228,10 +229,10 @@ def test_the_trunk_turns_about_its_own_axes(ant: Any) -> None:
         np.testing.assert_allclose(six[:3], in_world, atol=1e-12)
 
 
-def test_a_force_moves_the_contacts_of_its_body(env: Any) -> None:
-    """Six numbers of each body: torque before force, in the axes of the world, N·m and N."""
+def test_a_force_changes_the_contacts_of_its_body(env: Any) -> None:
+    """Each body has six numbers: torque before force, in the world's axes, N·m and N."""
     for body in (env.model.body(b).name for b in range(1, env.model.nbody)):
-        # A force has a lever, so it is a torque as well; a torque alone is no force.
+        # A force with a lever is also a torque; a torque gives no force.
         for kind, first, others in (("f", 0, "tf"), ("t", 3, "t")):
             _in_the_air(env)
             applied = np.array([0.2, -0.3, 0.4])
@@ -247,7 +248,7 @@ def test_a_force_moves_the_contacts_of_its_body(env: Any) -> None:
 
 
 def test_contacts_are_those_of_the_last_step(env: Any) -> None:
-    """Six numbers of a body stand for its six of `cfrc_ext`, clipped, and a reset clears them."""
+    """Contacts are the clipped `cfrc_ext` of a body, and zero after a reset."""
     observation, _ = env.reset(seed=0)
     sensed = dict(zip(env.observation_layout.names, observation, strict=True))
     assert not any(value for name, value in sensed.items() if "/contact/" in name)
@@ -267,7 +268,7 @@ def test_contacts_are_those_of_the_last_step(env: Any) -> None:
 
 @pytest.mark.parametrize(("push_n", "seen"), [(50.0, 2.0), (-50.0, -0.5), (0.25, 0.25)])
 def test_contacts_are_clipped_to_their_range(push_n: float, seen: float) -> None:
-    """The range is an argument, and the layout states it."""
+    """The range is an argument and stated by the layout."""
     with gym.make("shapechanger/Ant-v1", contact_force_range=(-0.5, 2.0)) as made:
         env: Any = made.unwrapped
         _in_the_air(env)
@@ -279,8 +280,8 @@ def test_contacts_are_clipped_to_their_range(push_n: float, seen: float) -> None
     np.testing.assert_allclose(observation[places], seen, rtol=1e-12)
 
 
-def test_a_motor_pulls_its_own_joint(env: Any) -> None:
-    """A control of c gives gain times c, in N·m or N, on one joint and on no other."""
+def test_a_motor_drives_its_own_joint(env: Any) -> None:
+    """A control c gives gain times c, in N·m or N, on one joint."""
     for a, feature in enumerate(env.action_layout):
         control = 0.25
         action = np.zeros(env.model.nu)
@@ -288,7 +289,7 @@ def test_a_motor_pulls_its_own_joint(env: Any) -> None:
         _in_the_air(env)
         env.step(action)
         assert feature.element is not None
-        # The pendulum's motor is called slide, and what it drives is called slider.
+        # The pendulum's motor `slide` drives the joint `slider`.
         joint = {"slide": "slider"}.get(feature.element.name, feature.element.name)
         hinge = env.model.joint(joint).type == _J.mjJNT_HINGE
         assert (feature.unit, feature.gain_unit) == ("1", "N·m" if hinge else "N")
@@ -298,14 +299,14 @@ def test_a_motor_pulls_its_own_joint(env: Any) -> None:
 
 
 def test_ranges_are_those_of_the_model(env: Any) -> None:
-    """A joint's limits are its feature's; what has no limits has none."""
+    """Features have the limits of their joints, or none."""
     limits = {
         env.model.joint(j).name: env.model.jnt_range[j]
         for j in range(env.model.njnt)
         if env.model.jnt_limited[j]
     }
     names = {env.model.joint(j).name for j in range(env.model.njnt)}
-    # The ant's root has the name that its body gives it.
+    # The ant's root joint has a generated name.
     assert names - limits.keys() <= _ROOTS | {env.model.joint(0).name}
     clipped = env.family.name in ("Hopper", "Walker2d")
 
@@ -328,8 +329,8 @@ def test_ranges_are_those_of_the_model(env: Any) -> None:
         assert (feature.low, feature.high) == tuple(bounds)
 
 
-def test_features_belong_to_parts_of_the_model(env: Any) -> None:
-    """Each feature's element is a joint, body or actuator of that name."""
+def test_features_name_elements_of_the_model(env: Any) -> None:
+    """Each feature's element is an existing joint, body or actuator."""
     for feature in (*env.observation_layout, *env.action_layout):
         assert feature.element is not None
         assert getattr(env.model, feature.element.kind)(feature.element.name).id >= 0
@@ -337,7 +338,7 @@ def test_features_belong_to_parts_of_the_model(env: Any) -> None:
 
 
 def test_the_units_of_the_ant() -> None:
-    """SI throughout; a number without a unit is 1."""
+    """Units are SI; the unit of a pure number is 1."""
     with gym.make("shapechanger/ExtendedAnt-v1") as made:
         layout = made.unwrapped.observation_layout
     assert {str(feature).partition("/")[2] for feature in layout} == {
@@ -349,7 +350,7 @@ def test_the_units_of_the_ant() -> None:
 
 
 def test_the_order_of_the_pendulum() -> None:
-    """Positions before velocities, the cart before the pole."""
+    """Positions come before velocities, and the cart before the pole."""
     with gym.make("shapechanger/InvertedPendulum-v1") as made:
         env: Any = made.unwrapped
         assert [str(feature) for feature in env.observation_layout] == [

@@ -1,4 +1,4 @@
-"""What the humanoid and the double pendulum see beside their joints is what its layout says."""
+"""Layouts of the humanoid and the double pendulum beyond their joints."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ _BLOCKS = {
 
 
 def _sensed(env: Any) -> dict[str, float]:
-    """What the env senses now, by the name of the feature."""
+    """Return the current observation, by feature name."""
     return dict(zip(env.observation_layout.names, env._get_obs(), strict=True))
 
 
 def _moved(before: dict[str, float], after: dict[str, float]) -> dict[str, float]:
-    """The features that changed, with what they are now."""
+    """Return the features that changed, with their new values."""
     return {name: value for name, value in after.items() if value != before[name]}
 
 
 @pytest.fixture
 def humanoid() -> Iterator[Any]:
-    """A humanoid in the air, turned and moving."""
+    """A humanoid in the air, in a random pose with random velocities."""
     with gym.make("shapechanger/Humanoid-v1") as made:
         env: Any = made.unwrapped
         made.reset(seed=0)
@@ -48,7 +48,7 @@ def humanoid() -> Iterator[Any]:
 
 @pytest.fixture
 def poles() -> Iterator[Any]:
-    """A double pendulum."""
+    """A double pendulum after a reset."""
     with gym.make("shapechanger/InvertedDoublePendulum-v1") as made:
         made.reset(seed=0)
         yield made.unwrapped
@@ -58,8 +58,8 @@ def _bodies(env: Any) -> list[str]:
     return [env.model.body(b).name for b in range(1, env.model.nbody)]
 
 
-def test_inertias_are_those_about_the_centre_of_mass(humanoid: Any) -> None:
-    """From masses and places by the parallel axis theorem, in the axes of the world."""
+def test_inertias_are_about_the_centre_of_mass(humanoid: Any) -> None:
+    """They follow from the parallel axis theorem, in the world's axes."""
     sensed, centre = _sensed(humanoid), humanoid.data.subtree_com[1]
     for name in _bodies(humanoid):
         body, model = humanoid.data.body(name), humanoid.model.body(name)
@@ -78,7 +78,7 @@ def test_inertias_are_those_about_the_centre_of_mass(humanoid: Any) -> None:
 
 
 def test_twists_are_velocities_at_the_centre_of_mass(humanoid: Any) -> None:
-    """MuJoCo's own measure of a body's velocity, moved to that point."""
+    """They equal MuJoCo's body velocities, moved to the centre of mass."""
     sensed, centre, six = _sensed(humanoid), humanoid.data.subtree_com[1], np.zeros(6)
     for name in _bodies(humanoid):
         body, kind = humanoid.data.body(name), mujoco.mjtObj.mjOBJ_XBODY
@@ -89,8 +89,8 @@ def test_twists_are_velocities_at_the_centre_of_mass(humanoid: Any) -> None:
             assert sensed[f"{name}/twist/v{axis}"] == pytest.approx(v, abs=1e-9)
 
 
-def test_a_motor_is_seen_on_its_own_joint(humanoid: Any) -> None:
-    """Its gain times its control, N·m."""
+def test_a_motor_changes_the_drive_of_its_joint(humanoid: Any) -> None:
+    """The drive is the gain times the control, N·m."""
     humanoid.data.ctrl[:] = 0.0
     mujoco.mj_forward(humanoid.model, humanoid.data)
     before = _sensed(humanoid)
@@ -104,7 +104,7 @@ def test_a_motor_is_seen_on_its_own_joint(humanoid: Any) -> None:
 
 
 def test_contacts_are_not_clipped(humanoid: Any) -> None:
-    """Six numbers of each body, torque before force."""
+    """Each body has six unclipped numbers, torque before force."""
     before = _sensed(humanoid)
     for name in _bodies(humanoid):
         written = np.array([100.0, -200.0, 300.0, -400.0, 500.0, -600.0])
@@ -117,8 +117,8 @@ def test_contacts_are_not_clipped(humanoid: Any) -> None:
 
 
 @pytest.mark.parametrize("shown", [*itertools.product([True, False], repeat=4)])
-def test_blocks_are_shown_or_hidden(shown: tuple[bool, ...]) -> None:
-    """The layout has as many numbers as the space, whatever is asked for."""
+def test_blocks_are_optional(shown: tuple[bool, ...]) -> None:
+    """The layout has the size of the space for all combinations of blocks."""
     arguments = {
         f"include_{block}_in_observation": show for block, show in zip(_BLOCKS, shown, strict=True)
     }
@@ -133,7 +133,7 @@ def test_blocks_are_shown_or_hidden(shown: tuple[bool, ...]) -> None:
 
 
 def test_the_units_of_the_humanoid(humanoid: Any) -> None:
-    """Of what it sees beside its joints."""
+    """Blocks of the humanoid have SI units."""
     units = {str(f).partition("/")[2] for f in humanoid.observation_layout if "torso/" in f.name}
     assert units >= {
         *("inertia/xx [kg·m²]", "inertia/yz [kg·m²]", "inertia/mx [kg·m]", "inertia/mass [kg]"),
@@ -143,7 +143,7 @@ def test_the_units_of_the_humanoid(humanoid: Any) -> None:
 
 
 def test_the_order_of_the_double_pendulum(poles: Any) -> None:
-    """The cart's place, sines, cosines, velocities, and the force on the cart."""
+    """The order is cart, sines, cosines, velocities, and the force on the cart."""
     assert [(str(f), f.low, f.high) for f in poles.observation_layout] == [
         ("slider/position [m]", -1.0, 1.0),
         *((f"{hinge}/sin [1]", -1.0, 1.0) for hinge in ("hinge", "hinge2")),
@@ -157,8 +157,8 @@ def test_the_order_of_the_double_pendulum(poles: Any) -> None:
     ]
 
 
-def test_each_part_of_the_double_pendulum_moves_its_own(poles: Any) -> None:
-    """A hinge its sine and cosine, a velocity its own number."""
+def test_each_joint_changes_its_own_numbers(poles: Any) -> None:
+    """A hinge changes its sine and cosine, a velocity its own number."""
     pose, velocity = np.array([0.1, 0.2, -0.3]), np.array([0.5, -0.6, 0.7])
 
     def sensed(pose: np.ndarray, velocity: np.ndarray) -> dict[str, float]:
@@ -178,16 +178,16 @@ def test_each_part_of_the_double_pendulum_moves_its_own(poles: Any) -> None:
         assert fast == {f"{joint}/velocity": -10.0}
 
 
-def test_the_end_of_the_rail_pushes_back(poles: Any) -> None:
-    """The force on the cart is seen, up to 10 N."""
+def test_the_rail_limits_give_a_force(poles: Any) -> None:
+    """The constraint force on the cart is observed, clipped to 10 N."""
     for place, pushed in ((1.05, -10.0), (-1.05, 10.0), (0.0, 0.0)):
         poles.set_state(np.array([place, 0.0, 0.0]), np.zeros(3))
         assert _sensed(poles)["slider/constraint_force"] == pushed
 
 
 @pytest.mark.parametrize("name", ["Hopper", "Walker2d"])
-def test_velocities_in_a_plane_are_clipped(name: str) -> None:
-    """At 10 m/s and rad/s, as the layout says; the simulation goes on with the whole."""
+def test_planar_velocities_are_clipped(name: str) -> None:
+    """Observed velocities are clipped to 10, those of the simulation are not."""
     with gym.make(f"shapechanger/{name}-v1") as made:
         env: Any = made.unwrapped
         made.reset(seed=0)
@@ -197,8 +197,8 @@ def test_velocities_in_a_plane_are_clipped(name: str) -> None:
             assert velocities == [seen] * env.model.nv
 
 
-def test_the_mirror_knows_the_blocks(humanoid: Any) -> None:
-    """The mirror image of what is seen is what is seen in the mirror image of the state."""
+def test_the_mirror_includes_the_blocks(humanoid: Any) -> None:
+    """The mirrored observation equals the observation of the mirrored state."""
     with gym.make(
         "shapechanger/Humanoid-v1", exclude_current_positions_from_observation=False
     ) as made:

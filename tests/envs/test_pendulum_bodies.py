@@ -1,4 +1,4 @@
-"""Pendulums of other shapes: spaces follow, and a pole must be left."""
+"""Pendulums with other bodies."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from shapechanger.morphology import Lock, Remove, Split
 from shapechanger.testing import examine
 
 
-def test_a_split_pole_is_seen_with_both_its_hinges() -> None:
-    """The space has the size of the layout, and the env keeps every promise."""
+def test_a_split_pole_has_two_hinges() -> None:
+    """Both hinges are observed, and the env keeps all promises of the exam."""
     body = Split("pole", "upper_pole")
     env = gym.make("shapechanger/InvertedPendulum-v1", body=body)
     assert env.observation_space.shape == (6,)
@@ -26,6 +26,6 @@ def test_a_split_pole_is_seen_with_both_its_hinges() -> None:
 
 @pytest.mark.parametrize("edit", [Lock("hinge"), Remove("pole"), Lock("slider")])
 def test_a_pendulum_without_cart_or_pole_is_refused(edit: Lock | Remove) -> None:
-    """The end of an episode is read from the hinge."""
+    """The slide and the hinge are needed for the task."""
     with pytest.raises(MorphologyError, match="needs a cart on a slide and a pole on a hinge"):
         gym.make("shapechanger/InvertedPendulum-v1", body=edit)

@@ -1,4 +1,4 @@
-"""Frames and pictures: that there is something on them, and that they follow the body."""
+"""Frames and pictures of the MuJoCo envs."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ _SIZE = {"width": 120, "height": 90}
 
 @pytest.fixture
 def ant() -> Iterator[Any]:
-    """An ant that draws frames."""
+    """An ant that renders frames."""
     with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **_SIZE) as env:
         env.reset(seed=0)
         yield env
 
 
 def _hide(env: Any, *, but: str = "") -> None:
-    """Make the body, but for one of its geoms, transparent, with nothing to be seen of it."""
+    """Make all geoms of the body transparent, except `but`."""
     model = env.unwrapped.model
     for geom in np.flatnonzero(model.geom_bodyid > 0):
         model.geom_rgba[geom, 3] = float(model.geom(geom).name == but)
 
 
 def _without_shadows(env: Any) -> None:
-    """Let the body be seen in its own place only."""
+    """Disable shadows and reflections."""
     model = env.unwrapped.model
     model.light_castshadow[:] = 0
     model.mat_reflectance[:] = 0.0
 
 
 def _differs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Which pixels differ by more than rounding."""
+    """Return the pixels that differ by more than rounding."""
     return np.any(np.abs(one.astype(int) - other.astype(int)) > 4, axis=2)
 
 
@@ -53,8 +53,8 @@ def _differs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
 def test_a_frame_shows_the_body(env_id: str) -> None:
-    """It is of the size asked for, not of one colour, and changes when the body goes away."""
-    # Gymnasium looks at these two from so far away that they are a few pixels.
+    """The frame has the requested size and changes when the body is hidden."""
+    # Gymnasium's cameras show these two as a few pixels only.
     far = "Double" in env_id or "Walker2d" in env_id
     nearer = {"default_camera_config": {"distance": 2.0}} if far else {}
     with gym.make(env_id, render_mode="rgb_array", **nearer, **_SIZE) as env:
@@ -67,15 +67,15 @@ def test_a_frame_shows_the_body(env_id: str) -> None:
         assert _differs(env.render(), frame).mean() > 0.01
 
 
-def test_a_frame_shows_how_the_body_moves(ant: Any) -> None:
-    """Frames of a step and of the next are not the same."""
+def test_frames_follow_the_motion(ant: Any) -> None:
+    """Frames of successive steps differ."""
     frame = ant.render()
     ant.step(np.array([1, -1, 1, -1, 1, -1, 1, -1], np.float32))
     assert _differs(ant.render(), frame).any()
 
 
-def test_a_frame_shows_depths() -> None:
-    """A depth for each pixel, nearer where the body is, with the colours if asked for."""
+def test_depth_frames() -> None:
+    """Depth is smaller at the body; `rgbd_tuple` has both arrays."""
     with gym.make("shapechanger/Ant-v1", render_mode="depth_array", **_SIZE) as env:
         env.reset(seed=0)
         depth = env.render()
@@ -92,8 +92,8 @@ def test_a_frame_shows_depths() -> None:
         np.testing.assert_array_equal(again, depth)
 
 
-def test_envs_draw_side_by_side(ant: Any) -> None:
-    """OpenGL draws for one at a time; another env, or a picture, must not leave black frames."""
+def test_envs_render_in_turn(ant: Any) -> None:
+    """Switching between envs and pictures gives no black frames."""
     frame = ant.render()
     with gym.make("shapechanger/BigAnt-v1", render_mode="rgb_array", **_SIZE) as other:
         other.reset(seed=0)
@@ -109,8 +109,8 @@ def test_envs_draw_side_by_side(ant: Any) -> None:
     np.testing.assert_array_equal(ant.render(), frame)
 
 
-def test_an_env_that_is_dropped_leaves_the_others_their_pictures(ant: Any) -> None:
-    """Not everybody closes what they made."""
+def test_an_unclosed_env_does_not_affect_others(ant: Any) -> None:
+    """Garbage collection of an unclosed env does not affect the frames of others."""
     frame = ant.render()
     dropped = gym.make("shapechanger/BigAnt-v1", render_mode="rgb_array", **_SIZE)
     dropped.reset(seed=0)
@@ -121,8 +121,8 @@ def test_an_env_that_is_dropped_leaves_the_others_their_pictures(ant: Any) -> No
     np.testing.assert_array_equal(ant.render(), frame)
 
 
-def test_a_closed_env_can_draw_again(ant: Any) -> None:
-    """Closing twice does no harm, and a frame after it is drawn anew."""
+def test_a_closed_env_can_render_again(ant: Any) -> None:
+    """Closing is idempotent, and rendering afterwards works."""
     frame = ant.render()
     ant.close()
     ant.close()
@@ -133,7 +133,7 @@ def test_a_closed_env_can_draw_again(ant: Any) -> None:
 
 
 def _seen(env: Any) -> np.ndarray:
-    """The pixels of a frame that show the body; it is gone afterwards."""
+    """Return the pixels that show the body, and hide the body."""
     _without_shadows(env)
     frame = env.render()
     _hide(env)
@@ -141,8 +141,8 @@ def _seen(env: Any) -> np.ndarray:
 
 
 @pytest.mark.parametrize("body", ["Ant", "BigAnt", "ExtendedAnt"])
-def test_the_camera_follows_a_body_that_runs(body: str) -> None:
-    """It is as large, and in the same place, thirty metres on; and no part is cut off."""
+def test_the_camera_follows_the_body(body: str) -> None:
+    """After 30 m the body has the same size and place in the frame, and is not cropped."""
     seen = []
     for x, y in ((0.0, 0.0), (30.0, -20.0)):
         with gym.make("shapechanger/Ant-v1", body=body, render_mode="rgb_array", **_SIZE) as env:
@@ -160,8 +160,8 @@ def test_the_camera_follows_a_body_that_runs(body: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["HalfCheetah", "Hopper", "Walker2d", "Swimmer"])
-def test_the_camera_follows_a_body_that_runs_in_a_plane(name: str) -> None:
-    """Ten metres on it is still there, as large as before."""
+def test_the_camera_follows_planar_bodies(name: str) -> None:
+    """After 10 m the body has the same size."""
     seen = []
     for x in (0.0, 10.0):
         with gym.make(f"shapechanger/{name}-v1", render_mode="rgb_array", **_SIZE) as env:
@@ -175,8 +175,8 @@ def test_the_camera_follows_a_body_that_runs_in_a_plane(name: str) -> None:
     assert seen[1] == pytest.approx(seen[0], rel=0.2)
 
 
-def test_a_camera_that_is_told_where_to_look_stays() -> None:
-    """The world is looked at, and the body runs out of it."""
+def test_a_given_lookat_is_fixed() -> None:
+    """With `lookat` the camera does not follow the body."""
     camera = {"lookat": np.array([0.0, 0.0, 0.5]), "distance": 6.0, "elevation": -30.0}
     with gym.make(
         "shapechanger/Ant-v1", render_mode="rgb_array", default_camera_config=camera, **_SIZE
@@ -195,7 +195,7 @@ def test_a_camera_that_is_told_where_to_look_stays() -> None:
 
 
 def test_frames_follow_the_body(ant: Any) -> None:
-    """After a reset the new body is drawn, as by an env that was made with it."""
+    """After a reset with a new body, frames equal those of an env made with it."""
     before = ant.render()
     ant.reset(seed=0, options={"body": "BigAnt"})
     after = ant.render()
@@ -208,8 +208,8 @@ def test_frames_follow_the_body(ant: Any) -> None:
     np.testing.assert_array_equal(ant.render(), before)
 
 
-def test_the_camera_stays_as_it_was_asked_for() -> None:
-    """Camera, size and options are those of the env, whichever body it has."""
+def test_the_camera_settings_are_kept() -> None:
+    """Camera, size and options are kept when the body changes."""
     camera = {"distance": 9.0, "trackbodyid": 0, "elevation": -80.0}
     arguments = {
         "default_camera_config": camera,
@@ -236,8 +236,8 @@ def test_the_camera_stays_as_it_was_asked_for() -> None:
         assert env.unwrapped.mujoco_renderer.camera_id == 0
 
 
-def test_the_old_body_is_not_kept(ant: Any) -> None:
-    """A training with a new body each episode must not grow: model, viewer and context go."""
+def test_the_old_renderer_is_freed(ant: Any) -> None:
+    """Model, viewer and context of the old body are freed."""
     ant.render()
     renderer = ant.unwrapped.mujoco_renderer
     context = renderer.viewer.opengl_context
@@ -255,8 +255,8 @@ def test_the_old_body_is_not_kept(ant: Any) -> None:
 
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
-def test_a_picture_holds_the_whole_body(env_id: str) -> None:
-    """At its own reach: nothing is cut off at the border, and it is not lost in the middle."""
+def test_a_picture_shows_the_whole_body(env_id: str) -> None:
+    """At its own reach, the body fills the picture without being cropped."""
     with gym.make(env_id) as made:
         env: Any = made.unwrapped
         _without_shadows(env)
@@ -268,7 +268,7 @@ def test_a_picture_holds_the_whole_body(env_id: str) -> None:
         seen = _differs(env.picture(**_SIZE, reach=reach), picture)
     border = np.concatenate((seen[0], seen[-1], seen[:, 0], seen[:, -1]))
     assert not border.any()
-    # Some floors reflect the body, and darkly.
+    # Some floors have a dark reflection of the body.
     assert picture[seen].mean() > 70.0
     rows = np.flatnonzero(seen.any(axis=1))
     columns = np.flatnonzero(seen.any(axis=0))
@@ -276,7 +276,7 @@ def test_a_picture_holds_the_whole_body(env_id: str) -> None:
 
 
 def _torso_pixels(env_id: str, reach: float) -> int:
-    """How many pixels the torso takes; it is the same ball on each ant."""
+    """Return the number of pixels of the torso, which is the same ball on each ant."""
     with gym.make(env_id) as made:
         env: Any = made.unwrapped
         _without_shadows(env)
@@ -288,18 +288,18 @@ def _torso_pixels(env_id: str, reach: float) -> int:
 
 
 def test_bodies_are_drawn_to_one_scale() -> None:
-    """With one reach for both, what is as large is drawn as large."""
+    """With equal reach, equal parts have equal size."""
     with gym.make("shapechanger/Ant-v1") as one, gym.make("shapechanger/BigAnt-v1") as other:
         small, large = one.unwrapped.reach, other.unwrapped.reach
     assert large > 1.4 * small
     reference = _torso_pixels("shapechanger/Ant-v1", large)
-    # The torso of the ant is a little nearer to the camera's middle than that of its big brother.
+    # The ant's torso is slightly nearer to the camera's centre than the big ant's.
     assert _torso_pixels("shapechanger/BigAnt-v1", large) == pytest.approx(reference, rel=0.1)
     assert _torso_pixels("shapechanger/Ant-v1", small) > 1.4 * reference
 
 
 def test_a_picture_changes_nothing(ant: Any) -> None:
-    """Neither the state nor the model, nor how the env draws."""
+    """`picture` changes neither the state nor the model."""
     env = ant.unwrapped
     state, headlight = env.state_vector(), env.model.vis.headlight.ambient.copy()
     width = env.model.vis.global_.offwidth
@@ -310,7 +310,7 @@ def test_a_picture_changes_nothing(ant: Any) -> None:
 
 
 def test_a_picture_shows_the_start_and_not_the_state(ant: Any) -> None:
-    """So that two of them compare bodies, not poses."""
+    """Pictures show the start pose, so that they compare bodies."""
     picture = ant.unwrapped.picture(**_SIZE)
     for _ in range(5):
         ant.step(np.ones(8, np.float32))
@@ -355,14 +355,14 @@ print("closed")
 
 
 def test_a_window_opens(display: str) -> None:
-    """With the body in it, through steps, pictures and a new body."""
+    """Human rendering works through steps, pictures and a new body."""
     run = run_python(_WINDOW, DISPLAY=display)
     assert run.returncode == 0, run.stderr
     assert run.stdout.splitlines() == ["(80, 60)", "True", "True", "True", "closed"]
 
 
 def test_gymnasium_records_videos(tmp_path: Path) -> None:
-    """`RecordVideo` has its encoder from the extra `sim`."""
+    """`RecordVideo` works with the extra `sim`."""
     env = RecordVideo(
         gym.make("shapechanger/InvertedPendulum-v1", render_mode="rgb_array"),
         str(tmp_path / "videos"),

@@ -1,4 +1,4 @@
-"""Starts and ends that follow from the body: runners, and poles on poles."""
+"""Start poses and terminations derived from the body."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _made(name: str, **arguments: Any) -> Any:
 
 @pytest.mark.parametrize("name", [*_LEGS, "Swimmer"])
 def test_a_body_starts_as_in_gymnasium(name: str) -> None:
-    """The humanoid's knees excepted, which Gymnasium stretches 2 degrees beyond their limit."""
+    """Starts are equal, except for the humanoid's knees, which Gymnasium overstretches."""
     ours = _made(name)
     with gym.make(f"{name}-v5") as env:
         theirs: Any = env.unwrapped
@@ -38,8 +38,8 @@ def test_a_body_starts_as_in_gymnasium(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", _HEALTHY)
-def test_a_body_as_it_is_is_healthy_where_gymnasiums_is(name: str) -> None:
-    """The numbers are Gymnasium's own, also for a body that only its motors tell apart."""
+def test_healthy_ranges_equal_gymnasiums(name: str) -> None:
+    """Bodies of the original shape have Gymnasium's numbers."""
     with gym.make(f"{name}-v5") as env:
         theirs = env.unwrapped._healthy_z_range
     for body in (name, Gear("*", 2.0)):
@@ -48,8 +48,8 @@ def test_a_body_as_it_is_is_healthy_where_gymnasiums_is(name: str) -> None:
 
 @pytest.mark.parametrize("name", _HEALTHY)
 @pytest.mark.parametrize("factor", [0.5, 2.0])
-def test_healthy_heights_grow_with_the_body(name: str, factor: float) -> None:
-    """In proportion to the height at which it stands; at a reset as well."""
+def test_healthy_heights_scale_with_the_body(name: str, factor: float) -> None:
+    """They are proportional to the standing height, after a reset too."""
     plain, legs = _made(name), Stretch(_LEGS[name], factor)
     tall = _made(name, body=legs)
     growth = tall.standing_height / plain.standing_height
@@ -61,8 +61,8 @@ def test_healthy_heights_grow_with_the_body(name: str, factor: float) -> None:
 
 
 @pytest.mark.parametrize("name", _HEALTHY)
-def test_an_explicit_range_wins(name: str) -> None:
-    """Whatever the body, and in a copy; None asks for the derived one."""
+def test_an_explicit_range_takes_precedence(name: str) -> None:
+    """A given range is kept for any body and in copies; None derives it."""
     env = _made(name, body=Stretch(_LEGS[name], 2.0), healthy_z_range=(0.1, 9.0))
     for one in (env, pickle.loads(pickle.dumps(env))):
         assert one.healthy_z_range == (0.1, 9.0)
@@ -71,7 +71,7 @@ def test_an_explicit_range_wins(name: str) -> None:
 
 @pytest.mark.parametrize("name", _LEGS)
 def test_long_legs_start_above_the_floor(name: str) -> None:
-    """The trunk is raised as far as they need, and noise does not push them in."""
+    """The trunk is raised so that no foot starts in the floor, with noise too."""
     env = _made(name, body=Stretch(_LEGS[name], 2.0))
     lift = trunk_lift(env.model)
     assert lift is not None
@@ -82,8 +82,8 @@ def test_long_legs_start_above_the_floor(name: str) -> None:
 
 
 @pytest.mark.parametrize("height_m", [0.5, 2.0])
-def test_the_range_follows_where_the_joint_counts_from(height_m: float) -> None:
-    """A hopper whose model puts it elsewhere is as high when it counts as fallen."""
+def test_the_range_is_relative_to_the_joints_zero(height_m: float) -> None:
+    """The healthy height does not depend on the start height of the model."""
     env = _made("Hopper", body=StartHeight("torso", height_m))
     lift = trunk_lift(env.model)
     assert lift is not None
@@ -95,8 +95,8 @@ def test_the_range_follows_where_the_joint_counts_from(height_m: float) -> None:
     assert env.is_healthy
 
 
-def test_a_torso_without_legs_has_a_range_too() -> None:
-    """It stands on its end: still a height."""
+def test_a_torso_without_legs_has_a_range() -> None:
+    """The range scales with the height of the torso on its end."""
     env = _made("Walker2d", body=(Remove("thigh"), Remove("thigh_left")))
     plain = _made("Walker2d")
     growth = env.standing_height / plain.standing_height
@@ -104,20 +104,20 @@ def test_a_torso_without_legs_has_a_range_too() -> None:
 
 
 @pytest.mark.parametrize(("name", "joint"), [("Hopper", "rooty"), ("HalfCheetah", "rooty")])
-def test_the_joints_of_the_trunk_stay(name: str, joint: str) -> None:
-    """Reward and end are read from them."""
+def test_root_joints_cannot_be_locked(name: str, joint: str) -> None:
+    """Reward and termination need them."""
     with pytest.raises(MorphologyError, match="must be slide, slide, hinge; here they are slide"):
         _made(name, body=Lock(joint))
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
-def test_poles_of_any_length_are_judged_alike(factor: float) -> None:
-    """Reward and end depend on the height in parts of the length."""
+def test_pole_rewards_are_relative_to_the_length(factor: float) -> None:
+    """Reward and termination depend on the height relative to the length."""
     with gym.make(_POLES, body=Stretch("pole*", factor)) as made:
         env: Any = made.unwrapped
         made.reset(seed=0)
         for part, fallen in ((1.01, False), (0.99, True)):
-            # Both poles lean alike, so that the tip is at 1 m on the model as it is.
+            # Both poles lean alike; on the original model the tip is at about 1 m.
             lean = math.acos(part / 1.2)
             env.set_state(np.array([0.0, lean, 0.0]), np.zeros(3))
             y = env.data.site_xpos[0, 2]
@@ -132,8 +132,8 @@ def test_poles_of_any_length_are_judged_alike(factor: float) -> None:
         assert not made.step(np.zeros(1, np.float32))[2]
 
 
-def test_a_rail_elsewhere_changes_no_reward() -> None:
-    """Heights are those above the first hinge."""
+def test_the_height_of_the_rail_does_not_matter() -> None:
+    """Heights are relative to the first hinge."""
     rewards: list[float] = []
     for body in ((), StartHeight("cart", 1.0)):
         with gym.make(_POLES, body=body) as env:
@@ -143,8 +143,8 @@ def test_a_rail_elsewhere_changes_no_reward() -> None:
 
 
 @pytest.mark.parametrize("body", [Lock("hinge2"), Remove("pole2")])
-def test_a_double_pendulum_keeps_its_poles(body: Edit) -> None:
-    """Nine numbers and a reward count on them, when it is made and when it is changed."""
+def test_a_double_pendulum_needs_both_poles(body: Edit) -> None:
+    """Bodies without them are refused at `make` and at `reset`."""
     with pytest.raises(MorphologyError, match="two poles on hinges and a tip above them"):
         gym.make(_POLES, body=body)
     with gym.make(_POLES) as env:

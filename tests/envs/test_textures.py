@@ -1,4 +1,4 @@
-"""Textures where nobody looks take less memory, and nothing else is another."""
+"""Smaller textures in envs without rendering."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def _model(**arguments: Any) -> Any:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_only_pixels_are_fewer_where_nobody_looks() -> None:
-    """All other numbers are those of an env that draws."""
+def test_only_textures_differ_without_rendering() -> None:
+    """All other arrays equal those of an env with rendering."""
     plain, drawn = _model(), _model(render_mode="rgb_array")
     assert plain.ntexdata < 0.3 * drawn.ntexdata
     for name in dir(drawn):
@@ -29,8 +29,8 @@ def test_only_pixels_are_fewer_where_nobody_looks() -> None:
             np.testing.assert_array_equal(getattr(plain, name), value, err_msg=name)
 
 
-def test_floors_keep_their_edges() -> None:
-    """The checks of a floor would be seen to blur; bodies and skies are of one colour."""
+def test_floor_textures_keep_their_size() -> None:
+    """Floor textures keep their resolution; uniform ones shrink."""
     model = _model()
     flat = model.tex_type == mujoco.mjtTexture.mjTEXTURE_2D
     assert model.tex_width[flat].tolist() == [100]

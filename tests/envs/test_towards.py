@@ -1,4 +1,4 @@
-"""`towards`: each reset draws a body on the way to another one."""
+"""`towards`: each reset draws a body between two bodies."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _heights(env: gym.Env[object, object], seeds: list[int | None]) -> list[floa
 
 
 def test_each_reset_draws_a_body_between_the_two() -> None:
-    """The seed decides which; without one the draws go on."""
+    """The seed determines the body; without a seed the generator continues."""
     small, big = (
         _heights(gym.make("shapechanger/Ant-v1", body=body), [0])[0] for body in ("Ant", "BigAnt")
     )
@@ -36,8 +36,8 @@ def test_each_reset_draws_a_body_between_the_two() -> None:
     assert _heights(again, seeds) == drawn
 
 
-def test_a_reset_may_still_name_the_body() -> None:
-    """For once."""
+def test_a_given_body_overrides_towards() -> None:
+    """A body in the options applies to one reset."""
     env = gym.make("shapechanger/Ant-v1", towards="BigAnt", fast_model=False)
     env.reset(seed=0, options={"body": "BigAnt"})
     (big,) = _heights(gym.make("shapechanger/BigAnt-v1"), [0])
@@ -45,8 +45,8 @@ def test_a_reset_may_still_name_the_body() -> None:
     assert _heights(env, [0])[0] < big
 
 
-def test_copies_draw_the_same() -> None:
-    """Pickles and specs hold both ends, not the body of the moment."""
+def test_copies_draw_the_same_bodies() -> None:
+    """Pickles and specs have both ends instead of the present body."""
     env = gym.make("shapechanger/Ant-v1", towards="BigAnt", fast_model=False)
     drawn = _heights(env, [3, 4])
     assert env.spec is not None
@@ -54,8 +54,8 @@ def test_copies_draw_the_same() -> None:
         assert _heights(other, [3, 4]) == drawn
 
 
-def test_the_envs_of_a_vector_draw_each_their_own() -> None:
-    """As single envs with their seeds do."""
+def test_vector_envs_draw_one_body_per_env() -> None:
+    """Bodies equal those of single envs with the same seeds."""
     envs = shapechanger.make_vec("shapechanger/Ant-v1", 3, towards="BigAnt", fast_model=False)
     envs.reset(seed=5)
     drawn = [env.unwrapped.standing_height for env in envs.envs]
@@ -64,8 +64,8 @@ def test_the_envs_of_a_vector_draw_each_their_own() -> None:
     envs.close()
 
 
-def test_a_pole_has_a_way_too() -> None:
-    """Every family has one."""
+def test_towards_works_for_pendulums() -> None:
+    """Families without a trunk support `towards`."""
     env = gym.make("shapechanger/InvertedPendulum-v1", towards="BigInvertedPendulum")
     lengths = set[float]()
     for seed in range(3):
@@ -75,8 +75,8 @@ def test_a_pole_has_a_way_too() -> None:
     assert all(0.3 <= length <= 0.6 for length in lengths)
 
 
-def test_what_cannot_be_a_way_is_refused() -> None:
-    """A body that does not exist, and one of other spaces."""
+def test_an_invalid_towards_is_refused() -> None:
+    """Unknown bodies, and bodies of other spaces, are refused."""
     with pytest.raises(UnknownName, match="BigAnt"):
         gym.make("shapechanger/Ant-v1", towards="BigAntt")
     with pytest.raises(UnknownName, match="towards"):
@@ -86,8 +86,8 @@ def test_what_cannot_be_a_way_is_refused() -> None:
         env.reset(seed=0)
 
 
-def test_two_bodies_without_another_id_have_the_same_layouts() -> None:
-    """So that methods for equal spaces take them."""
+def test_ant_and_big_ant_have_equal_layouts() -> None:
+    """Methods for equal spaces accept the pair."""
     traits = [env_traits(gym.make(f"shapechanger/{name}-v1")) for name in ("Ant", "BigAnt")]
     assert traits[0].observation_layout == traits[1].observation_layout
     assert np.array_equal(traits[0].action_layout.low, traits[1].action_layout.low)

@@ -1,4 +1,4 @@
-"""What holds for every body map."""
+"""Laws of body maps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from shapechanger.transfer.body_map import (
     mirror,
 )
 
-# The same examples every time, so that a failure can be looked at twice.
+# A fixed number of examples.
 law = settings(max_examples=60)
 
 NAMES = ("hip/angle", "ankle/angle", "foot/angle", "Größe", 'odd "name"', "x[0]", "eye")
@@ -32,13 +32,13 @@ SCALES = st.sampled_from([1.0, -1.0, 2.0, -0.5, 0.25, 8.0])
 
 
 def feature(name: str) -> Feature:
-    """The feature of this name, the same in every body; the eye is a block."""
+    """Return the feature of this name, the same in every body; the eye is a block."""
     return Feature(name, "1", shape=(2, 2) if name == "eye" else (), gain_unit="N·m")
 
 
 @st.composite
 def layouts(draw: st.DrawFn) -> Layout:
-    """Some of the features in some order."""
+    """Draw some of the features in any order."""
     names = draw(st.lists(st.sampled_from(NAMES), unique=True, min_size=1))
     return Layout(tuple(feature(name) for name in names))
 
@@ -46,14 +46,14 @@ def layouts(draw: st.DrawFn) -> Layout:
 def rules(
     over: Layout, shape: tuple[int, ...], scales: st.SearchStrategy[float]
 ) -> st.SearchStrategy[Rule]:
-    """Any rule for a feature of this shape."""
+    """Return a strategy of rules for a feature of this shape."""
     constant = st.one_of(
         st.just(Zero()), st.just(Learn()), st.builds(Hold, st.sampled_from([-1.0, 0.1, 2.0]))
     )
     fitting = [taken.name for taken in over if taken.shape == shape]
     if not fitting:
         return constant
-    # Twice, so that most rules take something.
+    # Listed twice, so that most rules copy.
     take = st.builds(Copy, st.sampled_from(fitting), scales)
     return st.one_of(take, take, constant)
 
@@ -64,7 +64,7 @@ def maps(
     source: tuple[Layout, Layout] | None = None,
     scales: st.SearchStrategy[float] = SCALES,
 ) -> BodyMap:
-    """Any map, from a body given or from any body."""
+    """Draw a map, from a given body or any body."""
     source_observation, source_action = source or (draw(layouts()), draw(layouts()))
     target_observation, target_action = draw(layouts()), draw(layouts())
 
@@ -83,7 +83,7 @@ def maps(
 
 @st.composite
 def chains(draw: st.DrawFn, length: int) -> list[BodyMap]:
-    """Maps that meet."""
+    """Draw maps whose layouts connect."""
     links = [draw(maps())]
     while len(links) < length:
         last = links[-1]
@@ -93,7 +93,7 @@ def chains(draw: st.DrawFn, length: int) -> list[BodyMap]:
 
 @st.composite
 def one_to_one(draw: st.DrawFn) -> BodyMap:
-    """A map in which nothing is taken twice."""
+    """Draw a map that copies no feature twice."""
     built = draw(maps())
 
     def thinned(entries: tuple[MapEntry, ...]) -> tuple[MapEntry, ...]:
@@ -118,7 +118,7 @@ def one_to_one(draw: st.DrawFn) -> BodyMap:
 
 @st.composite
 def symmetries(draw: st.DrawFn) -> Symmetry:
-    """Any signed permutation of features that are alike."""
+    """Draw a signed permutation of similar features."""
 
     def turned(layout: Layout) -> tuple[Copy, ...]:
         names = [f.name for f in layout if not f.shape]
@@ -132,7 +132,7 @@ def symmetries(draw: st.DrawFn) -> Symmetry:
 
 
 def layouts_of(built: BodyMap) -> tuple[Layout, Layout, Layout, Layout]:
-    """The four layouts, as `between` and `from_toml` want them."""
+    """Return the four layouts in the order of `between` and `from_toml`."""
     return (
         built.source_observation,
         built.target_observation,
@@ -144,7 +144,7 @@ def layouts_of(built: BodyMap) -> tuple[Layout, Layout, Layout, Layout]:
 @law
 @given(links=chains(3))
 def test_composition_is_associative(links: list[BodyMap]) -> None:
-    """Three maps in a row are one map, however they are joined."""
+    """The grouping of three maps does not matter."""
     a, b, c = links
     left, right = a.then(b).then(c), a.then(b.then(c))
     assert left == right
@@ -154,7 +154,7 @@ def test_composition_is_associative(links: list[BodyMap]) -> None:
 @law
 @given(built=maps())
 def test_the_identity_is_neutral(built: BodyMap) -> None:
-    """To stay in a body before or after changing it changes nothing."""
+    """Composing with the identity on either side changes nothing."""
     before = BodyMap.identity(built.source_observation, built.source_action)
     after = BodyMap.identity(built.target_observation, built.target_action)
     assert before.then(built) == built == built.then(after)
@@ -164,7 +164,7 @@ def test_the_identity_is_neutral(built: BodyMap) -> None:
 @law
 @given(links=chains(2), seed=st.integers(0, 2**32 - 1))
 def test_a_composed_map_adapts_as_its_links_do(links: list[BodyMap], seed: int) -> None:
-    """The matrices of a chain are the products of the matrices of its links."""
+    """Matrices of a chain are products of those of its links."""
     a, b = links
     both = a.then(b)
     rng = np.random.default_rng(seed)
@@ -181,7 +181,7 @@ def test_a_composed_map_adapts_as_its_links_do(links: list[BodyMap], seed: int) 
 @law
 @given(built=one_to_one())
 def test_there_and_back_is_the_identity_where_it_matched(built: BodyMap) -> None:
-    """What was taken comes back; what was not stays as its rule says."""
+    """Copied features return to themselves; others keep their rule."""
     there_and_back = built.then(built.inverse("learn"))
     for before, after in zip(built.observation, there_and_back.observation, strict=True):
         expected = Copy(before.feature) if isinstance(before.rule, Copy) else before.rule
@@ -194,8 +194,8 @@ def test_there_and_back_is_the_identity_where_it_matched(built: BodyMap) -> None
 
 @law
 @given(built=one_to_one())
-def test_the_inverse_of_the_inverse_takes_the_same(built: BodyMap) -> None:
-    """Inverting twice leaves every taken entry as it was."""
+def test_inverting_twice_restores_copies(built: BodyMap) -> None:
+    """Every copy rule is restored."""
     again = built.inverse().inverse()
     for before, after in zip(
         (*built.observation, *built.action), (*again.observation, *again.action), strict=True
@@ -207,7 +207,7 @@ def test_the_inverse_of_the_inverse_takes_the_same(built: BodyMap) -> None:
 @law
 @given(built=maps())
 def test_an_inverse_takes_each_feature_at_most_once(built: BodyMap) -> None:
-    """Where a feature went to several places, one of them gives it back or nobody does."""
+    """If a feature has several copies, the inverse is ambiguous and raises."""
     back = None
     with contextlib.suppress(MapError):
         back = built.inverse()
@@ -222,7 +222,7 @@ def test_an_inverse_takes_each_feature_at_most_once(built: BodyMap) -> None:
 @law
 @given(built=maps(scales=st.floats(1e-3, 1e3)))
 def test_json_round_trip(built: BodyMap) -> None:
-    """A map that is written down is the same map, remarks included."""
+    """Maps are equal after JSON, including remarks."""
     again = BodyMap.from_json(built.to_json())
     assert again == built
     assert again.table() == built.table()
@@ -231,7 +231,7 @@ def test_json_round_trip(built: BodyMap) -> None:
 @law
 @given(built=maps(scales=st.floats(1e-3, 1e3)))
 def test_toml_round_trip(built: BodyMap) -> None:
-    """The text of a map gives the map again, to the last bit."""
+    """Maps are equal after TOML, to the last bit."""
     text = built.to_toml()
     assert BodyMap.from_toml(text, *layouts_of(built)) == built
     assert BodyMap.from_toml(text, *layouts_of(built)).to_toml() == text
@@ -240,7 +240,7 @@ def test_toml_round_trip(built: BodyMap) -> None:
 @law
 @given(symmetry=symmetries())
 def test_a_symmetry_and_its_inverse_are_the_identity(symmetry: Symmetry) -> None:
-    """Turned and turned back, nothing has moved."""
+    """Applying both gives the identity."""
     still = BodyMap.identity(symmetry.observation_layout, symmetry.action_layout)
     once = still.with_symmetry(symmetry)
     assert once.with_symmetry(symmetry.inverse()) == still
@@ -254,8 +254,8 @@ def test_a_symmetry_and_its_inverse_are_the_identity(symmetry: Symmetry) -> None
     flip=st.booleans(),
     order=st.randoms(use_true_random=False),
 )
-def test_a_mirror_undoes_itself(legs: int, flip: bool, order: object) -> None:
-    """Left and right exchanged twice is the body as it was, whatever the order of its features."""
+def test_a_mirror_is_its_own_inverse(legs: int, flip: bool, order: object) -> None:
+    """Holds for any order of features."""
     names = [f"torso/{q}" for q in ("y", "qw", "qx", "qy", "qz", "vx", "vy", "wx", "wy", "wz")]
     names += [
         f"{joint}_{side}{leg}/{quantity}"
@@ -280,7 +280,7 @@ def test_a_mirror_undoes_itself(legs: int, flip: bool, order: object) -> None:
     seed=st.integers(0, 2**32 - 1),
 )
 def test_units_of_torque_keep_the_torque(gains: list[tuple[float, float]], seed: int) -> None:
-    """Gain times action is the same in both bodies, to rounding."""
+    """Gain times action is equal in both bodies."""
 
     def motors(which: int) -> Layout:
         return Layout(
@@ -305,7 +305,7 @@ def test_units_of_torque_keep_the_torque(gains: list[tuple[float, float]], seed:
 def test_matched_entries_are_bit_exact(
     dtype: type, layout: Layout, more: Layout, seed: int
 ) -> None:
-    """A number that has a namesake is copied and never computed."""
+    """Matching features are copied, not computed."""
     target = Layout((*more.features, *(f for f in layout if f.name not in more)))
     built = BodyMap.between(layout, target, layout, target)
     values = np.random.default_rng(seed).normal(size=target.size).astype(dtype)

@@ -1,4 +1,4 @@
-"""Laws of the measures, for curves of any height, size and source."""
+"""Laws of the transfer metrics, for any curves."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ DIFFERENCES: dict[str, Difference] = {
 }
 differences = pytest.mark.parametrize("difference", DIFFERENCES.values(), ids=DIFFERENCES.keys())
 
-# Returns down to rounding noise and up to a few thousand, as simulated robots have them.
+# Returns from rounding noise to a few thousand, as for simulated robots.
 heights = st.floats(-5.0, 5.0) | st.floats(-1e4, 1e4)
 source_steps = st.just(0) | st.integers(0, 2000)
 
 
 @st.composite
 def pairs(draw: st.DrawFn, low: float | None = None, high: float | None = None) -> Pair:
-    """An arm and scratch on one grid of evaluations, with any number of seeds each."""
+    """Draw an arm and scratch on one grid of evaluations, with any number of seeds each."""
     gaps = draw(st.lists(st.integers(1, 300), min_size=1, max_size=5))
     steps = np.cumsum([0.0, *gaps])
     heights_here = heights if low is None else st.floats(low, high)
@@ -58,13 +58,13 @@ def pairs(draw: st.DrawFn, low: float | None = None, high: float | None = None) 
 
 
 def value(estimate: Estimate) -> float:
-    """The point of an estimate that must exist."""
+    """Return the point estimate, which must exist."""
     assert estimate.value is not None
     return estimate.value
 
 
 def points(summary: Summary) -> list[float | None]:
-    """Every point estimate of a summary, in one order."""
+    """Return all point estimates of a summary in a fixed order."""
 
     def of(measures: Measures) -> list[float | None]:
         found = [
@@ -87,7 +87,7 @@ def points(summary: Summary) -> list[float | None]:
 def summary_of(
     arm: LearningCurves, scratch: LearningCurves, reference: Reference, source: float
 ) -> Summary:
-    """A summary with few resamples, always from the same seed."""
+    """Summarise with few resamples and a fixed seed."""
     return summarise(
         scratch,
         arm,
@@ -100,7 +100,7 @@ def summary_of(
 
 
 def same(left: list[float | None], right: list[float | None], tolerance: float) -> None:
-    """Both lists hold the same numbers and the same gaps, up to rounding."""
+    """Assert that both lists have equal numbers and gaps, up to rounding."""
     assert [v is None for v in left] == [v is None for v in right]
     np.testing.assert_allclose(
         [v for v in left if v is not None],
@@ -112,10 +112,8 @@ def same(left: list[float | None], right: list[float | None], tolerance: float) 
 
 @differences
 @given(pair=pairs())
-def test_differences_change_sign_when_arms_change_places(
-    difference: Difference, pair: Pair
-) -> None:
-    """What one arm gains the other loses, intervals included."""
+def test_differences_are_antisymmetric(difference: Difference, pair: Pair) -> None:
+    """Swapping the arms negates estimates and intervals."""
     arm, scratch = pair
     there, back = difference(arm, scratch), difference(scratch, arm)
     assert value(there) == -value(back)
@@ -128,13 +126,13 @@ def test_differences_change_sign_when_arms_change_places(
 @differences
 @given(pair=pairs())
 def test_no_arm_gains_on_itself(difference: Difference, pair: Pair) -> None:
-    """The identity: every gain of an arm over itself is zero."""
+    """Identity: every gain of an arm over itself is zero."""
     assert value(difference(pair[0], pair[0])) == 0.0
 
 
 @given(pair=pairs(0.0, 1.0))
 def test_ratios_of_an_arm_with_itself(pair: Pair) -> None:
-    """The identity: a ratio of 1 and a forward transfer of 0, where they are defined."""
+    """Identity: a ratio of 1 and a forward transfer of 0, where defined."""
     arm, _ = pair
     ratio = auc_ratio(arm, arm, rng=np.random.default_rng(0), n_resamples=50)
     transfer = forward_transfer(arm, arm, rng=np.random.default_rng(0), n_resamples=50)
@@ -149,14 +147,14 @@ def test_ratios_of_an_arm_with_itself(pair: Pair) -> None:
     span=st.floats(1.0, 1e3),
     clip=st.booleans(),
 )
-def test_scores_do_not_know_units_of_reward(
+def test_scores_are_invariant_to_reward_units(
     pair: Pair,
     scale: float,
     offset: float,
     span: float,
     clip: bool,
 ) -> None:
-    """Affine invariance: a reward times a > 0 plus b is the same task, and the same score."""
+    """Affine invariance: scaling and shifting the reward does not change scores."""
     curves, _ = pair
     plain = Reference(0.0, span)
     moved = Reference(offset, scale * span + offset)
@@ -174,7 +172,7 @@ def test_scores_do_not_know_units_of_reward(
 def test_a_better_arm_never_gains_less(
     difference: Difference, pair: Pair, bonus: float, source: int
 ) -> None:
-    """Monotonicity: a bonus at every evaluation lowers no gain, in either way of counting."""
+    """Monotonicity: a bonus at every evaluation lowers no gain, for both step counts."""
     arm, scratch = pair
     better = LearningCurves(arm.steps, arm.returns + bonus)
     before = value(difference(in_total_steps(arm, source, 0.0), scratch))
@@ -204,7 +202,7 @@ def test_a_better_arm_never_has_a_lower_ratio(pair: Pair, bonus: float, source: 
 
 @given(pair=pairs(), source=source_steps, data=st.data())
 def test_seeds_have_no_order(pair: Pair, source: int, data: st.DataObject) -> None:
-    """Permutation: which run is called seed 0 changes no point estimate."""
+    """Permutation: the order of seeds changes no point estimate."""
     arm, scratch = pair
     rows = data.draw(st.permutations(range(arm.n_seeds)))
     shuffled = LearningCurves(arm.steps, arm.returns[np.array(rows)])
@@ -218,7 +216,7 @@ def test_seeds_have_no_order(pair: Pair, source: int, data: st.DataObject) -> No
 
 @given(pair=pairs(), threshold=heights, source=source_steps)
 def test_restricted_times_stay_within_the_budget(pair: Pair, threshold: float, source: int) -> None:
-    """Restricted means and medians lie in [0, H], and censored seeds are exactly the rest."""
+    """Restricted means and medians lie in [0, H], and other seeds are censored."""
     arm, scratch = pair
     counted = in_total_steps(arm, source, -1e4)
     times = time_to_threshold(counted, scratch, threshold)
@@ -233,14 +231,14 @@ def test_restricted_times_stay_within_the_budget(pair: Pair, threshold: float, s
 
 @given(pair=pairs())
 def test_a_higher_threshold_is_never_sooner(pair: Pair) -> None:
-    """What is at 0.75 has been at 0.25 before."""
+    """A curve reaches 0.25 no later than 0.75."""
     curves, _ = pair
     assert np.all(steps_to_reach(curves, 0.25) <= steps_to_reach(curves, 0.75))
 
 
 @given(pair=pairs(), source=st.integers(0, 2000))
-def test_steps_on_the_source_never_pay_in_total_steps(pair: Pair, source: int) -> None:
-    """Each crossing comes later by the source steps, or not within the budget."""
+def test_source_steps_delay_crossings_in_total_steps(pair: Pair, source: int) -> None:
+    """Each crossing is later by the source steps, or beyond the budget."""
     curves, _ = pair
     floor = float(curves.returns.min()) - 1.0
     height = float(curves.returns.mean())
@@ -252,15 +250,15 @@ def test_steps_on_the_source_never_pay_in_total_steps(pair: Pair, source: int) -
 
 
 @given(pair=pairs())
-def test_no_source_no_difference(pair: Pair) -> None:
-    """With source_steps = 0 total steps are target steps, to the last digit and with intervals."""
+def test_without_source_steps_both_counts_agree(pair: Pair) -> None:
+    """Estimates and intervals are exactly equal."""
     summary = summary_of(*pair, Reference(0.0, 1.0), 0)
     assert summary.in_total_steps == summary.in_target_steps
 
 
 @given(pair=pairs(), source=source_steps, floor=st.floats(-1e4, 1e4))
-def test_area_in_total_steps_is_floor_and_rest(pair: Pair, source: int, floor: float) -> None:
-    """The area is linear: a floor of f adds f times the share of the budget spent on the source."""
+def test_area_in_total_steps_is_linear_in_the_floor(pair: Pair, source: int, floor: float) -> None:
+    """A floor of f adds f times the share of the budget spent on the source."""
     curves, _ = pair
     share = min(source / curves.horizon, 1.0)
     difference = (

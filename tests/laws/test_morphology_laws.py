@@ -1,4 +1,4 @@
-"""What holds for every change of body."""
+"""Laws of morphology edits."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ from tests.morphology.models import (
     tip,
 )
 
-# The same examples every time, so that a failure can be looked at twice.
+# A fixed number of examples.
 law = settings(max_examples=30)
 
 FACTORS = st.floats(0.1, 10.0)
@@ -72,10 +72,10 @@ MODELS: list[Callable[[], mujoco.MjSpec]] = [leg, gantry, ant, pendulum]
 @law
 @given(body=LIMBS, a=FACTORS, b=FACTORS)
 @pytest.mark.parametrize("kind", [Stretch, Radius])
-def test_twice_is_once_by_the_product(
+def test_edits_of_size_compose_by_multiplication(
     kind: type[Stretch | Radius], body: str, a: float, b: float
 ) -> None:
-    """Edits of size compose as their factors do."""
+    """Two edits equal one by the product of their factors."""
     once, twice = built(leg(), kind(body, a * b)), built(leg(), kind(body, a), kind(body, b))
     for field in ("body_pos", "geom_pos", "geom_size", "site_pos", "jnt_pos"):
         np.testing.assert_allclose(
@@ -94,8 +94,8 @@ def test_twice_is_once_by_the_product(
         *(Gear("*", scale=1.0), Stretch("*", 7.0, amount=0.0), Stretch("*", 1.0, "z")),
     ],
 )
-def test_by_one_is_the_identity(load: Callable[[], mujoco.MjSpec], edit: Edit) -> None:
-    """Bit for bit, whatever the model."""
+def test_a_factor_of_one_is_the_identity(load: Callable[[], mujoco.MjSpec], edit: Edit) -> None:
+    """The models are equal bit for bit."""
     assert differing(built(load()), built(load(), edit)) == []
 
 
@@ -104,7 +104,7 @@ def test_by_one_is_the_identity(load: Callable[[], mujoco.MjSpec], edit: Edit) -
 def test_masses_and_inertias_follow_from_geometry(
     factor: float, thickness: float, density: float
 ) -> None:
-    """A capsule's mass and moments are those of the formulas, after any edit of its size."""
+    """A capsule's mass and moments match the formulas after any edit of its size."""
     content = f'<geom type="capsule" size=".1" fromto="0 0 0 .3 0 .4" density="{density!r}"/>'
     model = built(limb(content), Stretch("link", factor), Radius("link", thickness))
     radius, length = 0.1 * thickness, 0.5 * factor
@@ -119,7 +119,7 @@ def test_masses_and_inertias_follow_from_geometry(
 @law
 @given(body=BODIES, factor=RATIOS)
 def test_mass_scales_as_density(body: str, factor: float) -> None:
-    """A denser material is a heavier body of the same shape, with the same axes of inertia."""
+    """Scaling mass equals scaling density, and keeps the principal axes."""
     before = built(leg())
     by_mass, by_density = (built(leg(), kind(body, scale=factor)) for kind in (Mass, Density))
     assert differing(by_mass, by_density) == []
@@ -134,7 +134,7 @@ def test_mass_scales_as_density(body: str, factor: float) -> None:
 @law
 @given(factor=st.floats(0.1, 10.0))
 def test_a_uniform_body_scales_as_a_whole(factor: float) -> None:
-    """Longer and thicker by the same factor: mass by its cube, inertia by its fifth power."""
+    """Scaling all sizes by f scales mass by f^3 and inertia by f^5."""
     geom = '<geom type="capsule" size=".1" fromto="0 0 0 0 0 .4"/>'
     before = built(limb(geom))
     after = built(limb(geom), Stretch("link", factor), Radius("link", factor))
@@ -172,7 +172,7 @@ def test_a_uniform_body_scales_as_a_whole(factor: float) -> None:
     )
 )
 def test_edits_of_different_bodies_commute(edits: tuple[Edit, Edit]) -> None:
-    """Who comes first does not matter where one does not touch what the other does."""
+    """The order of independent edits does not matter."""
     a, b = built(leg(), *edits), built(leg(), *reversed(edits))
     for field in differing(a, b):
         np.testing.assert_allclose(
@@ -184,8 +184,8 @@ def test_edits_of_different_bodies_commute(edits: tuple[Edit, Edit]) -> None:
 
 
 @pytest.mark.parametrize(("load", "joint"), [(leg, "hip"), (leg, "knee"), (ant, "hip_1")])
-def test_locked_at_rest_nothing_moves(load: Callable[[], mujoco.MjSpec], joint: str) -> None:
-    """The bodies are where they are in the model's own pose."""
+def test_locking_at_rest_moves_nothing(load: Callable[[], mujoco.MjSpec], joint: str) -> None:
+    """Bodies keep the model's initial pose."""
     free = built(load())
     rest = float(free.qpos0[free.joint(joint).qposadr[0]])
     locked = built(load(), Lock(joint, rest))
@@ -198,8 +198,8 @@ def test_locked_at_rest_nothing_moves(load: Callable[[], mujoco.MjSpec], joint: 
     lock=st.sampled_from(["x", "yaw", "y", "pitch", "swing"]),
     positions=st.fixed_dictionaries({j: SMALL for j in ("x", "yaw", "y", "pitch", "swing")}),
 )
-def test_locked_is_where_the_joint_would_be(lock: str, positions: dict[str, float]) -> None:
-    """Hinges and slides, alone or with others on one body, wherever those are."""
+def test_a_locked_joint_keeps_its_position(lock: str, positions: dict[str, float]) -> None:
+    """Hinges and slides, alone or with other joints of the body."""
     free = built(gantry())
     locked = built(gantry(), Lock(lock, positions[lock]))
     others = {joint: at for joint, at in positions.items() if joint != lock}
@@ -212,7 +212,7 @@ def test_locked_is_where_the_joint_would_be(lock: str, positions: dict[str, floa
 @law
 @given(hip=st.floats(-1.0, 0.5), knee=st.floats(-1.5, 0.0))
 def test_locked_legs_reach_where_free_ones_do(hip: float, knee: float) -> None:
-    """In a model that is written in degrees, all joints at once."""
+    """All joints locked at once, in a model written in degrees."""
     locked = built(leg(), Lock("knee", knee), Lock("hip", hip))
     np.testing.assert_allclose(
         tip(locked, "toe"), tip(built(leg()), "toe", {"hip": hip, "knee": knee}), atol=1e-12
@@ -225,7 +225,7 @@ def test_locked_legs_reach_where_free_ones_do(hip: float, knee: float) -> None:
 @law
 @given(at=PARTS, body=st.sampled_from(["thigh", "shin"]))
 def test_a_split_keeps_length_and_ends(at: float, body: str) -> None:
-    """The parts are as long as the whole, and everything is where it was."""
+    """The lengths of the parts add up, and sites keep their places."""
     before, after = built(leg()), built(leg(), Split(body, "half", at))
     lengths = [after.geom(name).size[1] for name in (body, f"{body}_of_half")]
     assert sum(lengths) == pytest.approx(before.geom(body).size[1])
@@ -236,8 +236,8 @@ def test_a_split_keeps_length_and_ends(at: float, body: str) -> None:
 
 @law
 @given(angle=ANGLES, hip=st.floats(-1.0, 0.5), knee=st.floats(-1.5, 0.0))
-def test_a_copied_limb_is_the_limb_turned(angle: float, hip: float, knee: float) -> None:
-    """About the trunk's vertical axis, in every pose of its joints."""
+def test_a_copied_limb_is_rotated(angle: float, hip: float, knee: float) -> None:
+    """It is rotated about the trunk's vertical axis, in every pose of its joints."""
     model = built(leg(), AddLimb("thigh", "_2", angle))
     data = posed(model, {"hip": hip, "hip_2": hip, "knee": knee, "knee_2": knee})
     cos, sin = math.cos(angle), math.sin(angle)
@@ -263,10 +263,10 @@ def test_a_copied_limb_is_the_limb_turned(angle: float, hip: float, knee: float)
         (gantry, AddLimb("boom", "_2", 0.7), "boom_2"),
     ],
 )
-def test_what_was_added_can_be_removed(
+def test_adding_and_removing_restores_the_model(
     load: Callable[[], mujoco.MjSpec], add: Edit, name: str
 ) -> None:
-    """And the model is what it was, bit for bit."""
+    """The models are equal bit for bit."""
     assert differing(built(load()), built(load(), add)) != []
     assert differing(built(load()), built(load(), add, Remove(name))) == []
 
@@ -282,7 +282,7 @@ _LIMITS = st.tuples(NUMBERS, NUMBERS).filter(lambda x: x[0] < x[1])
 
 
 def _values(kind: Any, to: st.SearchStrategy[float], **more: Any) -> st.SearchStrategy[Edit]:
-    """Any edit of one number, as a ratio or as a value."""
+    """Return a strategy of edits of one value, by scale or target."""
     fields: dict[str, Any] = {"element": _NAMES, "amount": _AMOUNTS, **more}
     return st.builds(kind, scale=RATIOS, **fields) | st.builds(kind, to=to, **fields)
 
@@ -340,16 +340,16 @@ _ANY_EDIT: dict[type[Edit], st.SearchStrategy[Any]] = {
 }
 
 
-def test_there_is_a_strategy_for_every_kind() -> None:
-    """A new kind of edit is to be tried here."""
+def test_every_edit_has_a_strategy() -> None:
+    """A new kind of edit must be added here."""
     assert tuple(_ANY_EDIT) == EDITS
 
 
 @law
 @given(data=st.data())
 @pytest.mark.parametrize("kind", EDITS)
-def test_json_gives_back_every_edit(kind: type[Edit], data: st.DataObject) -> None:
-    """Every kind, with any numbers and names, whole or in part."""
+def test_edits_round_trip_through_json(kind: type[Edit], data: st.DataObject) -> None:
+    """For each kind of edit, with any values and amounts."""
     edit = data.draw(_ANY_EDIT[kind])
     text = to_json([edit])
     assert from_json(text) == (edit,) == as_body(text)
@@ -359,8 +359,8 @@ def test_json_gives_back_every_edit(kind: type[Edit], data: st.DataObject) -> No
 
 @law
 @given(body=st.lists(st.one_of(*_ANY_EDIT.values()), max_size=6), alpha=_AMOUNTS)
-def test_json_gives_back_every_body(body: list[Edit], alpha: float) -> None:
-    """In order, and from a body to itself nothing changes."""
+def test_bodies_round_trip_through_json(body: list[Edit], alpha: float) -> None:
+    """The order is kept, and interpolating a body with itself changes nothing."""
     edits = tuple(body)
     assert from_json(to_json(edits)) == edits
     assert interpolate(edits, edits, alpha) == edits
@@ -371,8 +371,8 @@ def test_json_gives_back_every_body(body: list[Edit], alpha: float) -> None:
     pair=st.tuples(*[st.lists(st.one_of(*_ANY_EDIT.values()), max_size=3)] * 2),
     alpha=st.floats(0.0, 1.0),
 )
-def test_every_path_is_made_of_bodies(pair: tuple[list[Edit], list[Edit]], alpha: float) -> None:
-    """Whatever the ends, what lies between can be written as JSON and read again."""
+def test_interpolated_bodies_are_valid(pair: tuple[list[Edit], list[Edit]], alpha: float) -> None:
+    """Bodies between any two round-trip through JSON."""
     a, b = (tuple(body) for body in pair)
     assert interpolate(a, b, 0.0) == a
     assert interpolate(a, b, 1.0) == b

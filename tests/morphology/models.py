@@ -1,4 +1,4 @@
-"""Small models, and ways to look at them, that the tests of edits share."""
+"""Small models and helpers shared by tests of edits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.morphology.scenes import ASSETS
 
 Array = NDArray[np.float64]
 
-# A leg of two segments on a trunk that floats above a floor, written in degrees as most models are.
+# A leg of two segments on a free trunk above a floor, in degrees like most models.
 LEG = """
 <mujoco model="leg">
   <default><geom density="500"/><joint armature=".1"/></default>
@@ -46,7 +46,7 @@ LEG = """
 </mujoco>
 """
 
-# A body that moves by several joints at once, in radians, none of them where the body's origin is.
+# A body with several joints away from its origin, in radians.
 GANTRY = """
 <mujoco model="gantry">
   <compiler angle="radian"/>
@@ -78,32 +78,32 @@ GANTRY = """
 
 
 def spec_of(text: str) -> mujoco.MjSpec:
-    """A model from its MJCF."""
+    """Return the spec of an MJCF text."""
     return mujoco.MjSpec.from_string(text)
 
 
 def leg() -> mujoco.MjSpec:
-    """A fresh leg on a trunk."""
+    """Return a new leg on a trunk."""
     return spec_of(LEG)
 
 
 def gantry() -> mujoco.MjSpec:
-    """A fresh body of several joints."""
+    """Return a new body with several joints."""
     return spec_of(GANTRY)
 
 
 def ant() -> mujoco.MjSpec:
-    """Gymnasium's ant, with a name for everything."""
+    """Return Gymnasium's ant, with all elements named."""
     return ANT.load(os.path.join(ASSETS, "ant.xml"))
 
 
 def pendulum() -> mujoco.MjSpec:
-    """Gymnasium's inverted pendulum, with a name for everything."""
+    """Return Gymnasium's inverted pendulum, with all elements named."""
     return PENDULUM.load(os.path.join(ASSETS, "inverted_pendulum.xml"))
 
 
 def limb(content: str, compiler: str = "") -> mujoco.MjSpec:
-    """A trunk with one limb, `link`, on a hinge, made of `content`."""
+    """Return a trunk with one limb, `link`, on a hinge, made of `content`."""
     return spec_of(
         f"""<mujoco><compiler {compiler}/><worldbody><body name="trunk"><geom name="trunk"
         type="box" size=".1 .1 .1"/><body name="link" pos="0 0 1"><joint name="link" axis="0 1 0"/>
@@ -112,12 +112,12 @@ def limb(content: str, compiler: str = "") -> mujoco.MjSpec:
 
 
 def built(spec: mujoco.MjSpec, *edits: Edit) -> mujoco.MjModel:
-    """The compiled model with some edits."""
+    """Return the compiled model with some edits."""
     return compile_body(spec, edits)
 
 
 def differing(a: mujoco.MjModel, b: mujoco.MjModel, ignoring: Iterable[str] = ()) -> list[str]:
-    """The arrays of two models that differ in shape or in any bit, but for names and paths."""
+    """Return the arrays in which two models differ bitwise, except for names and paths."""
     fields = [name for name in dir(a) if isinstance(getattr(a, name), np.ndarray)]
     skipped = ("_", "name_", "names_", "paths")
     unlike = [
@@ -130,14 +130,14 @@ def differing(a: mujoco.MjModel, b: mujoco.MjModel, ignoring: Iterable[str] = ()
 
 
 def mass(model: mujoco.MjModel, *bodies: str) -> float:
-    """The mass of some bodies, or of all, kg."""
+    """Return the mass of some bodies, or of all, kg."""
     if not bodies:
         return float(model.body_mass.sum())
     return float(sum(model.body(name).mass[0] for name in bodies))
 
 
 def posed(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> mujoco.MjData:
-    """Where everything is with some hinges and slides at given positions, rad or m."""
+    """Return the kinematics with some hinges and slides at given positions, rad or m."""
     data = mujoco.MjData(model)
     for joint, position in (angles or {}).items():
         data.joint(joint).qpos[:] = position
@@ -146,21 +146,21 @@ def posed(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> mujo
 
 
 def tip(model: mujoco.MjModel, site: str, angles: dict[str, float] | None = None) -> Array:
-    """Where a site is in the world, m."""
+    """Return the position of a site in the world, m."""
     return np.array(posed(model, angles).site(site).xpos)
 
 
 def capsule_mass(radius: float, length: float, density: float) -> float:
-    """Mass of a capsule whose axis is `length` long, kg."""
+    """Return the mass of a capsule with an axis of this length, kg."""
     return density * np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
 
 
 def capsule_inertia(radius: float, length: float, density: float) -> tuple[float, float]:
-    """Moments of inertia of a capsule about its centre: across its axis and along it, kg·m²."""
+    """Return the moments of inertia of a capsule, across its axis and along it, kg·m²."""
     cylinder = density * np.pi * radius**2 * length
     caps = density * np.pi * radius**3 * 4.0 / 3.0
     along = 0.5 * cylinder * radius**2 + 0.4 * caps * radius**2
-    # A half ball's centre of mass is 3/8 of its radius from its flat side.
+    # The centre of mass of a half ball is 3/8 of its radius from the flat side.
     across = cylinder * (radius**2 / 4.0 + length**2 / 12.0) + caps * (
         0.4 * radius**2 + length**2 / 4.0 + 3.0 / 8.0 * length * radius
     )
@@ -168,10 +168,10 @@ def capsule_inertia(radius: float, length: float, density: float) -> tuple[float
 
 
 def physics(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> dict[str, Array]:
-    """What a body is made of and how it is driven, by name, with some joints at given positions.
+    """Return the physical properties of a model by name, with joints at given positions.
 
-    The mass, its centre and its inertia are those of all bodies together, so that they can be
-    compared between bodies that have different parts.
+    Mass, centre of mass and inertia are those of all bodies together, so that models with
+    different bodies can be compared.
     """
     data = posed(model, {j: p for j, p in (angles or {}).items() if _has_joint(model, j)})
     weights = model.body_mass[1:] / model.body_mass.sum()
@@ -196,7 +196,7 @@ def physics(model: mujoco.MjModel, angles: dict[str, float] | None = None) -> di
         found[f"place {name}"] = np.array(data.geom_xpos[i])
         found[f"size {name}"] = np.array(model.geom_size[i])
     for i in range(model.nu):
-        # In hundreds, so that all numbers are of the order of one.
+        # In hundreds, so that all values are of order one.
         found[f"gear {model.actuator(i).name}"] = 0.01 * model.actuator_gear[i]
     for i in range(model.njnt):
         joint = model.joint(i)

@@ -1,4 +1,4 @@
-"""Small models that the tests of comparisons share."""
+"""Small models shared by tests of comparisons."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import mujoco
 
 ASSETS = os.path.join(os.path.dirname(gymnasium.envs.mujoco.__file__), "assets")
 
-# One of nearly everything that decides motion.
+# Nearly every kind of element that affects the motion.
 EVERYTHING = """
 <mujoco model="everything">
   <compiler angle="radian"/>
@@ -109,15 +109,15 @@ EVERYTHING = """
 
 
 def everything() -> mujoco.MjModel:
-    """A fresh model with one of nearly everything."""
+    """Return a new model with nearly every kind of element."""
     return mujoco.MjModel.from_xml_string(EVERYTHING)
 
 
 def asset(name: str) -> mujoco.MjModel:
-    """One of Gymnasium's own bodies, such as `ant`."""
+    """Return one of Gymnasium's bodies, such as `ant`."""
     return mujoco.MjModel.from_xml_path(os.path.join(ASSETS, f"{name}.xml"))
 
 
 def asset_spec(name: str) -> mujoco.MjSpec:
-    """The same, before it is compiled."""
+    """Return the spec of one of Gymnasium's bodies."""
     return mujoco.MjSpec.from_file(os.path.join(ASSETS, f"{name}.xml"))

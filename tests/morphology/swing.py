@@ -1,4 +1,4 @@
-"""A tiny environment, and wrappers around it, that certificates are tested on."""
+"""A small environment with wrappers, for tests of certificates."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _WRIST = """
 
 
 class Swing:
-    """A pendulum with a motor, and with a second one at its wrist if asked for."""
+    """Pendulum with a motor, and an optional second one at its wrist."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class Swing:
         return self._observation(), {}
 
     def step(self, action: Any, /) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Push for ten steps of the simulation."""
+        """Apply an action for ten simulation steps."""
         self.commands.append(action)
         self._data.ctrl[:] = action
         mujoco.mj_step(self.model, self._data, nstep=10)
@@ -79,7 +79,7 @@ class Swing:
 
 
 class Wrapper:
-    """What Gymnasium's wrappers are to us: something with `unwrapped`."""
+    """Minimal wrapper in the style of Gymnasium."""
 
     def __init__(self, env: Any) -> None:
         self.env = env
@@ -90,51 +90,51 @@ class Wrapper:
         return getattr(self.env, "unwrapped", self.env)
 
     def reset(self, *, seed: int | None = None) -> tuple[Any, dict[str, Any]]:
-        """Pass on."""
+        """Reset the env."""
         observation, info = self.env.reset(seed=seed)
         return self.sensed(observation), info
 
     def step(self, action: Any, /) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Pass on."""
+        """Step the env."""
         observation, *rest = self.env.step(action)
         return (self.sensed(observation), *rest)
 
     def sensed(self, observation: Any) -> Any:
-        """What becomes of an observation."""
+        """Return the modified observation."""
         return observation
 
 
 class Noisy(Wrapper):
-    """Adds noise to what is sensed, from its own seed."""
+    """Wrapper that adds noise to the observation, from its own generator."""
 
     def __init__(self, env: Any) -> None:
         super().__init__(env)
         self._random = np.random.default_rng(7)
 
     def sensed(self, observation: Any) -> Any:
-        """With noise."""
+        """Add noise."""
         return observation + self._random.normal(scale=0.01, size=np.shape(observation))
 
 
 class Dictionary(Wrapper):
-    """Splits the observation over a dictionary."""
+    """Wrapper that splits the observation into a dictionary."""
 
     def sensed(self, observation: Any) -> Any:
-        """Two parts."""
+        """Return velocity and angle."""
         return {"velocity": observation[1:], "angle": observation[:1]}
 
 
 class Longer(Wrapper):
-    """Adds a number that no layout describes."""
+    """Wrapper that appends a number to the observation, without a layout for it."""
 
     def sensed(self, observation: Any) -> Any:
-        """One more."""
+        """Append a number."""
         return np.append(observation, 1.0)
 
 
 class Broken(Wrapper):
-    """Senses nothing but what is not a number."""
+    """Wrapper that makes the first number of the observation NaN."""
 
     def sensed(self, observation: Any) -> Any:
-        """NaN in the first place."""
+        """Replace the first number by NaN."""
         return np.concatenate([[np.nan], observation[1:]])

@@ -1,4 +1,4 @@
-"""The edits on every MuJoCo model that Gymnasium ships."""
+"""All edits on every MuJoCo model that Gymnasium ships."""
 
 from __future__ import annotations
 
@@ -37,24 +37,24 @@ _ELEMENTS = ("bodies", "joints", "geoms", "sites", "cameras", "actuators")
 
 
 def _named(model: str) -> mujoco.MjSpec:
-    """The model with a name for everything."""
+    """Return the spec with all elements named."""
     spec = asset_spec(model)
     name_elements(spec)
     return spec
 
 
 def _before(model: str) -> mujoco.MjModel:
-    """The model as it is, but for a total mass that is written out geom by geom."""
+    """Return the compiled model with its total mass resolved."""
     return built(_named(model), Mass("*", scale=1.0))
 
 
 def _limbs(spec: mujoco.MjSpec) -> list[str]:
-    """The names of all bodies that hang on another."""
+    """Return the names of all bodies with a parent."""
     return [b.name for b in limbs_and_trunks(spec) if b.parent.parent is not None]
 
 
-def test_these_are_all_of_them() -> None:
-    """Eleven bodies, some in two versions."""
+def test_all_models_are_included() -> None:
+    """Gymnasium ships these models, some in two versions."""
     assert {name.removesuffix("_v5") for name in _MODELS} == {
         *("ant", "half_cheetah", "hopper", "humanoid", "humanoidstandup"),
         *("inverted_double_pendulum", "inverted_pendulum", "point", "pusher", "reacher"),
@@ -63,21 +63,21 @@ def test_these_are_all_of_them() -> None:
 
 
 @pytest.mark.parametrize("model", _MODELS)
-def test_everything_has_a_name_of_its_own(model: str) -> None:
-    """And naming changes nothing."""
+def test_all_names_are_unique(model: str) -> None:
+    """Naming does not change the model."""
     spec = _named(model)
     for elements in _ELEMENTS:
         names = [element.name for element in getattr(spec, elements)]
         assert all(names)
         assert len({*names}) == len(names)
-    if model != "half_cheetah":  # MuJoCo warns about its total mass.
+    if model != "half_cheetah":  # MuJoCo warns about the total mass of this one.
         assert differing(built(asset_spec(model)), built(spec)) == []
 
 
 @pytest.mark.parametrize("model", _MODELS)
 @pytest.mark.parametrize("kind", [Mass, Density])
-def test_masses_and_inertias_follow(model: str, kind: Any) -> None:
-    """Half as heavy again, body by body."""
+def test_masses_and_inertias_scale(model: str, kind: Any) -> None:
+    """Mass and density scale masses and inertias, and nothing else."""
     before, after = _before(model), built(_named(model), kind("*", scale=1.5))
     np.testing.assert_allclose(after.body_mass, 1.5 * before.body_mass, rtol=1e-12)
     np.testing.assert_allclose(after.body_inertia, 1.5 * before.body_inertia, rtol=1e-9)
@@ -87,8 +87,8 @@ def test_masses_and_inertias_follow(model: str, kind: Any) -> None:
 
 @pytest.mark.parametrize("model", _MODELS)
 @pytest.mark.parametrize("edit", [Stretch("*", 1.3), Radius("*", 0.8)])
-def test_masses_follow_the_volume(model: str, edit: Stretch | Radius) -> None:
-    """Every body is as dense as it was."""
+def test_densities_are_kept(model: str, edit: Stretch | Radius) -> None:
+    """Stretches and radii keep the density of every body."""
     densities = []
     for model_built in (_before(model), built(_named(model), edit)):
         volumes = _volumes(model_built, _weights(model))
@@ -97,7 +97,7 @@ def test_masses_follow_the_volume(model: str, edit: Stretch | Radius) -> None:
 
 
 def _weights(model: str) -> Array:
-    """The density of each geom, in the compiled order."""
+    """Return the density of each geom, in compiled order."""
     spec = _named(model)
     by_name = {
         geom.name: geom.density if np.isnan(geom.mass) else geom.mass / volume(spec, geom)
@@ -108,7 +108,7 @@ def _weights(model: str) -> Array:
 
 
 def _volumes(model: mujoco.MjModel, weights: Array) -> Array:
-    """For each body the volumes of its geoms, weighted, from the compiled sizes."""
+    """Return the weighted volume of each body, from the compiled sizes."""
     a, b, c = model.geom_size.T
     kind = mujoco.mjtGeom
     shapes = {
@@ -123,8 +123,8 @@ def _volumes(model: mujoco.MjModel, weights: Array) -> Array:
 
 
 @pytest.mark.parametrize("model", _MODELS)
-def test_poses_follow_a_stretch(model: str) -> None:
-    """Where each body is held is 1.3 times as far from where its parent is held."""
+def test_anchors_scale_with_a_stretch(model: str) -> None:
+    """The distance between anchors of child and parent scales by the factor."""
     before, after = _before(model), built(_named(model), Stretch("*", 1.3))
     for body in range(1, before.nbody):
         parent = int(before.body_parentid[body])
@@ -137,14 +137,14 @@ def test_poses_follow_a_stretch(model: str) -> None:
 
 
 def _held(model: mujoco.MjModel, body: int, parent: int) -> Array:
-    """Where a body is held, as seen from where its parent is, in the parent's frame, m."""
+    """Return the anchor of a body relative to that of its parent, in the parent's frame, m."""
     turned = np.empty(3)
     mujoco.mju_rotVecQuat(turned, _anchor(model, body), model.body_quat[body])
     return model.body_pos[body] + turned - _anchor(model, parent)
 
 
 def _anchor(model: mujoco.MjModel, body: int) -> Array:
-    """The place of a body's first hinge in its frame, m."""
+    """Return the position of a body's first hinge in its frame, m."""
     first = int(model.body_jntadr[body])
     joints = range(first, first + int(model.body_jntnum[body]))
     hinges = [j for j in joints if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE]
@@ -161,8 +161,8 @@ def _anchor(model: mujoco.MjModel, body: int) -> Array:
         (Stiffness("*", scale=2.0), "jnt_stiffness", 2.0),
     ],
 )
-def test_values_follow(model: str, edit: Edit, field: str, factor: Any) -> None:
-    """Every number of the kind, and no other."""
+def test_values_scale(model: str, edit: Edit, field: str, factor: Any) -> None:
+    """All values of the kind scale, and no others."""
     before, after = _before(model), built(_named(model), edit)
     np.testing.assert_array_equal(getattr(after, field), getattr(before, field) * factor)
     assert {*differing(before, after)} <= {field, "actuator_acc0", "actuator_moment0"}
@@ -170,7 +170,7 @@ def test_values_follow(model: str, edit: Edit, field: str, factor: Any) -> None:
 
 @pytest.mark.parametrize("model", _MODELS)
 def test_every_hinge_and_slide_can_be_locked(model: str) -> None:
-    """One after the other, at the model's own pose, where nothing moves."""
+    """Locks at the model's own pose move nothing."""
     free = _before(model)
     for joint in range(free.njnt):
         if free.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
@@ -183,7 +183,7 @@ def test_every_hinge_and_slide_can_be_locked(model: str) -> None:
 
 @pytest.mark.parametrize("model", _MODELS)
 def test_every_limb_can_be_removed_copied_cut_split_and_extended(model: str) -> None:
-    """And weighs afterwards what it should."""
+    """The total mass changes as expected."""
     spec = _named(model)
     before = _before(model)
     for limb in _limbs(spec):

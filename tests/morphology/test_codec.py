@@ -1,4 +1,4 @@
-"""A body as JSON, and back."""
+"""Bodies as JSON."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ BODY = (
 
 
 def test_a_body_is_a_list_of_tagged_objects() -> None:
-    """What is left at its default is left out."""
+    """Default values are omitted."""
     assert json.loads(to_json(BODY)) == [
         {"edit": "stretch", "body": "shank_*", "factor": 2.0},
         {"edit": "mass", "element": "torso", "to": 2.0},
@@ -43,8 +43,8 @@ def test_a_body_is_a_list_of_tagged_objects() -> None:
     ]
 
 
-def test_json_gives_back_the_body() -> None:
-    """As text, as bytes, as one object, and with whole numbers for any."""
+def test_a_body_round_trips_through_json() -> None:
+    """Text, bytes, single objects and integers are accepted."""
     assert from_json(to_json(BODY)) == from_json(to_json(BODY).encode()) == BODY
     assert from_json('{"edit":"cut","body":"shin","keep":0.5}') == (Cut("shin", 0.5),)
     assert from_json('[{"edit":"stretch","body":"shin","factor":2}]') == (Stretch("shin", 2.0),)
@@ -56,8 +56,8 @@ def test_json_gives_back_the_body() -> None:
     "text",
     ["", "{", "stretch", "[1,", b"\xff\xfe\x00", b"[\xc3\x28]", "[" * 100_000],
 )
-def test_what_is_no_json_is_refused(text: str | bytes) -> None:
-    """Also what is no text at all, or nested without end."""
+def test_invalid_json_is_refused(text: str | bytes) -> None:
+    """Malformed, non-UTF-8 and deeply nested input raises an error."""
     with pytest.raises(MorphologyError, match="A body must be a JSON list of edits: "):
         from_json(text)
 
@@ -65,23 +65,23 @@ def test_what_is_no_json_is_refused(text: str | bytes) -> None:
 @pytest.mark.parametrize(
     "text", ["1", "null", '"stretch"', "[1]", "[[]]", "{}", '[{"kind":"stretch"}]', "[null]"]
 )
-def test_json_that_is_no_edit_is_refused(text: str) -> None:
-    """An edit is an object that says what kind it is."""
+def test_other_json_is_refused(text: str) -> None:
+    """An edit is an object with the key "edit"."""
     with pytest.raises(MorphologyError, match='An edit is an object with the key "edit", got '):
         from_json(text)
 
 
 @pytest.mark.parametrize("kind", ["strech", "", None, 3, ["stretch"]])
-def test_unknown_kinds_are_named(kind: object) -> None:
-    """With the nearest, and all that there are."""
+def test_unknown_kinds_are_refused(kind: object) -> None:
+    """The error lists all kinds and suggests the nearest."""
     with pytest.raises(UnknownName, match=r"No edit matches .* There are: stretch, radius, cut"):
         from_json(json.dumps([{"edit": kind, "body": "shin"}]))
     with pytest.raises(UnknownName, match=r"Did you mean 'stretch'\?"):
         from_json('[{"edit":"strech"}]')
 
 
-def test_unknown_fields_are_named() -> None:
-    """A misspelt option must not be ignored."""
+def test_unknown_fields_are_refused() -> None:
+    """Misspelt fields are not ignored."""
     with pytest.raises(
         UnknownName, match=r"No field of 'stretch' matches 'facter'\. Did you mean "
     ):
@@ -107,23 +107,23 @@ def test_unknown_fields_are_named() -> None:
         ({"edit": "split", "body": "a", "name": "b", "at": 1}, "split: A segment is split between"),
     ],
 )
-def test_wrong_fields_are_refused(fields: dict[str, Any], message: str) -> None:
-    """The message begins with the kind of edit."""
+def test_invalid_fields_are_refused(fields: dict[str, Any], message: str) -> None:
+    """The error starts with the kind of edit."""
     with pytest.raises(MorphologyError, match=message):
         from_json(json.dumps(fields))
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-def test_numbers_that_json_does_not_have_are_refused(number: str) -> None:
-    """Python's reader takes them, no edit does."""
+def test_infinite_numbers_are_refused(number: str) -> None:
+    """NaN and infinity are refused, although Python's parser accepts them."""
     with pytest.raises(MorphologyError, match="stretch: The factor of a stretch must be a ratio"):
         from_json(f'[{{"edit":"stretch","body":"shin","factor":{number}}}]')
     with pytest.raises(MorphologyError, match="lock: A joint cannot be locked at"):
         from_json(f'[{{"edit":"lock","joint":"hip","position":{number}}}]')
 
 
-def test_a_body_may_be_written_in_many_ways() -> None:
-    """One edit, several, any iterable of them, or their JSON."""
+def test_as_body_accepts_several_forms() -> None:
+    """One edit, iterables of edits, and JSON are accepted."""
     edits = (Lock("hip"), JointRange("knee", lower=-1.0))
     assert as_body(edits) == as_body(list(edits)) == as_body(iter(edits)) == edits
     assert as_body(to_json(edits)) == edits
@@ -132,14 +132,14 @@ def test_a_body_may_be_written_in_many_ways() -> None:
 
 
 @pytest.mark.parametrize("value", [3, None, [3], ["stretch"], Stretch, [Stretch], [b"[]"]])
-def test_other_things_are_no_body(value: Any) -> None:
-    """The message shows what would be."""
+def test_other_objects_are_refused(value: Any) -> None:
+    """The error shows a valid body."""
     with pytest.raises(
         MorphologyError, match=r"made of edits such as Stretch\('shank_\*', 1\.5\), "
     ):
         as_body(value)
 
 
-def test_every_kind_can_be_read() -> None:
-    """Each has a tag of its own."""
+def test_tags_are_unique() -> None:
+    """Each of the 17 kinds has its own tag."""
     assert len({kind.__struct_config__.tag for kind in EDITS}) == len(EDITS) == 17

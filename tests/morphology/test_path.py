@@ -1,4 +1,4 @@
-"""The continuous path between two bodies."""
+"""Interpolation between two bodies."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from shapechanger.morphology import (
 )
 from tests.morphology.models import ant, built, differing, leg, mass, pendulum, physics
 
-# One of each kind, for the leg.
+# One edit of each kind, for the leg.
 ONE_OF_EACH: tuple[Edit, ...] = (
     Stretch("thigh", 2.0),
     Radius("thigh", 1.5),
@@ -60,13 +60,13 @@ ONE_OF_EACH: tuple[Edit, ...] = (
 _STEP = 1e-5
 
 
-def test_one_of_each_kind() -> None:
-    """A new kind of edit needs a path, too."""
+def test_all_kinds_are_covered() -> None:
+    """A new kind of edit must be added to these tests."""
     assert tuple(type(edit) for edit in ONE_OF_EACH) == EDITS
 
 
 def test_the_ends_are_the_bodies_themselves() -> None:
-    """Not copies, and not edits with an amount."""
+    """At 0 and 1 the same objects are returned."""
     a, b = ANT.body("BigAnt"), ANT.body("ExtendedAnt")
     assert interpolate(a, b, 0.0) is a
     assert interpolate(a, b, 1.0) is b
@@ -74,21 +74,21 @@ def test_the_ends_are_the_bodies_themselves() -> None:
 
 
 @pytest.mark.parametrize("alpha", [-0.1, 1.1, np.nan, np.inf])
-def test_the_path_ends_at_its_ends(alpha: float) -> None:
-    """Beyond them there is nothing."""
+def test_alpha_is_a_fraction(alpha: float) -> None:
+    """Values outside 0 to 1 are refused."""
     with pytest.raises(MorphologyError, match="alpha must be between 0 and 1, got"):
         interpolate((), (), alpha)
 
 
 @pytest.mark.parametrize("body", [*ANT.bodies.values(), *PENDULUM.bodies.values(), ONE_OF_EACH])
 def test_from_a_body_to_itself_nothing_changes(body: Body) -> None:
-    """At any point of the way."""
+    """Interpolating between equal bodies gives an equal body."""
     for alpha in (0.0, 0.1, 1.0 / 3.0, 1.0):
         assert interpolate(body, body, alpha) == body
 
 
-def test_an_edit_that_both_have_moves_between_its_strengths() -> None:
-    """Numbers, pairs of numbers, and vectors; words stay."""
+def test_common_edits_are_interpolated() -> None:
+    """Numbers, ranges and vectors are interpolated; strings stay."""
     a = (Stretch("thigh", 1.0, "z"), Gravity((0.0, 0.0, -10.0)), JointRange("hip", -1.0, 1.0))
     b = (Stretch("thigh", 3.0, "z"), Gravity((4.0, 0.0, -2.0)), JointRange("hip", -2.0, 1.0))
     assert interpolate(a, b, 0.25) == (
@@ -99,7 +99,7 @@ def test_an_edit_that_both_have_moves_between_its_strengths() -> None:
 
 
 def test_edits_of_one_body_only_fade() -> None:
-    """Those of the first out, those of the second in; what both have in common stays."""
+    """Edits of the first fade out, those of the second fade in, common ones stay."""
     a = (Mass("*", scale=2.0), Stretch("thigh", 2.0))
     b = (Mass("*", scale=2.0), Stretch("shin", 2.0), Gear("*", scale=3.0))
     assert interpolate(a, b, 0.25) == (
@@ -110,14 +110,14 @@ def test_edits_of_one_body_only_fade() -> None:
     )
 
 
-def test_a_ratio_is_no_value() -> None:
-    """What one scales and the other sets are two edits."""
+def test_scale_and_to_are_different_edits() -> None:
+    """An edit with `scale` and one with `to` fade separately."""
     path = interpolate((Mass("*", scale=2.0),), (Mass("*", to=2.0),), 0.5)
     assert path == (Mass("*", scale=2.0, amount=0.5), Mass("*", to=2.0, amount=0.5))
 
 
-def test_a_motor_that_one_body_lacks_is_weak() -> None:
-    """A segment is not there twice because only one of two bodies moves it by a motor."""
+def test_a_motor_of_one_body_fades() -> None:
+    """A segment with and without a motor is one segment, whose gear is interpolated."""
     passive, active = ANT.body("ExtendedAntPassive"), ANT.body("ExtendedAnt")
     for alpha in (0.01, 0.5, 0.99):
         for path in (interpolate(passive, active, alpha), interpolate(active, passive, 1 - alpha)):
@@ -129,8 +129,8 @@ def test_a_motor_that_one_body_lacks_is_weak() -> None:
     )
 
 
-def test_paths_of_paths() -> None:
-    """A body on the way is a body, and a way may begin there."""
+def test_interpolated_bodies_can_be_interpolated() -> None:
+    """A path may start at an interpolated body."""
     half = interpolate((), ANT.body("BigAnt"), 0.5)
     assert interpolate(half, ANT.body("BigAnt"), 0.5) == interpolate((), ANT.body("BigAnt"), 0.75)
 
@@ -138,13 +138,13 @@ def test_paths_of_paths() -> None:
 def _assert_continuous(
     load: Callable[[], mujoco.MjSpec], a: Body, b: Body, tolerance: float = 1e-3
 ) -> None:
-    """A small step changes everything that two neighbours have in common by little."""
+    """Assert that small steps along the path change the physics by little."""
     for alpha in (0.0, _STEP, 0.3, 0.5, 0.99, 1.0 - _STEP):
         near = [built(load(), *interpolate(a, b, min(x, 1.0))) for x in (alpha, alpha + _STEP)]
         before, after = (physics(model, {"knee": -0.5}) for model in near)
         jumping = {f"range {edit.joint}" for edit in (*a, *b) if isinstance(edit, Lock)}
         for edit in (*a, *b):
-            if isinstance(edit, Split):  # The geom of this name is one half of it, then.
+            if isinstance(edit, Split):  # The geom of this name becomes one half.
                 jumping |= {f"place {edit.body}", f"size {edit.body}"}
         for name in before.keys() & after.keys() - jumping:
             np.testing.assert_allclose(
@@ -154,33 +154,33 @@ def _assert_continuous(
 
 @pytest.mark.parametrize("pair", [*itertools.permutations(ANT.bodies, 2)], ids="-".join)
 def test_the_ants_change_continuously(pair: tuple[str, str]) -> None:
-    """Between any two of the named bodies, in both directions."""
+    """Paths between all pairs of named bodies are continuous."""
     _assert_continuous(ant, ANT.body(pair[0]), ANT.body(pair[1]))
 
 
 @pytest.mark.parametrize("pair", [*itertools.permutations(PENDULUM.bodies, 2)], ids="-".join)
 def test_the_pendulums_change_continuously(pair: tuple[str, str]) -> None:
-    """Between any two of the named bodies, in both directions."""
+    """Paths between all pairs of named bodies are continuous."""
     _assert_continuous(pendulum, PENDULUM.body(pair[0]), PENDULUM.body(pair[1]))
 
 
 @pytest.mark.parametrize("edit", ONE_OF_EACH, ids=lambda edit: type(edit).__name__)
 def test_every_kind_of_edit_is_continuous(edit: Edit) -> None:
-    """From nothing to all of it, and back."""
-    # The rounded ends where a segment is split are in other places than they were.
+    """Fading in and out is continuous."""
+    # The rounded ends at a split are displaced.
     tolerance = 5e-3 if isinstance(edit, Split) else 1e-3
     _assert_continuous(leg, (), (edit,), tolerance)
     _assert_continuous(leg, (edit,), (), tolerance)
 
 
 @pytest.mark.parametrize("pair", [*itertools.pairwise(ONE_OF_EACH)], ids=lambda x: type(x).__name__)
-def test_every_kind_of_edit_gives_way_to_the_next(pair: tuple[Edit, Edit]) -> None:
-    """Two different edits, the one fading out and the other in."""
+def test_pairs_of_edits_are_continuous(pair: tuple[Edit, Edit]) -> None:
+    """One edit fades out while another fades in."""
     _assert_continuous(leg, pair[:1], pair[1:], 5e-3)
 
 
-def test_a_limb_may_fade_for_two_reasons_at_once() -> None:
-    """It is then smaller than a hundredth, and MuJoCo takes it all the same."""
+def test_two_edits_can_shrink_one_limb() -> None:
+    """The limb is then smaller than 0.01, and still compiles."""
     grown = (AddSegment("shin", "foot", (0.1, 0.0, 0.0)), AddLimb("thigh", "_2", 1.0, size=0.01))
     for alpha in (1e-9, 0.5, 1.0 - 1e-9):
         model = built(leg(), *interpolate(grown, (Remove("thigh"),), alpha))
@@ -188,8 +188,8 @@ def test_a_limb_may_fade_for_two_reasons_at_once() -> None:
         assert mass(model, "foot") > 0.0
 
 
-def test_the_ant_grows_heavier_on_its_way_to_the_big_one() -> None:
-    """At every step."""
+def test_the_mass_grows_towards_the_big_ant() -> None:
+    """The mass increases at every step."""
     path = [interpolate((), ANT.body("BigAnt"), x) for x in np.linspace(0.0, 1.0, 21).tolist()]
     masses = [mass(built(ant(), *body)) for body in path]
     assert np.all(np.diff(masses) > 0.0)
@@ -197,8 +197,8 @@ def test_the_ant_grows_heavier_on_its_way_to_the_big_one() -> None:
     assert masses[-1] == mass(built(ant(), *ANT.body("BigAnt")))
 
 
-def test_the_way_to_the_extended_ant_has_its_dimensions() -> None:
-    """From the first step on, so that one policy can walk all of it."""
+def test_paths_to_the_extended_ant_have_its_dimensions() -> None:
+    """From the first step on, one policy fits the whole path."""
     target = built(ant(), *ANT.body("ExtendedAnt"))
     for alpha in (1e-12, 1e-3, 0.5, 1.0 - 1e-12, 1.0):
         model = built(ant(), *interpolate((), ANT.body("ExtendedAnt"), alpha))
@@ -209,6 +209,6 @@ def test_the_way_to_the_extended_ant_has_its_dimensions() -> None:
 
 
 def test_the_ends_are_exact_for_every_pair() -> None:
-    """The models at both ends are those of the bodies, bit for bit."""
+    """The models at the ends equal bitwise those of the bodies."""
     for a, b in itertools.permutations(ANT.bodies.values(), 2):
         assert differing(built(ant(), *interpolate(a, b, 1.0)), built(ant(), *b)) == []

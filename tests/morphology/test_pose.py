@@ -1,4 +1,4 @@
-"""Poses that follow from a body."""
+"""Poses derived from a body."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _PLANE = '<geom type="plane" size="1 1 1" pos="0 0 .3"/>'
 
 
 def _ball(floor: str, ball: str = "") -> mujoco.MjModel:
-    """A ball of 20 cm whose middle is 1 m up."""
+    """Return a ball of 20 cm radius with its centre 1 m above the origin."""
     return built(spec_of(_BALL.format(floor=floor, ball=ball)))
 
 
@@ -42,14 +42,14 @@ def _ball(floor: str, ball: str = "") -> mujoco.MjModel:
         ('<geom type="hfield" hfield="hill"/>', 0.8),
         (f'{_PLANE}<geom type="plane" size="1 1 1" pos="0 0 .5"/>', 0.3),
         (f'<body name="stage" pos="0 0 .1">{_PLANE}</body>', 0.4),
-        # A table is no floor, and no part of the body that stands on it.
+        # Boxes, static or on bodies, are no floor.
         (f'{_PLANE}<body><geom type="box" size="1 1 .1" pos="5 0 .2"/></body>', 0.5),
         (f'{_PLANE}<geom type="box" size="1 1 .1" pos="0 0 .6"/>', 0.5),
         ('<geom type="plane" size="1 1 1" pos="0 0 1.1"/>', -0.3),
     ],
 )
-def test_the_floor_is_what_lies_below(floor: str, gap: float) -> None:
-    """Every plane and height field that is fixed to the world; the highest counts."""
+def test_the_floor_is_the_highest_static_plane(floor: str, gap: float) -> None:
+    """Static planes and height fields count, the highest one wins."""
     model = _ball(floor)
     assert StartRules(model).floor_gap(posed(model)) == pytest.approx(gap)
     assert standing_height(model) == pytest.approx(1.0 - gap)
@@ -64,8 +64,8 @@ def test_the_floor_is_what_lies_below(floor: str, gap: float) -> None:
         (_PLANE, 'contype="2" conaffinity="2"'),
     ],
 )
-def test_what_does_not_touch_is_no_floor(floor: str, ball: str) -> None:
-    """Then there is nothing to stand on, and no height to stand at."""
+def test_geoms_without_contact_are_no_floor(floor: str, ball: str) -> None:
+    """Without a floor there is no standing height."""
     model = _ball(floor, ball)
     assert StartRules(model).floor_gap(posed(model)) == 1000.0
     assert standing_height(model) is None
@@ -73,13 +73,13 @@ def test_what_does_not_touch_is_no_floor(floor: str, ball: str) -> None:
 
 
 def test_either_side_may_allow_the_contact() -> None:
-    """MuJoCo lets two geoms touch if one of them is willing."""
+    """One matching pair of contype and conaffinity suffices."""
     for ball in ('contype="1" conaffinity="0"', 'contype="0" conaffinity="1"'):
         assert standing_height(_ball(_PLANE, ball)) == pytest.approx(0.5)
 
 
-def test_what_is_fixed_to_the_world_does_not_stand() -> None:
-    """It has no trunk that is free, and starts where its joints are."""
+def test_fixed_bodies_have_no_standing_height() -> None:
+    """They have no free trunk."""
     for spec in (pendulum(), gantry()):
         model = built(spec)
         assert trunk_joint(model) is None
@@ -88,7 +88,7 @@ def test_what_is_fixed_to_the_world_does_not_stand() -> None:
 
 
 def test_the_trunk_is_the_first_free_joint() -> None:
-    """Also where other joints come before it."""
+    """Other joints before it are skipped."""
     model = built(
         spec_of(
             """<mujoco><worldbody><body><joint name="door"/><geom size=".1"/></body>
@@ -104,19 +104,19 @@ def test_the_trunk_is_the_first_free_joint() -> None:
     [("Ant", 0.513), ("BigAnt", 0.947), ("ExtendedAnt", 1.292), ("ExtendedAntPassive", 1.292)],
 )
 def test_standing_heights_of_the_ants(body: str, height: float) -> None:
-    """Each joint in the middle of its range, the lowest point on the floor, in metres."""
+    """Joints are in the middle of their ranges, and the lowest point is on the floor."""
     model = built(ant(), *ANT.bodies[body])
     assert standing_height(model) == pytest.approx(height, abs=1e-3)
 
 
 def test_the_standing_height_does_not_depend_on_the_start() -> None:
-    """It is a property of the body, not of where the model begins."""
+    """Changing the start height keeps the standing height."""
     heights = [standing_height(built(ant(), StartHeight("torso", z))) for z in (-3.0, 0.75, 40.0)]
     assert heights == pytest.approx([heights[0]] * 3)
 
 
 def test_a_body_starts_inside_its_limits() -> None:
-    """By a tenth of the range, and no farther from the model's pose than that takes."""
+    """Joints move by the least amount to be a tenth of the range inside."""
     model = built(ant())
     pose = start_pose(model)
     for joint in range(1, model.njnt):
@@ -134,7 +134,7 @@ def test_a_body_starts_inside_its_limits() -> None:
 @pytest.mark.parametrize("body", ANT.bodies)
 @pytest.mark.parametrize("factor", [0.5, 1.0, 3.0])
 def test_no_foot_starts_in_the_floor(body: str, factor: float) -> None:
-    """The trunk is raised as far as the feet need and not lowered."""
+    """The trunk is raised as far as needed and never lowered."""
     model = built(ant(), *ANT.bodies[body], Stretch("shank_*", factor))
     pose = start_pose(model)
     data = mujoco.MjData(model)
@@ -146,14 +146,14 @@ def test_no_foot_starts_in_the_floor(body: str, factor: float) -> None:
     assert pose[2] >= model.qpos0[2]
 
 
-def test_a_body_that_starts_high_starts_there() -> None:
-    """It falls, as its model says."""
+def test_a_high_start_is_kept() -> None:
+    """The body is not lowered to the floor."""
     model = built(leg(), StartHeight("trunk", 5.0))
     assert start_pose(model)[2] == 5.0
 
 
 def test_a_pose_is_moved_inside_the_limits() -> None:
-    """Hinges and slides to the nearest limit; what has none, and the pose given, stay."""
+    """Limited joints move to the nearest limit; the given pose is not changed."""
     model = built(leg(), JointRange("hip", -0.5, 0.5))
     pose = model.qpos0 + 7.0
     inside = StartRules(model).keep_within_limits(pose)
@@ -165,8 +165,8 @@ def test_a_pose_is_moved_inside_the_limits() -> None:
     np.testing.assert_allclose(StartRules(free).keep_within_limits(far), [2.0, -1.0, 9.0, 9.0, 2.0])
 
 
-def test_a_body_without_joints_has_a_pose() -> None:
-    """An empty one."""
+def test_a_body_without_joints_has_an_empty_pose() -> None:
+    """The pose has shape (0,)."""
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     assert (
         start_pose(model).shape == StartRules(model).keep_within_limits(np.zeros(0)).shape == (0,)
@@ -196,7 +196,7 @@ def _hopper(
     turn: str = "0 0 0",
     limits: str = "",
 ) -> mujoco.MjModel:
-    """A ball with a foot half a metre below, on a rail and a slide."""
+    """Return a ball with a foot 0.5 m below it, on two slides."""
     text = _HOPPER.format(height=height, axis=axis, ref=ref, turn=turn, limits=limits)
     return built(spec_of(text))
 
@@ -207,13 +207,13 @@ def _hopper(
         ("0 0 1", 0.0, "0 0 0", Lift(1, 1.0, 1.0)),
         ("0 0 3", 1.0, "0 0 0", Lift(1, 1.0, 0.0)),
         ("0 0 -1", 0.25, "0 0 0", Lift(1, -1.0, 1.25)),
-        # The axis is the body's own.
+        # The axis is in the body's frame.
         ("0 1 0", 0.0, "90 0 0", Lift(1, 1.0, 1.0)),
         ("0 0 1", 0.0, "180 0 0", Lift(1, -1.0, 1.0)),
     ],
 )
 def test_a_slide_raises_a_trunk(axis: str, ref: float, turn: str, lift: Lift) -> None:
-    """Whichever way it points, and wherever it counts from."""
+    """Direction and reference of a vertical slide are taken into account."""
     model = _hopper(axis=axis, ref=ref, turn=turn)
     found = trunk_lift(model)
     assert found is not None
@@ -230,18 +230,18 @@ def test_a_slide_raises_a_trunk(axis: str, ref: float, turn: str, lift: Lift) ->
 @pytest.mark.parametrize(
     ("axis", "limits"),
     [("0 1 0", ""), ("0 .1 1", ""), ("0 0 1", 'range="-1 1"')],
-    ids=["flat", "aslant", "a hoist"],
+    ids=["horizontal", "oblique", "limited"],
 )
 def test_other_slides_raise_nothing(axis: str, limits: str) -> None:
-    """Then the body stays where its model puts it."""
+    """Slides that are not vertical, or limited, do not lift the trunk."""
     model = _hopper(height=0.1, axis=axis, limits=limits)
     assert trunk_lift(model) is None
     assert standing_height(model) is None
     assert start_pose(model)[1] == model.qpos0[1]
 
 
-def test_a_free_trunk_raises_itself() -> None:
-    """By its third number, which is its height."""
+def test_a_free_joint_lifts_the_trunk() -> None:
+    """The third position is the height."""
     assert trunk_lift(built(leg())) == Lift(2, 1.0, 0.0)
     for spec in (pendulum(), gantry()):
         assert trunk_lift(built(spec)) is None
@@ -249,7 +249,7 @@ def test_a_free_trunk_raises_itself() -> None:
 
 @pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1"])
 def test_feet_on_a_slide_start_on_the_floor(axis: str) -> None:
-    """Raised, not lowered; at the height at which the body stands in that pose."""
+    """The trunk is raised to its standing height and never lowered."""
     for height in (0.1, 1.0, 9.0):
         model = _hopper(height=height, axis=axis, ref=0.3)
         pose, lift = start_pose(model), trunk_lift(model)
@@ -259,8 +259,8 @@ def test_feet_on_a_slide_start_on_the_floor(axis: str) -> None:
         assert lift.height(pose) == pytest.approx(max(height, stands))
 
 
-def test_a_start_may_be_at_the_limits() -> None:
-    """A joint that the model puts beyond is moved as far inside as is asked for."""
+def test_the_distance_from_the_limits_can_be_given() -> None:
+    """A joint beyond its limits is moved inside by this share of the range."""
     model = _hopper()
     place = model.joint("leg").qposadr[0]
     starts = [np.rad2deg(start_pose(model, inside)[place]) for inside in (0.0, 0.1, 0.5)]

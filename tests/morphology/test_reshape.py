@@ -1,4 +1,4 @@
-"""Applying edits to a copy, and compiling the result."""
+"""Application of edits to a copy, and compilation."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ _MISTAKES: list[tuple[Callable[[], mujoco.MjSpec], tuple[Edit, ...]]] = [
 
 
 @pytest.mark.parametrize(("load", "edit"), _CHANGES, ids=lambda x: type(x).__name__)
-def test_the_model_given_is_untouched(load: Callable[[], mujoco.MjSpec], edit: Edit) -> None:
-    """Edits are made to a copy; the model compiles to the same afterwards."""
+def test_the_given_spec_is_unchanged(load: Callable[[], mujoco.MjSpec], edit: Edit) -> None:
+    """Edits apply to a copy."""
     spec = load()
     text, before = spec.to_xml(), built(load())
     assert differing(before, built(spec, edit)) != []
@@ -67,10 +67,10 @@ def test_the_model_given_is_untouched(load: Callable[[], mujoco.MjSpec], edit: E
 
 
 @pytest.mark.parametrize(("load", "edits"), _MISTAKES)
-def test_the_model_given_is_untouched_after_a_mistake(
+def test_the_given_spec_is_unchanged_after_an_error(
     load: Callable[[], mujoco.MjSpec], edits: tuple[Edit, ...]
 ) -> None:
-    """Also when half of the edits have been made."""
+    """Edits before the failing one have no effect either."""
     spec = load()
     text = spec.to_xml()
     with pytest.raises(ShapechangerError):
@@ -79,16 +79,16 @@ def test_the_model_given_is_untouched_after_a_mistake(
     assert differing(built(load()), built(spec)) == []
 
 
-def test_edits_are_made_in_order() -> None:
-    """The second sees what the first has made."""
+def test_edits_are_applied_in_order() -> None:
+    """An edit sees the results of earlier ones."""
     spec = reshape(leg(), [Split("thigh", "half"), Stretch("half", 2.0)])
     assert spec.geom("thigh_of_half") is not None
     with pytest.raises(UnknownName, match="No body matches 'half'"):
         reshape(leg(), [Stretch("half", 2.0), Split("thigh", "half")])
 
 
-def test_an_edit_made_to_no_part_is_not_made() -> None:
-    """Not even looked at: the body it names need not be there."""
+def test_edits_with_amount_0_are_skipped() -> None:
+    """Even their names are not looked up."""
     edits = [Stretch("no such body", 2.0, amount=0.0), Remove("trunk", amount=0.0)]
     assert differing(built(leg()), compile_body(leg(), iter(edits))) == []
 
@@ -103,8 +103,8 @@ def test_an_edit_made_to_no_part_is_not_made() -> None:
         (Mass("shin", to=1e-18), "mass and inertia of moving bodies must be larger than mjMINVAL"),
     ],
 )
-def test_a_body_that_does_not_compile_is_named(edit: Edit, reason: str) -> None:
-    """In one sentence: the body as JSON, and what MuJoCo has against it."""
+def test_a_body_that_does_not_compile_is_refused(edit: Edit, reason: str) -> None:
+    """The error has the body as JSON and MuJoCo's reason."""
     with pytest.raises(BrokenModel) as caught:
         built(leg(), edit)
     message = str(caught.value)
@@ -116,8 +116,8 @@ def test_a_body_that_does_not_compile_is_named(edit: Edit, reason: str) -> None:
     assert isinstance(caught.value.__cause__, ValueError | mujoco.FatalError)
 
 
-def test_mistakes_of_ours_are_not_mujocos() -> None:
-    """An edit that does not fit is reported as such, not as a model that does not compile."""
+def test_invalid_edits_are_no_compile_errors() -> None:
+    """They raise MorphologyError instead of BrokenModel."""
     with pytest.raises(MorphologyError) as caught:
         built(leg(), Remove("trunk"))
     assert type(caught.value) is MorphologyError

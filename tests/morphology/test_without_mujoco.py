@@ -1,4 +1,4 @@
-"""Morphology on a machine without MuJoCo."""
+"""Morphology without MuJoCo installed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shapechanger.errors import MissingExtra
 
 
 def test_the_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The import says what to install, in place of a bare ModuleNotFoundError."""
+    """Importing the package raises MissingExtra."""
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtra, match=r"pip install 'shapechanger\[sim\]'"):
         importlib.reload(shapechanger.morphology)

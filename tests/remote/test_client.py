@@ -107,8 +107,8 @@ def test_a_wrong_key_is_refused(run: Run) -> None:
 
 
 @pytest.mark.parametrize(("version", "older"), [(0, "robot"), (2, "workstation")])
-def test_another_version_says_what_to_update(run: Run, version: int, older: str) -> None:
-    """The error names the older side."""
+def test_another_version_is_refused(run: Run, version: int, older: str) -> None:
+    """The error names the side to update."""
     with pytest.raises(LinkError, match=f"on the {older}"):
         RobotClient.connect(run(version=version).known)
 

@@ -20,10 +20,10 @@ HELD_OUT: Final = 1_000
 
 
 class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
-    """Stay in the middle: `steering` moves to the right, a wind blows, `throttle` is worth a bit.
+    """Stay in the middle of a lane: `steering` moves sideways against wind, `throttle` adds reward.
 
     Args:
-        grip: How far full steering moves in a step.
+        grip: Distance that full steering moves in a step.
     """
 
     observation_space = gym.spaces.Box(0, 255, (_ROWS, _COLUMNS, 3), np.uint8)
@@ -55,7 +55,7 @@ class Lane(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-        """Start at a random place beside the middle."""
+        """Start at a random position beside the middle."""
         super().reset(seed=seed)
         self.course = int(self.np_random.integers(HELD_OUT)) + HELD_OUT * self.held_out
         self.place = float(self.np_random.uniform(-0.8, 0.8))
@@ -107,7 +107,7 @@ class _Keeper:
 
 
 gym.register("tests/Lane-v0", Lane, max_episode_steps=30)
-# Three with names of their own, as the vehicles of a suite have.
+# Three ids, as the vehicles of a suite have.
 for _name, _grip in (("Dry", 0.3), ("Wet", 0.2), ("Icy", 0.1)):
     gym.register(f"tests/{_name}-v1", Lane, max_episode_steps=30, kwargs={"grip": _grip})
 
@@ -116,7 +116,7 @@ SLIPPERY = EnvRef("tests.transfer.lane:tests/Lane-v0", {"grip": 0.15})
 
 DRY, WET, ICY = (EnvRef(f"tests.transfer.lane:tests/{name}-v1") for name in ("Dry", "Wet", "Icy"))
 
-# A network and budgets that are learned in a second, and learn something.
+# A network and budgets that learn within a second.
 TINY_CLONING = CloningSettings(
     budgets=(30, 60, 120),
     episode_steps=20,
@@ -135,7 +135,7 @@ TINY_CLONING = CloningSettings(
     ),
 )
 
-# Learned in no time, for what does not depend on what is learned.
+# Minimal training, for tests that do not depend on the result.
 QUICK_CLONING = msgspec.structs.replace(
     TINY_CLONING,
     budgets=(20, 40),

@@ -19,7 +19,7 @@ from tests.transfer.studies import BIG
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_envs_in_which_nobody_shows_how_are_refused(order: int) -> None:
+def test_envs_without_a_demonstrator_are_refused(order: int) -> None:
     """Envs without a camera or a demonstrator are refused when a study is planned."""
     task = TransferTask(*(LANE, BIG)[::order])
     with pytest.raises(

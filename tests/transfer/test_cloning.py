@@ -58,13 +58,15 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
     return run_study(_plan(), out, executor=Serial()), out
 
 
-def test_demonstrations_are_what_was_meant_on_what_was_seen() -> None:
+def test_demonstrations_pair_images_with_intended_actions() -> None:
     """Recorded actions are the intended ones for the picture before them."""
     shown = record_demonstrations(LANE, 150, 20, 3, _FRAMING)
     assert shown.pictures.shape == (150, 12, 20, 3)
     assert shown.episodes == (20,) * 7 + (10,)
     bright = shown.pictures[:, 6, :, 0].argmax(axis=1)
-    left = bright < 8  # Seen on the left: it is right of the middle, and meant to go left.
+    left = (
+        bright < 8
+    )  # The stripe is on the left: the lane env is right of the middle and must go left.
     right = bright > 9
     assert left.any()
     assert right.any()
@@ -105,7 +107,7 @@ def _cloned(
     return policy, found
 
 
-def test_a_clone_is_judged_at_each_budget_and_gets_better(tmp_path: Path) -> None:
+def test_a_clone_improves_with_each_budget(tmp_path: Path) -> None:
     """There is an evaluation per budget, and the last is better than the first."""
     policy, found = _cloned(tmp_path)
     assert [one.steps for one in found] == [0, 30, 60, 120]
@@ -122,7 +124,7 @@ def test_only_the_last_budget_gives_the_same_clone(tmp_path: Path) -> None:
     assert last[-1].mean_return == found[-1].mean_return
 
 
-def test_a_clone_goes_on_from_another(tmp_path: Path) -> None:
+def test_a_clone_can_start_from_another(tmp_path: Path) -> None:
     """The first evaluation is that of the start, which is not changed."""
     policy, found = _cloned(tmp_path)
     _, tuned = _cloned(tmp_path, 30, start=policy)
@@ -158,7 +160,7 @@ def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.Mo
     assert asked == []
 
 
-def test_clones_are_judged_where_nobody_learned() -> None:
+def test_clones_are_evaluated_on_held_out_courses() -> None:
     """Evaluations are on held-out courses, with the settings' number of steps."""
     envs = evaluation_envs(LANE, TINY_CLONING)
     try:
@@ -242,7 +244,7 @@ def test_settings_that_contradict_themselves_are_refused() -> None:
             msgspec.structs.replace(TINY_CLONING, **{name: 0})
 
 
-def test_a_budget_is_one_of_those_that_there_are() -> None:
+def test_steps_are_rounded_up_to_a_budget() -> None:
     """Steps are rounded up to a budget, or to the largest."""
     assert [TINY_CLONING.whole_updates(steps) for steps in (1, 30, 31, 120, 500)] == [
         30,
@@ -255,7 +257,7 @@ def test_a_budget_is_one_of_those_that_there_are() -> None:
     assert (TINY_CLONING.steps, TINY_CLONING.eval_every) == (120, 30)
 
 
-def test_the_learner_is_there_by_its_name() -> None:
+def test_the_learner_is_found_by_name() -> None:
     """Its settings round trip through the JSON of a plan."""
     settings = learner_settings("cloning")
     assert isinstance(settings, CloningSettings)

@@ -83,21 +83,21 @@ def test_one_env_plays_several_episodes() -> None:
 class Succeeding(Countdown):
     """An env that reports a given success at each step, or none."""
 
-    def __init__(self, said: list[bool]) -> None:
-        self.said = said
+    def __init__(self, successes: list[bool]) -> None:
+        self.successes = successes
 
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
-        """Say the next."""
-        said = {"is_success": self.said.pop(0)} if self.said else {}
-        return np.zeros(1), 0.0, not self.said, False, said
+        """Report the next value."""
+        info = {"is_success": self.successes.pop(0)} if self.successes else {}
+        return np.zeros(1), 0.0, not self.successes, False, info
 
 
-def test_success_is_the_last_that_was_said() -> None:
-    """The last value of each episode counts; None without any."""
+def test_the_last_success_counts() -> None:
+    """Success is the mean of the last values of the episodes; None without any."""
     assert evaluate(lambda o: np.zeros((len(o), 1)), [Countdown()], 1).success is None
-    envs = [Succeeding(said) for said in ([False, True], [True, False], [True], [])]
+    envs = [Succeeding(successes) for successes in ([False, True], [True, False], [True], [])]
     result = evaluate(lambda o: np.zeros((len(o), 1)), envs, 1)
     assert result.success == pytest.approx(2 / 3)
 

@@ -16,15 +16,13 @@ from shapechanger.transfer.files import (
 )
 
 
-def test_json_goes_round(tmp_path: Path) -> None:
+def test_json_round_trip(tmp_path: Path) -> None:
     """JSON round trips."""
     write_json(tmp_path / "a.json", {"x": [1, 2]})
     assert read_json(tmp_path / "a.json", dict[str, list[int]], "try") == {"x": [1, 2]}
 
 
-def test_a_file_appears_whole_or_keeps_what_was_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_writes_are_atomic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A write that fails keeps the old file, and leaves no other."""
     path = tmp_path / "a.json"
     write_atomic(path, b"old")
@@ -40,7 +38,7 @@ def test_a_file_appears_whole_or_keeps_what_was_there(
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[1]", b'{"x": "1"}', b"\xff"])
-def test_a_file_that_is_not_what_it_should_be_is_named(tmp_path: Path, content: bytes) -> None:
+def test_an_invalid_file_is_named(tmp_path: Path, content: bytes) -> None:
     """The message has the file and the remedy."""
     path = tmp_path / "run.json"
     path.write_bytes(content)

@@ -35,7 +35,7 @@ def one_thread() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A clone of the demonstrator on the dry lane."""
+    """Return a clone of the demonstrator on the dry lane."""
     folder = tmp_path_factory.mktemp("clone")
     policy = CloneLearner("cloning", QUICK_CLONING).train(
         DRY,
@@ -50,7 +50,7 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def ppo_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A policy of a pendulum trained with PPO."""
+    """Return a policy of a pendulum trained with PPO."""
     path = tmp_path_factory.mktemp("ppo") / "pole.safetensors"
     policy = Sb3Learner("tiny", TINY).train(SMALL, 32, 3, on_evaluation=lambda evaluation: None)
     save_policy(policy, path)
@@ -79,9 +79,7 @@ def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> 
         assert [evaluation.steps for evaluation in tuned.curve] == [0, 20, 40]
 
 
-def test_a_study_goes_on_with_the_clone_it_was_planned_with(
-    clone_file: Path, tmp_path: Path
-) -> None:
+def test_a_study_resumes_with_its_planned_clone_only(clone_file: Path, tmp_path: Path) -> None:
     """Another file than the planned one is refused."""
     other = tmp_path / "other.safetensors"
     CameraPolicy.load(clone_file).described(command="again").save(other)
@@ -137,7 +135,7 @@ def test_a_clone_without_provenance_is_refused(tmp_path: Path, data: dict[str, A
         _plan(path)
 
 
-def test_what_is_no_policy_is_refused(clone_file: Path, tmp_path: Path) -> None:
+def test_invalid_policy_files_are_refused(clone_file: Path, tmp_path: Path) -> None:
     """Missing, foreign, truncated and damaged files are refused."""
     with pytest.raises(CorruptStudy, match=r"There is no policy file .*none\.safetensors"):
         _plan(tmp_path / "none.safetensors")

@@ -97,7 +97,7 @@ def trained(learner: str, **options: Any) -> tuple[TrainedPolicy, list[Evaluatio
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
-def test_a_policy_goes_round(learner: str, tmp_path: Path) -> None:
+def test_policies_round_trip(learner: str, tmp_path: Path) -> None:
     """Every learner is evaluated at the same steps, and its policy round trips."""
     policy, curve, settings = trained(learner)
     update = settings.update_steps
@@ -166,7 +166,7 @@ def test_an_exported_policy_acts_the_same(learner: str, tmp_path: Path) -> None:
     )
 
 
-def test_a_study_of_sac_is_a_study_as_any(tmp_path: Path) -> None:
+def test_a_study_of_sac(tmp_path: Path) -> None:
     """A study of SAC with scratch, zero-shot and fine-tune."""
     study = run_study(tiny_plan(settings_of("sac"), steps=64, source_steps=32), tmp_path)
     assert len(study.of("fine-tune")) == 2
@@ -217,7 +217,7 @@ def test_a_function_that_builds_something_else_is_refused() -> None:
         trained(f"{HERE}:not_a_model")
 
 
-def test_arguments_that_a_class_refuses_are_one_sentence() -> None:
+def test_arguments_refused_by_a_class_give_one_sentence() -> None:
     """Errors of the class become a StudyError."""
     _, settings = resolve_learner("stable_baselines3:A2C", {"learning_rate": "fast"})
     assert isinstance(settings, ImportedSettings)

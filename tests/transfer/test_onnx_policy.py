@@ -76,7 +76,7 @@ def test_other_observations_are_refused(files: tuple[Path, Path]) -> None:
 
 
 @pytest.mark.parametrize("how", ["missing", "cut", "text", "foreign"])
-def test_what_is_no_policy_gets_one_sentence(
+def test_invalid_files_give_one_sentence(
     files: tuple[Path, Path], tmp_path: Path, how: str
 ) -> None:
     """Missing, truncated and foreign files are refused in one sentence."""

@@ -33,7 +33,7 @@ def trained(settings: PpoSettings, seed: int = 0) -> tuple[TrainedPolicy, list[E
 
 
 @pytest.mark.parametrize("settings", [TINY, TINY_NORMALISED], ids=["plain", "normalised"])
-def test_a_policy_goes_round(settings: PpoSettings, tmp_path: Path) -> None:
+def test_a_policy_round_trips(settings: PpoSettings, tmp_path: Path) -> None:
     """Actions, statistics and card round trip."""
     policy, curve = trained(settings)
     save_policy(policy, tmp_path / "policy.safetensors")
@@ -75,7 +75,7 @@ def test_the_seed_decides_the_training() -> None:
 
 
 @pytest.mark.parametrize("kind", ["missing", "text", "zip"])
-def test_what_is_no_policy_is_refused(tmp_path: Path, kind: str) -> None:
+def test_invalid_files_are_refused(tmp_path: Path, kind: str) -> None:
     """A missing file, a text and a zip are refused."""
     path = tmp_path / "policy.safetensors"
     if kind == "text":
@@ -124,8 +124,8 @@ def test_a_changed_file_is_refused(at: int, tmp_path: Path) -> None:
         load_policy(tmp_path / "bad.safetensors")
 
 
-def test_half_a_file_is_refused(tmp_path: Path) -> None:
-    """A truncated file is refused."""
+def test_a_truncated_file_is_refused(tmp_path: Path) -> None:
+    """Any truncation raises a PolicyError."""
     content = POLICIES["reach"].read_bytes()
     for size in (0, 4, 500, len(content) - 1):
         (tmp_path / "half.safetensors").write_bytes(content[:size])

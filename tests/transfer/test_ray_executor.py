@@ -105,7 +105,7 @@ def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path)
     assert attempts() == 3
 
 
-def test_a_job_that_fails_is_reported_and_the_rest_goes_on(cluster: Any, tmp_path: Path) -> None:
+def test_a_failed_job_is_reported_and_others_continue(cluster: Any, tmp_path: Path) -> None:
     """Failed jobs, lost jobs and those that need them are named."""
     mark = tmp_path / "mark"
     with pytest.raises(StudyError) as caught:

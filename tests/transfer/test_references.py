@@ -23,7 +23,7 @@ def test_every_env_of_the_catalogue_has_one() -> None:
     }
 
 
-def test_they_are_small() -> None:
+def test_the_policies_are_small() -> None:
     """All policies together take less than 6 MB."""
     assert sum(path.stat().st_size for path in FOLDER.iterdir() if path.is_file()) < 6_000_000
 

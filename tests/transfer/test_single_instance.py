@@ -15,10 +15,10 @@ from tests.transfer.studies import TINY
 FINGER = EnvRef("shapechanger/Finger-v1")
 
 
-_STEPS = 100  # Of an episode.
+_STEPS = 100  # Steps of an episode.
 
 
-def test_it_is_trained_in_and_judged_in_by_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_training_and_evaluation_alternate(monkeypatch: pytest.MonkeyPatch) -> None:
     """Training and evaluation share the env; each rollout starts an episode."""
     called: dict[int, list[int | str | None]] = {}
     reset, step = FingerReachEnv.reset, FingerReachEnv.step
@@ -41,7 +41,7 @@ def test_it_is_trained_in_and_judged_in_by_turns(monkeypatch: pytest.MonkeyPatch
     assert [evaluation.steps for evaluation in curve] == [0, 32, 64, 96]
     assert policy.card.steps == 96
     (calls,) = called.values()
-    # The last episodes of the evaluations; after each but the last one something is learned from.
+    # Last episodes of the evaluations; each but the last is followed by training.
     ends = [i for i, call in enumerate(calls) if call == EVALUATION_SEED + TINY.eval_episodes - 1]
     assert len(ends) == 4
     for i in ends:

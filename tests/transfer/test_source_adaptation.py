@@ -32,7 +32,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[A
     moved: list[Any] = []
 
     def identified(env: gym.Env[Any, Any], actions: str, seed: int) -> FingerParameters:
-        # What it finds has tests of its own; here only who is asked counts.
+        # Identification has its own tests; here only the calls matter.
         moved.append((env.get_wrapper_attr("parameters"), actions, seed))
         return NOMINAL.replace(tendon_friction=0.25)
 
@@ -44,7 +44,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[A
         return run_study(plan, out, executor=Serial()), out, moved
 
 
-def test_every_arm_is_there_and_measured(study: tuple[Study, Path, list[Any]]) -> None:
+def test_every_arm_is_evaluated(study: tuple[Study, Path, list[Any]]) -> None:
     """Policies of adapted sources are evaluated on the target without training."""
     made, _, _ = study
     assert set(made.summaries) == {"zero-shot", "fine-tune", "randomised", "identified"}
@@ -53,7 +53,7 @@ def test_every_arm_is_there_and_measured(study: tuple[Study, Path, list[Any]]) -
         assert made.summaries[kind].in_target_steps.jumpstart.value is not None
 
 
-def test_each_seed_meets_another_individual(study: tuple[Study, Path, list[Any]]) -> None:
+def test_each_seed_has_another_target(study: tuple[Study, Path, list[Any]]) -> None:
     """Each seed has another finger as its target."""
     made, _, moved = study
     assert made.plan.individual == "finger_seed"
@@ -67,7 +67,7 @@ def test_each_seed_meets_another_individual(study: tuple[Study, Path, list[Any]]
         one.close()
 
 
-def test_the_sources_are_written_down(study: tuple[Study, Path, list[Any]]) -> None:
+def test_adapted_sources_are_saved(study: tuple[Study, Path, list[Any]]) -> None:
     """The adapted envs are in the folders of the runs, with their policies."""
     made, out, _ = study
     sources = {
@@ -83,14 +83,14 @@ def test_the_sources_are_written_down(study: tuple[Study, Path, list[Any]]) -> N
 def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
     """Every arm reports success, and so does the source policy in the source."""
     made, _, _ = study
-    said = {row.kind: row.success for row in arm_rows(made)}
-    assert set(said) == {"source", "random", "zero-action", *_EVERY}
-    assert said["randomised"].startswith("0 % [0 %, 0 %]")
+    successes = {row.kind: row.success for row in arm_rows(made)}
+    assert set(successes) == {"source", "random", "zero-action", *_EVERY}
+    assert successes["randomised"].startswith("0 % [0 %, 0 %]")
     assert made.plan.measure == "success"
     assert any("whose finger_seed is the index of the seed" in words for words in caveats(made))
 
 
-def test_a_study_that_cannot_go_on_begins_no_run_twice(
+def test_a_failed_study_keeps_finished_runs(
     study: tuple[Study, Path, list[Any]],
 ) -> None:
     """Finished runs are kept when a later one fails."""
@@ -120,7 +120,7 @@ def test_only_what_is_needed_is_trained() -> None:
     assert {run.kind for run in plan.runs()} == {"random", "zero-action", "scratch", "randomised"}
 
 
-def test_a_robot_is_had_by_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_exclusive_env_is_used_by_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """The plan of an exclusive env says so."""
     task = TransferTask(FINGER, REAL_LIKE)
     assert not tiny_plan(task=task).exclusive

@@ -38,13 +38,13 @@ def _teacher(vehicle: str = "Car") -> TrainedPolicy:
 
 @pytest.fixture(scope="module")
 def teacher() -> TrainedPolicy:
-    """A teacher that has hardly learned anything."""
+    """A barely trained teacher."""
     return _teacher()
 
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_a_student_sees_pictures_alone(teacher: TrainedPolicy, tmp_path: Path) -> None:
+def test_a_student_sees_images_only(teacher: TrainedPolicy, tmp_path: Path) -> None:
     """Its card names the teacher, and it acts like it."""
     quick = msgspec.structs.replace(STUDENT_CLONING, fewest_steps=20, most_steps=20)
     done: list[int] = []
@@ -60,7 +60,7 @@ def test_a_student_sees_pictures_alone(teacher: TrainedPolicy, tmp_path: Path) -
     assert 0.25 <= action[1] < 0.5
 
 
-def test_who_cannot_teach_is_refused(teacher: TrainedPolicy) -> None:
+def test_unsuitable_teachers_are_refused(teacher: TrainedPolicy) -> None:
     """Policies of other envs, envs without teachers and too few steps are refused."""
     with pytest.raises(StudyError, match=r"A teacher for shapechanger/Car-v1 is a policy of"):
         train_student(_CAR, _teacher("Tank"), 10, 0)
@@ -70,7 +70,7 @@ def test_who_cannot_teach_is_refused(teacher: TrainedPolicy) -> None:
         train_student(_CAR, teacher, 2, 0)
 
 
-def test_the_command_line_refuses_in_sentences(
+def test_invalid_arguments_give_one_sentence(
     teacher: TrainedPolicy, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Wrong arguments are refused before the training."""

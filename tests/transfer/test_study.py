@@ -54,7 +54,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
     return run_study(tiny_plan(), out, executor=Serial(), command="test"), out
 
 
-def test_every_arm_and_seed_is_there(finished: tuple[Study, Path]) -> None:
+def test_every_arm_and_seed_is_evaluated(finished: tuple[Study, Path]) -> None:
     """Two seeds of each arm, evaluated at step 0 and after each update."""
     study, _ = finished
     assert [run.run.name for run in study.runs] == [
@@ -99,15 +99,15 @@ def test_seeds_make_different_runs(finished: tuple[Study, Path]) -> None:
     assert len(set(seeds)) == len(seeds)
 
 
-def test_a_study_again_gives_the_same_numbers(finished: tuple[Study, Path], tmp_path: Path) -> None:
+def test_studies_are_reproducible(finished: tuple[Study, Path], tmp_path: Path) -> None:
     """Equal plans give equal numbers."""
     again = run_study(tiny_plan(), tmp_path / "again", executor=Serial())
     assert curves(again) == curves(finished[0])
     assert again.summaries == finished[0].summaries
 
 
-def test_runs_that_were_cut_off_start_again(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """Incomplete runs are repeated, with the same numbers."""
+def test_incomplete_runs_are_repeated(finished: tuple[Study, Path], tmp_path: Path) -> None:
+    """The numbers are the same."""
     study, out = finished
     cut = tmp_path / "cut"
     shutil.copytree(out, cut)
@@ -157,7 +157,7 @@ def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
     assert "reward_forward" in study.of("scratch")[0].curve[-1].terms
 
 
-def test_a_policy_can_be_brought_along(finished: tuple[Study, Path], tmp_path: Path) -> None:
+def test_a_source_policy_can_be_given(finished: tuple[Study, Path], tmp_path: Path) -> None:
     """With a given policy no source is trained, and every seed starts from it."""
     policy = Run("source", 0).policy_file(finished[1])
     plan = tiny_plan(source_policy=policy)
@@ -229,9 +229,7 @@ def test_unknown_envs_are_refused() -> None:
         tiny_plan(task=TransferTask(EnvRef("shapechanger/BigAnd-v1"), BIG))
 
 
-def test_a_folder_of_another_study_is_left_alone(
-    finished: tuple[Study, Path], tmp_path: Path
-) -> None:
+def test_a_folder_of_another_study_is_refused(finished: tuple[Study, Path], tmp_path: Path) -> None:
     """The message names the differences; nothing is overwritten."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
@@ -240,7 +238,7 @@ def test_a_folder_of_another_study_is_left_alone(
     assert read_json(out / STUDY_FILE, Study, "") == finished[0]
 
 
-def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
     """A folder with other files is refused."""
     (tmp_path / "thesis.tex").write_text("precious")
     with pytest.raises(ForeignStudy, match="holds other files"):
@@ -310,7 +308,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     assert (tmp_path / "file").read_text() == "here"
 
 
-def test_a_disk_that_runs_full_loses_nothing(
+def test_a_full_disk_loses_nothing(
     finished: tuple[Study, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Finished runs are kept, and the study can be resumed."""
@@ -338,8 +336,8 @@ def test_a_study_of_an_env_without_layouts_is_refused() -> None:
         tiny_plan(task=TransferTask(bare, BIG))
 
 
-def test_settings_refuse_what_cannot_be(finished: tuple[Study, Path]) -> None:
-    """Evaluations cannot be more frequent than updates."""
+def test_evaluations_are_not_more_frequent_than_updates(finished: tuple[Study, Path]) -> None:
+    """Such settings are refused."""
     with pytest.raises(StudyError, match="more often than an update"):
         msgspec.structs.replace(TINY, eval_every=31)
     with pytest.raises(StudyError, match="at least one env"):
@@ -372,7 +370,7 @@ def test_a_layout_that_does_not_fit_its_space_is_refused(
         del gym.registry["tests/Misnamed-v0"]
 
 
-def test_an_argument_that_an_env_of_others_refuses_is_named() -> None:
+def test_an_argument_refused_by_a_foreign_env_is_named() -> None:
     """A TypeError of a constructor becomes a StudyError."""
     with pytest.raises(StudyError, match=r"CartPole-v1 cannot be made with these opt.*'colour'"):
         EnvRef("CartPole-v1", {"colour": "red"}).make()
@@ -386,7 +384,7 @@ class Failing(Misnamed):
         raise TypeError("can't multiply sequence by non-int")
 
 
-def test_an_env_that_fails_in_the_rollout_is_refused_in_a_sentence() -> None:
+def test_an_env_that_fails_in_the_rollout_is_refused() -> None:
     """The message names both envs, because either can fail."""
     with pytest.raises(
         StudyError, match=r"Failing.* or .*Misnamed.* fails in a short rollout \(can"

@@ -32,11 +32,11 @@ class _Stopped(Exception):
     """Raised by an executor that only records its jobs."""
 
 
-class _Told(Serial):
-    """Remembers which jobs it was given.
+class _Recording(Serial):
+    """Executor that records its jobs.
 
     Args:
-        refuses: Whether to do none of them.
+        refuses: Whether to run none of them.
     """
 
     def __init__(self, *, refuses: bool = False) -> None:
@@ -93,9 +93,9 @@ def _curves(study: Study) -> dict[str, list[tuple[int, float]]]:
 def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a suite with a finished Dry-to-Wet; tests use copies."""
     out = tmp_path_factory.mktemp("suite") / "suite"
-    told = _Told()
-    _run(_plan(DRY, WET), out, executor=told)
-    assert set(told.names) == _names(*_KINDS)
+    executor = _Recording()
+    _run(_plan(DRY, WET), out, executor=executor)
+    assert set(executor.names) == _names(*_KINDS)
     return out
 
 
@@ -105,18 +105,18 @@ def out(first: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(first, tmp_path / "suite"))
 
 
-def _asked_for(plan: Plan, out: Path) -> set[str]:
+def _requested(plan: Plan, out: Path) -> set[str]:
     """Return the runs that a study would perform, without performing them."""
-    told = _Told(refuses=True)
+    executor = _Recording(refuses=True)
     with pytest.raises(_Stopped):
-        _run(plan, out, executor=told)
-    return set(told.names)
+        _run(plan, out, executor=executor)
+    return set(executor.names)
 
 
-def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
+def test_runs_of_a_source_are_shared(out: Path) -> None:
     """Studies of one source share its policies and demonstrations."""
     plan = _plan(DRY, ICY)
-    assert _asked_for(plan, out) == _names(
+    assert _requested(plan, out) == _names(
         "random", "zero-action", "scratch", "zero-shot", "fine-tune"
     )
     there, here = out / "Dry-to-Wet", out / _study(plan)
@@ -131,11 +131,11 @@ def test_the_runs_of_a_source_are_done_once(out: Path) -> None:
         assert (there / "demonstrations" / name).read_bytes() == content
 
 
-def test_the_runs_of_a_target_are_done_once(out: Path) -> None:
+def test_runs_of_a_target_are_shared(out: Path) -> None:
     """Studies of one target share its runs, with the numbers of a study alone."""
-    plan, told = _plan(ICY, WET), _Told()
-    beside = _run(plan, out, executor=told)
-    assert set(told.names) == _names("source", "zero-shot", "fine-tune")
+    plan, executor = _plan(ICY, WET), _Recording()
+    beside = _run(plan, out, executor=executor)
+    assert set(executor.names) == _names("source", "zero-shot", "fine-tune")
     for name in _names("random", "zero-action", "scratch"):
         there, here = (out / study / "runs" / name for study in ("Dry-to-Wet", "Icy-to-Wet"))
         assert files_of(here) == files_of(there)
@@ -146,55 +146,53 @@ def test_the_runs_of_a_target_are_done_once(out: Path) -> None:
 
 def test_nothing_is_shared_by_studies_of_other_bodies(out: Path) -> None:
     """Studies with another source and target share nothing."""
-    assert _asked_for(_plan(WET, DRY), out) == _names(*_KINDS)
+    assert _requested(_plan(WET, DRY), out) == _names(*_KINDS)
 
 
 @pytest.mark.parametrize("differs", [{"seed": 1}, {"steps": 20}, {"source_steps": 40}])
-def test_a_study_with_another_plan_lends_nothing(out: Path, differs: dict[str, int]) -> None:
+def test_studies_with_other_plans_share_nothing(out: Path, differs: dict[str, int]) -> None:
     """Studies with other seeds or budgets share nothing."""
-    assert _asked_for(_plan(DRY, ICY, **differs), out) == _names(*_KINDS)
+    assert _requested(_plan(DRY, ICY, **differs), out) == _names(*_KINDS)
 
 
 def test_more_seeds_add_to_those_that_are_done(out: Path) -> None:
     """With more seeds, finished runs are reused."""
-    assert _asked_for(_plan(DRY, WET, seeds=3), out) == {
+    assert _requested(_plan(DRY, WET, seeds=3), out) == {
         f"{kind}-2" for kind in _KINDS if kind != "zero-action"
     }
-    beside = _asked_for(_plan(DRY, ICY, seeds=3), out)
+    beside = _requested(_plan(DRY, ICY, seeds=3), out)
     assert not beside & _names("source")
     with pytest.raises(ForeignStudy, match="differs in seeds"):
-        _asked_for(_plan(DRY, WET), out)
+        _requested(_plan(DRY, WET), out)
 
 
-def test_other_versions_lend_nothing(out: Path) -> None:
-    """Studies of other versions share nothing."""
+def test_studies_of_other_versions_share_nothing(out: Path) -> None:
+    """Versions of packages are part of the plan."""
     plan = _plan(DRY, ICY)
     other = msgspec.structs.replace(plan, versions={**plan.versions, "torch": "0.1"})
-    assert _asked_for(other, out) == _names(*_KINDS)
+    assert _requested(other, out) == _names(*_KINDS)
 
 
-def test_a_run_that_was_cut_off_is_not_lent(out: Path) -> None:
-    """Incomplete runs are not shared."""
+def test_incomplete_runs_are_not_shared(out: Path) -> None:
+    """They are repeated."""
     (out / "Dry-to-Wet" / "runs" / "source-1" / "run.json").unlink()
-    assert _asked_for(_plan(DRY, ICY), out) & _names("source") == {"source-1"}
+    assert _requested(_plan(DRY, ICY), out) & _names("source") == {"source-1"}
 
 
-def test_what_is_there_already_stays(out: Path) -> None:
+def test_existing_runs_are_kept(out: Path) -> None:
     """Runs are not copied twice, and a finished suite does nothing."""
     plan = _plan(DRY, ICY)
-    _asked_for(plan, out)
+    _requested(plan, out)
     taken_over = out / "Dry-to-Icy" / "runs" / "source-0" / "run.json"
     before = taken_over.stat().st_ino
-    _asked_for(plan, out)
+    _requested(plan, out)
     assert taken_over.stat().st_ino == before
-    told = _Told()
-    _run(_plan(DRY, WET), out, executor=told)
-    assert told.names == []
+    executor = _Recording()
+    _run(_plan(DRY, WET), out, executor=executor)
+    assert executor.names == []
 
 
-def test_a_copy_that_was_cut_off_counts_for_nothing(
-    out: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_partial_copies_are_removed(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs are copied atomically; parts of a copy are removed."""
 
     def full(theirs: Path, mine: Path) -> None:
@@ -207,22 +205,22 @@ def test_a_copy_that_was_cut_off_counts_for_nothing(
     with monkeypatch.context() as patch:
         patch.setattr(shutil, "copytree", full)
         with pytest.raises(OutputError, match="source-0: No space left"):
-            _run(plan, out, executor=_Told(refuses=True))
+            _run(plan, out, executor=_Recording(refuses=True))
     assert not (runs / "source-0").exists()
-    _asked_for(plan, out)
+    _requested(plan, out)
     assert sorted(path.name for path in runs.iterdir()) == ["source-0", "source-1"]
     assert files_of(runs / "source-0") == files_of(out / "Dry-to-Wet" / "runs" / "source-0")
 
 
-def test_a_neighbour_that_cannot_be_read_is_named(out: Path) -> None:
+def test_an_unreadable_study_is_named(out: Path) -> None:
     """A corrupt study of the suite is named with the remedy."""
     (out / "Dry-to-Wet" / "plan.json").write_text('{"half": ')
     with pytest.raises(CorruptStudy, match=r"to-Wet/plan\.json .*delete .*to-Wet to repeat"):
-        _run(_plan(DRY, ICY), out, executor=_Told(refuses=True))
+        _run(_plan(DRY, ICY), out, executor=_Recording(refuses=True))
 
 
-def test_a_folder_of_another_study_is_left_alone(out: Path) -> None:
-    """A folder of a study with another seed is refused."""
+def test_a_folder_of_another_study_is_refused(out: Path) -> None:
+    """The seed differs."""
     before = files_of(out)
     with pytest.raises(ForeignStudy, match="differs in seed"):
         _run(_plan(DRY, WET, seed=1), out, executor=Serial())
@@ -276,15 +274,15 @@ def test_a_policy_that_is_as_good_at_once_needs_no_step() -> None:
     assert found.halves
 
 
-def test_never_is_not_half() -> None:
+def test_never_reaching_the_level_does_not_count() -> None:
     """Fine-tuning that never reaches the level has no steps."""
     found = _crossing(np.full(11, 400.0))
     assert found.fine_tune_steps is None
     assert not found.halves
 
 
-def test_half_is_less_than_half() -> None:
-    """Exactly half of scratch's steps do not count as half."""
+def test_exactly_half_does_not_count() -> None:
+    """Less than half of scratch's steps are needed."""
     at_half = np.array([*[0.0] * 5, *[1000.0] * 6])
     assert _crossing(at_half).fine_tune_steps == pytest.approx(5120.0)
     assert not StudyOutcome("a", 1.0, None, 1.0, 5120.0, 2560.0).halves

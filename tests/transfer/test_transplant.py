@@ -269,7 +269,7 @@ def test_the_identity_changes_no_bit(kind: type[Model]) -> None:
 
 
 @each_class
-def test_there_and_back_changes_no_bit(kind: type[Model]) -> None:
+def test_there_and_back_is_bitwise_identical(kind: type[Model]) -> None:
     """To an ant with feet and back keeps all parameters bitwise."""
     there = MAPS["growth"]
     source = trained(kind, there, normalised=True)
@@ -305,7 +305,7 @@ def test_each_weight_goes_to_its_name() -> None:
 
 
 @each_class
-def test_new_inputs_are_open_to_training(kind: type[Model]) -> None:
+def test_new_inputs_can_be_trained(kind: type[Model]) -> None:
     """New inputs have weights of 0 and non-zero gradients."""
     body_map = MAPS["growth"]
     source = trained(kind, body_map)
@@ -327,7 +327,7 @@ def test_new_inputs_are_open_to_training(kind: type[Model]) -> None:
 
 @pytest.mark.parametrize("net_arch", [([16], [16]), ([], [])], ids=["[16]", "[]"])
 @each_class
-def test_what_is_to_be_learned_is_fresh(kind: type[Model], net_arch: Any) -> None:
+def test_learned_actions_have_fresh_weights(kind: type[Model], net_arch: Any) -> None:
     """Learned actions have the weights of an untrained policy of the seed."""
     body_map = ant_map(False, True, rules={"foot_*": "learn"})
     source = trained(kind, body_map, net_arch, policy={"log_std_init": -1.5})
@@ -419,7 +419,7 @@ def test_sac_follows_the_range() -> None:
     np.testing.assert_allclose(ours, 0.5 * source.predict(z, deterministic=True)[0], atol=1e-6)
 
 
-def test_critics_judge_copies_by_the_namesake_or_the_mean() -> None:
+def test_critics_use_the_equal_name_or_the_mean() -> None:
     """Critics are exact for the policy's actions; new and lost motors have no weight."""
     sensing = pendulum_observation(), pendulum_observation()
     cart = Layout((motor("a"), motor("b"), motor("lost")))
@@ -627,7 +627,7 @@ def test_action_noise_is_not_guessed() -> None:
 
 
 @each_class
-def test_a_transplanted_model_goes_on_learning(kind: type[Model]) -> None:
+def test_a_transplanted_model_can_be_trained(kind: type[Model]) -> None:
     """It trains from step 0, and the source model is unchanged."""
     body_map = MAPS["growth"]
     source = trained(kind, body_map, normalised=True)
@@ -644,7 +644,7 @@ def test_a_transplanted_model_goes_on_learning(kind: type[Model]) -> None:
         assert torch.equal(values, before[name])
 
 
-def test_a_plain_env_will_do() -> None:
+def test_a_plain_env_is_accepted() -> None:
     """An env that is not vectorised is accepted."""
     body_map = MAPS["growth"]
     env = Box(body_map.target_observation, body_map.target_action)
@@ -693,7 +693,7 @@ def _custom_mlp(body_map: BodyMap) -> Any:
 
 def _own_extractor(body_map: BodyMap) -> Any:
     class Own(FlattenExtractor):
-        """Not known."""
+        """An unsupported layer."""
 
     return trained(SAC, body_map, policy={"features_extractor_class": Own})
 

@@ -25,7 +25,7 @@ def _pair(env_id: str, threads: int, **more: Any) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("env_id", [_PENDULUM, "shapechanger/Ant-v1", "shapechanger/Hopper-v1"])
-def test_the_numbers_are_those_of_sb3(env_id: str, threads: int) -> None:
+def test_results_equal_those_of_sb3(env_id: str, threads: int) -> None:
     """Observations, rewards, ends and infos are equal, also in VecMonitor."""
     ours, theirs = (VecMonitor(one) for one in _pair(env_id, threads, max_episode_steps=60))
     for one in (ours, theirs):
@@ -39,7 +39,7 @@ def test_the_numbers_are_those_of_sb3(env_id: str, threads: int) -> None:
         (found, expected) = (one.step(actions) for one in (ours, theirs))
         for one in (found, expected):
             for info in one[3]:
-                info.get("episode", {}).pop("t", None)  # The time on the wall.
+                info.get("episode", {}).pop("t", None)  # Wall-clock time.
         require_same(found, expected)
         require_same(ours.reset_infos, theirs.reset_infos)
         ended += int(found[2].sum())
@@ -89,7 +89,7 @@ def test_pictures_are_tiled() -> None:
     envs.close()
 
 
-def test_envs_of_strangers_are_stepped_by_sb3() -> None:
+def test_foreign_envs_use_dummy_vec_env() -> None:
     """Envs of other packages are stepped by DummyVecEnv."""
     for env_id, kind in ((_PENDULUM, ThreadVecEnv), ("CartPole-v1", DummyVecEnv)):
         envs = training_vec_env(EnvRef(env_id), 2, 1)

@@ -23,8 +23,8 @@ class Line:
 
     Attributes:
         network: The network.
-        near: The end of whoever connected.
-        far: The end of whoever was connected to.
+        near: Socket of the connecting side.
+        far: Socket of the accepting side.
     """
 
     def __init__(self, network: BadNetwork, listener: socket.socket) -> None:

@@ -23,7 +23,7 @@ def _pin(ms: float, pin: int, duty: float) -> Transition:
 
 
 def test_driving_within_a_deadline_is_allowed() -> None:
-    """Driving within the deadline of a command is no violation."""
+    """Driving within the deadline of a command is not a violation."""
     ledger = [_pin(10, 22, 0.5), _pin(200, 22, 0.0)]
     assert unauthorised(ledger, _NO_ONE_SHOT, [ExpectedCommand(9 * _MS, 1000)], 250) == []
 

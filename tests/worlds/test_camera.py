@@ -30,8 +30,8 @@ def _model(colour: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_it_sees_what_is_ahead_of_it() -> None:
-    """The camera renders the selected model."""
+def test_it_renders_the_selected_model() -> None:
+    """The image shows the geom ahead of the camera."""
     camera = OnboardCamera((32, 16))
     for colour, brightest in (("1 0 0", 0), ("0 1 0", 1)):
         model, data = _model(colour)
@@ -44,7 +44,7 @@ def test_it_sees_what_is_ahead_of_it() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_pictures_share_no_memory() -> None:
+def test_images_share_no_memory() -> None:
     """Each picture is a new array."""
     camera = OnboardCamera((32, 16))
     model, data = _model("1 0 0")
@@ -57,8 +57,8 @@ def test_pictures_share_no_memory() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_two_draw_side_by_side() -> None:
-    """Two cameras can render in turn."""
+def test_two_cameras_render_in_turn() -> None:
+    """Contexts do not disturb each other."""
     cameras = [OnboardCamera((32, 16)), OnboardCamera((16, 16))]
     models = [_model("1 0 0"), _model("0 0 1")]
     for camera, (model, _) in zip(cameras, models, strict=True):
@@ -72,8 +72,8 @@ def test_two_draw_side_by_side() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_who_forgets_to_close_it_loses_nothing() -> None:
-    """An unclosed camera frees its context, and `close` can be called twice."""
+def test_an_unclosed_camera_frees_its_context() -> None:
+    """Garbage collection frees it, and `close` can be called twice."""
     model, data = _model("1 0 0")
     for _ in range(3):
         camera = OnboardCamera((32, 16))
@@ -86,7 +86,7 @@ def test_who_forgets_to_close_it_loses_nothing() -> None:
     camera.close()
 
 
-def test_a_camera_that_looks_at_nothing_says_so() -> None:
+def test_a_camera_without_a_model_raises() -> None:
     """`picture` raises before a model is selected and after `close`."""
     model, data = _model("1 0 0")
     camera = OnboardCamera((32, 16))
@@ -99,13 +99,13 @@ def test_a_camera_that_looks_at_nothing_says_so() -> None:
 
 
 @pytest.mark.parametrize("size", [(0, 16), (16, 0), (-1, -1)])
-def test_no_picture_has_no_pixels(size: tuple[int, int]) -> None:
+def test_invalid_sizes_are_refused(size: tuple[int, int]) -> None:
     """Sizes below 1 pixel raise an error with the size."""
     with pytest.raises(RenderError, match=f"cannot be {size[0]} x {size[1]} pixels"):
         OnboardCamera(size)
 
 
-def test_a_fork_of_who_draws_is_told_how_to_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rendering_after_a_fork_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process forked after rendering raises an error instead of a deadlock."""
     monkeypatch.setattr(module, "_drawing", {os.getpid() + 1})
     camera = OnboardCamera((32, 16))

@@ -11,7 +11,7 @@ from shapechanger.bodies.vehicles import Motion
 from shapechanger.worlds.simulation import APART_S, BUMPER_SPREAD, ContactTracker
 
 _DT = 0.01
-# A ball of 0.1 m that can be put anywhere, a wall whose face is at x = 1 m, and the ground.
+# A movable ball of 0.1 m, a wall with its face at x = 1 m, and the ground.
 _MODEL = """
 <mujoco><option gravity="0 0 0"/><worldbody>
 <geom name="world/ground" type="plane" size="5 5 1"/>
@@ -29,15 +29,15 @@ class _Bench:
         self.touch = ContactTracker(self.model)
 
     def stand(self, x: float, seconds: float = _DT, heading: float = 0.0) -> None:
-        """Stay at x for some time."""
+        """Stay at x for a while."""
         self.data.qpos[:3] = x, 0.0, 0.1
         mujoco.mj_forward(self.model, self.data)
         for _ in range(round(seconds / _DT)):
             self.touch.follow(self.data, Motion(x, 0.0, heading, 0.0, 0.0, 0.0), _DT)
 
 
-def test_the_ground_is_nothing_to_run_into() -> None:
-    """Contact with the ground is no collision."""
+def test_ground_contact_is_no_collision() -> None:
+    """Contacts with the ground are ignored."""
     bench = _Bench()
     bench.stand(0.0)
     assert bench.data.ncon > 0
@@ -45,7 +45,7 @@ def test_the_ground_is_nothing_to_run_into() -> None:
     assert bench.touch.collisions == 0
 
 
-def test_a_wall_is() -> None:
+def test_wall_contact_is_a_collision() -> None:
     """A lasting contact is one collision."""
     bench = _Bench()
     bench.stand(0.91, seconds=3.0)
@@ -55,7 +55,7 @@ def test_a_wall_is() -> None:
     assert not bench.touch.touches
 
 
-def test_a_vehicle_that_bounces_ran_into_it_once() -> None:
+def test_bouncing_counts_once() -> None:
     """Contacts within 0.5 s are one collision, later ones another."""
     bench = _Bench()
     bench.stand(0.91)
@@ -67,7 +67,7 @@ def test_a_vehicle_that_bounces_ran_into_it_once() -> None:
     assert bench.touch.collisions == 2
 
 
-def test_after_it_was_lifted_off_the_next_one_counts() -> None:
+def test_a_contact_after_release_counts() -> None:
     """A contact after `release` is a new collision."""
     bench = _Bench()
     bench.stand(0.91)
@@ -77,7 +77,7 @@ def test_after_it_was_lifted_off_the_next_one_counts() -> None:
     assert bench.touch.collisions == 2
 
 
-def test_a_reset_forgets() -> None:
+def test_a_reset_clears_collisions() -> None:
     """`reset` clears the counter and the bumper."""
     bench = _Bench()
     bench.stand(0.91)

@@ -20,7 +20,7 @@ def _picture(height: int = 120, width: int = 160) -> Picture:
 
 @_ALL
 @pytest.mark.parametrize("size", [(120, 160), (64, 64), (33, 47)])
-def test_a_lens_gives_a_picture_of_the_same_size(change: Lens, size: tuple[int, int]) -> None:
+def test_lenses_keep_size_and_type(change: Lens, size: tuple[int, int]) -> None:
     """A lens keeps the shape and dtype."""
     before = _picture(*size)
     kept = before.copy()
@@ -33,7 +33,7 @@ def test_a_lens_gives_a_picture_of_the_same_size(change: Lens, size: tuple[int, 
 
 
 @_ALL
-def test_a_lens_is_a_function_of_picture_and_seed(change: Lens) -> None:
+def test_lenses_are_deterministic(change: Lens) -> None:
     """A lens is a function of picture and seed, and does not change its input."""
     np.testing.assert_array_equal(change(_picture(), 5), change(_picture(), 5))
 
@@ -44,8 +44,8 @@ def test_another_seed_gives_another_picture(change: Lens) -> None:
     assert not np.array_equal(change(_picture(), 5), change(_picture(), 6))
 
 
-def test_night_leaves_half_of_the_brightness_and_its_noise_moves() -> None:
-    """Night halves the brightness, and its noise varies between pictures."""
+def test_night_halves_the_brightness_and_adds_noise() -> None:
+    """Noise varies between images."""
     white = np.full((120, 160, 3), 255, np.uint8)
     dark = night(white, 0)
     assert dark.mean(axis=(0, 1)) == pytest.approx([117.3, 127.5, 168.3], abs=0.5)
@@ -63,7 +63,7 @@ def test_glare_only_adds_light() -> None:
     assert lit.min() >= 20
 
 
-def test_blur_keeps_the_light_and_spreads_a_point() -> None:
+def test_blur_keeps_the_sum() -> None:
     """Blur keeps the sum, with a standard deviation of 1.25 % of the width."""
     point = np.zeros((121, 161, 3), np.uint8)
     point[56:65, 76:85] = 255
@@ -74,7 +74,7 @@ def test_blur_keeps_the_light_and_spreads_a_point() -> None:
     assert variance == pytest.approx((81 - 1) / 12 + (0.0125 * 161) ** 2, rel=0.05)
 
 
-def test_dirt_stays_where_it_is() -> None:
+def test_dirt_does_not_move() -> None:
     """Spots do not move between pictures, and most pixels stay clean."""
     white = np.full((120, 160, 3), 255, np.uint8)
     grey = np.full((120, 160, 3), 200, np.uint8)
@@ -84,7 +84,7 @@ def test_dirt_stays_where_it_is() -> None:
     assert darker[spots].max() < 200
 
 
-def test_an_unknown_lens_names_the_nearest() -> None:
+def test_an_unknown_lens_is_refused() -> None:
     """The error suggests the nearest name."""
     assert find_lens("night") is night
     with pytest.raises(UnknownName, match="Did you mean 'glare'"):

@@ -28,7 +28,7 @@ def test_a_random_look_stays_in_its_ranges(world: str) -> None:
             assert 0.75 <= channel <= 1.0
 
 
-def test_a_random_look_follows_from_its_generator_and_varies_in_everything() -> None:
+def test_random_looks_are_reproducible() -> None:
     """Equal seeds give equal looks; another seed changes each attribute."""
     one, same, other = (Look.random("corridor", np.random.default_rng(seed)) for seed in (1, 1, 2))
     assert one == same
@@ -36,7 +36,7 @@ def test_a_random_look_follows_from_its_generator_and_varies_in_everything() -> 
         assert getattr(one, part.name) != getattr(other, part.name)
 
 
-def test_tone_is_a_colour_whatever_the_light() -> None:
+def test_tones_are_in_range() -> None:
     """Tones stay within 0 to 1."""
     for light in (0.0, 0.5, 1.0, 3.0):
         assert all(0.0 <= c <= 1.0 for c in Look(light=light, warmth=1.0).tone())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import WorldError
 from shapechanger.worlds.camera import CameraJitter, move_camera
 
-# It looks along x, with z up, as those on the vehicles do.
+# Looks along x, with z up, as the cameras of vehicles.
 _MODEL = """
 <mujoco><worldbody><body><geom size="0.1"/>
 <camera name="eye" pos="0.05 0 0.12" xyaxes="0 -1 0 0 0 1"/>
@@ -33,19 +33,19 @@ def _axes(model: mujoco.MjModel) -> NDArray[np.float64]:
     return axes.reshape(3, 3)
 
 
-def test_none_is_none() -> None:
-    """A zero error keeps the pose."""
+def test_a_zero_error_keeps_the_pose() -> None:
+    """No offset and no rotation."""
     assert _moved(CameraJitter()).camera("eye").pos == pytest.approx([0.05, 0.0, 0.12])
     np.testing.assert_allclose(_axes(_moved(CameraJitter()))[:, 2], [-1, 0, 0], atol=1e-9)
 
 
-def test_places_are_up_and_left() -> None:
+def test_offsets_are_up_and_left() -> None:
     """Offsets are upwards and to the left."""
     place = _moved(CameraJitter(up_m=0.01, left_m=0.02)).camera("eye").pos
     assert place == pytest.approx([0.05, 0.02, 0.13])
 
 
-def test_each_angle_turns_the_way_it_says() -> None:
+def test_directions_of_the_angles() -> None:
     """Pitch turns down, yaw to the left, and roll clockwise."""
     few = 0.05
     ahead_down = -_axes(_moved(CameraJitter(pitch_rad=few)))[:, 2]
@@ -56,7 +56,7 @@ def test_each_angle_turns_the_way_it_says() -> None:
     np.testing.assert_allclose(up_right, [0.0, -math.sin(few), math.cos(few)], atol=1e-9)
 
 
-def test_random_ones_are_small_and_of_both_signs() -> None:
+def test_random_errors_are_within_their_ranges() -> None:
     """Random errors are within their ranges, of both signs and reproducible."""
     drawn = [CameraJitter.random(np.random.default_rng(seed)) for seed in range(200)]
     for name, most in {
@@ -82,7 +82,7 @@ def test_a_camera_stays_on_its_vehicle(jitter: CameraJitter) -> None:
 
 
 @pytest.mark.parametrize("jitter", [CameraJitter(left_m=math.nan), CameraJitter(roll_rad=math.inf)])
-def test_a_camera_is_off_by_numbers(jitter: CameraJitter) -> None:
+def test_non_finite_errors_are_refused(jitter: CameraJitter) -> None:
     """Errors must be finite."""
     with pytest.raises(WorldError, match="must be finite, got"):
         _moved(jitter)

@@ -1,4 +1,4 @@
-"""Rectified pictures, and measuring a camera."""
+"""Rectified images, and measuring a camera."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_rectified_pictures_of_vehicles_agree() -> None:
         geometry = CameraGeometry(math.degrees(mount.pitch_rad), mount.fovy_deg)
         with closing(MujocoWorld(vehicle, "corridor", 11)) as world:
             start = world.pose
-            # The lens of each at the same place.
+            # Put all lenses at the same place.
             ahead = 0.12 - mount.x
             world.put(
                 Pose(
@@ -76,7 +76,7 @@ def test_rectified_pictures_of_vehicles_agree() -> None:
         assert after < 0.6 * before
 
 
-def test_a_camera_that_looks_elsewhere_is_refused() -> None:
+def test_a_camera_that_misses_the_view_is_refused() -> None:
     """Cameras that do not cover the virtual view are refused."""
     with pytest.raises(WorldError, match=r"looks 30 degrees down .* misses 60 %"):
         Rectifier(CameraGeometry(30.0, 48.8), _SIZE)
@@ -122,7 +122,7 @@ def board_picture(
     ("pitch_deg", "fovy_deg", "turned_deg", "roll_deg"),
     [(0.0, 48.8, 35.0, 0.0), (4.0, 48.8, -35.0, 2.0), (-6.0, 62.0, 40.0, 0.0)],
 )
-def test_a_board_tells_pitch_and_field_of_view(
+def test_a_board_gives_pitch_and_field_of_view(
     pitch_deg: float, fovy_deg: float, turned_deg: float, roll_deg: float
 ) -> None:
     """The pitch is measured to 0.1 degrees and the field of view to 0.5."""
@@ -154,7 +154,7 @@ def test_pictures_without_the_board_are_refused() -> None:
 
 
 @pytest.mark.parametrize(("pitch_deg", "fovy_deg"), [(0.0, 48.8), (5.0, 48.8), (-3.0, 62.0)])
-def test_a_horizon_tells_the_pitch(pitch_deg: float, fovy_deg: float) -> None:
+def test_a_horizon_gives_the_pitch(pitch_deg: float, fovy_deg: float) -> None:
     """The row of the horizon gives the pitch."""
     high = _SIZE[1]
     row = float((_horizon(pitch_deg, fovy_deg)[:, 0, 0] == 255).sum())

@@ -46,7 +46,7 @@ def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
 
 
 @_EACH
-def test_a_vehicle_begins_at_home_and_at_rest(vehicle: str) -> None:
+def test_a_vehicle_starts_in_its_default_world_at_rest(vehicle: str) -> None:
     """A vehicle starts in its default world, at rest and free."""
     world = _world(vehicle)
     seen = world.inputs()
@@ -67,8 +67,8 @@ def test_driving_ahead_is_progress(vehicle: str) -> None:
     assert world.inputs().travelled_m > 0.2
 
 
-def test_the_same_happens_again() -> None:
-    """Simulation is deterministic."""
+def test_simulation_is_deterministic() -> None:
+    """Equal seeds and outputs give equal poses."""
     poses = []
     for _ in range(2):
         world = _world()
@@ -77,7 +77,7 @@ def test_the_same_happens_again() -> None:
     assert poses[0] == poses[1]
 
 
-def test_it_does_not_matter_how_time_is_cut() -> None:
+def test_the_time_step_of_calls_does_not_matter() -> None:
     """The remainder of a step is carried over to the next call."""
     cut, steps, whole = _world(), _world(), _world()
     for _ in range(300):
@@ -92,7 +92,7 @@ def test_it_does_not_matter_how_time_is_cut() -> None:
     assert cut.data.time == pytest.approx(100 * SIM_DT)
 
 
-def test_placing_begins_anew_where_the_seed_says() -> None:
+def test_place_restarts_at_a_seeded_pose() -> None:
     """`place` resets motion and progress, and its seed gives the pose."""
     world = _world()
     world.place(5)
@@ -106,7 +106,7 @@ def test_placing_begins_anew_where_the_seed_says() -> None:
     assert world.inputs().speed == 0.0
 
 
-def test_the_odometer_counts_through_every_start() -> None:
+def test_place_keeps_the_odometer() -> None:
     """`place` keeps the travelled distance."""
     world = _world()
     _drive(world, _AHEAD["car"], 1.0)
@@ -117,8 +117,8 @@ def test_the_odometer_counts_through_every_start() -> None:
     assert world.inputs().travelled_m < before
 
 
-def test_another_course_is_another_course() -> None:
-    """`lay_out` changes the course, reproducibly."""
+def test_lay_out_changes_the_course() -> None:
+    """`lay_out` is reproducible."""
     world = _world()
     walls = world.course.walls
     world.lay_out(4)
@@ -128,7 +128,7 @@ def test_another_course_is_another_course() -> None:
     assert world.course.walls == walls
 
 
-def test_the_battery_gives_way_under_load() -> None:
+def test_the_battery_sags_under_load() -> None:
     """The battery's voltage drops with current and with `resting_v`."""
     world = _world()
     idle = world.inputs()
@@ -141,14 +141,14 @@ def test_the_battery_gives_way_under_load() -> None:
     assert world.inputs().battery_v < 6.0
 
 
-def test_a_wall_ahead_is_as_far_as_it_is() -> None:
+def test_the_distance_to_a_wall() -> None:
     """`distance_m` is measured from the front bumper."""
     world = _world()
     world.put(_before_a_wall(world, 0.9))
     assert world.distance_m() == pytest.approx(0.9 - world.vehicle.nose_m, abs=0.005)
 
 
-def test_running_into_a_wall_is_one_collision_that_the_bumper_tells() -> None:
+def test_running_into_a_wall_is_one_collision() -> None:
     """A crash stops the car, presses the bumper and counts once."""
     world = _world()
     world.put(_before_a_wall(world, 0.7))
@@ -160,7 +160,7 @@ def test_running_into_a_wall_is_one_collision_that_the_bumper_tells() -> None:
     assert world.distance_m() == pytest.approx(0.0, abs=0.03)
 
 
-def test_who_is_put_back_can_drive_on() -> None:
+def test_put_back_frees_the_vehicle() -> None:
     """After `put_back` the vehicle is free nearby, and collisions and progress are kept."""
     world = _world()
     world.put(_before_a_wall(world, 0.7))
@@ -178,7 +178,7 @@ def test_who_is_put_back_can_drive_on() -> None:
     assert world.progress_m > progress + 0.05
 
 
-def test_acceleration_is_what_it_feels() -> None:
+def test_acceleration_in_the_body_frame() -> None:
     """Acceleration is forward at a start and centripetal in a bend."""
     world = _world()
     _drive(world, _AHEAD["car"], 0.05)
@@ -189,7 +189,7 @@ def test_acceleration_is_what_it_feels() -> None:
     assert seen.acceleration_y == pytest.approx(seen.speed * seen.yaw_rate, rel=0.2)
 
 
-def test_a_current_sets_a_boat_adrift() -> None:
+def test_a_boat_drifts_with_the_current() -> None:
     """A boat without thrust drifts with the current."""
     world = _world("boat")
     start, flow = world.pose, world.course.current_mps
@@ -199,7 +199,7 @@ def test_a_current_sets_a_boat_adrift() -> None:
     assert moved[0] * flow[0] + moved[1] * flow[1] > 0.0
 
 
-def test_without_a_camera_there_is_no_picture() -> None:
+def test_picture_needs_a_camera() -> None:
     """The error names the missing argument."""
     with pytest.raises(WorldError, match="has no camera: pass a `size`"):
         _world().picture()
@@ -212,13 +212,13 @@ def test_without_a_camera_there_is_no_picture() -> None:
         ("car", "harbour", "A car does not float: it cannot drive in a harbour"),
     ],
 )
-def test_who_cannot_drive_there_hears_why(vehicle: str, world: str, sentence: str) -> None:
+def test_unsuitable_worlds_are_refused(vehicle: str, world: str, sentence: str) -> None:
     """Boats need water, and other vehicles land."""
     with pytest.raises(WorldError, match=sentence):
         MujocoWorld(vehicle, world, size=None)
 
 
-def test_names_that_nothing_bears() -> None:
+def test_unknown_names_are_refused() -> None:
     """Errors suggest the nearest name."""
     with pytest.raises(UnknownName, match=r"No vehicle matches 'tnak'. Did you mean 'tank'"):
         MujocoWorld("tnak", "corridor", size=None)
@@ -228,7 +228,7 @@ def test_names_that_nothing_bears() -> None:
         MujocoWorld("car", size=None, lenses=("nihgt",))
 
 
-def test_what_is_refused_leaves_the_world_as_it_was() -> None:
+def test_a_failed_layout_changes_nothing() -> None:
     """A failed `lay_out` leaves the world unchanged."""
     world = _world()
     model, course, look = world.model, world.course, world.look
@@ -241,7 +241,7 @@ def test_what_is_refused_leaves_the_world_as_it_was() -> None:
     _drive(world, _AHEAD["car"], 0.2)
 
 
-def test_a_course_that_comes_out_too_tight_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_layout_error_keeps_the_course(monkeypatch: pytest.MonkeyPatch) -> None:
     """An error of the layout propagates and keeps the old course."""
     world = _world()
 
@@ -250,13 +250,13 @@ def test_a_course_that_comes_out_too_tight_is_told_of(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(simulation, "lay_out", too_tight)
     with pytest.raises(WorldError, match="No corridor with seed 77777 can be laid out"):
-        world.lay_out(77_777)  # A course that no other test keeps.
+        world.lay_out(77_777)  # Not in the cache of another test.
     assert world.seed == 3
 
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_a_picture_shows_the_course_and_its_light() -> None:
+def test_an_image_shows_the_course_and_its_light() -> None:
     """Pictures have the requested size and show the look."""
     world = MujocoWorld("car", seed=3, size=(64, 48))
     bright = world.picture()
@@ -271,7 +271,7 @@ def test_a_picture_shows_the_course_and_its_light() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_a_moved_camera_sees_something_else() -> None:
+def test_a_moved_camera_changes_the_image() -> None:
     """A camera error lasts until the next layout."""
     world = MujocoWorld("car", seed=3, size=(64, 48))
     usual = world.picture()
@@ -284,7 +284,7 @@ def test_a_moved_camera_sees_something_else() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_lenses_spoil_pictures_and_nothing_else() -> None:
+def test_lenses_change_images_only() -> None:
     """Lenses change pictures only."""
     clear = MujocoWorld("car", seed=3, size=(64, 48))
     night = MujocoWorld("car", seed=3, size=(64, 48), lenses=("night", "dirt"))

@@ -1,4 +1,4 @@
-"""Fingers and commands for several tests."""
+"""Fingers and commands shared by tests."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from shapechanger.bodies.finger import (
 )
 from shapechanger.bodies.finger.anatomy import JOINT_REST
 
-# With each fault that the model knows.
+# With every imperfection of the model.
 STRETCHED = NOMINAL.replace(
     tendon_stiffness=10e3, tendon_friction=1.0, backlash=0.5e-3, command_delay=0.03
 )
 
 
 def modes() -> list[str]:
-    """Every mode of action."""
+    """Return every action mode."""
     return list(DRIVES)
 
 
 def made(
     parameters: FingerParameters = NOMINAL, mode: str = "tension", *, anatomy: bool = False
 ) -> mujoco.MjModel:
-    """The compiled finger."""
+    """Return the compiled finger."""
     return build_finger(parameters, drive_of(mode, NOMINAL), anatomy=anatomy).compile()
 
 

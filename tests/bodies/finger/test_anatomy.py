@@ -14,8 +14,8 @@ from shapechanger.bodies.finger.anatomy import (
     PHALANX_LENGTH_M,
 )
 
-# What a newton of each tendon gives at the fingertip of a cadaver's index finger: force aside,
-# along and across it, N, and torque about it, N·m (R/main.r of github.com/bc/stfeasibility).
+# Effect of 1 N of each tendon at the fingertip of a cadaver's index finger: force sideways, along
+# and across it, N, and torque about it, N·m (R/main.r of github.com/bc/stfeasibility).
 _ASIDE = [-0.08941, -0.0447, -0.009249, 0.03669, 0.1421, 0.2087, -0.2138]
 _ALONG = [-0.04689, -0.1496, 0.052, 0.052, 0.0248, 0.0, 0.0248]
 _ACROSS = [0.06472, 0.001953, -0.1518, -0.1518, 0.2919, 0.0568, 0.2067]
@@ -23,10 +23,10 @@ _TORQUE = [0.003081, -0.002352, -0.0001649, -0.0001649, -0.0004483, 0.0001579, -
 _FDS, _DI = 1, 5
 
 
-def test_moment_arms_follow_from_what_was_measured_at_a_fingertip() -> None:
+def test_moment_arms_follow_from_measured_forces() -> None:
     """Moment arms follow from the measured fingertip forces."""
     aside, along, across, torque = map(np.array, (_ASIDE, _ALONG, _ACROSS, _TORQUE))
-    # Two tendons have no arm at the end joint: that tells where the joint is, seen from the tip.
+    # Two tendons have no arm at the last joint, which gives its position relative to the tip.
     y = torque[_DI] / across[_DI]
     z = (torque[_FDS] - y * across[_FDS]) / -along[_FDS]
     assert math.hypot(y, z) == pytest.approx(0.016, abs=1e-4)
@@ -40,6 +40,6 @@ def test_moment_arms_follow_from_what_was_measured_at_a_fingertip() -> None:
     np.testing.assert_allclose(1e3 * MOMENT_ARMS, 1e3 * arms, atol=0.06)
 
 
-def test_no_tendon_is_pulled_harder_than_its_muscle_can() -> None:
+def test_tension_limits_are_below_the_muscles_force() -> None:
     """Tension limits are at most 30 % of the muscles' force."""
     assert (MOST_TENSION_N <= 0.3 * FORCE_POTENTIAL_N + 1e-12).all()

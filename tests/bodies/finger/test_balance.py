@@ -19,7 +19,7 @@ from shapechanger.bodies.finger.tensions import (
 _MICRO = 1e-6
 
 
-def test_the_tendons_of_a_finger_give_every_torque() -> None:
+def test_the_nominal_finger_spans_all_torques() -> None:
     """Non-negative tensions of the finger span all torques."""
     assert spans_all_torques(MOMENT_ARMS)
     for j in range(len(JOINTS)):
@@ -28,15 +28,15 @@ def test_the_tendons_of_a_finger_give_every_torque() -> None:
             assert tensions_for_torque(MOMENT_ARMS, torque, 0.0, 1e3)[1]
 
 
-def test_co_contraction_moves_nothing() -> None:
-    """Co-contraction has no torque and a smallest tension of 1."""
+def test_co_contraction_has_no_torque() -> None:
+    """The smallest tension of a co-contraction is 1."""
     tensions = co_contraction(MOMENT_ARMS)
     assert tensions is not None
     assert tensions.min() == pytest.approx(1.0)
     np.testing.assert_allclose(MOMENT_ARMS.T @ tensions, 0.0, atol=1e-12)
 
 
-def test_which_tendons_a_finger_cannot_do_without() -> None:
+def test_necessary_tendons() -> None:
     """Without FDP, FDS or PI, some torques are out of reach; the other tendons are redundant."""
     needed = [
         name
@@ -46,8 +46,8 @@ def test_which_tendons_a_finger_cannot_do_without() -> None:
     assert needed == ["FDP", "FDS", "PI"]
 
 
-def test_arms_that_do_not_span_are_refused() -> None:
-    """Arms that do not span all torques are detected."""
+def test_arms_that_do_not_span_are_detected() -> None:
+    """`spans_all_torques` is false, and there is no co-contraction."""
     assert not spans_all_torques(np.abs(MOMENT_ARMS))
     assert co_contraction(np.abs(MOMENT_ARMS)) is None
     numb = MOMENT_ARMS.copy()
@@ -55,7 +55,7 @@ def test_arms_that_do_not_span_are_refused() -> None:
     assert co_contraction(numb) is not None
     assert not spans_all_torques(numb)
     assert not spans_all_torques(np.zeros((7, 4)))
-    # As much quoted: these extend the middle and the end joint too hard for any balance.
+    # Values often quoted: they extend the middle and last joints too strongly to be balanced.
     quoted = np.array(
         [
             (11.1, 1.1, 7.9, 4.1),
@@ -71,7 +71,7 @@ def test_arms_that_do_not_span_are_refused() -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-def test_spanning_is_what_it_says(seed: int) -> None:
+def test_spanning_agrees_with_linear_programming(seed: int) -> None:
     """`spans_all_torques` agrees with solving for random torques."""
     rng = np.random.default_rng(seed)
     arms = MOMENT_ARMS * (1.0 + rng.uniform(-0.8, 0.8, MOMENT_ARMS.shape))
@@ -96,8 +96,8 @@ def _problem(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_tensions_stay_within_bounds_and_say_whether_they_are_enough(seed: int) -> None:
-    """Tensions keep to the bounds, and the flag tells whether they give the torque."""
+def test_tensions_are_within_bounds(seed: int) -> None:
+    """The flag states whether the tensions give the torque."""
     arms, torque, low, high = _problem(seed)
     tensions, is_enough = tensions_for_torque(arms, torque, low, high)
     assert (tensions >= low - 1e-9).all()
@@ -112,7 +112,7 @@ def test_tensions_stay_within_bounds_and_say_whether_they_are_enough(seed: int) 
 
 
 @pytest.mark.parametrize("seed", range(0, 40, 2))
-def test_no_other_tensions_hold_it_with_less(seed: int) -> None:
+def test_tensions_are_minimal(seed: int) -> None:
     """No other solution has less co-contraction."""
     arms, torque, low, high = _problem(seed)
     tensions, _ = tensions_for_torque(arms, torque, low, high)
@@ -123,8 +123,8 @@ def test_no_other_tensions_hold_it_with_less(seed: int) -> None:
     assert np.linalg.norm(tensions - low) <= np.linalg.norm(other.x) * (1.0 + 1e-3)
 
 
-def test_nothing_asked_is_nothing_given() -> None:
-    """The torque of the smallest tensions gives the smallest tensions."""
+def test_the_torque_of_the_least_tensions_gives_them() -> None:
+    """The least tensions are returned for their own torque."""
     least = np.full(7, LEAST_TENSION_N)
     tensions, is_enough = tensions_for_torque(
         MOMENT_ARMS, MOMENT_ARMS.T @ least, LEAST_TENSION_N, MOST_TENSION_N
@@ -133,8 +133,8 @@ def test_nothing_asked_is_nothing_given() -> None:
     np.testing.assert_allclose(tensions, least, atol=1e-6)
 
 
-def test_too_much_is_not_enough() -> None:
-    """An impossible torque is reported."""
+def test_an_impossible_torque_is_reported() -> None:
+    """The flag is false, and the tensions stay within bounds."""
     tensions, is_enough = tensions_for_torque(
         MOMENT_ARMS, [5.0, 0.0, 0.0, 0.0], LEAST_TENSION_N, MOST_TENSION_N
     )

@@ -20,8 +20,8 @@ _REST = -MOMENT_ARMS @ JOINT_REST
 
 
 @pytest.mark.parametrize("mode", DRIVES)
-def test_a_command_asks_for_the_tension_that_asked_for_it(mode: str) -> None:
-    """`command` inverts `tension`, and tension grows with the command."""
+def test_command_inverts_tension(mode: str) -> None:
+    """Tension grows with the command."""
     rng = np.random.default_rng(0)
     drive = drive_of(mode, NOMINAL)
     command, length, speed = rng.uniform(-1, 1, (3, 7)) * [[1.0], [0.01], [0.2]]
@@ -31,15 +31,15 @@ def test_a_command_asks_for_the_tension_that_asked_for_it(mode: str) -> None:
 
 
 @pytest.mark.parametrize("mode", ["tension", "impedance"])
-def test_a_tension_goes_from_its_least_to_its_most(mode: str) -> None:
-    """At rest length, commands span the range of tensions."""
+def test_commands_span_the_tensions(mode: str) -> None:
+    """At the resting length, -1 and 1 give the least and the largest tension."""
     drive = drive_of(mode, NOMINAL)
     np.testing.assert_allclose(drive.tension(-np.ones(7), _REST, _STILL), LEAST_TENSION_N)
     np.testing.assert_allclose(drive.tension(np.ones(7), _REST, _STILL), MOST_TENSION_N)
 
 
-def test_a_muscle_resists_being_stretched() -> None:
-    """Impedance adds stiffness and damping; tension does not."""
+def test_impedance_has_stiffness_and_damping() -> None:
+    """The mode "tension" has neither."""
     longer = _REST + 0.01
     muscle, plain = drive_of("impedance", NOMINAL), drive_of("tension", NOMINAL)
     more = muscle.tension(_STILL, longer, _STILL) - muscle.tension(_STILL, _REST, _STILL)
@@ -50,8 +50,8 @@ def test_a_muscle_resists_being_stretched() -> None:
     )
 
 
-def test_lengths_go_from_the_longest_to_the_shortest() -> None:
-    """Length commands span all postures."""
+def test_length_commands_span_all_postures() -> None:
+    """In any posture, -1 gives the least and 1 the largest tension."""
     drive = drive_of("length", NOMINAL)
     rng = np.random.default_rng(0)
     for angles in rng.uniform(JOINT_RANGE[:, 0], JOINT_RANGE[:, 1], (50, 4)):
@@ -60,7 +60,7 @@ def test_lengths_go_from_the_longest_to_the_shortest() -> None:
         assert (drive.tension(np.ones(7), length, _STILL) >= MOST_TENSION_N).all()
 
 
-def test_a_mode_that_there_is_not_is_named() -> None:
+def test_an_unknown_mode_is_refused() -> None:
     """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"'tensions'. Did you mean 'tension'\? There are: imped"):
         drive_of("tensions", NOMINAL)

@@ -22,8 +22,8 @@ from tests.bodies.finger.commands import STRETCHED, at_rest, made, modes
 
 @pytest.mark.parametrize("mode", modes())
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
-def test_what_is_shown_moves_nothing(parameters: FingerParameters, mode: str) -> None:
-    """Anatomy does not change the simulation."""
+def test_anatomy_does_not_change_the_simulation(parameters: FingerParameters, mode: str) -> None:
+    """States with and without anatomy are equal."""
     found = []
     for anatomy in (False, True):
         model = made(parameters, mode, anatomy=anatomy)
@@ -38,8 +38,8 @@ def test_what_is_shown_moves_nothing(parameters: FingerParameters, mode: str) ->
     np.testing.assert_array_equal(*found)
 
 
-def test_what_is_not_drawn_is_not_there() -> None:
-    """Without anatomy, the model has no visual elements."""
+def test_without_anatomy_there_are_no_visual_elements() -> None:
+    """The numbers of tendons, sites, geoms and textures are minimal."""
     plain, shown = made(), made(anatomy=True)
     assert (plain.ntendon, plain.nsite, plain.ngeom, plain.ntex) == (7, 1, 5, 0)
     assert (plain.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT).all()
@@ -105,7 +105,7 @@ def _places(tendon: str, body: str) -> np.ndarray:
     )
 
 
-def test_tendons_run_where_anatomy_has_them() -> None:
+def test_routes_are_anatomical() -> None:
     """Flexors are palmar, extensors dorsal, and intrinsic tendons lateral."""
     for tendon, side in itertools.product(("FDP", "FDS"), ("hand", "proximal", "middle")):
         assert (_places(tendon, side)[:, 2] < -0.002).all()
@@ -123,7 +123,7 @@ def test_tendons_run_where_anatomy_has_them() -> None:
         assert (sign * _places(tendon, "middle")[:, 1] > 0.0).all()
 
 
-def test_what_is_shown_pulls_as_what_moves() -> None:
+def test_routes_agree_with_the_moment_arms() -> None:
     """Routes shorten with their fixed tendons, for arms above 2.5 mm."""
     model = made(anatomy=True)
     data = mujoco.MjData(model)
@@ -139,14 +139,14 @@ def test_what_is_shown_pulls_as_what_moves() -> None:
     shown = (arms[1] - arms[0]) / 0.1
     true = NOMINAL.arms
     large = np.abs(true) > 2.5e-3
-    # FDP and FDS pass the knuckle in its middle here, and the arms have them a little ulnar.
+    # FDP and FDS are routed through the middle of the knuckle; their arms are slightly ulnar.
     large[:2, 1] = False
     assert large.sum() == 12
     np.testing.assert_array_equal(np.sign(shown[large]), np.sign(true[large]))
 
 
-def test_no_tendon_is_cut_short_or_thrown_by_any_posture() -> None:
-    """Route lengths stay bounded at all joint limits."""
+def test_route_lengths_are_bounded() -> None:
+    """Lengths change by less than 45 mm between all joint limits."""
     model = made(anatomy=True)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -158,16 +158,16 @@ def test_no_tendon_is_cut_short_or_thrown_by_any_posture() -> None:
         assert np.abs(data.ten_length[courses] - straight).max() < 0.045
 
 
-def test_each_tendon_has_a_colour_of_its_own() -> None:
-    """Tendon colours are distinct, also for the colour-blind."""
+def test_tendon_colours_are_distinct() -> None:
+    """The colours differ for the colour-blind too."""
     assert tuple(TENDON_COLOURS) == TENDONS
-    # As deuteranopes see them: red and green become one, weighted as Viénot et al. 1999 do.
+    # Deuteranopia: red and green merge, with the weights of Viénot et al. 1999.
     seen = [(0.29 * r + 0.71 * g, b) for r, g, b in TENDON_COLOURS.values()]
     for one, other in itertools.combinations(seen, 2):
         assert np.linalg.norm(np.subtract(one, other)) > 0.1
 
 
-def test_a_figure_takes_the_posture_it_is_shown_in() -> None:
+def test_show_sets_the_figure() -> None:
     """`show` sets posture, tendon widths and target."""
     figure = FingerFigure()
     pulled = np.linspace(0.0, 1.2, 7)

@@ -18,13 +18,13 @@ from shapechanger.bodies.finger.model import FINGERTIP, SIM_DT
 from shapechanger.envs.finger.gap import GAPS
 from tests.bodies.finger.commands import STRETCHED, at_rest, harsh_commands, made, modes
 
-# How far beyond its range a joint may be thrown, degrees: measured at most 4.8, 1.6, 5.9 and 15.3
-# (the end joint weighs 3 g, and a lumbrical with a servo's stiffness hits its stop at 39 rad/s).
+# Tolerated overshoot of each joint beyond its range, degrees; measured 4.8, 1.6, 5.9 and 15.3
+# (the last phalanx weighs 3 g and hits its stop at 39 rad/s).
 _MOST_BEYOND = np.array([7.0, 3.0, 8.0, 18.0])
 # rad/s; measured 40.
 _FASTEST = 50.0
 
-# In which direction each tendon moves the joints when it is pulled alone.
+# Direction in which each tendon alone moves the joints.
 _ANATOMY = {
     "FDP": {"MCP_flexion": 1, "PIP_flexion": 1, "DIP_flexion": 1},
     "FDS": {"MCP_flexion": 1, "PIP_flexion": 1},
@@ -38,10 +38,8 @@ _ANATOMY = {
 
 @pytest.mark.parametrize("tendon", TENDONS)
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
-def test_each_tendon_moves_the_joints_as_anatomy_says(
-    parameters: FingerParameters, tendon: str
-) -> None:
-    """Each tendon moves its joints in the anatomical direction."""
+def test_each_tendon_moves_its_joints(parameters: FingerParameters, tendon: str) -> None:
+    """A tendon moves its joints in the anatomical direction."""
     model = made(parameters)
     model.opt.gravity[:] = 0.0
     ends = {}
@@ -57,7 +55,7 @@ def test_each_tendon_moves_the_joints_as_anatomy_says(
 
 
 @pytest.mark.parametrize("tendon", TENDONS)
-def test_a_newton_of_tension_is_its_moment_arms_in_torque(tendon: str) -> None:
+def test_torques_follow_from_moment_arms(tendon: str) -> None:
     """MuJoCo's torque per newton is the moment arm."""
     model = made()
     data = at_rest(model)
@@ -72,8 +70,8 @@ def test_a_newton_of_tension_is_its_moment_arms_in_torque(tendon: str) -> None:
 
 @pytest.mark.parametrize("mode", modes())
 @pytest.mark.parametrize("finger", ["nominal", "stretched", *GAPS])
-def test_nothing_diverges_whatever_is_commanded(finger: str, mode: str) -> None:
-    """Extreme commands keep the simulation stable and within limits."""
+def test_extreme_commands_are_stable(finger: str, mode: str) -> None:
+    """Joints, velocities and tensions stay within their limits."""
     parameters = {"nominal": NOMINAL, "stretched": STRETCHED}.get(finger)
     if parameters is None:
         parameters = GAPS[finger].draw(np.random.default_rng(3))
@@ -94,15 +92,15 @@ def test_nothing_diverges_whatever_is_commanded(finger: str, mode: str) -> None:
                 beyond = np.degrees(np.maximum(low - angles, angles - high))
                 assert (beyond < _MOST_BEYOND).all(), name
                 assert np.abs(data.qvel[:4]).max() < _FASTEST, name
-                # Stiff tendons shorten under tension, spools wind up: each pull has its sign.
+                # Actuator forces are negative for stiff tendons and positive for spools.
                 tensions = data.actuator_force * (1.0 if parameters.gives else -1.0)
                 assert (tensions >= LEAST_TENSION_N - 1e-12).all(), name
                 assert (tensions <= most + 1e-12).all(), name
         assert not any(warning.number for warning in data.warning), name
 
 
-def test_commands_beyond_their_range_are_those_at_its_end() -> None:
-    """Commands are clipped to their range."""
+def test_commands_are_clipped() -> None:
+    """Commands beyond their range act like those at its end."""
     model = made()
     ends = []
     for command in (1.0, 100.0):
@@ -113,7 +111,7 @@ def test_commands_beyond_their_range_are_those_at_its_end() -> None:
     np.testing.assert_array_equal(*ends)
 
 
-def test_a_stretched_tendon_is_slack_until_the_backlash_is_wound_up() -> None:
+def test_tendons_are_slack_within_the_backlash() -> None:
     """Within the backlash, motors do not move the finger."""
     parameters = STRETCHED.replace(backlash=2e-3)
     model = made(parameters)
@@ -128,8 +126,8 @@ def test_a_stretched_tendon_is_slack_until_the_backlash_is_wound_up() -> None:
     np.testing.assert_allclose(data.qfrc_spring[4:], -10e3 * 1e-3)
 
 
-def test_lengths_are_those_beyond_the_straight_finger() -> None:
-    """Lengths are relative to the straight finger."""
+def test_lengths_are_relative_to_the_straight_finger() -> None:
+    """Lengths are 0 for the straight finger, and follow from the moment arms."""
     model = made()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -139,7 +137,7 @@ def test_lengths_are_those_beyond_the_straight_finger() -> None:
     np.testing.assert_allclose(data.ten_length[:7], -MOMENT_ARMS @ JOINT_REST, atol=1e-15)
 
 
-def test_the_finger_has_the_size_and_weight_of_one() -> None:
+def test_size_and_weight_of_the_finger() -> None:
     """The finger is about 9 cm long and weighs about 25 g."""
     model = made()
     data = mujoco.MjData(model)
@@ -157,7 +155,7 @@ def test_a_command_acts_after_its_delay() -> None:
     for parameters in (NOMINAL, late):
         model = made(parameters)
         data = at_rest(model)
-        for _ in range(200):  # Until nothing is left of what was commanded before.
+        for _ in range(200):  # Until earlier commands have no effect.
             mujoco.mj_step(model, data)
         data.ctrl[:] = 1.0
         found = []

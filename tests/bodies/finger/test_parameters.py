@@ -15,15 +15,15 @@ from tests.bodies.finger.commands import STRETCHED
 
 
 @pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["nominal", "stretched"])
-def test_parameters_survive_json(parameters: FingerParameters) -> None:
+def test_parameters_round_trip_through_json(parameters: FingerParameters) -> None:
     """JSON round trips are exact, as text and bytes."""
     text = parameters.to_json()
     assert FingerParameters.from_json(text) == parameters
     assert FingerParameters.from_json(text.encode()) == parameters
 
 
-def test_what_is_left_out_is_nominal() -> None:
-    """Omitted parameters are nominal, in Python and in JSON."""
+def test_omitted_parameters_are_nominal() -> None:
+    """Python and JSON have the same defaults."""
     changed = NOMINAL.replace(tendon_friction=1.0)
     assert changed != NOMINAL
     assert FingerParameters(tendon_friction=1.0) == changed
@@ -58,8 +58,8 @@ def test_arms_are_a_copy() -> None:
         ({"backlash": 1e-3}, "backlash needs a tendon_stiffness: a stiff tendon has none."),
     ],
 )
-def test_numbers_that_no_finger_has_are_refused(changes: dict[str, Any], sentence: str) -> None:
-    """Invalid numbers are refused by name."""
+def test_invalid_numbers_are_refused(changes: dict[str, Any], sentence: str) -> None:
+    """The error names the parameter."""
     with pytest.raises(FingerError, match=sentence):
         NOMINAL.replace(**changes)
 
@@ -75,7 +75,7 @@ def test_numbers_that_no_finger_has_are_refused(changes: dict[str, Any], sentenc
         (b"\xff", "Invalid finger parameters"),
     ],
 )
-def test_json_that_is_no_finger_is_refused(text: str | bytes, sentence: str) -> None:
+def test_invalid_json_is_refused(text: str | bytes, sentence: str) -> None:
     """Invalid JSON raises FingerError."""
     with pytest.raises(FingerError, match=sentence):
         FingerParameters.from_json(text)

@@ -1,4 +1,4 @@
-"""Ground, water and a wall to test vehicles on."""
+"""Ground, water and a wall for tests of vehicles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapechanger.bodies.vehicles.parts import BATTERY_V
 LAND = ("car", "tank", "truck")
 ALL = (*LAND, "boat")
 
-# Full speed ahead, as steering in general: negative is to the left.
+# Outputs for full speed ahead; negative steering is to the left.
 AHEAD: Mapping[str, Mapping[str, float]] = {
     "car": {"wheels": 1.0, "steering": 0.0},
     "truck": {"wheels": 1.0, "steering": 0.0},
@@ -39,10 +39,10 @@ class Ground:
     """A vehicle on flat ground or in water.
 
     Attributes:
-        kind: What kind it is.
-        model: Model of everything.
-        data: State of everything.
-        vehicle: The vehicle.
+        kind: Model of the vehicle.
+        model: Compiled scene.
+        data: State of the scene.
+        vehicle: The bound vehicle.
     """
 
     kind: VehicleModel
@@ -60,15 +60,15 @@ class Ground:
             mujoco.mj_step(self.model, self.data)
 
     def pace(self) -> float:
-        """Speed over ground, m/s."""
+        """Return the speed over ground, m/s."""
         return math.hypot(self.vehicle.motion().speed, self.vehicle.motion().lateral_speed)
 
     def uprightness(self) -> float:
-        """Cosine of the angle between the vehicle's upright axis and the world's."""
+        """Return the cosine of the angle between the vehicle's upright axis and the world's."""
         return float(self.data.body("vehicle/chassis").xmat[8])
 
     def height(self) -> float:
-        """Height of the origin above the ground, m."""
+        """Return the height of the origin above the ground, m."""
         return float(self.data.body("vehicle/chassis").xpos[2])
 
 

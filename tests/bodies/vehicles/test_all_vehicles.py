@@ -14,8 +14,8 @@ from tests.bodies.vehicles.grounds import AHEAD, ALL, LAND, TO_THE_LEFT, ground,
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_it_stands_still_at_rest(name: str) -> None:
-    """A vehicle at rest creeps by less than 0.1 mm in ten seconds."""
+def test_a_vehicle_at_rest_stays(name: str) -> None:
+    """It creeps by less than 0.1 mm in ten seconds."""
     here = ground(name)
     here.drive(1.0, {})
     before = here.vehicle.motion()
@@ -39,16 +39,16 @@ def test_top_speed_is_as_declared(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_less_voltage_is_less_speed(name: str) -> None:
-    """Speed falls with the voltage."""
+def test_speed_falls_with_the_voltage(name: str) -> None:
+    """At 80 % of the voltage, the speed is 60 to 90 % of the top speed."""
     here = ground(name)
     here.drive(5.0, AHEAD[name], battery_v=0.8 * BATTERY_V)
     assert 0.6 < here.vehicle.motion().speed / here.kind.top_speed_mps < 0.9
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_backwards_counts_down(name: str) -> None:
-    """Speed and distance are negative backwards."""
+def test_reverse_is_negative(name: str) -> None:
+    """Speed and distance are negative in reverse."""
     here = ground(name)
     here.drive(2.0, scaled(AHEAD[name], -0.5))
     assert here.vehicle.motion().speed < -0.05
@@ -76,8 +76,8 @@ def test_left_is_counter_clockwise(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("value", [0.03, -0.05])
-def test_a_small_value_moves_nothing(name: str, value: float) -> None:
-    """Outputs within the dead band do not move a vehicle."""
+def test_small_outputs_do_not_move_a_vehicle(name: str, value: float) -> None:
+    """Outputs within the dead band have no effect."""
     here = ground(name)
     here.drive(2.0, scaled(AHEAD[name], value))
     assert here.pace() < 1e-3
@@ -86,7 +86,7 @@ def test_a_small_value_moves_nothing(name: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("name", LAND)
-def test_zero_brakes_on_land(name: str) -> None:
+def test_zero_brakes_and_none_coasts(name: str) -> None:
     """A shorted motor brakes more than an open one."""
     here = ground(name)
     ways: list[float] = []
@@ -103,7 +103,7 @@ def test_zero_brakes_on_land(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_stalled_motor_draws_most(name: str) -> None:
+def test_a_stalled_motor_draws_the_most_current(name: str) -> None:
     """The stall current is that of the winding, and less flows at speed."""
     here = ground(name)
     here.vehicle.drive(AHEAD[name], BATTERY_V)
@@ -116,8 +116,8 @@ def test_a_stalled_motor_draws_most(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("heading", [0.0, 0.6])
-def test_a_wall_stops_it(name: str, heading: float) -> None:
-    """A wall stops a vehicle, which neither climbs nor tips."""
+def test_a_wall_stops_a_vehicle(name: str, heading: float) -> None:
+    """It neither climbs nor tips."""
     here = ground(name, wall_x=6.0)
     here.vehicle.place(0.0, 0.0, heading)
     most_height, least_upright, furthest = 0.0, 1.0, 0.0
@@ -136,8 +136,8 @@ def test_a_wall_stops_it(name: str, heading: float) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_wild_outputs_break_nothing(name: str) -> None:
-    """Random outputs keep the simulation stable."""
+def test_random_outputs_are_stable(name: str) -> None:
+    """Random outputs and voltages keep the vehicle upright and its state finite."""
     rng = np.random.default_rng(7)
     here = ground(name, wall_x=2.0)
     with np.errstate(all="raise"):
@@ -153,8 +153,8 @@ def test_wild_outputs_break_nothing(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_placing_forgets_everything(name: str) -> None:
-    """`place` resets the whole state."""
+def test_place_resets_the_state(name: str) -> None:
+    """Motion after `place` does not depend on what was before."""
     here = ground(name)
     ends: list[tuple[float, float, float, float]] = []
     for _ in range(2):
@@ -182,7 +182,7 @@ def test_speed_is_along_the_heading(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_names_and_collisions_are_the_vehicles_own(name: str) -> None:
+def test_names_and_collision_bits(name: str) -> None:
     """Collision bits and names follow the conventions."""
     model = ground(name).model
     for i in range(model.ngeom):
@@ -202,7 +202,7 @@ def test_names_and_collisions_are_the_vehicles_own(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_its_size_is_as_declared(name: str) -> None:
+def test_the_size_is_as_declared(name: str) -> None:
     """The extent of the collision geoms is as declared."""
     here = ground(name)
     hits: list[float] = []
@@ -219,7 +219,7 @@ def test_its_size_is_as_declared(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_its_camera_looks_ahead(name: str) -> None:
+def test_the_camera_looks_ahead(name: str) -> None:
     """The camera looks along the heading, level or slightly down."""
     here = ground(name)
     here.vehicle.place(0.0, 0.0, 1.0)

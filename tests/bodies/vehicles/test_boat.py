@@ -9,7 +9,7 @@ import pytest
 from tests.bodies.vehicles.grounds import AHEAD, TO_THE_LEFT, ground
 
 
-def test_it_has_no_brakes() -> None:
+def test_a_boat_has_no_brakes() -> None:
     """A boat glides on for more than a second without thrust."""
     here = ground("boat")
     here.drive(6.0, AHEAD["boat"])
@@ -19,7 +19,7 @@ def test_it_has_no_brakes() -> None:
     assert here.vehicle.current_a() == 0.0
 
 
-def test_astern_is_weak() -> None:
+def test_reverse_thrust_is_weak() -> None:
     """Reverse thrust is weak."""
     here = ground("boat")
     here.drive(6.0, AHEAD["boat"])
@@ -29,7 +29,7 @@ def test_astern_is_weak() -> None:
     assert -0.95 * here.kind.top_speed_mps < here.vehicle.motion().speed < -0.3
 
 
-def test_it_drifts_outwards_in_a_turn() -> None:
+def test_a_boat_drifts_outwards_in_a_turn() -> None:
     """In a left turn the boat drifts to the right."""
     here = ground("boat")
     here.drive(8.0, TO_THE_LEFT["boat"])
@@ -40,7 +40,7 @@ def test_it_drifts_outwards_in_a_turn() -> None:
     assert radius == pytest.approx(here.kind.turning_radius_m, rel=0.25)
 
 
-def test_it_slows_down_in_a_turn() -> None:
+def test_a_boat_slows_down_in_a_turn() -> None:
     """A turn reduces the speed."""
     here = ground("boat")
     here.drive(8.0, {"propeller": 0.7, "rudder": 0.0})
@@ -49,7 +49,7 @@ def test_it_slows_down_in_a_turn() -> None:
     assert here.vehicle.motion().speed < 0.85 * straight
 
 
-def test_a_current_carries_it() -> None:
+def test_a_current_carries_the_boat() -> None:
     """A current moves the boat over ground, hardly through the water."""
     here = ground("boat")
     here.vehicle.set_current(0.0, 0.3)
@@ -59,17 +59,17 @@ def test_a_current_carries_it() -> None:
     assert abs(here.vehicle.travelled_m()) < 0.05 * here.vehicle.motion().y
 
 
-def test_the_log_goes_by_the_water() -> None:
+def test_the_log_measures_distance_through_water() -> None:
     """The log measures distance through the water."""
     here = ground("boat")
     here.vehicle.set_current(-0.3, 0.0)
     here.drive(10.0, AHEAD["boat"])
-    # 10 s of 0.3 m/s, less what it takes until the flow has hold of the hull.
+    # 10 s of 0.3 m/s, minus the time to accelerate the hull.
     assert here.vehicle.travelled_m() - here.vehicle.motion().x == pytest.approx(3.0, abs=0.1)
     assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps - 0.3, rel=0.1)
 
 
-def test_physics_is_the_same_in_every_steady_current() -> None:
+def test_motion_is_relative_to_the_current() -> None:
     """Motion relative to a uniform flow is that in still water."""
     still, flowing = ground("boat"), ground("boat")
     flowing.vehicle.set_current(0.2, -0.1)
@@ -81,7 +81,7 @@ def test_physics_is_the_same_in_every_steady_current() -> None:
     assert flowing.vehicle.travelled_m() == pytest.approx(still.vehicle.travelled_m(), abs=1e-6)
 
 
-def test_without_thrust_the_rudder_needs_way() -> None:
+def test_the_rudder_needs_flow() -> None:
     """The rudder needs flow, from motion or from the propeller."""
     here = ground("boat")
     here.drive(2.0, {"propeller": 0.0, "rudder": -1.0})
@@ -94,7 +94,7 @@ def test_without_thrust_the_rudder_needs_way() -> None:
     assert here.vehicle.motion().yaw_rate > 0.1
 
 
-def test_it_keeps_its_course() -> None:
+def test_a_boat_keeps_its_course() -> None:
     """A disturbed heading rate decays."""
     here = ground("boat")
     here.drive(5.0, AHEAD["boat"])
@@ -117,7 +117,7 @@ def test_two_propellers_steer() -> None:
     assert here.pace() < 0.5
 
 
-def test_two_propellers_share_fairly() -> None:
+def test_two_equal_propellers_drive_straight() -> None:
     """Equal thrust drives straight and draws twice the current."""
     here = ground("boat")
     here.vehicle.drive({"left propeller": 1.0, "right propeller": 1.0}, 7.2)

@@ -12,14 +12,14 @@ from shapechanger.bodies.vehicles.parts import HOBBY_MOTOR, HOBBY_SERVO
 from shapechanger.errors import ProfileError, UnknownName
 
 
-def test_each_is_listed_under_its_name() -> None:
+def test_names_are_consistent() -> None:
     """Names are consistent, and only the boat floats."""
     assert {name: model.name for name, model in VEHICLES.items()} == {n: n for n in VEHICLES}
     assert set(VEHICLES) == {"car", "tank", "truck", "boat"}
     assert [name for name, model in VEHICLES.items() if model.floats] == ["boat"]
 
 
-def test_an_unknown_name_gets_a_hint() -> None:
+def test_an_unknown_name_is_refused() -> None:
     """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"Did you mean 'truck'\?"):
         vehicle_model("truk")
@@ -71,7 +71,7 @@ def test_the_unit_of_angles_in_the_model_does_not_matter(degrees: bool) -> None:
     assert limits == pytest.approx((-1.4835, 1.4835), abs=1e-3)
 
 
-def test_the_motor_is_that_of_its_data_sheet() -> None:
+def test_the_motor_matches_its_data_sheet() -> None:
     """At 6 V: 6 A and 1.2 kgf·cm when stalled, 0.5 A at 2200 turns a minute without load."""
     free = 2200.0 * 2.0 * 3.141592653589793 / 60.0
     assert HOBBY_MOTOR.amperes(6.0, 0.0) == pytest.approx(6.0)
@@ -88,8 +88,8 @@ def test_a_gear_trades_speed_for_torque() -> None:
     assert HOBBY_MOTOR.geared(3.0, 0.5).friction == pytest.approx(1.5 * HOBBY_MOTOR.friction)
 
 
-def test_a_motor_that_brakes_draws_nothing() -> None:
-    """A braking motor draws no current."""
+def test_a_braking_motor_draws_no_current() -> None:
+    """A motor that turns faster than its voltage drives it draws no current."""
     assert HOBBY_MOTOR.amperes(0.0, 100.0) == 0.0
     assert HOBBY_MOTOR.amperes(1.0, 100.0) == 0.0
     assert HOBBY_MOTOR.amperes(-6.0, -100.0) == HOBBY_MOTOR.amperes(6.0, 100.0) > 0.0

@@ -13,7 +13,7 @@ from tests.bodies.vehicles.grounds import AHEAD, Ground, ground
 @pytest.mark.parametrize("name", ["car", "truck"])
 @pytest.mark.parametrize("throttle", [0.25, 0.6])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_the_turning_circle_is_geometrys(name: str, throttle: float, side: float) -> None:
+def test_the_turning_radius_follows_from_geometry(name: str, throttle: float, side: float) -> None:
     """The turning radius follows from the geometry."""
     here = ground(name)
     here.drive(8.0, {"wheels": throttle, "steering": side})
@@ -21,7 +21,7 @@ def test_the_turning_circle_is_geometrys(name: str, throttle: float, side: float
     assert radius == pytest.approx(here.kind.turning_radius_m, rel=0.15)
 
 
-def test_wheels_point_along_their_own_circles() -> None:
+def test_wheel_angles_satisfy_ackermann() -> None:
     """Wheel angles satisfy Ackermann's condition."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
@@ -33,7 +33,7 @@ def test_wheels_point_along_their_own_circles() -> None:
     assert 1 / math.tan(right) - 1 / math.tan(left) == pytest.approx(0.140 / 0.26, rel=0.02)
 
 
-def test_the_servo_takes_its_time() -> None:
+def test_the_servo_has_a_limited_speed() -> None:
     """The servo's speed is limited to 60 degrees in 0.19 s."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
@@ -46,7 +46,7 @@ def test_the_servo_takes_its_time() -> None:
     assert float(joint.qpos[0]) < -0.3
 
 
-def test_a_servo_without_pulses_stays() -> None:
+def test_a_servo_without_pulses_keeps_its_angle() -> None:
     """Without pulses, the steering angle stays."""
     here = ground("car")
     here.drive(1.0, {"steering": -1.0})
@@ -78,19 +78,19 @@ def test_the_car_slips_on_ice() -> None:
 
 
 @pytest.mark.parametrize("name", ["car", "truck"])
-def test_no_wheel_sticks_out_at_full_lock(name: str) -> None:
+def test_wheels_stay_inside_the_body(name: str) -> None:
     """At full lock, wheels stay inside the body's width."""
     here = ground(name)
     here.drive(1.0, {"steering": -1.0})
     for side in ("left", "right"):
         geom = here.model.geom(f"vehicle/front {side} wheel")
         turn = here.data.geom_xmat[geom.id].reshape(3, 3)
-        reach = np.linalg.norm(turn[1] * geom.size)  # Of an ellipsoid, along y.
+        reach = np.linalg.norm(turn[1] * geom.size)  # Half-width of an ellipsoid along y.
         assert abs(here.data.geom_xpos[geom.id, 1]) + reach < here.kind.width_m / 2 + 1e-3
 
 
 @pytest.mark.parametrize("name", ["car", "truck"])
-def test_it_scrapes_along_a_wall(name: str) -> None:
+def test_a_vehicle_scrapes_along_a_wall(name: str) -> None:
     """Steered into a wall, a vehicle stays upright and moves on."""
     here = ground(name, wall_x=1.0)
     here.vehicle.place(0.7, -4.0, math.radians(80.0))
@@ -138,7 +138,7 @@ def test_the_tank_steers_while_it_drives() -> None:
     assert radii[0] > 1.5 * radii[1] > 0.1
 
 
-def test_a_track_turns_as_one() -> None:
+def test_wheels_of_a_track_turn_together() -> None:
     """The wheels of a track turn together."""
     here = ground("tank")
     here.drive(2.0, {"left track": -1.0, "right track": 1.0})
@@ -163,7 +163,7 @@ def test_the_trailer_follows() -> None:
     assert abs(_hitch(here)) < math.radians(2.0)
 
 
-def test_it_does_not_jack_knife_going_forward() -> None:
+def test_no_jackknife_going_forward() -> None:
     """A slalom at full throttle keeps the trailer behind."""
     here = ground("truck")
     most = 0.0
@@ -175,7 +175,7 @@ def test_it_does_not_jack_knife_going_forward() -> None:
     assert here.uprightness() > 0.98
 
 
-def test_it_does_jack_knife_going_backward() -> None:
+def test_jackknife_going_backward() -> None:
     """Reversing without counter-steering folds the trailer."""
     here = ground("truck")
     here.drive(1.0, {"wheels": 0.4, "steering": -0.3})
@@ -183,7 +183,7 @@ def test_it_does_jack_knife_going_backward() -> None:
     assert abs(_hitch(here)) > math.radians(45.0)
 
 
-def test_gear_and_bed_do_nothing() -> None:
+def test_gear_and_bed_have_no_effect() -> None:
     """The optional parts have no effect."""
     here = ground("truck")
     here.drive(2.0, {**AHEAD["truck"], "gear": 1.0, "bed": -1.0})

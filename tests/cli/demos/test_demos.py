@@ -1,4 +1,4 @@
-"""`shapechanger demos` on small recordings: list, show, cut, bad, good, mark, merge, repair."""
+"""`shapechanger demos`: list, show, cut, bad, good, mark, merge, repair."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.demos.episodes.making import header, recorded, step
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
-    """Two episodes with real pictures; in the first a policy is corrected."""
+    """Two episodes with JPEG frames; in the first, a policy is corrected."""
     for number, steps in enumerate((30, 10)):
         about = header(env="shapechanger/Car-v1", image_size=(40, 30), seed=number)
         with EpisodeWriter.create(tmp_path / "data", about, spare_bytes=0) as writer:
@@ -30,18 +30,18 @@ def data(tmp_path: Path) -> Path:
 
 
 def episodes(data: Path) -> list[Path]:
-    """The folders of its episodes."""
+    """Return the folders of the episodes."""
     return sorted(path for path in data.iterdir() if path.is_dir())
 
 
-def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """What a command prints."""
+def output_of(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """Return the standard output of a command."""
     main(["demos", *map(str, arguments)])
     return capsys.readouterr().out
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """The one sentence that a command refuses with."""
+    """Return the one-sentence error of a command."""
     with pytest.raises(SystemExit) as stop:
         main(["demos", *map(str, arguments)])
     assert stop.value.code == 2
@@ -52,11 +52,11 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 
 
 def test_list(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A line an episode with all of its name; one that is not whole is told, and the rest too."""
+    """Each episode is a line; damaged ones are reported, and the others listed."""
     first, second = episodes(data)
     with (second / "steps.jsonl").open("ab") as file:
         file.write(b"torn")
-    printed = said(capsys, "list", data)
+    printed = output_of(capsys, "list", data)
     line = next(line for line in printed.splitlines() if first.name in line)
     assert "Car-v1" in line
     assert "policy 67 %, expert 33 %" in line
@@ -67,17 +67,17 @@ def test_list(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "2 episodes: 30 of 30 steps count" in printed
 
 
-def test_an_episode_that_is_not_closed_says_so(
+def test_an_episode_that_is_not_closed_is_marked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It may be recorded at this moment."""
+    """It may be recording at present."""
     recorded(tmp_path / "data", close=False)
-    assert "not closed" in said(capsys, "list", tmp_path / "data")
+    assert "not closed" in output_of(capsys, "list", tmp_path / "data")
 
 
-def test_show_in_words(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Without a page the numbers are told all the same."""
-    printed = said(capsys, "show", data)
+def test_show_as_text(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without `--out`, the statistics are printed."""
+    printed = output_of(capsys, "show", data)
     assert "driven by policy 50 %, expert 50 %" in printed
     assert "steering: 0.1 to 0.1, median 0.1" in printed
     assert "time between steps: 50 to 50 ms" in printed
@@ -85,11 +85,11 @@ def test_show_in_words(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_show_as_a_page(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One file without scripts or addresses elsewhere; drop and marks are shown, names escaped."""
+    """One self-contained file, with drops and marks, and names escaped."""
     first, _ = episodes(data)
-    said(capsys, "bad", first, "--from", 10, "--to", 19)
+    output_of(capsys, "bad", first, "--from", 10, "--to", 19)
     page = tmp_path / "deep" / "page.html"
-    assert f"wrote {page}" in said(capsys, "show", data, "--out", page)
+    assert f"wrote {page}" in output_of(capsys, "show", data, "--out", page)
     text = page.read_text()
     assert not re.search(r"<script|<link|@import|url\(|(src|href)=\"(?!data:|#)", text)
     assert "a &lt;b&gt; bend" in text
@@ -100,68 +100,68 @@ def test_show_as_a_page(data: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "20 of 30" in text
 
 
-def test_a_damaged_picture_is_one_gap_on_the_page(
+def test_a_damaged_frame_is_shown_as_damaged(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Bytes that changed but are as many are found when the picture is shown."""
+    """Damage that keeps the size is detected when the frame is shown."""
     _, second = episodes(data)
     frame = second / "frames" / "000003.jpg"
     frame.write_bytes(bytes(len(frame.read_bytes())))
-    said(capsys, "show", data, "--out", tmp_path / "page.html")
+    output_of(capsys, "show", data, "--out", tmp_path / "page.html")
     assert (tmp_path / "page.html").read_text().count(">damaged<") == 1
 
 
 def test_cut_bad_good(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nothing is taken away: `good` brings all of it back."""
+    """`good` restores all steps."""
     first, _ = episodes(data)
-    assert "11 of 30 steps" in said(capsys, "cut", first, "--from", 5, "--to", 15)
+    assert "11 of 30 steps" in output_of(capsys, "cut", first, "--from", 5, "--to", 15)
     assert [s.index for s in read_episode(first).kept] == list(range(5, 16))
-    assert "8 of 30 steps" in said(capsys, "bad", first, "--from", 7, "--to", 9)
-    assert "10 of 30 steps" in said(capsys, "good", first, "--from", 8, "--to", 9)
-    assert "0 of 30 steps" in said(capsys, "bad", first)
-    assert "30 of 30 steps" in said(capsys, "good", first)
+    assert "8 of 30 steps" in output_of(capsys, "bad", first, "--from", 7, "--to", 9)
+    assert "10 of 30 steps" in output_of(capsys, "good", first, "--from", 8, "--to", 9)
+    assert "0 of 30 steps" in output_of(capsys, "bad", first)
+    assert "30 of 30 steps" in output_of(capsys, "good", first)
 
 
 def test_mark(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A step, with words or without."""
+    """A step is marked with or without a text."""
     first, _ = episodes(data)
-    said(capsys, "mark", first, 4, "a stone")
-    said(capsys, "mark", first, 6)
+    output_of(capsys, "mark", first, 4, "a stone")
+    output_of(capsys, "mark", first, 6)
     assert [(m.step, m.text) for m in read_episode(first).marks][1:] == [(4, "a stone"), (6, "")]
 
 
 def test_merge(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Layouts that differ are told; the same episode twice is refused."""
+    """Different layouts are reported; duplicates are refused."""
     other = header(state_layout="")
     with EpisodeWriter.create(tmp_path / "other", other, spare_bytes=0) as writer:
         writer.add(step(state=()))
     out = tmp_path / "all"
-    printed = said(capsys, "merge", data, tmp_path / "other", "--out", out)
+    printed = output_of(capsys, "merge", data, tmp_path / "other", "--out", out)
     assert "copied 3 episodes" in printed
     assert "2 different layouts" in printed
     assert "the same episode" in refused(capsys, "merge", data, "--out", out)
 
 
 def test_repair(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Says of each what was done, and once more that nothing is left to do."""
+    """Each episode gets a line, and a second repair changes nothing."""
     first, second = episodes(data)
     with (first / "steps.jsonl").open("ab") as file:
         file.write(b'{"kind":"step","st')
     (second / "frames" / "000009.jpg").unlink()
-    printed = said(capsys, "repair", data)
+    printed = output_of(capsys, "repair", data)
     assert f"{first.name}: kept 30 steps, moved 1 line aside, because it is cut off" in printed
     assert f"{second.name}: kept 9 steps, moved 1 line aside" in printed
-    assert said(capsys, "repair", data).count("was complete") == 2
+    assert output_of(capsys, "repair", data).count("was complete") == 2
 
 
-def test_repair_waits_for_no_recorder(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The others are repaired, and the exit code says that one was not."""
+def test_repair_skips_a_running_recording(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The exit code reports that one episode was not repaired."""
     with EpisodeWriter.create(data, header(), spare_bytes=0):
         assert "being recorded" in refused(capsys, "repair", data)
 
 
-def test_an_episode_is_named_alone(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Every command for one episode says which there are."""
+def test_one_episode_must_be_named(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The error lists episodes and valid steps."""
     first, second = episodes(data)
     assert f"has 2 episodes: name one of them, such as {first}" in refused(capsys, "bad", data)
     near = data / f"{second.name[:-1]}9"
@@ -172,42 +172,42 @@ def test_an_episode_is_named_alone(data: Path, capsys: pytest.CaptureFixture[str
     assert "and not 50 to 50" in refused(capsys, "mark", first, 50)
     assert "There is no recording" in refused(capsys, "list", data / "no" / "such")
     shutil.rmtree(second)
-    assert "0 of 30 steps" in said(capsys, "bad", data)
+    assert "0 of 30 steps" in output_of(capsys, "bad", data)
 
 
-def test_replay_is_asked_for_one_way(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """And of an episode that has steps which count."""
+def test_replay_needs_one_target(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Exactly one of --film, --env and --robot, and an episode with kept steps."""
     first, _ = episodes(data)
     assert "one of --film, --env and --robot" in refused(capsys, "replay", first)
-    said(capsys, "bad", first)
+    output_of(capsys, "bad", first)
     assert "demos good" in refused(capsys, "replay", first, "--film", "a.mp4")
 
 
-def test_a_robot_that_nobody_knows_is_refused(
+def test_an_unknown_robot_is_refused(
     data: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As by every command for robots."""
+    """The error names the robot."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(data))
     assert "nobody" in refused(capsys, "replay", episodes(data)[0], "--robot", "nobody")
 
 
 def test_a_film(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As many pictures as steps that count, each with the bars of two actions below it."""
+    """The film has one frame per kept step, with the bars of two actions below."""
     import imageio_ffmpeg
 
     first, _ = episodes(data)
-    said(capsys, "cut", first, "--to", 19)
-    assert "20 steps, 1.0 s" in said(capsys, "replay", first, "--film", tmp_path / "a.mp4")
+    output_of(capsys, "cut", first, "--to", 19)
+    assert "20 steps, 1.0 s" in output_of(capsys, "replay", first, "--film", tmp_path / "a.mp4")
     assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "a.mp4")) == (20, 1.0)
     assert "a film ends with one of" in refused(
         capsys, "replay", first, "--film", tmp_path / "a.txt"
     )
 
 
-def test_another_env_is_refused_by_what_it_moves(
+def test_an_env_with_other_actions_is_refused(
     data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The names of both are told."""
+    """The error names the actions of both."""
     first, _ = episodes(data)
     sentence = refused(capsys, "replay", first, "--env", "Ant")
     assert "hip_1/motor" in sentence

@@ -1,4 +1,4 @@
-"""Who drives: policies by what they see and feel, experts, and what fits nowhere."""
+"""Drivers for recording: policies, experts, and unsuitable ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.demos.corridor_env import CorridorEnv, Shows
 
 
 def clone(path: Path, **changes: Any) -> str:
-    """A policy that has learned nothing, for the state of the corridor."""
+    """Save an untrained policy for the state of the corridor, and return its path."""
     env = CorridorEnv("state")
     card = CloneCard(
         framing=Framing(),
@@ -38,8 +38,8 @@ def clone(path: Path, **changes: Any) -> str:
 
 
 @pytest.mark.parametrize("shows", ["state", "both"])
-def test_a_policy_gets_the_part_that_it_takes(shows: Shows, tmp_path: Path) -> None:
-    """A state alone, or out of a Dict; its actions fit the env."""
+def test_a_policy_gets_its_part_of_the_observation(shows: Shows, tmp_path: Path) -> None:
+    """A state alone, or from a Dict; the actions fit the env."""
     env = CorridorEnv(shows)
     pilot = pilot_of(env, clone(tmp_path / "policy.safetensors"), "", 0)
     pilot.begin()
@@ -50,8 +50,8 @@ def test_a_policy_gets_the_part_that_it_takes(shows: Shows, tmp_path: Path) -> N
     np.testing.assert_array_equal(decision.carried_out, decision.meant)
 
 
-def test_a_policy_that_is_corrected_has_the_expert_of_the_env(tmp_path: Path) -> None:
-    """A world that tells nothing is no danger."""
+def test_a_corrected_policy_uses_the_expert_of_the_env(tmp_path: Path) -> None:
+    """An env that reports no distances has no danger."""
     env = CorridorEnv("both")
     pilot = pilot_of(env, clone(tmp_path / "policy.safetensors"), "expert", 0)
     assert isinstance(pilot, CorrectedPilot)
@@ -59,8 +59,8 @@ def test_a_policy_that_is_corrected_has_the_expert_of_the_env(tmp_path: Path) ->
     assert pilot.decide(env.reset(seed=0)[0]).driver == "policy"
 
 
-def test_what_feels_or_sees_something_else_is_refused(tmp_path: Path) -> None:
-    """With both sides in the sentence."""
+def test_a_policy_with_other_inputs_is_refused(tmp_path: Path) -> None:
+    """The error names both sides."""
     other = Layout((Feature("way", "m"), Feature("heat", "K")))
     policy = clone(tmp_path / "other.safetensors", state_layout=other)
     with pytest.raises(PolicyError, match=r"heat.*battery"):

@@ -1,4 +1,4 @@
-"""`demos train` and `demos evaluate`, as their user runs them."""
+"""`demos train` and `demos evaluate`."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Settings with which it takes seconds."""
+    """Settings that train in seconds."""
     monkeypatch.setattr("shapechanger.demos.cloning.learn.DEMOS", QUICK)
 
 
 def _record(folder: Path, n: int, seed: int, layout: object = KEYS) -> Path:
-    """An episode on disk, as a person would have driven it."""
+    """Record an episode as a person would drive it."""
     chosen = STEERS if layout is STEERS else KEYS
     data = stripes(n, seed, chosen)
     header = EpisodeHeader(action_layout=chosen.to_json(), image_size=(50, 33), clock="none")
@@ -40,7 +40,7 @@ def _record(folder: Path, n: int, seed: int, layout: object = KEYS) -> Path:
 def test_a_recording_becomes_a_policy_with_a_report(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The last line of the other command is its accuracy; all files are there, and no others."""
+    """`train` writes policy, report and exports; `evaluate` prints the accuracy last."""
     data = _record(tmp_path / "drive", 150, 0)
     out = tmp_path / "made" / "policy.safetensors"
     TrainClone(data, out, ppo=tmp_path / "made" / "ppo.zip").run()
@@ -49,8 +49,8 @@ def test_a_recording_becomes_a_policy_with_a_report(
     page = out.with_suffix(".html").read_text()
     assert page.count("data:image/png;base64,") == 12
     assert "http" not in page.replace("http://www.w3.org", "")
-    told = json.loads(out.with_suffix(".json").read_text())
-    assert told["judgement"]["steps"] == 30
+    report = json.loads(out.with_suffix(".json").read_text())
+    assert report["judgement"]["steps"] == 30
     assert CameraPolicy.load(out).card.data["learned"] == 120
     capsys.readouterr()
     Evaluate(out, data).run()
@@ -59,15 +59,15 @@ def test_a_recording_becomes_a_policy_with_a_report(
     capsys.readouterr()
     Evaluate(out, _record(tmp_path / "other", 60, 1), report=tmp_path / "r" / "page.html").run()
     lines = capsys.readouterr().out.splitlines()
-    told = json.loads((tmp_path / "r" / "page.json").read_text())
-    assert lines[-1] == f"accuracy {told['judgement']['accuracy']:.3f}"
-    assert told["judgement"]["accuracy"] > 0.8
+    report = json.loads((tmp_path / "r" / "page.json").read_text())
+    assert lines[-1] == f"accuracy {report['judgement']['accuracy']:.3f}"
+    assert report["judgement"]["accuracy"] > 0.8
 
 
-def test_numbers_end_with_the_accuracy_too(
+def test_regression_prints_errors_and_accuracy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With errors in place of a calibration; whole episodes judge, if asked for."""
+    """Whole episodes are the test set with `split="episode"`."""
     data = _record(tmp_path / "drive", 90, 0, STEERS)
     _record(data, 30, 1, STEERS)
     out = tmp_path / "policy.safetensors"
@@ -79,8 +79,8 @@ def test_numbers_end_with_the_accuracy_too(
     assert out.with_suffix(".html").exists()
 
 
-def test_what_cannot_be_done_is_said_before_the_work(tmp_path: Path) -> None:
-    """And leaves no file."""
+def test_invalid_arguments_are_refused_before_training(tmp_path: Path) -> None:
+    """No file is written."""
     data = _record(tmp_path / "drive", 20, 0)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match="it is a folder"):
@@ -97,7 +97,7 @@ def test_what_cannot_be_done_is_said_before_the_work(tmp_path: Path) -> None:
 
 
 def test_a_policy_for_another_layout_is_refused(tmp_path: Path) -> None:
-    """In one sentence."""
+    """The error names both layouts."""
     policy = CameraPolicy.fresh(QUICK, 0)
     policy.save(tmp_path / "p.safetensors")
     with pytest.raises(PolicyError, match=r"policy are steering, throttle, but .* forward"):

@@ -1,4 +1,4 @@
-"""`shapechanger demos replay --robot` on a robot on its twin, with a person at the terminal."""
+"""`shapechanger demos replay --robot` on a twin, with a person at the terminal."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningRo
 
 
 def forward(folder: Path, robot: RunningRobot, seconds: float, **changes: object) -> Path:
-    """An episode of this robot: full throttle for so long, and rest."""
+    """Record an episode of this robot: full throttle for some seconds, then rest."""
     with robot.client(role="person") as client:
         welcome = client.welcome
     about = EpisodeHeader(
@@ -45,22 +45,22 @@ def forward(folder: Path, robot: RunningRobot, seconds: float, **changes: object
 
 
 def person(episode: Path, folder: Path) -> Person:
-    """Somebody who asks for it to be played."""
+    """Run the replay at a terminal."""
     arguments = ("demos", "replay", str(episode), "--robot", "car")
     return Person(arguments, folder, {"XDG_CONFIG_HOME": str(folder)})
 
 
-def test_it_plays_once_somebody_has_armed_it(robot: RunningRobot, tmp_path: Path) -> None:
+def test_it_plays_after_arming(robot: RunningRobot, tmp_path: Path) -> None:
     """Nothing moves before E; at the end the robot stands still and is disarmed."""
     episode = forward(tmp_path, robot, 0.6)
-    with robot.operator() as operator, person(episode, tmp_path) as somebody:
+    with robot.operator() as operator, person(episode, tmp_path) as terminal:
         operator.place(0)
         start = operator.where().travelled_m
-        somebody.read_until("E arms it")
+        terminal.read_until("E arms it")
         assert operator.where().travelled_m == start
-        somebody.press("e")
-        somebody.read_until("played 16 steps")
-        assert somebody.end() == 0
+        terminal.press("e")
+        terminal.read_until("played 16 steps")
+        assert terminal.end() == 0
         assert operator.where().travelled_m - start > 0.05
         eventually(lambda: operator.where().speed < 0.05, 20.0)
         with robot.client(role="person") as client:
@@ -68,44 +68,46 @@ def test_it_plays_once_somebody_has_armed_it(robot: RunningRobot, tmp_path: Path
 
 
 def test_any_key_stops_it(robot: RunningRobot, tmp_path: Path) -> None:
-    """With an emergency stop, which a person has to end."""
+    """A key sends an emergency stop, which only a person can clear."""
     episode = forward(tmp_path, robot, 60.0)
-    with robot.operator() as operator, person(episode, tmp_path) as somebody:
+    with robot.operator() as operator, person(episode, tmp_path) as terminal:
         operator.place(0)
         start = operator.where().travelled_m
-        somebody.read_until("E arms it")
-        somebody.press("e")
-        somebody.wait_for(lambda: operator.where().travelled_m - start > 0.05)
-        somebody.press("j")
-        somebody.read_until("stopped by a key")
-        assert somebody.end() == 0
+        terminal.read_until("E arms it")
+        terminal.press("e")
+        terminal.wait_for(lambda: operator.where().travelled_m - start > 0.05)
+        terminal.press("j")
+        terminal.read_until("stopped by a key")
+        assert terminal.end() == 0
         eventually(lambda: operator.where().speed < 0.05, 20.0)
         with robot.client(role="person") as client:
             assert client.ask().message.emergency
 
 
-def test_another_key_than_e_leaves(robot: RunningRobot, tmp_path: Path) -> None:
-    """And so does E after another one: a hand that lies on the keys arms nothing."""
+def test_any_key_but_e_leaves(robot: RunningRobot, tmp_path: Path) -> None:
+    """E after another key does not arm, so that resting a hand on the keys is safe."""
     episode = forward(tmp_path, robot, 0.2)
-    with robot.operator() as operator, person(episode, tmp_path) as somebody:
+    with robot.operator() as operator, person(episode, tmp_path) as terminal:
         operator.place(0)
         start = operator.where().travelled_m
-        somebody.read_until("E arms it")
-        somebody.press("qe")
-        somebody.read_until("nothing was played")
-        assert somebody.end() == 0
+        terminal.read_until("E arms it")
+        terminal.press("qe")
+        terminal.read_until("nothing was played")
+        assert terminal.end() == 0
         assert operator.where().travelled_m == start
 
 
-def test_what_does_not_fit_the_robot_is_refused(robot: RunningRobot, tmp_path: Path) -> None:
-    """By its rate and by its layout, before anybody is asked."""
+def test_an_episode_that_does_not_fit_the_robot_is_refused(
+    robot: RunningRobot, tmp_path: Path
+) -> None:
+    """Rate and layout are checked before asking to arm."""
     slow = forward(tmp_path / "slow", robot, 0.2, control_hz=7.0)
-    with person(slow, tmp_path) as somebody:
-        somebody.read_until("steps a second.")
-        assert somebody.end() == 2
+    with person(slow, tmp_path) as terminal:
+        terminal.read_until("steps a second.")
+        assert terminal.end() == 2
     with robot.client(role="person") as client:
         layout = client.welcome.action_layout.replace('"low":-1.0', '"low":-0.5', 1)
     other = forward(tmp_path / "other", robot, 0.2, action_layout=layout)
-    with person(other, tmp_path) as somebody:
-        somebody.read_until("was recorded with steering [1] from -0.5 to 1")
-        assert somebody.end() == 2
+    with person(other, tmp_path) as terminal:
+        terminal.read_until("was recorded with steering [1] from -0.5 to 1")
+        assert terminal.end() == 2

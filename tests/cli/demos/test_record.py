@@ -1,4 +1,4 @@
-"""`shapechanger demos record` in a real env, and its replay there."""
+"""`shapechanger demos record` in a real env, and its replay."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from shapechanger.cli import main
 from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.envs.vehicle.drivers import CLONES
-from tests.cli.demos.test_demos import refused, said
+from tests.cli.demos.test_demos import output_of, refused
 
 SHORT = ("--minutes", "0.05", "--episode-s", "2", "--options", '{"size": [64, 48]}')
 
 
 @pytest.mark.usefixtures("gl")
 @pytest.mark.gl
-def test_the_expert_is_recorded_and_comes_out_the_same(
+def test_an_experts_recording_replays_identically(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What was decided, what was applied, the state and the pictures; one seed an episode."""
+    """State and images are equal in every step; each episode has its seed."""
     data = tmp_path / "data"
-    printed = said(capsys, "record", "Car", "--out", data, "--seed", 7, *SHORT)
+    printed = output_of(capsys, "record", "Car", "--out", data, "--seed", 7, *SHORT)
     assert "wrote 60 steps" in printed
     first, second = (read_episode(path) for path in episodes_of(data))
     assert (len(first.steps), len(second.steps)) == (40, 20)
@@ -34,21 +34,21 @@ def test_the_expert_is_recorded_and_comes_out_the_same(
     assert {step.driver for step in first.steps} == {"expert"}
     assert any(step.action != step.applied for step in first.steps)
     assert load_dataset(data).pictures is not None
-    printed = said(capsys, "replay", first.path, "--env", "Car")
+    printed = output_of(capsys, "replay", first.path, "--env", "Car")
     assert "played 40 of 40 steps" in printed
     assert "the state is the same in every step" in printed
     assert "the pictures are the same in every step" in printed
-    printed = said(capsys, "replay", first.path, "--env", "Tank")
+    printed = output_of(capsys, "replay", first.path, "--env", "Tank")
     assert "when recorded" in printed
 
 
 @pytest.mark.usefixtures("gl")
 @pytest.mark.gl
 def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The clone of another vehicle is often off; only what the expert did is learned from."""
+    """Only the expert's steps are loaded for learning."""
     data = tmp_path / "data"
     policy = ("--driver", str(CLONES["boat"]), "--corrected-by", "expert")
-    said(capsys, "record", "Car", "--out", data, "--minutes", "0.1", *policy)
+    output_of(capsys, "record", "Car", "--out", data, "--minutes", "0.1", *policy)
     (path,) = episodes_of(data)
     episode = read_episode(path)
     drivers = [step.driver for step in episode.steps]
@@ -78,7 +78,7 @@ def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str
         (["Ant", "--put-back"], "are for vehicles"),
     ],
 )
-def test_what_cannot_be_recorded_is_one_sentence(
+def test_invalid_arguments_give_one_sentence(
     arguments: list[str],
     words: str,
     tmp_path: Path,
@@ -86,7 +86,7 @@ def test_what_cannot_be_recorded_is_one_sentence(
     capsys: pytest.CaptureFixture[str],
     gl: None,
 ) -> None:
-    """And nothing is left behind."""
+    """No file is written."""
     monkeypatch.chdir(tmp_path)
     Path("text.safetensors").write_text("text")
     assert words in refused(capsys, "record", *arguments, "--out", "data")
@@ -98,7 +98,7 @@ def test_what_cannot_be_recorded_is_one_sentence(
 def test_ctrl_c_leaves_whole_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit code 130, and what was recorded until then is closed."""
+    """Exit code 130, and the episode is closed."""
     from shapechanger.envs.vehicle.drivers import VehicleDemonstrator
 
     acts = VehicleDemonstrator.act

@@ -1,4 +1,4 @@
-"""`shapechanger finger`: from an env to a log, and from a log to a finger."""
+"""`shapechanger finger`: recording a log, and identifying a finger."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from shapechanger.identify import load_log
 from tests.identify.logs import recorded
 
 
-def said(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    """What a command prints."""
+def output_of(capsys: pytest.CaptureFixture[str], *words: object) -> str:
+    """Return the standard output of a command."""
     main(["finger", *map(str, words)])
     return capsys.readouterr().out
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    """Why a command is refused."""
+    """Return the error of a command."""
     with pytest.raises(SystemExit) as stop:
         main(["finger", *map(str, words)])
     assert stop.value.code == 2
@@ -28,10 +28,10 @@ def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
 
 
 def test_a_finger_is_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As from Python, with the same seeds."""
+    """The log equals that of the Python API with the same seeds."""
     out = tmp_path / "new" / "log.npz"
     words = ("--seconds", 2.4, "--seed", 4, "--gap", "real-like", "--finger-seed", 3)
-    printed = said(capsys, "record", "Finger", "--out", out, *words, "--actions", "tension")
+    printed = output_of(capsys, "record", "Finger", "--out", out, *words, "--actions", "tension")
     assert "wrote 121 rows, 2.4 s" in printed
     log = load_log(out)
     assert (log.actions, log.source) == ("tension", "shapechanger/Finger-v1")
@@ -40,10 +40,8 @@ def test_a_finger_is_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     np.testing.assert_array_equal(log.commands, again.commands)
 
 
-def test_what_cannot_be_recorded_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Another body, another name, no time, no options, and a goal."""
+def test_invalid_recordings_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Unsuitable envs, options and durations."""
     out = ("--out", tmp_path / "log.npz")
     assert "is not a finger env" in refused(capsys, "record", "Ant", *out)
     assert "Did you mean" in refused(capsys, "record", "Fingr", *out)
@@ -53,13 +51,11 @@ def test_what_cannot_be_recorded_is_refused(
     assert "real-like" in refused(capsys, "record", "Finger", *out, "--gap", "real-lik")
 
 
-def test_what_cannot_be_identified_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A log that is too short, none, and a report that would take the log's place."""
+def test_invalid_logs_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Missing and short logs, and outputs that would overwrite the log."""
     log = tmp_path / "log.npz"
     assert "There is no file" in refused(capsys, "identify", log)
-    said(capsys, "record", "Finger", "--out", log, "--seconds", "1")
+    output_of(capsys, "record", "Finger", "--out", log, "--seconds", "1")
     assert "1.0 s long" in refused(capsys, "identify", log)
     assert "it is the log" in refused(capsys, "identify", log, "--report", log)
     assert "it is a folder" in refused(capsys, "identify", log, "--out", tmp_path)
@@ -68,11 +64,11 @@ def test_what_cannot_be_identified_is_refused(
 
 @pytest.mark.slow
 def test_a_finger_is_identified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A line for each parameter, what cannot be determined, and a last line that sums it up."""
+    """One line per parameter, those that cannot be determined, and a summary."""
     log, out = tmp_path / "log.npz", tmp_path / "finger.json"
     gap = ("--gap", "real-like", "--finger-seed", 3)
-    said(capsys, "record", "Finger", "--out", log, "--seconds", 6, *gap)
-    lines = said(capsys, "identify", log, "--out", out).splitlines()
+    output_of(capsys, "record", "Finger", "--out", log, "--seconds", 6, *gap)
+    lines = output_of(capsys, "identify", log, "--out", out).splitlines()
     assert sum(line.startswith("moment arm ") for line in lines) == 25
     assert any(line.startswith("backlash cannot be determined: ") for line in lines)
     assert lines[-1].startswith("arms: 25 intervals, ")

@@ -1,4 +1,4 @@
-"""What a robot is tried with while its wheels are up, tried on its twin."""
+"""Checks of the self-test, run on a twin."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _checked(folder: Path, text: str, wired: str = "") -> dict[str, SelftestResu
 
 
 def test_a_good_robot_passes_every_check(tmp_path: Path) -> None:
-    """It boots disarmed, drives forward, and stops in every way that a person has."""
+    """The robot boots disarmed, drives forward, and stops by every means."""
     checks = _checked(tmp_path, CAR)
     assert [name for name, check in checks.items() if check.level != "good"] == []
     assert {"boots disarmed", "drives", "stops by silence", "emergency stop"} <= set(checks)
@@ -35,14 +35,14 @@ def test_a_good_robot_passes_every_check(tmp_path: Path) -> None:
 
 
 def test_an_encoder_that_counts_backward_is_found(tmp_path: Path) -> None:
-    """Its two wires are swapped: the reward would pay for reversing."""
+    """Swapped encoder pins would reward reversing."""
     swapped = changed("a = 5\nb = 6\n", "a = 6\nb = 5\n")
     assert _checked(tmp_path, swapped, wired=CAR)["drives"].level == "bad"
 
 
-def test_without_an_encoder_it_says_what_it_does_not_know(tmp_path: Path) -> None:
-    """Nothing is called good that nothing measured; what its outputs do is measured without one."""
+def test_without_an_encoder_checks_are_unknown(tmp_path: Path) -> None:
+    """Unmeasured checks are "unknown", while stopping is measured at the outputs."""
     checks = _checked(tmp_path, BLIND_CAR)
     assert (checks["drives"].level, checks["wheels stand"].level) == ("unknown", "unknown")
-    # How fast it stops is for the robot's own tests: a busy machine is slower.
+    # Do not check the time, since the test machine may be busy.
     assert checks["stops by silence"].level != "unknown"

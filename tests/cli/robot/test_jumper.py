@@ -1,4 +1,4 @@
-"""Two pins that are joined by a wire, before a robot is tried."""
+"""The self-test of two pins joined by a wire."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PLAN = GuardPlan(
 
 
 class _Pins(RealHardware):
-    """Pins of gpiozero's own fake; 20 and 21 are joined, 20 and 16 are not."""
+    """gpiozero's mock pins; 20 and 21 are joined, 20 and 16 are not."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -44,13 +44,13 @@ def pins() -> Iterator[_Pins]:
     made.factory.close()
 
 
-def test_an_input_follows_the_output_that_it_is_joined_to(pins: _Pins) -> None:
-    """Then the pins work, and so does what drives them."""
+def test_joined_pins_pass(pins: _Pins) -> None:
+    """The input follows the output."""
     assert "20 followed pin 21" in check_jumper(21, 20, _PLAN, pins)
 
 
-def test_without_a_wire_it_does_not(pins: _Pins) -> None:
-    """The check can fail."""
+def test_pins_without_a_wire_fail(pins: _Pins) -> None:
+    """The error asks for the wire."""
     with pytest.raises(RobotError, match="is the wire between them"):
         check_jumper(21, 16, _PLAN, pins)
 
@@ -60,6 +60,6 @@ def test_without_a_wire_it_does_not(pins: _Pins) -> None:
     [((22, 20), "drive"), ((20, 6), "bumper"), ((19, 20), "enable line"), ((20, 26), "button")],
 )
 def test_pins_of_the_robot_are_never_toggled(pair: tuple[int, int], user: str) -> None:
-    """A self-test must not start a motor."""
+    """Pins in use are refused, so that the test cannot start a motor."""
     with pytest.raises(RobotError, match=user):
         check_jumper(*pair, _PLAN)

@@ -1,4 +1,4 @@
-"""A twin that is served here is known here, and takes nobody's name."""
+"""Served twins become known robots, without replacing others."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
 
 
-def test_a_robot_that_nobody_knows_is_written_down() -> None:
-    """And said to be, with the command that drives it; again changes nothing."""
-    said = make_known(_MINE)
+def test_a_new_robot_is_remembered() -> None:
+    """The message gives the command to drive it; repeating changes nothing."""
+    message = make_known(_MINE)
     assert recall("rover") == _MINE
-    assert said == "Known here as rover: `shapechanger robot drive rover` drives it from here."
-    assert make_known(replace(_MINE, address="127.0.0.1:5000")) == said
+    assert message == "Known here as rover: `shapechanger robot drive rover` drives it from here."
+    assert make_known(replace(_MINE, address="127.0.0.1:5000")) == message
 
 
-def test_the_same_robot_on_another_port_is_found_there() -> None:
-    """Both addresses are said."""
+def test_the_address_of_a_known_robot_is_updated() -> None:
+    """The message gives both addresses."""
     remember(_MINE)
     moved = replace(_MINE, address="127.0.0.1:5001")
     assert "now at 127.0.0.1:5001 and no more at 127.0.0.1:5000" in make_known(moved)
@@ -44,15 +44,15 @@ def test_the_same_robot_on_another_port_is_found_there() -> None:
     ],
     ids=["key", "fingerprint", "address"],
 )
-def test_another_robot_of_the_same_name_stays_known(other: KnownRobot) -> None:
-    """Nobody loses the key of a real car because they served a twin."""
+def test_another_robot_of_the_same_name_is_kept(other: KnownRobot) -> None:
+    """Serving a twin does not overwrite the key of a real robot."""
     remember(other)
     assert "stays" in make_known(_MINE)
     assert recall("rover") == other
 
 
 def test_a_file_that_cannot_be_read_is_left_alone() -> None:
-    """It may hold the only copy of a key."""
+    """The file may hold the only copy of a key."""
     remember(_MINE)
     path = known_folder() / "rover.toml"
     path.write_text("key = ")

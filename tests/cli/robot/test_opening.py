@@ -1,4 +1,4 @@
-"""`shapechanger robot drive` opens the console, and the key goes to the browser alone."""
+"""`shapechanger robot drive` opens the console in a browser and passes the key to it alone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 
 pytestmark = pytest.mark.realtime
 
-# Stands in for a browser: keeps what it was given, and who may read it.
+# Fake browser: stores the page that it was given, and the page's file mode.
 _BROWSER = """\
 import os, pathlib, sys, urllib.parse
 page = pathlib.Path(urllib.parse.urlparse(sys.argv[2]).path)
@@ -30,12 +30,12 @@ out.write_text(f"{os.stat(page).st_mode & 0o777:o} {page} {page.read_text()}")
 
 @pytest.fixture
 def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The file in which the browser of this test keeps what it was given."""
+    """The file in which the fake browser stores its page."""
     script, out = tmp_path / "browser.py", tmp_path / "opened.txt"
     script.write_text(_BROWSER)
     monkeypatch.setenv("BROWSER", f"{sys.executable} {script} {out} %s")
     monkeypatch.setenv("DISPLAY", ":99")
-    # This browser has read the page when it ends; not every file system tells that.
+    # The fake browser has read the page when it exits; not every file system reports the access.
     monkeypatch.setattr(opening, "_OPENED_WITHIN_S", 0.1)
     return out
 
@@ -46,7 +46,7 @@ def test_drive_opens_the_console_with_its_key(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Nobody else can read the key: not in the address that is printed, nor in a file."""
+    """The key is neither printed nor left in a readable file."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot:
         known = robot.known
@@ -56,20 +56,20 @@ def test_drive_opens_the_console_with_its_key(
     assert mode == "600"
     assert f"https://{known.address}/#key={known.key}" in content
     assert not Path(page).exists()
-    said = capsys.readouterr().out
-    assert f"https://{known.address}/" in said
-    assert known.key not in said
+    output = capsys.readouterr().out
+    assert f"https://{known.address}/" in output
+    assert known.key not in output
 
 
-def test_without_a_screen_there_is_nothing_to_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The terminal drives then."""
+def test_without_a_display_nothing_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The terminal is used instead."""
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     assert can_open() == (sys.platform == "darwin")
 
 
-def test_a_browser_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the address to open by hand, and the way that needs no browser."""
+def test_a_browser_failure_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error gives the address, and the option to use the terminal."""
     monkeypatch.setattr(webbrowser, "open", lambda *_: False)
     robot = KnownRobot("car", "127.0.0.1:5000", new_key(), "insecure")
     with pytest.raises(LinkError, match=r"open http://127\.0\.0\.1:5000/ in one, or .*--terminal"):

@@ -1,4 +1,4 @@
-"""Where the vehicle of a twin is that somebody serves."""
+"""Default worlds of served twins."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def _shipped(name: str) -> Profile:
         ("finger-pwm", Place()),
     ],
 )
-def test_a_vehicle_is_at_home_and_anything_else_in_the_room(name: str, place: Place) -> None:
-    """Whoever asks for nothing gets what fits."""
+def test_the_default_place(name: str, place: Place) -> None:
+    """Vehicles get their own world, fingers a rig, and others the room."""
     assert place_of(_shipped(name), "", ()) == place
 
 
-def test_a_finger_is_one_of_a_gap_where_it_is_asked_for() -> None:
-    """The same that `Finger-v1` draws for that seed."""
+def test_a_finger_of_a_gap() -> None:
+    """The finger is the one that `Finger-v1` draws for the seed."""
     drawn = finger_of(_shipped("finger"), "real-like", 3)
     assert drawn is not None
     expected = GAPS["real-like"].draw(np.random.default_rng(3))
@@ -52,20 +52,20 @@ def test_a_finger_is_one_of_a_gap_where_it_is_asked_for() -> None:
     assert finger_of(_shipped("lab-car"), "", None) is None
 
 
-def test_lenses_go_where_the_vehicle_goes() -> None:
-    """In the order in which they spoil pictures."""
+def test_lenses_apply_to_the_default_world() -> None:
+    """Lenses keep their order."""
     place = place_of(_shipped("lab-car"), "", ("night", "dirt"))
     assert place == Place("corridor", "car", ("night", "dirt"))
     assert place_of(_shipped("lab-car"), "yard", ()) == Place("yard", "car")
 
 
 def test_the_room_takes_any_robot() -> None:
-    """Also one that would have a home."""
+    """`--world room` applies to vehicles with a world of their own too."""
     assert place_of(_shipped("lab-car"), "room", ()) == Place()
 
 
 def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path) -> None:
-    """Unless somebody asks for a world: then it hears what does not fit."""
+    """If a world is requested, the error names the part that does not fit."""
     text = changed('part = "steering"', 'part = "rudder"')
     odd = write_profile(tmp_path, text)
     assert place_of(odd, "", ()) == Place()
@@ -73,8 +73,8 @@ def test_a_body_with_other_parts_than_its_vehicle_is_in_the_room(tmp_path: Path)
         place_of(odd, "corridor", ())
 
 
-def test_without_mujoco_everybody_is_in_the_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And whoever asks for a world hears what to install."""
+def test_without_mujoco_the_default_is_the_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Requesting a world raises an error that names the extra."""
     found = serving.find_spec
     monkeypatch.setattr(
         serving, "find_spec", lambda name: found(name) if name != "mujoco" else None
@@ -85,8 +85,8 @@ def test_without_mujoco_everybody_is_in_the_room(monkeypatch: pytest.MonkeyPatch
         place_of(_shipped("lab-car"), "corridor", ())
 
 
-def test_what_there_is_not_is_told_with_what_there_is() -> None:
-    """A slip, a body without a vehicle, and a lens for a camera that has none."""
+def test_unknown_worlds_and_lenses_are_refused() -> None:
+    """The error lists what exists, or explains the mismatch."""
     car = _shipped("lab-car")
     with pytest.raises(UnknownName, match=r"No world matches 'coridor'. Did you mean 'corridor'"):
         place_of(car, "coridor", ())
@@ -102,8 +102,8 @@ def test_what_there_is_not_is_told_with_what_there_is() -> None:
         place_of(car, "room", ("night",))
 
 
-def test_a_twin_is_where_its_place_says(tmp_path: Path) -> None:
-    """A place for a command is a place for the board that it starts."""
+def test_a_board_starts_in_its_place(tmp_path: Path) -> None:
+    """The place of a command is passed to the board."""
     profile = write_profile(tmp_path, CAR)
     board = start_board(
         profile.guard_plan(),

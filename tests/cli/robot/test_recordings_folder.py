@@ -1,4 +1,4 @@
-"""Where a robot keeps what it records."""
+"""The folder of a robot's recordings."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from shapechanger.cli.robot.serve import recordings_folder
 from shapechanger.errors import RobotError
 
 
-def test_it_is_below_the_folder_for_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the XDG base directory specification, as the credentials are below that for settings."""
+def test_it_follows_the_xdg_specification(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The folder is below XDG_DATA_HOME, if that is absolute."""
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("XDG_DATA_HOME", raising=False)
     home = tmp_path / ".local/share/shapechanger/recordings/car"
@@ -23,7 +23,7 @@ def test_it_is_below_the_folder_for_data(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("name", ["", "..", "a/b", ".car", "a\0b"])
-def test_a_name_leads_nowhere_else(name: str) -> None:
-    """It is that of a folder."""
+def test_invalid_names_are_refused(name: str) -> None:
+    """The name must be a single folder name."""
     with pytest.raises(RobotError, match="folder"):
         recordings_folder(name)

@@ -1,4 +1,4 @@
-"""`shapechanger robot camera`: what a picture tells of a camera is written into the profile."""
+"""`shapechanger robot camera`: writes a camera's measured geometry into the profile."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.worlds.test_rectify import board_picture
 
 @pytest.fixture(autouse=True)
 def profile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The profile of a robot whose camera has not been measured."""
+    """A profile whose camera has not been measured."""
     monkeypatch.chdir(tmp_path)
     return write_profile(tmp_path, CAR).path
 
@@ -30,7 +30,7 @@ def _jpeg(path: Path, picture: NDArray[np.uint8]) -> str:
 def test_a_board_is_measured_written_and_drawn(
     profile: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """And without a board the drawing is that of the profile."""
+    """Without a board, the drawing uses the profile."""
     picture = _jpeg(tmp_path / "board.jpg", board_picture(4.0, 48.8, 35.0))
     main(["robot", "camera", str(profile), "--picture", picture, "--board", "7x5"])
     camera = load_profile(profile).camera
@@ -45,7 +45,7 @@ def test_a_board_is_measured_written_and_drawn(
 
 
 def test_a_mark_at_the_height_of_the_lens_is_enough(profile: Path, tmp_path: Path) -> None:
-    """With the field of view of a data sheet."""
+    """--horizon and --fovy replace the board."""
     picture = _jpeg(tmp_path / "wall.jpg", np.full((120, 160, 3), 90, np.uint8))
     options = ["--picture", picture, "--horizon", "50", "--fovy", "48.8"]
     main(["robot", "camera", str(profile), *options])
@@ -55,7 +55,7 @@ def test_a_mark_at_the_height_of_the_lens_is_enough(profile: Path, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--board", "nine"], "such as 9x6, got 'nine'"),
         (["--board", "7x5"], "no checkerboard of 7 x 5"),
@@ -67,33 +67,33 @@ def test_a_mark_at_the_height_of_the_lens_is_enough(profile: Path, tmp_path: Pat
         ([], "does not say pitch_deg and fovy_deg"),
     ],
 )
-def test_what_tells_nothing_is_refused(
+def test_unsuitable_options_are_refused(
     profile: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     options: list[str],
-    said: str,
+    message: str,
 ) -> None:
-    """In one sentence, and the profile stays as it was."""
+    """One sentence, and the profile is unchanged."""
     before = profile.read_bytes()
     picture = _jpeg(tmp_path / "wall.jpg", np.full((120, 160, 3), 90, np.uint8))
     with pytest.raises(SystemExit):
         main(["robot", "camera", str(profile), "--picture", picture, *options])
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert profile.read_bytes() == before
     assert not Path("camera.jpg").exists()
 
 
-def test_shipped_profiles_and_foreign_files_are_left_alone(
+def test_shipped_profiles_and_invalid_images_are_refused(
     profile: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A shipped profile is not written, and a text is not a picture."""
+    """Shipped profiles are not written."""
     (tmp_path / "text.jpg").write_bytes(b"no picture")
-    for robot, options, said in (
+    for robot, options, message in (
         ("lab-car", ["--fovy", "50"], "comes with Shapechanger"),
         (str(profile), ["--picture", "text.jpg"], "is not a JPEG"),
         (str(profile), ["--picture", "none.jpg"], "Cannot read none.jpg"),
     ):
         with pytest.raises(SystemExit):
             main(["robot", "camera", robot, *options])
-        assert said in capsys.readouterr().err
+        assert message in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""`shapechanger robot fetch`: the same bytes here as there, whatever was cut off before."""
+"""`shapechanger robot fetch`: exact copies, resumed after interruptions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ HEADER = EpisodeHeader(action_layout=ACTIONS.to_json(), driver="Ada")
 
 @pytest.fixture
 def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Folder of the recordings of a robot that is known as car."""
+    """The recordings folder of a robot known as car."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     kept = tmp_path / "robot" / "kept"
     with Served(tmp_path / "robot", monkeypatch, recordings=str(kept)).serving() as served:
@@ -42,7 +42,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture
 def robot(there: Path) -> Iterator[RobotClient]:
-    """A connection to it."""
+    """A connection to the robot."""
     from shapechanger.remote.known_robots import recall
 
     with RobotClient.connect(recall("car"), frames=False) as client:
@@ -50,7 +50,7 @@ def robot(there: Path) -> Iterator[RobotClient]:
 
 
 def record(folder: Path, count: int = 40) -> Path:
-    """An episode on the robot."""
+    """Record an episode on the robot."""
     with EpisodeWriter.create(folder, HEADER) as writer:
         for number in range(count):
             jpeg = picture(number) if number % 3 != 2 else None
@@ -60,7 +60,7 @@ def record(folder: Path, count: int = 40) -> Path:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """All files below a folder, by name."""
+    """Return all files below a folder, by name."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in folder.rglob("*")
@@ -68,10 +68,10 @@ def files(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_everything_comes_byte_for_byte_and_then_only_what_is_new(
+def test_fetching_copies_exactly_and_then_only_what_is_new(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A judgement that was made on the robot since, too."""
+    """Judgements made since on the robot are fetched too."""
     first, data = record(there), tmp_path / "here"
     fetch = ["robot", "fetch", "car", "--out", str(data)]
     main(fetch)
@@ -80,9 +80,9 @@ def test_everything_comes_byte_for_byte_and_then_only_what_is_new(
     drop(first, 0, 9, "bad")
     second = record(there, 3)
     main(fetch)
-    said = capsys.readouterr().out
-    assert "30 steps kept of 40, 1 lines came" in said
-    assert "3 steps kept of 3, 4 lines came" in said
+    output = capsys.readouterr().out
+    assert "30 steps kept of 40, 1 lines came" in output
+    assert "3 steps kept of 3, 4 lines came" in output
     main([*fetch, "--episodes", second.name])
     assert capsys.readouterr().out == f"{second.name}: 3 steps kept of 3, nothing new\n"
     assert [path.name for path in episodes_of(data)] == [first.name, second.name]
@@ -91,10 +91,8 @@ def test_everything_comes_byte_for_byte_and_then_only_what_is_new(
     assert len(read_episode(data / first.name).kept) == 30
 
 
-def test_it_goes_on_wherever_it_was_cut_off(
-    there: Path, robot: RobotClient, tmp_path: Path
-) -> None:
-    """At any byte of the lines or of a picture; no reader sees the half of it meanwhile."""
+def test_an_interrupted_fetch_resumes(there: Path, robot: RobotClient, tmp_path: Path) -> None:
+    """Cut at any byte of lines or frames; partial episodes are invisible to readers."""
     rng = random.Random(3)
     episode = record(there)
     lines = (episode / "steps.jsonl").read_bytes()
@@ -105,7 +103,7 @@ def test_it_goes_on_wherever_it_was_cut_off(
         part = data / f".{episode.name}.fetching"
         (part / "frames").mkdir(parents=True)
         (part / "steps.jsonl").write_bytes(lines[:cut])
-        # Pictures come before the line that names them, and the last one may be cut off, too.
+        # Frames are written before their line, and the last one may be incomplete.
         whole = lines[:cut].count(b"\n")
         for frame in sorted((episode / "frames").iterdir()):
             if int(frame.stem) < whole:
@@ -122,10 +120,10 @@ def test_it_goes_on_wherever_it_was_cut_off(
         assert not part.exists()
 
 
-def test_what_was_changed_here_is_not_written_over(
+def test_local_changes_are_not_overwritten(
     there: Path, robot: RobotClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It is said, the others come all the same, and the exit status tells."""
+    """The conflict is reported, other episodes are fetched, and the exit code is 1."""
     first, data = record(there, 4), tmp_path / "here"
     fetch_episode(robot, first.name, data)
     drop(data / first.name, 0, 0, "bad")
@@ -135,18 +133,18 @@ def test_what_was_changed_here_is_not_written_over(
     with pytest.raises(SystemExit) as ended:
         main(["robot", "fetch", "car", "--out", str(data)])
     assert ended.value.code == 1
-    said = capsys.readouterr()
-    assert "it was changed here" in said.err
-    assert second.name in said.out
+    output = capsys.readouterr()
+    assert "it was changed here" in output.err
+    assert second.name in output.out
     assert files(data / first.name) == before
     assert files(data / second.name) == files(second)
 
 
 @pytest.mark.parametrize("damage", ["line", "picture", "missing"])
-def test_what_is_damaged_on_the_robot_is_not_taken(
+def test_damaged_episodes_are_not_fetched(
     there: Path, robot: RobotClient, tmp_path: Path, damage: str
 ) -> None:
-    """What came before stays here, for when it was repaired there."""
+    """Partial data are kept until the episode is repaired."""
     episode = record(there, 9)
     frame = episode / "frames" / "000003.jpg"
     if damage == "line":
@@ -162,10 +160,10 @@ def test_what_is_damaged_on_the_robot_is_not_taken(
         episodes_of(tmp_path / "here")
 
 
-def test_mistakes_are_answered_in_a_sentence(
+def test_mistakes_give_one_sentence(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """An episode that is not there; nothing recorded; a file in the way."""
+    """Unknown episodes, no recordings, and a file in place of the folder."""
     out = ["--out", str(tmp_path / "here")]
     main(["robot", "fetch", "car", *out])
     assert "has recorded nothing yet" in capsys.readouterr().out
@@ -177,10 +175,10 @@ def test_mistakes_are_answered_in_a_sentence(
     assert "Cannot write" in capsys.readouterr().err
 
 
-def test_what_is_being_recorded_comes_later(
+def test_a_running_recording_is_skipped(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It says so."""
+    """A message says so."""
     from shapechanger.remote.known_robots import recall
 
     with RobotClient.connect(recall("car"), role="person") as person:

@@ -1,4 +1,4 @@
-"""What `shapechanger robot key` shows of a robot of this machine."""
+"""`shapechanger robot key`."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from shapechanger.robot.daemon.credentials import credentials_folder, make_crede
 _HALVES = {"█": (0, 0), "▀": (0, 1), "▄": (1, 0), " ": (1, 1)}
 
 
-def test_a_phone_finds_the_console_by_the_picture(
+def test_the_qr_code_holds_the_console_address(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It is the QR code of the console's address, with the key where no browser sends it."""
+    """The key is in the fragment of the URL, which browsers do not send."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     made = make_credentials(credentials_folder("car"), "car")
     main(["robot", "key", "car", "--qr", "--address", "192.168.0.7"])
-    said = capsys.readouterr().out
-    assert "https://192.168.0.7:5000/" in said
-    drawn = [[_HALVES[c] for c in line] for line in said.splitlines() if set(line) & {"█", "▀"}]
+    output = capsys.readouterr().out
+    assert "https://192.168.0.7:5000/" in output
+    drawn = [[_HALVES[c] for c in line] for line in output.splitlines() if set(line) & {"█", "▀"}]
     rows = [[pair[half] for pair in line] for line in drawn for half in (0, 1)]
     key = made.key_file.read_text().strip()
     expected = segno.make(f"https://192.168.0.7:5000/#key={key}", micro=False)

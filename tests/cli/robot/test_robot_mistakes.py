@@ -1,4 +1,4 @@
-"""What is asked wrongly of `shapechanger robot` is refused in one sentence, and leaves nothing."""
+"""Mistakes in `shapechanger robot` commands give one sentence and leave no files."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ KEY = "F3KI-CLDB-JQNI-LWGB-LOBU-SJPT-5E"
 
 @pytest.fixture(autouse=True)
 def home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder to work in, with nobody's configuration and an empty temporary folder.
+    """A working folder with empty configuration and temporary folders.
 
-    Its path is short: a socket's must be.
+    Its path is short, as sockets require.
     """
     tmp_path = Path(tempfile.mkdtemp())
     for name, variable in (("config", "XDG_CONFIG_HOME"), ("tmp", "TMPDIR")):
@@ -51,7 +51,7 @@ def home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """Run a command: its exit code, what it printed, and what it said was wrong."""
+    """Run a command and return its exit code, standard output and standard error."""
 
     def ran(*arguments: str) -> tuple[int, str, str]:
         code = 0
@@ -66,12 +66,12 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 def files(folder: Path) -> set[str]:
-    """Everything in a folder."""
+    """Return all paths in a folder."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
-def fits(home: Path, text: str = CAR) -> str:
-    """A profile whose robot has its key and certificate."""
+def write_ready_profile(home: Path, text: str = CAR) -> str:
+    """Write a profile whose robot has its key and certificate."""
     profile = write_profile(home / "work", text)
     make_credentials(home / "config" / "shapechanger" / "robots" / profile.name, profile.name)
     return str(profile.path)
@@ -95,10 +95,10 @@ def fits(home: Path, text: str = CAR) -> str:
     ],
 )
 def test_help(run: Run, command: str) -> None:
-    """Each command says what it does."""
-    code, said, _ = run(command, "--help")
+    """Each command has a help text."""
+    code, output, _ = run(command, "--help")
     assert code == 0
-    assert f"shapechanger robot {command}" in said
+    assert f"shapechanger robot {command}" in output
 
 
 @pytest.mark.parametrize(
@@ -159,45 +159,45 @@ def test_help(run: Run, command: str) -> None:
 def test_one_sentence(
     run: Run, home: Path, monkeypatch: pytest.MonkeyPatch, arguments: str, words: str
 ) -> None:
-    """Exit code 2; no file more than before, and no process."""
+    """Exit code 2, and no new file or process."""
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
-    fits(home)
+    write_ready_profile(home)
     (home / "work" / "twice.toml").write_text(changed("pins = [13, 12]", "pins = [22, 12]"))
     (home / "work" / "stale").mkdir()
     (home / "work" / "stale" / "ledger.jsonl").touch()
     before = files(home)
-    code, _, said = run(*arguments.split())
+    code, _, output = run(*arguments.split())
     assert code == 2
-    assert said.startswith("error: ")
-    assert words in said
-    assert said.count("\n") == 1
+    assert output.startswith("error: ")
+    assert words in output
+    assert output.count("\n") == 1
     assert files(home) == before
 
 
 def test_the_key_is_asked_for(run: Run) -> None:
-    """It does not belong on a command line."""
-    code, _, said = run("remember", "one", "127.0.0.1", "--fingerprint", "insecure")
+    """The key must not be given on the command line."""
+    code, _, output = run("remember", "one", "127.0.0.1", "--fingerprint", "insecure")
     assert code == 2
-    assert "SHAPECHANGER_KEY" in said
+    assert "SHAPECHANGER_KEY" in output
 
 
 def test_a_port_in_use(run: Run, home: Path) -> None:
-    """Nothing starts for it."""
-    path = fits(home)
+    """No process is started."""
+    path = write_ready_profile(home)
     before = files(home / "work")
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
-        code, _, said = run(
+        code, _, output = run(
             "serve", path, "--twin", "--port", str(port), "--no-announce", *IN_A_ROOM
         )
     assert code == 2
-    assert "Does the robot run already?" in said
+    assert "Does the robot run already?" in output
     assert files(home / "work") == before
 
 
 def test_a_twin_on_another_clock(run: Run, home: Path) -> None:
-    """A twin that runs keeps its clock."""
-    path = fits(home)
+    """A running twin keeps its clock."""
+    path = write_ready_profile(home)
     folder = home / "work" / "twin"
     folder.mkdir()
     ready = home / "ready.json"
@@ -219,81 +219,81 @@ def test_a_twin_on_another_clock(run: Run, home: Path) -> None:
     try:
         until(lambda: ready.exists() or served.poll() is not None, 30.0)
         assert json.loads(ready.read_text())["port"] > 0
-        code, _, said = run(*command[4:], "--clock", "twin")
+        code, _, output = run(*command[4:], "--clock", "twin")
         assert code == 2
-        assert "runs on --clock real" in said
+        assert "runs on --clock real" in output
     finally:
         served.send_signal(signal.SIGTERM)
         assert served.wait(20.0) == 0
 
 
 def test_init_never_overwrites(run: Run, home: Path) -> None:
-    """Neither the profile nor the key."""
-    code, said, _ = run("init", "car", "--name", "rover")
+    """Profile and key are kept."""
+    code, output, _ = run("init", "car", "--name", "rover")
     assert code == 0
-    key = next(line.split()[1] for line in said.splitlines() if line.startswith("key  "))
+    key = next(line.split()[1] for line in output.splitlines() if line.startswith("key  "))
     profile = home / "work" / "rover.toml"
     text = profile.read_text() + "# Mine.\n"
     profile.write_text(text)
     before = {path: path.read_bytes() for path in home.rglob("*") if path.is_file()}
-    code, _, said = run("init", "car", "--name", "rover")
+    code, _, output = run("init", "car", "--name", "rover")
     assert code == 2
-    assert "it exists" in said
+    assert "it exists" in output
     profile.rename(profile.with_name("other.toml"))
-    code, said, _ = run("init", "car", "--name", "rover")
+    code, output, _ = run("init", "car", "--name", "rover")
     assert code == 0
-    assert key in said
+    assert key in output
     profile.unlink()
     profile.with_name("other.toml").rename(profile)
     assert {path: path.read_bytes() for path in before} == before
 
 
 def test_the_key_can_be_shown_again(run: Run, home: Path) -> None:
-    """In the words of `init`, with the whole fingerprint."""
+    """The output matches that of `init`, with the full fingerprint."""
     _, made, _ = run("init", "car", "--name", "rover")
-    code, said, _ = run("key", "rover")
+    code, output, _ = run("key", "rover")
     assert code == 0
-    assert all(part in made for part in said.strip().split("\n\n"))
+    assert all(part in made for part in output.strip().split("\n\n"))
     known = tomllib.loads((home / "config" / "shapechanger" / "known" / "rover.toml").read_text())
-    assert f"key          {known['key']}\n" in said
-    assert f"fingerprint  {known['fingerprint']}\n" in said
-    assert "shapechanger robot remember rover " in said
+    assert f"key          {known['key']}\n" in output
+    assert f"fingerprint  {known['fingerprint']}\n" in output
+    assert "shapechanger robot remember rover " in output
 
 
 def test_a_profile_in_this_folder_is_found_by_its_name(run: Run, home: Path) -> None:
-    """A newcomer types what `init` was told; a shipped profile of that name comes first."""
-    fits(home)
-    _, said, _ = run("doctor", "test-car", "--port", "0")
-    assert "good     profile: test-car.toml is valid" in said
+    """A shipped profile of that name takes precedence."""
+    write_ready_profile(home)
+    _, output, _ = run("doctor", "test-car", "--port", "0")
+    assert "good     profile: test-car.toml is valid" in output
     (home / "work" / "car.toml").write_text("broken")
-    _, said, _ = run("doctor", "car", "--port", "0")
-    assert "shipped" in said
+    _, output, _ = run("doctor", "car", "--port", "0")
+    assert "shipped" in output
 
 
 def test_stopping_a_robot_that_is_off(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Exit code 1 and words: whoever pressed stop must know that nothing was stopped."""
-    with socket.create_server(("127.0.0.1", 0)) as nobody:
-        address = f"127.0.0.1:{nobody.getsockname()[1]}"
+    """Exit code 1, and an error that the stop was not confirmed."""
+    with socket.create_server(("127.0.0.1", 0)) as unused:
+        address = f"127.0.0.1:{unused.getsockname()[1]}"
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
     assert run("remember", "off", address, "--fingerprint", "ab" * 32)[0] == 0
-    code, said, wrong = run("stop", "off")
-    assert (code, said) == (1, "")
+    code, output, wrong = run("stop", "off")
+    assert (code, output) == (1, "")
     assert "The stop was not confirmed" in wrong
 
 
 def test_doctor(run: Run, home: Path) -> None:
-    """Here nothing is a Raspberry Pi, and it says what is good all the same."""
-    code, said, _ = run("doctor", fits(home), "--port", "0")
+    """The doctor reports what is good on a machine other than a Raspberry Pi."""
+    code, output, _ = run("doctor", write_ready_profile(home), "--port", "0")
     assert code == 1
-    assert "good     profile" in said
-    assert "good     credentials" in said
+    assert "good     profile" in output
+    assert "good     credentials" in output
     shutil.rmtree(home / "config" / "shapechanger")
-    _, said, _ = run("doctor", "test-car.toml")
-    assert "MISSING  credentials" in said
+    _, output, _ = run("doctor", "test-car.toml")
+    assert "MISSING  credentials" in output
 
 
 def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A robot that is forgotten leaves nothing."""
+    """Forgetting removes all files."""
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
     before = files(home / "work")
     assert run("remember", "one", "127.0.0.1:5000", "--fingerprint", "insecure")[0] == 0
@@ -305,17 +305,17 @@ def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPat
 @pytest.mark.skipif(any(Path("/dev").glob("gpiochip*")), reason="This machine has pins.")
 @pytest.mark.parametrize("command", ["serve", "safe-pins"])
 def test_a_machine_without_pins(run: Run, home: Path, command: str) -> None:
-    """The twin is named, and nothing starts that would fail again and again."""
-    code, _, said = run(command, fits(home))
+    """The error names the twin, and nothing starts that would fail repeatedly."""
+    code, _, output = run(command, write_ready_profile(home))
     assert code == 2
-    assert "serve --twin" in said
-    assert said.count("\n") == 1
+    assert "serve --twin" in output
+    assert output.count("\n") == 1
 
 
-def test_a_full_disk_leaves_no_half_of_a_robot(
+def test_a_full_disk_leaves_no_partial_robot(
     run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Wherever the disk is full first, nothing is empty, and `init` can be run again."""
+    """No file is empty, and `init` can be run again."""
     real, left = os.fsync, 0
 
     def fsync(fd: int) -> None:
@@ -326,11 +326,11 @@ def test_a_full_disk_leaves_no_half_of_a_robot(
         real(fd)
 
     monkeypatch.setattr("os.fsync", fsync)
-    for first in (0, 1, 2, 3, 1):  # What was made whole stays, and is not made again.
+    for first in (0, 1, 2, 3, 1):  # Complete files are kept.
         left = first
-        code, _, said = run("init", "car", "--name", "rover")
+        code, _, output = run("init", "car", "--name", "rover")
         assert code == 2
-        assert "No space left" in said
+        assert "No space left" in output
         assert not (home / "work" / "rover.toml").exists()
         assert all(path.stat().st_size for path in home.rglob("*") if path.is_file())
         assert not list(home.rglob(".*"))
@@ -339,8 +339,8 @@ def test_a_full_disk_leaves_no_half_of_a_robot(
 
 
 def test_a_refused_init_leaves_nothing(run: Run, home: Path) -> None:
-    """No key for a robot whose profile could not be written."""
-    fits(home)
+    """No key is created when the profile cannot be written."""
+    write_ready_profile(home)
     before = files(home)
     assert run("init", "car", "--name", "rover", "--out", "test-car.toml")[0] == 2
     assert files(home) == before
@@ -349,7 +349,7 @@ def test_a_refused_init_leaves_nothing(run: Run, home: Path) -> None:
 def test_a_broken_file_of_a_known_robot_is_skipped(
     run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The others are found all the same."""
+    """Other robots are found."""
     found = FoundRobot("rover", "car", Address("192.0.2.1", 5000), "ab" * 32, "1")
     monkeypatch.setattr("shapechanger.remote.discovery.find", lambda _: [found])
     monkeypatch.setenv("SHAPECHANGER_KEY", KEY)
@@ -357,8 +357,8 @@ def test_a_broken_file_of_a_known_robot_is_skipped(
     broken = home / "config" / "shapechanger" / "known" / "broken.toml"
     broken.write_text("key = ")
     broken.chmod(0o600)
-    code, said, warned = run("find")
+    code, output, warned = run("find")
     assert code == 0
-    assert "mine" in said
+    assert "mine" in output
     assert warned.startswith("broken is skipped: ")
     assert warned.count("\n") == 1

@@ -1,4 +1,4 @@
-"""A policy drives a robot on its twin, and the person in charge takes over from the terminal."""
+"""A policy drives a twin, and a person takes over from the terminal."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 def test_a_person_lets_a_policy_drive_and_corrects_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """P lets it drive, a direction takes over at once, and both are in what was recorded."""
+    """P starts the policy, a direction key takes over, and both are recorded."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(
         write_profile(tmp_path, PATIENT_CAR), arguments=("--world", "corridor")
@@ -34,7 +34,7 @@ def test_a_person_lets_a_policy_drive_and_corrects_it(
         command = ("robot", "drive", "car", "--policy", str(CLONES["car"]), "--record", str(data))
         with Person(command, tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}) as person:
             read = person.read_until("not armed")
-            # It does not drive by itself, though anyone may arm a twin.
+            # The policy does not start by itself.
             read = person.read_until("recording", read)
             person.press("p")
             read = person.read_until("it drives", read)
@@ -56,10 +56,10 @@ def test_a_person_lets_a_policy_drive_and_corrects_it(
         assert all(read_episode(path).jpeg(step) for step in steps)
 
 
-def test_what_was_recorded_stays_where_driving_fails(
+def test_recordings_are_kept_after_a_failure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The error names the command that downloads it; otherwise it is here, closed and complete."""
+    """The error names the command that downloads it; otherwise it is complete here."""
     with (
         run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
         robot.client(role="person") as person,
@@ -67,8 +67,8 @@ def test_what_was_recorded_stays_where_driving_fails(
         person.take()
         with pytest.raises(KeyboardInterrupt), recorded(person, "car", tmp_path / "lost"):
             raise KeyboardInterrupt
-        said = " ".join(capsys.readouterr().err.split())
-        assert f"`shapechanger robot fetch car --out {tmp_path / 'lost'}` downloads it" in said
+        message = " ".join(capsys.readouterr().err.split())
+        assert f"`shapechanger robot fetch car --out {tmp_path / 'lost'}` downloads it" in message
         assert not (tmp_path / "lost").exists()
         person.record(on=False)
 
@@ -83,7 +83,7 @@ def test_what_was_recorded_stays_where_driving_fails(
 
 
 def _is_corrected(seen: Observation) -> bool:
-    """Whether a person drives, and the policy says what it would do."""
+    """Return whether a person drives while the policy suggests."""
     return seen.commanded[1:] == (0.5,) and bool(seen.suggested)
 
 
@@ -119,7 +119,7 @@ deadline_ms = 1000
 def test_a_policy_for_another_robot_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Before anything moves, with what the one decides and what the other takes."""
+    """The error names the actions of both, before anything moves."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(write_profile(tmp_path, PLOUGH), arguments=IN_A_ROOM) as robot:
         known = robot.known
@@ -127,5 +127,5 @@ def test_a_policy_for_another_robot_is_refused(
         with pytest.raises(SystemExit) as stop:
             main(["robot", "drive", "plough", "--policy", str(CLONES["car"])])
     assert stop.value.code == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert "steering, throttle, but those required here are throttle, blade" in said
+    message = " ".join(capsys.readouterr().err.split())
+    assert "steering, throttle, but those required here are throttle, blade" in message

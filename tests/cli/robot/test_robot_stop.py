@@ -1,4 +1,4 @@
-"""A twin is served by a newcomer, known at once, and stopped by somebody who only watches."""
+"""Serving a twin registers it, and any observer can stop it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.system]
 def test_a_second_person_stops_a_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Whoever drives it; it says so, and stays stopped."""
+    """`robot stop` works while another client drives, and stays in force."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(write_profile(tmp_path, BLIND_CAR), arguments=IN_A_ROOM) as robot:
         known = robot.known
@@ -29,10 +29,10 @@ def test_a_second_person_stops_a_robot(
         with driving(robot, "real") as car:
             car.drive_until(lambda seen: seen.action_applied[1] > 0.0, 0.0, 0.5)
             main(["robot", "stop", "car", "--reason", "a dog"])
-            said = capsys.readouterr().out
-            assert said.startswith("car is stopped. ")
-            assert "a dog" in said
-            assert "shapechanger robot drive car" in said
+            output = capsys.readouterr().out
+            assert output.startswith("car is stopped. ")
+            assert "a dog" in output
+            assert "shapechanger robot drive car" in output
             seen = car.step(0.0, 0.5)
             assert seen.emergency
             assert seen.action_applied[1] == 0.0
@@ -41,7 +41,7 @@ def test_a_second_person_stops_a_robot(
 def test_a_robot_that_is_served_on_its_twin_is_known_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So that somebody who copied a profile can drive it at once, by its name."""
+    """The twin can then be driven by its name."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     profile = write_profile(tmp_path, BLIND_CAR)
     with socket.create_server(("127.0.0.1", 0)) as free:

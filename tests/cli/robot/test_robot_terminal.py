@@ -1,4 +1,4 @@
-"""A person at a terminal drives and calibrates a robot on its twin."""
+"""Driving and calibrating a twin from a terminal."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.robots import CAR, IN_A_ROOM, PATIENT_CAR, changed, write_profile
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 SERVO = """\
-# A car with a servo that somebody must calibrate.
+# A car with a servo to calibrate.
 
 [robot]
 name = "servo-car"
@@ -40,7 +40,7 @@ mix = { steering = 1.0 }
 """
 
 MOTOR = """\
-# A car whose motor somebody must calibrate.
+# A car with a motor to calibrate.
 
 [robot]
 name = "motor-car"
@@ -78,7 +78,7 @@ mix = { throttle = 1.0 }
 
 
 def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """E arms, W drives, X disarms, Space stops, Q leaves; the wheels of the twin turn."""
+    """E arms, W drives, X disarms, Space stops, Q leaves."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with (
         run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
@@ -96,7 +96,7 @@ def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             read = person.read_until("\rarmed · cap 1.0")
             person.press("w")
             person.wait_for(lambda: operator.where().travelled_m - start > 0.1)
-            # A key that is not pressed again lets go.
+            # Without key repeats, driving stops.
             person.wait_for(lambda: operator.where().speed < 0.05)
             person.press("x")
             read = person.read_until("not armed", read)
@@ -134,13 +134,13 @@ mix = { blade = 1.0 }
 [limits]
 deadline_ms = 1000
 """
-"""A truck whose blade is up at rest, and which no key moves."""
+"""A truck whose blade is up at rest, and has no key."""
 
 
-def test_what_no_key_moves_stays_where_it_is(
+def test_actions_without_a_key_stay_at_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A blade that is up at rest does not come down because somebody drives, whatever the cap."""
+    """A blade that is up at rest stays up, whatever the cap."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with (
         run_robot(write_profile(tmp_path, PLOUGH), arguments=IN_A_ROOM) as robot,
@@ -168,9 +168,9 @@ def test_what_no_key_moves_stays_where_it_is(
             assert person.end() == 0
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="The kernel's word that a parent died.")
-def test_a_command_that_is_killed_takes_its_robot_along(tmp_path: Path) -> None:
-    """A closed terminal must not leave a robot behind that somebody has armed."""
+@pytest.mark.skipif(sys.platform != "linux", reason="Needs the parent-death signal.")
+def test_killing_the_command_ends_its_robot(tmp_path: Path) -> None:
+    """Closing the terminal must not leave an armed robot."""
     profile = write_profile(tmp_path, MOTOR)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
         person.read_until("begins to move")
@@ -183,16 +183,16 @@ def test_a_command_that_is_killed_takes_its_robot_along(tmp_path: Path) -> None:
 
 
 def _below(pid: int) -> list[int]:
-    """All processes that a process has started, and those that these have."""
+    """Return the pids of all descendants of a process."""
     try:
-        told = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     except FileNotFoundError:
         return []
-    return [one for child in map(int, told) for one in (child, *_below(child))]
+    return [one for child in map(int, children) for one in (child, *_below(child))]
 
 
 def test_calibrating_a_servo(tmp_path: Path) -> None:
-    """Its ends and its middle are found; everything else in the file stays."""
+    """Ends and centre are written, and other lines kept."""
     profile = write_profile(tmp_path, SERVO)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
         read = person.read_until("full left")
@@ -215,7 +215,7 @@ def test_calibrating_a_servo(tmp_path: Path) -> None:
 
 
 def test_calibrating_a_motor(tmp_path: Path) -> None:
-    """The smallest duty that moves it; one that goes backward is turned around."""
+    """The start duty is written; a reversed motor gets a negative mix."""
     profile = write_profile(tmp_path, MOTOR)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
         read = person.read_until("begins to move")
@@ -231,7 +231,7 @@ def test_calibrating_a_motor(tmp_path: Path) -> None:
 
 
 def test_skipping_everything_writes_nothing(tmp_path: Path) -> None:
-    """The file stays as it is."""
+    """The file is unchanged."""
     profile = write_profile(tmp_path, SERVO)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
         person.read_until("full left")
@@ -242,7 +242,7 @@ def test_skipping_everything_writes_nothing(tmp_path: Path) -> None:
 
 
 def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
-    """At the cap it stays until the person says Y."""
+    """Values are limited to the cap until the person confirms."""
     profile = write_profile(tmp_path, ESC)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
         read = person.read_until("fastest backward")
@@ -263,7 +263,7 @@ def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("key", ["q", " "])
 def test_ending_writes_nothing_and_goes_no_further(tmp_path: Path, key: str) -> None:
-    """Q ends and Space stops, also what was found before; N skips one output only."""
+    """Q and Space end the calibration and discard results; N skips one output."""
     second = MOTOR.partition("[action.throttle]")
     text = SERVO + "\n" + second[1] + second[2]
     profile = write_profile(tmp_path, text)
@@ -285,7 +285,7 @@ def test_ending_writes_nothing_and_goes_no_further(tmp_path: Path, key: str) -> 
 
 
 def test_an_action_that_is_capped(tmp_path: Path) -> None:
-    """What is written is where the servo really was, not where it was asked to go."""
+    """The value written is the one applied, not the one requested."""
     capped = changed("gain = 1.0  # Not touched.", "low = -0.3", SERVO)
     profile = write_profile(tmp_path, capped)
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
@@ -302,20 +302,20 @@ def test_an_action_that_is_capped(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_selftest_on_a_twin(tmp_path: Path) -> None:
-    """Every fault once, in a table; each promise is kept, or the exit code says so."""
+    """Each fault is tried once, and a missed promise sets the exit code."""
     text = changed('[camera]\ndriver = "picamera2"\nsize = [160, 120]\nfps = 20\n\n', "", CAR)
     profile = write_profile(tmp_path, changed("camera_stale_ms = 500\n", "", text))
     with Person(("robot", "selftest", str(profile.path), "--twin"), tmp_path, {}) as person:
         code = person.end(200.0)
-        said = person.text
-    assert "this robot has no camera" in said
-    assert "NEVER" not in said
-    assert "it never drove" not in said
-    assert code == (1 if "BAD" in said else 0)
+        output = person.text
+    assert "this robot has no camera" in output
+    assert "NEVER" not in output
+    assert "it never drove" not in output
+    assert code == (1 if "BAD" in output else 0)
 
 
 def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
-    """The motor is written, the servo is not, and the robot does not count as calibrated."""
+    """The motor's results are written, and the robot does not count as calibrated."""
     second = SERVO.partition("[action.steering]")
     profile = write_profile(tmp_path, MOTOR + "\n" + second[1] + second[2])
     with Person(("robot", "calibrate", str(profile.path), "--twin"), tmp_path, {}) as person:
@@ -332,14 +332,16 @@ def test_an_error_halfway_keeps_what_was_found_before(tmp_path: Path) -> None:
         assert person.end() == 2
         assert "must lie between" in person.text
         assert "Results so far" in person.text
-    told = tomllib.loads(profile.path.read_text())
-    assert told["output"]["drive"]["start"] == pytest.approx(4 * 0.05 * 0.8)
-    assert told["output"]["steer"]["left_us"] == 1150
-    assert "calibrated" not in told["robot"]
+    written = tomllib.loads(profile.path.read_text())
+    assert written["output"]["drive"]["start"] == pytest.approx(4 * 0.05 * 0.8)
+    assert written["output"]["steer"]["left_us"] == 1150
+    assert "calibrated" not in written["robot"]
 
 
-def test_a_cap_below_a_threshold_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A steering of three levels does nothing below its threshold; a person hears why."""
+def test_a_cap_below_a_threshold_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three-level steering does nothing below its threshold, and the person is told."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot:
         known = robot.known
@@ -363,7 +365,7 @@ def test_a_cap_below_a_threshold_is_said(tmp_path: Path, monkeypatch: pytest.Mon
 def test_a_person_lets_a_waiting_program_drive(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """P gives the robot to the program, armed, and the person stays to stop it."""
+    """P hands the armed robot to the program, and the person can still stop it."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with (
         run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
@@ -382,11 +384,11 @@ def test_a_person_lets_a_waiting_program_drive(
             read = person.read_until("\rarmed · cap 0.5", read)
             waits: list[str] = []
 
-            def told(sentence: str) -> None:
+            def on_waiting(sentence: str) -> None:
                 waits.append(sentence)
                 person.press("p")
 
-            env = RemoteVehicleEnv("car", on_waiting=told, name="ada")
+            env = RemoteVehicleEnv("car", on_waiting=on_waiting, name="ada")
             env.reset()
             person.read_until("armed, commanded by ada", read)
             *_, truncated, info = env.step(np.array([0.0, 0.3], np.float32))

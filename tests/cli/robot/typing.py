@@ -1,4 +1,4 @@
-"""A person at a terminal: presses keys, and reads what the command writes."""
+"""A terminal session: sends keys and reads the output of a command."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _ESCAPES = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 
 
 class Person:
-    """Runs a command at a terminal.
+    """Runs a command at a pseudo-terminal.
 
     Args:
-        arguments: Of `shapechanger`.
-        folder: Where.
-        variables: Of the environment, besides what there is.
+        arguments: Arguments of `shapechanger`.
+        folder: Working folder.
+        variables: Additional environment variables.
     """
 
     def __init__(
@@ -46,11 +46,11 @@ class Person:
         self._reader.start()
 
     def __enter__(self) -> Self:
-        """The person."""
+        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End what is left."""
+        """Terminate the command."""
         if self.process.poll() is None:
             self.process.terminate()
         self.process.wait(20.0)
@@ -60,7 +60,7 @@ class Person:
 
     @property
     def text(self) -> str:
-        """What was written so far, without colours."""
+        """Output so far, without escape sequences."""
         return _ESCAPES.sub("", self._text)
 
     def press(self, keys: str) -> None:
@@ -68,20 +68,20 @@ class Person:
         os.write(self._main, keys.encode())
 
     def read_until(self, words: str, after: int = 0, seconds: float = 40.0) -> int:
-        """Wait for words, and say where they end; a line drawn anew begins with a return."""
+        """Wait for a text, and return the index of its end."""
         self.wait_for(lambda: words in self.text[after:], seconds, words)
         return self.text.index(words, after) + len(words)
 
     def wait_for(self, done: Callable[[], bool], seconds: float = 40.0, what: str = "it") -> None:
-        """Wait until something is so."""
+        """Wait for a condition."""
         until_s = time.monotonic() + seconds
         while not done():
             late = time.monotonic() > until_s or not self._reader.is_alive()
-            assert not late or done(), f"{what!r} did not come, but: {self.text[-2000:]}"
+            assert not late or done(), f"{what!r} did not appear; output: {self.text[-2000:]}"
             time.sleep(0.02)
 
     def end(self, seconds: float = 40.0) -> int:
-        """Wait for the command to end; its exit code."""
+        """Wait for the command to exit, and return its exit code."""
         return self.process.wait(seconds)
 
     def _read(self) -> None:

@@ -1,4 +1,4 @@
-"""What holds for the tests of cloning."""
+"""Fixtures for the tests of cloning."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import torch
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread() -> Iterator[None]:
-    """Networks this small gain nothing from more, and lose a lot on a busy machine."""
+    """Limit Torch to one thread, which is fastest for small networks on a busy machine."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     yield

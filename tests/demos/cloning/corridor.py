@@ -1,4 +1,4 @@
-"""Pictures of a straight corridor, drawn by rays, with what a driver would do on seeing them."""
+"""Ray-cast images of a straight corridor, with the actions of a driver."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ def drive(
     gain: float = 1.0,
     noise: float = 4.0,
 ) -> Drive:
-    """Pictures from n places in n corridors.
+    """Return demonstrations from n poses in n corridors.
 
     Args:
-        n: How many.
-        seed: Of places, colours and noise.
+        n: Number of images.
+        seed: Seed of poses, colours and noise.
         size: Rows and columns.
-        light: Least and most brightness.
-        gain: How strongly the driver steers; another vehicle needs more, or less.
-        noise: Of a pixel, in its own steps of 256.
+        light: Range of the brightness.
+        gain: Steering gain; another vehicle needs more, or less.
+        noise: Standard deviation of pixel noise, in steps of 256.
     """
     rng = np.random.default_rng(seed)
     aside = rng.uniform(-0.7, 0.7, n)  # m to the left of the middle.
@@ -63,13 +63,13 @@ def drive(
 def _look(
     aside: float, turned: float, ahead: float, size: tuple[int, int], rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """One picture at full light: where each ray ends, and what is there."""
+    """Render one image at full light."""
     height, width = size
     left = 1.0 - 2.0 * (np.arange(width) + 0.5) / width
     up = (1.0 - 2.0 * (np.arange(height) + 0.5) / height) * height / width + 0.1
     x = np.cos(turned) - left * np.sin(turned)
     y = np.sin(turned) + left * np.cos(turned)
-    # Rays that never meet a plane meet it far away.
+    # Rays parallel to a plane meet it far away.
     to_end = np.where(x > 1e-6, ahead / np.maximum(x, 1e-6), 1e6)
     to_side = (np.sign(y) * _WIDTH / 2.0 - aside) / np.where(np.abs(y) < 1e-6, 1e-6, y)
     to_wall = np.minimum(to_end, np.abs(to_side))

@@ -1,4 +1,4 @@
-"""Small demonstrations: a bright stripe says which key is held, or a number of the state does."""
+"""Small demonstrations in which a bright stripe or a state feature determines the action."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ QUICK: Final = msgspec.structs.replace(
 
 
 def stripes(n: int, seed: int, layout: Layout = KEYS, size: tuple[int, int] = (33, 50)) -> Dataset:
-    """Dark noise with a stripe: on the left, the middle or the right, and so it is steered.
+    """Return dark noise with a stripe on the left, in the middle or on the right.
 
-    The first number of the state says it, too; the last one gives the action away.
+    The side sets the steering. The first state feature holds it too; the last equals the action.
     """
     rng = np.random.default_rng(seed)
     side = rng.integers(-1, 2, n)

@@ -1,4 +1,4 @@
-"""Settings with which a policy learns the drawn corridor in seconds."""
+"""Settings that learn the rendered corridor in seconds."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ SMALL: Final = CloneSettings(
 )
 
 
-def shown(n: int, seed: int, gain: float = 1.0) -> Drive:
-    """Demonstrations at the size of `SMALL`."""
+def demonstrations(n: int, seed: int, gain: float = 1.0) -> Drive:
+    """Return demonstrations at the size of `SMALL`."""
     return drive(n, seed, size=SIZE, gain=gain)
 
 
 def error(policy: CameraPolicy, test: Drive) -> float:
-    """Mean absolute error of steering and throttle on pictures that nothing was learned from."""
+    """Return the mean absolute error of steering and throttle on test images."""
     return float(np.abs(policy.predict_many(test.pictures) - test.actions).mean())

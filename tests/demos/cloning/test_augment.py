@@ -1,4 +1,4 @@
-"""What is changed in a picture, and what that does to its action."""
+"""Augmentation of images and its effect on their actions."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ def _augmented(seed: int = 0, **changes: float) -> tuple[Tensor, Tensor, Tensor,
     return seen, wanted, plain(pictures, index), actions
 
 
-def test_nothing_asked_for_changes_nothing() -> None:
+def test_a_neutral_augmentation_changes_nothing() -> None:
     """Each change can be switched off."""
     seen, wanted, before, actions = _augmented()
     torch.testing.assert_close(seen, before)
     torch.testing.assert_close(wanted, actions)
 
 
-def test_a_mirrored_picture_steers_the_other_way() -> None:
-    """Left is right in the mirror, and forward stays forward."""
+def test_a_mirrored_image_negates_the_steering() -> None:
+    """Steering is negated, and throttle kept."""
     seen, wanted, before, actions = _augmented(mirror=1.0)
     torch.testing.assert_close(seen, before.flip(3))
     torch.testing.assert_close(wanted, actions * torch.tensor([-1.0, 1.0]))
 
 
-def test_each_picture_is_mirrored_with_its_own_action() -> None:
-    """Half of them, and never one without the other."""
+def test_each_image_is_mirrored_with_its_action() -> None:
+    """With a probability of 0.5, image and action are always mirrored together."""
     seen, wanted, before, actions = _augmented(mirror=0.5)
     turned = (seen == before.flip(3)).all(dim=(1, 2, 3))
     kept = (seen == before).all(dim=(1, 2, 3))
@@ -58,8 +58,8 @@ def test_each_picture_is_mirrored_with_its_own_action() -> None:
     torch.testing.assert_close(wanted[:, 0], torch.where(turned, -1.0, 1.0) * actions[:, 0])
 
 
-def test_a_shift_moves_and_repeats_the_edge() -> None:
-    """What comes into view looks like the edge that was there."""
+def test_a_shift_repeats_the_edge() -> None:
+    """Pixels beyond the image repeat its edge."""
     seen, wanted, before, actions = _augmented(shift=2)
     moved = set[tuple[int, int]]()
     for new, old in zip(seen, before, strict=True):
@@ -73,8 +73,8 @@ def test_a_shift_moves_and_repeats_the_edge() -> None:
     torch.testing.assert_close(wanted, actions)
 
 
-def test_light_changes_whole_pictures() -> None:
-    """By one factor for a picture, within the bounds."""
+def test_the_gain_scales_whole_images() -> None:
+    """Each image is multiplied by one factor within the bounds."""
     seen, _, before, _ = _augmented(gain=1.25)
     factor = (seen / before).flatten(1)
     assert float(factor.std(dim=1).max()) < 1e-5
@@ -82,30 +82,30 @@ def test_light_changes_whole_pictures() -> None:
     assert 1.2 < float(factor.max()) < 1.25 + 1e-5
 
 
-def test_colours_change_apart() -> None:
-    """By one factor for each colour of a picture."""
+def test_colour_channels_are_scaled_separately() -> None:
+    """Each channel of an image has its own factor."""
     seen, _, before, _ = _augmented(colour=1.2)
     factor = (seen / before).flatten(2)
     assert float(factor.std(dim=2).max()) < 1e-5
     assert float(factor.mean(dim=2).std(dim=1).mean()) > 0.02
 
 
-def test_as_many_are_blurred_and_noisy_as_asked_for() -> None:
-    """A quarter of 64, give or take one; the others stay as they are."""
+def test_the_share_of_blurred_and_noisy_images() -> None:
+    """A quarter of 64 images changes, give or take one."""
     for changes in ({"blurred": 0.25}, {"noisy": 0.25, "noise": 0.1}):
         seen, _, before, _ = _augmented(**changes)
         assert int((seen != before).any(dim=(1, 2, 3)).sum()) in (16, 17)
 
 
-def test_pictures_stay_pictures() -> None:
-    """However much is changed."""
+def test_values_stay_in_range() -> None:
+    """Pixel values stay within 0 to 1 for any augmentation."""
     seen, _, _, _ = _augmented(gain=4.0, offset=0.5, noise=0.5, noisy=1.0, blurred=1.0)
     assert float(seen.min()) >= 0.0
     assert float(seen.max()) <= 1.0
 
 
-def test_the_same_seed_draws_the_same() -> None:
-    """And another one something else."""
+def test_the_same_seed_gives_the_same_images() -> None:
+    """Another seed gives other images."""
     changes = {"mirror": 0.5, "shift": 2, "gain": 1.5, "noise": 0.1, "noisy": 0.5, "blurred": 0.5}
     assert torch.equal(_augmented(3, **changes)[0], _augmented(3, **changes)[0])
     assert not torch.equal(_augmented(3, **changes)[0], _augmented(4, **changes)[0])
@@ -114,7 +114,7 @@ def test_the_same_seed_draws_the_same() -> None:
 @pytest.mark.parametrize(
     "wrong", [{"mirror": 1.5}, {"noisy": -0.1}, {"shift": -1}, {"noise": -1.0}, {"gain": 0.5}]
 )
-def test_what_cannot_be_drawn_is_refused(wrong: dict[str, float]) -> None:
-    """Before an hour of training, not after."""
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
+    """Invalid values raise CloningError at construction."""
     with pytest.raises(CloningError):
         Augmentation(**wrong)  # pyright: ignore[reportArgumentType]

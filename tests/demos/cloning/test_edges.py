@@ -1,4 +1,4 @@
-"""Eyes that see edges: not the light, not the colour, and hardly a small shift."""
+"""Edge features: invariant to light and colour, tolerant to small shifts."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from shapechanger.demos.cloning.pictures import Framing
 
 
 def _bars(upright: bool) -> Tensor:
-    """Bars of four pixels, shape (1, 3, 32, 32)."""
+    """Return bars of four pixels, shape (1, 3, 32, 32)."""
     bar = 0.3 + 0.5 * (torch.arange(32) // 4 % 2).float()
     rows = bar.expand(32, 32)
     return (rows if upright else rows.T).expand(1, 3, 32, 32).clone()
 
 
-def test_each_direction_has_its_place() -> None:
-    """Upright bars are edges of the first direction, level ones of the middle one."""
+def test_each_direction_has_its_channel() -> None:
+    """Vertical bars activate the first direction, horizontal bars the middle one."""
     upright, level = (edges(_bars(x), (4, 4)).mean(dim=(0, 2, 3)) for x in (True, False))
     assert int(upright.argmax()) == 0
     assert int(level.argmax()) == DIRECTIONS // 2
@@ -25,20 +25,20 @@ def test_each_direction_has_its_place() -> None:
 
 
 def test_neither_light_nor_colour_matters() -> None:
-    """A lamp of half the strength, and a yellow one."""
+    """Features hardly change with half the light or with yellow light."""
     before = edges(_bars(True), (4, 4))
     yellow = torch.tensor([1.0, 0.9, 0.4]).view(1, 3, 1, 1)
     for other in (0.5 * _bars(True), yellow * _bars(True)):
         torch.testing.assert_close(edges(other, (4, 4)), before, atol=0.05, rtol=0.0)
 
 
-def test_a_dark_lens_sees_nothing() -> None:
-    """No noise is blown up to edges."""
+def test_a_black_image_has_no_edges() -> None:
+    """Noise is not amplified."""
     assert float(edges(torch.zeros(1, 3, 32, 32), (4, 4)).max()) == 0.0
 
 
-def test_pictures_of_any_size_have_features() -> None:
-    """Also smaller than a cell."""
+def test_images_of_any_size_have_features() -> None:
+    """Includes images smaller than a cell."""
     for height, width in ((48, 64), (30, 41), (3, 5)):
         eyes = EdgeEyes(Framing(height=height, width=width, top=0.0), (8, 8), 5)
         found = eyes(torch.rand(2, 3, height, width))

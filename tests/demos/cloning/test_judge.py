@@ -1,4 +1,4 @@
-"""The numbers that say how good a policy is."""
+"""Metrics of a policy."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ def keys() -> CameraPolicy:
     return learn(stripes(120, 0), settings=QUICK, seed=0)[0]
 
 
-def test_macro_f1_counts_each_class_the_same() -> None:
-    """Also one that was chosen and never right; checked by hand."""
+def test_macro_f1_weighs_classes_equally() -> None:
+    """Includes a class that was predicted and never correct (computed by hand)."""
     truth, done = np.array([0, 0, 0, 1]), np.array([0, 0, 1, 2])
     assert macro_f1(done, truth) == pytest.approx((2 * 2 / 5 + 0.0 + 0.0) / 3)
     assert macro_f1(truth, truth) == 1.0
 
 
-def test_the_numbers_agree_with_each_other(keys: CameraPolicy) -> None:
-    """Confusion, accuracy, calibration and the worst frames are of the same steps."""
+def test_the_metrics_are_consistent(keys: CameraPolicy) -> None:
+    """Confusion, accuracy, calibration and worst frames describe the same steps."""
     data = stripes(60, 5)
-    data.actions[:5] = [0, 1, 0, 0]  # A key that it was never shown.
-    told = judge(keys, data)
-    confusion = np.array(told.confusion)
-    assert confusion.sum() == told.steps == 60
-    assert np.trace(confusion) / 60 == pytest.approx(told.accuracy)
-    assert sum(b.steps for b in told.calibration) == 60
-    right = sum(b.right * b.steps for b in told.calibration) / 60
-    assert right == pytest.approx(told.accuracy)
-    assert told.ece == pytest.approx(
-        sum(b.steps * abs(b.sure - b.right) for b in told.calibration) / 60
+    data.actions[:5] = [0, 1, 0, 0]  # A key that was not in the training data.
+    report = judge(keys, data)
+    confusion = np.array(report.confusion)
+    assert confusion.sum() == report.steps == 60
+    assert np.trace(confusion) / 60 == pytest.approx(report.accuracy)
+    assert sum(b.steps for b in report.calibration) == 60
+    right = sum(b.right * b.steps for b in report.calibration) / 60
+    assert right == pytest.approx(report.accuracy)
+    assert report.ece == pytest.approx(
+        sum(b.steps * abs(b.sure - b.right) for b in report.calibration) / 60
     )
-    assert "backward" in told.classes
-    assert set(range(5)) <= set(told.worst)
+    assert "backward" in report.classes
+    assert set(range(5)) <= set(report.worst)
 
 
 def test_only_the_chosen_steps_are_judged(keys: CameraPolicy) -> None:
-    """And the worst are counted in all of them."""
+    """Indices of the worst steps count over all steps."""
     data = stripes(60, 5)
-    told = judge(keys, data, np.arange(60) >= 40)
-    assert told.steps == 20
-    assert min(told.worst) >= 40
+    report = judge(keys, data, np.arange(60) >= 40)
+    assert report.steps == 20
+    assert min(report.worst) >= 40
     with pytest.raises(CloningError, match="no step to judge"):
         judge(keys, data, np.zeros(60, np.bool_))
 
 
-def test_numbers_are_right_in_the_same_third() -> None:
-    """Left, straight or right, and back, still or forward."""
+def test_regression_is_correct_in_the_same_third() -> None:
+    """Thirds are left, straight and right; back, still and forward."""
     actions = np.array([[-1.0, 1.0], [-0.4, 0.4], [0.2, 0.0], [0.4, -0.9]])
     names, numbers = in_thirds(actions, STEERS)
     assert [names[i] for i in numbers] == [
@@ -66,20 +66,20 @@ def test_numbers_are_right_in_the_same_third() -> None:
     ]
 
 
-def test_a_policy_that_gives_numbers_is_judged_by_errors() -> None:
-    """In the units of the actions."""
+def test_regression_is_judged_by_errors() -> None:
+    """Errors are in the units of the actions."""
     policy = learn(stripes(120, 0, STEERS), settings=QUICK, seed=0)[0]
     data = stripes(50, 6, STEERS)
-    told = judge(policy, data)
+    report = judge(policy, data)
     done = policy.predict_many(data.pictures)
-    np.testing.assert_allclose(told.errors, np.abs(done - data.actions).mean(axis=0), rtol=1e-5)
-    assert told.within == pytest.approx((np.abs(done - data.actions) <= 0.1).all(axis=1).mean())
-    np.testing.assert_allclose(told.done, done, rtol=1e-6)
-    assert told.ece is None
+    np.testing.assert_allclose(report.errors, np.abs(done - data.actions).mean(axis=0), rtol=1e-5)
+    assert report.within == pytest.approx((np.abs(done - data.actions) <= 0.1).all(axis=1).mean())
+    np.testing.assert_allclose(report.done, done, rtol=1e-6)
+    assert report.ece is None
 
 
-def test_the_temperature_makes_a_network_as_sure_as_it_is_right() -> None:
-    """One that is three times too sure is divided by three; few steps say nothing."""
+def test_the_temperature_calibrates_confidence() -> None:
+    """Logits that are three times too large give 3; few steps give 1."""
     generator = torch.Generator().manual_seed(0)
     logits = torch.randn((4000, 3), generator=generator)
     drawn = torch.multinomial(logits.softmax(dim=1), 1, generator=generator)[:, 0]

@@ -1,4 +1,4 @@
-"""Learning from any demonstrations: pictures or states, keys or numbers."""
+"""Learning from images or states, with classes or regression."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
 
 @pytest.fixture(scope="module")
 def keys() -> tuple[CameraPolicy, Training]:
-    """A policy that has learned which key is held."""
+    """A policy that learned which key is held."""
     return learn(stripes(200, 0), settings=QUICK, seed=3)
 
 
 def test_it_learns_which_key_is_held(keys: tuple[CameraPolicy, Training]) -> None:
-    """From pictures whose size does not divide, and through its file."""
+    """The size of the images does not divide by that of the input."""
     policy, training = keys
-    told = judge(policy, stripes(90, 1))
-    assert told.accuracy > 0.9
-    assert told.macro_f1 > 0.9
+    report = judge(policy, stripes(90, 1))
+    assert report.accuracy > 0.9
+    assert report.macro_f1 > 0.9
     assert (policy.card.head, policy.card.members) == ("class", 2)
     assert training.learned == 200
-    assert training.mirrored > 0.3  # It goes to both sides.
+    assert training.mirrored > 0.3  # The data go to both sides.
 
 
-def test_an_action_comes_in_the_order_of_its_layout(keys: tuple[CameraPolicy, Training]) -> None:
-    """One of those that were shown."""
+def test_actions_follow_the_layout(keys: tuple[CameraPolicy, Training]) -> None:
+    """Each prediction is one of the classes."""
     done = keys[0].predict_many(stripes(30, 2).pictures)
     assert done.shape == (30, 4)
     assert set(map(tuple, done.tolist())) <= set(keys[0].card.classes)
@@ -44,8 +44,8 @@ def test_an_action_comes_in_the_order_of_its_layout(keys: tuple[CameraPolicy, Tr
     np.testing.assert_allclose(probabilities.sum(axis=1), 1.0, atol=1e-5)
 
 
-def test_it_comes_back_from_its_file(keys: tuple[CameraPolicy, Training], tmp_path: Path) -> None:
-    """With all of its networks, its classes and its layouts."""
+def test_a_policy_round_trips(keys: tuple[CameraPolicy, Training], tmp_path: Path) -> None:
+    """The file keeps all members, classes and layouts."""
     policy, _ = keys
     policy.save(tmp_path / "keys.safetensors")
     again = CameraPolicy.load(tmp_path / "keys.safetensors")
@@ -55,18 +55,18 @@ def test_it_comes_back_from_its_file(keys: tuple[CameraPolicy, Training], tmp_pa
 
 
 @pytest.mark.parametrize("inputs", ["picture", "state", "both"])
-def test_it_learns_numbers_from_whatever_it_perceives(inputs: Inputs) -> None:
-    """Steering within a tenth, and a throttle that never changes."""
+def test_regression_from_any_input(inputs: Inputs) -> None:
+    """Steering within a tenth, and a constant throttle."""
     policy, _ = learn(stripes(200, 0, STEERS), settings=QUICK, inputs=inputs, seed=0)
-    told = judge(policy, stripes(90, 1, STEERS))
-    assert told.head == "regression"
-    assert told.accuracy > 0.9
-    assert told.errors[0] < 0.25
-    assert told.errors[1] < 0.1
+    report = judge(policy, stripes(90, 1, STEERS))
+    assert report.head == "regression"
+    assert report.accuracy > 0.9
+    assert report.errors[0] < 0.25
+    assert report.errors[1] < 0.1
 
 
-def test_what_the_robot_did_before_is_not_looked_at() -> None:
-    """A clone that saw it would repeat itself."""
+def test_applied_actions_are_not_inputs() -> None:
+    """A clone that saw them would repeat itself."""
     policy, _ = learn(stripes(100, 0, STEERS), settings=QUICK, inputs="state")
     assert policy.card.unseen == ("steering/applied",)
     states = stripes(10, 1, STEERS).states
@@ -78,8 +78,8 @@ def test_what_the_robot_did_before_is_not_looked_at() -> None:
     )
 
 
-def test_a_number_that_is_missing_is_no_number() -> None:
-    """The policy acts all the same, and as finitely, when everything is missing or far out."""
+def test_missing_state_values_are_handled() -> None:
+    """Predictions are finite for missing and extreme values."""
     data = stripes(100, 0, STEERS)
     assert data.states is not None
     data.states[::3, 1] = np.nan
@@ -88,8 +88,8 @@ def test_a_number_that_is_missing_is_no_number() -> None:
         assert np.isfinite(policy.predict(None, np.full(3, value))).all()
 
 
-def test_a_drive_to_one_side_is_hardly_mirrored() -> None:
-    """In the mirror it would teach to go the other way."""
+def test_one_sided_data_are_not_mirrored() -> None:
+    """Mirrored data would teach the opposite direction."""
     data = stripes(200, 0)
     to_the_right = data.actions[:, 2] > 0
     data.actions[to_the_right] = [1, 0, 0, 0]
@@ -99,7 +99,7 @@ def test_a_drive_to_one_side_is_hardly_mirrored() -> None:
 
 
 def test_a_layout_without_a_mirror_is_not_mirrored() -> None:
-    """And the reason is told."""
+    """The note gives the reason."""
     odd = Layout(tuple(Feature(f"joint_{i}/angle", "rad", -1.0, 1.0) for i in range(4)))
     data = replace(stripes(60, 0), action_layout=odd)
     _, training = learn(data, settings=msgspec.structs.replace(QUICK, fewest_steps=2, most_steps=2))
@@ -110,7 +110,7 @@ def test_a_layout_without_a_mirror_is_not_mirrored() -> None:
 
 
 def test_the_same_seed_gives_the_same_policy() -> None:
-    """Whatever was drawn before; and another seed gives another."""
+    """Independent of the global generator; another seed differs."""
     few = msgspec.structs.replace(QUICK, fewest_steps=5, most_steps=5)
     data, test = stripes(40, 0), stripes(10, 1).pictures
 
@@ -123,8 +123,8 @@ def test_the_same_seed_gives_the_same_policy() -> None:
     assert not np.array_equal(outputs(2), first)
 
 
-def test_what_is_held_out_is_not_learned_from() -> None:
-    """Whatever is in it."""
+def test_held_out_steps_are_not_learned_from() -> None:
+    """Changing them does not change the policy."""
     few = msgspec.structs.replace(QUICK, fewest_steps=5, most_steps=5)
     data = stripes(60, 0)
     learned = np.arange(60) < 40
@@ -138,7 +138,7 @@ def test_what_is_held_out_is_not_learned_from() -> None:
 
 
 def test_a_policy_for_another_layout_is_refused(keys: tuple[CameraPolicy, Training]) -> None:
-    """In a sentence with both."""
+    """The error gives both layouts."""
     with pytest.raises(PolicyError, match=r"policy are forward \[1\].*here are steering \[1\]"):
         judge(keys[0], stripes(10, 0, STEERS))
     keys[0].card.require_layouts(KEYS)
@@ -151,16 +151,16 @@ def test_a_policy_for_another_layout_is_refused(keys: tuple[CameraPolicy, Traini
         felt.card.require_layouts(KEYS)
 
 
-def test_a_policy_of_the_package_drives_what_steers() -> None:
-    """Its file is older than layouts, and says nothing of them."""
+def test_a_policy_without_layouts_needs_steering_and_throttle() -> None:
+    """Files older than layouts have none."""
     policy = CameraPolicy.fresh(QUICK, 0)
     policy.card.require_layouts(STEERS)
     with pytest.raises(PolicyError, match="policy are steering, throttle"):
         policy.card.require_layouts(KEYS)
 
 
-def test_what_cannot_be_learned_from_is_refused() -> None:
-    """Each in a sentence."""
+def test_invalid_data_are_refused() -> None:
+    """Each case raises its own error."""
     data = stripes(20, 0)
     with pytest.raises(CloningError, match="no step to learn from"):
         learn(data, np.zeros(20, np.bool_), settings=QUICK)

@@ -1,4 +1,4 @@
-"""What a policy sees of a picture."""
+"""Preparation of images for a policy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _pictures(n: int, height: int = 120, width: int = 160) -> np.ndarray:
 
 @pytest.mark.parametrize("scale", [1, 2])
 def test_each_pixel_is_the_mean_of_its_block(scale: int) -> None:
-    """Rounded half up, from below the cut."""
+    """Means are rounded half up, below the cropped rows."""
     pictures = _pictures(3, 120 * scale, 160 * scale)
     size = 2 * scale
     blocks = pictures[:, 24 * scale :].reshape(3, 48, size, 80, size, 3).astype(np.float64)
@@ -24,8 +24,8 @@ def test_each_pixel_is_the_mean_of_its_block(scale: int) -> None:
     np.testing.assert_array_equal(prepare(pictures, _FRAMING), expected)
 
 
-def test_many_pictures_are_prepared_as_one_is() -> None:
-    """In driving there is one at a time."""
+def test_batches_match_single_images() -> None:
+    """Preparing in chunks gives the same result."""
     pictures = _pictures(300)
     small = prepare(pictures, _FRAMING)
     assert small.dtype == np.uint8
@@ -34,8 +34,8 @@ def test_many_pictures_are_prepared_as_one_is() -> None:
 
 
 @pytest.mark.parametrize("size", [(100, 160), (120, 170), (20, 40), (7, 1), (1, 1)])
-def test_any_other_size_is_seen_by_area(size: tuple[int, int]) -> None:
-    """As if every pixel were cut into as many equal ones as it takes to divide."""
+def test_other_sizes_are_resized_by_area(size: tuple[int, int]) -> None:
+    """Matches averaging over a grid that divides both sizes."""
     framing = Framing(height=6, width=9, top=0.2)
     pictures = _pictures(2, *size)
     first = min(round(0.2 * size[0]), size[0] - 1)
@@ -47,20 +47,20 @@ def test_any_other_size_is_seen_by_area(size: tuple[int, int]) -> None:
     np.testing.assert_allclose(seen, means, atol=0.501)
 
 
-def test_an_even_picture_stays_even_at_any_size() -> None:
-    """No rounding makes white grey."""
+def test_a_uniform_image_stays_uniform() -> None:
+    """Rounding does not change white."""
     white = np.full((1, 101, 67, 3), 255, np.uint8)
     assert (prepare(white, _FRAMING) == 255).all()
 
 
-def test_prepared_pictures_stay_as_they_are() -> None:
-    """So that a data set can be kept small."""
+def test_prepared_images_are_returned_unchanged() -> None:
+    """No copy is made."""
     small = prepare(_pictures(2), _FRAMING)
     assert prepare(small, _FRAMING) is small
 
 
-def test_no_pictures_are_no_pictures() -> None:
-    """An empty array has the shape of an answer."""
+def test_an_empty_batch() -> None:
+    """An empty input gives an empty output of the right shape."""
     assert prepare(_pictures(0), _FRAMING).shape == (0, 48, 80, 3)
 
 
@@ -73,8 +73,8 @@ def test_no_pictures_are_no_pictures() -> None:
         (_pictures(1).astype(np.float32), "float32"),
     ],
 )
-def test_what_cannot_be_seen_is_refused(pictures: np.ndarray, words: str) -> None:
-    """The message says what the pictures are."""
+def test_invalid_images_are_refused(pictures: np.ndarray, words: str) -> None:
+    """The error gives shape or dtype."""
     with pytest.raises(CloningError, match=words):
         prepare(pictures, _FRAMING)
 
@@ -82,7 +82,7 @@ def test_what_cannot_be_seen_is_refused(pictures: np.ndarray, words: str) -> Non
 @pytest.mark.parametrize(
     "wrong", [{"height": 0}, {"width": -1}, {"top": 1.0}, {"top": float("nan")}]
 )
-def test_a_framing_shows_something(wrong: dict[str, float]) -> None:
-    """Nothing is left to see, or nothing can be."""
+def test_invalid_framing_is_refused(wrong: dict[str, float]) -> None:
+    """Sizes must be positive, and some rows remain."""
     with pytest.raises(CloningError, match="Invalid framing of"):
         Framing(**wrong)  # pyright: ignore[reportArgumentType]

@@ -1,4 +1,4 @@
-"""The file of a policy: it comes back as it was, and nothing else passes for one."""
+"""The file of a cloned policy: exact round trip, and rejection of anything else."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.errors import OutputError
 from shapechanger.tensor_file import read_tensors, tensor_bytes
-from tests.demos.cloning.small import SMALL, shown
+from tests.demos.cloning.small import SMALL, demonstrations
 
-_PICTURES = shown(20, 0).pictures
+_PICTURES = demonstrations(20, 0).pictures
 
 
 def _policy(settings: CloneSettings = SMALL) -> CameraPolicy:
@@ -36,8 +36,8 @@ def path(tmp_path: Path) -> Path:
     return file
 
 
-def test_a_policy_comes_back_as_it_was(path: Path) -> None:
-    """To the last bit, and with its card."""
+def test_a_policy_round_trips(path: Path) -> None:
+    """Predictions and card are identical."""
     policy = _policy().described(command="clone it", minutes=3, seeds=[1, 2])
     policy.save(path)
     again = CameraPolicy.load(path)
@@ -48,19 +48,19 @@ def test_a_policy_comes_back_as_it_was(path: Path) -> None:
 
 
 def test_the_same_policy_is_the_same_file(path: Path, tmp_path: Path) -> None:
-    """No date, no order that changes."""
+    """Files contain no date and no varying order."""
     CameraPolicy.load(path).save(tmp_path / "again.safetensors")
     assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
 
 
 def test_a_policy_of_the_default_settings_is_small(path: Path) -> None:
-    """It is to be sent to a robot."""
+    """A policy must be small enough to send to a robot."""
     _policy(CloneSettings()).save(path)
     assert path.stat().st_size < 1_000_000
 
 
-def test_one_picture_and_many_give_the_same() -> None:
-    """In driving there is one at a time."""
+def test_single_and_batch_predictions_agree() -> None:
+    """A batch gives the same actions as single images."""
     policy = _policy()
     many = policy.predict_many(_PICTURES)
     assert many.dtype == np.float32
@@ -69,8 +69,8 @@ def test_one_picture_and_many_give_the_same() -> None:
         np.testing.assert_allclose(policy.predict(picture), action, atol=1e-6)
 
 
-def test_light_hardly_matters() -> None:
-    """A picture is freed of its own brightness before the policy sees it."""
+def test_predictions_hardly_depend_on_brightness() -> None:
+    """Brightness is normalized before the network."""
     policy = _policy()
     bright = (_PICTURES // 2) * 2
     np.testing.assert_allclose(
@@ -78,8 +78,8 @@ def test_light_hardly_matters() -> None:
     )
 
 
-def test_a_picture_of_another_size_is_seen_and_no_picture_is_refused() -> None:
-    """In a sentence, not with a page of Torch."""
+def test_other_sizes_are_accepted_and_missing_images_refused() -> None:
+    """Errors are CloningError, not from Torch."""
     assert _policy().predict(np.zeros((50, 50, 3), np.uint8)).shape == (2,)
     with pytest.raises(CloningError, match="Pictures must be uint8"):
         _policy().predict(np.zeros((50, 50), np.uint8))
@@ -88,16 +88,16 @@ def test_a_picture_of_another_size_is_seen_and_no_picture_is_refused() -> None:
 
 
 def _changed(path: Path, weights: dict[str, Any] | None = None, **card: Any) -> None:
-    """Write a file anew with other weights or another card, and the hash that belongs to them."""
+    """Rewrite a file with other weights or another card, and a matching hash."""
     content, old = read_tensors(path, KIND)
-    told = {**json.loads(content), **card}
+    card_fields = {**json.loads(content), **card}
     path.write_bytes(
-        tensor_bytes(old if weights is None else weights, json.dumps(told).encode(), KIND)
+        tensor_bytes(old if weights is None else weights, json.dumps(card_fields).encode(), KIND)
     )
 
 
-def test_weights_that_are_not_the_policys_are_refused(path: Path) -> None:
-    """Of another shape, with other names, of another precision, not finite or missing."""
+def test_unsuitable_weights_are_refused(path: Path) -> None:
+    """Wrong shapes, names, dtypes, non-finite and missing weights."""
     state = {name: value.numpy() for name, value in _policy().network.state_dict().items()}
     bias = "hands.bias"
     for weights in (
@@ -113,8 +113,8 @@ def test_weights_that_are_not_the_policys_are_refused(path: Path) -> None:
             CameraPolicy.load(path)
 
 
-def test_a_changed_number_is_noticed(path: Path) -> None:
-    """The hash of the card is that of the numbers."""
+def test_changed_weights_are_detected(path: Path) -> None:
+    """The card holds a hash of the weights."""
     content = bytearray(path.read_bytes())
     content[-100] ^= 1
     path.write_bytes(content)
@@ -123,7 +123,7 @@ def test_a_changed_number_is_noticed(path: Path) -> None:
 
 
 def test_the_policy_of_a_study_is_refused(path: Path) -> None:
-    """It is such a file too, of another kind."""
+    """It is a safetensors file of another kind."""
     path.write_bytes(tensor_bytes({"policy.weight": np.zeros(3)}, b"{}"))
     with pytest.raises(PolicyError, match="it is a policy"):
         CameraPolicy.load(path)
@@ -133,7 +133,7 @@ def test_the_policy_of_a_study_is_refused(path: Path) -> None:
 def test_nothing_is_unpickled(
     path: Path, write: Callable[..., None], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A policy may come from anywhere."""
+    """Policy files are untrusted."""
     with path.open("wb") as file:
         write({"hands.bias": _Trap()}, file)
     with pytest.raises(PolicyError, match="not a safetensors file"):
@@ -150,7 +150,7 @@ class _Trap:
 
 @pytest.mark.parametrize("clone", [*CLONES.values()], ids=[*CLONES])
 def test_the_policies_of_the_package_load(clone: Path) -> None:
-    """Each drives a vehicle."""
+    """Each predicts an action for a vehicle."""
     action = CameraPolicy.load(clone).predict(np.zeros((120, 160, 3), np.uint8))
     assert action.shape == (2,)
 
@@ -168,8 +168,8 @@ def test_the_policies_of_the_package_load(clone: Path) -> None:
         {"members": 33},
     ],
 )
-def test_a_card_that_lies_is_refused(path: Path, changes: dict[str, Any]) -> None:
-    """Before it takes memory."""
+def test_an_invalid_card_is_refused(path: Path, changes: dict[str, Any]) -> None:
+    """Sizes are checked before memory is allocated."""
     _changed(path, **changes)
     with pytest.raises(PolicyError, match=r"corridor\.safetensors is n"):
         CameraPolicy.load(path)
@@ -177,14 +177,14 @@ def test_a_card_that_lies_is_refused(path: Path, changes: dict[str, Any]) -> Non
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"not a policy at all"])
 def test_another_file_is_refused(path: Path, content: bytes) -> None:
-    """The message names it."""
+    """The error names the file."""
     path.write_bytes(content)
     with pytest.raises(PolicyError, match=r"corridor\.safetensors is not a cloned policy"):
         CameraPolicy.load(path)
 
 
-def test_every_cut_is_noticed(path: Path) -> None:
-    """A copy that was broken off, wherever."""
+def test_a_truncated_file_is_refused(path: Path) -> None:
+    """Truncation at any place is detected."""
     whole = path.read_bytes()
     for share in (0.1, 0.5, 0.9, 0.999):
         path.write_bytes(whole[: int(share * len(whole))])
@@ -192,8 +192,8 @@ def test_every_cut_is_noticed(path: Path) -> None:
             CameraPolicy.load(path)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    """So that a misspelt path is seen."""
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    """A folder is refused too."""
     with pytest.raises(PolicyError, match=r"There is no policy file .*nowhere\.safetensors"):
         CameraPolicy.load(tmp_path / "nowhere.safetensors")
     with pytest.raises(PolicyError, match="is not a cloned policy"):
@@ -201,7 +201,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
-    """Neither a part nor a surprise."""
+    """No partial file remains."""
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match="Cannot write"):
         _policy().save(tmp_path / "taken")
@@ -209,7 +209,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_copies_share_nothing() -> None:
-    """A copy may be trained on."""
+    """A copy can be trained without changing the original."""
     policy = _policy()
     copy = policy.copy()
     with torch.no_grad():

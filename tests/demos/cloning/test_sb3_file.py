@@ -1,4 +1,4 @@
-"""A clone as an ordinary file of Stable-Baselines3: it acts the same, and goes on learning."""
+"""Export of a clone to Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SHORT = msgspec.structs.replace(QUICK, fewest_steps=20, most_steps=20)
 
 
 class _World(gym.Env[Any, Any]):
-    """Shows stripes, and is fond of throttle; a world for a learner to begin in."""
+    """An env that shows stripes and rewards throttle."""
 
     def __init__(self, layout: Layout, inputs: Inputs) -> None:
         self._data, self._inputs, self._at = stripes(20, 9, layout), inputs, 0
@@ -68,8 +68,8 @@ def _done(policy: CameraPolicy, inputs: Inputs, data: Any) -> np.ndarray:
 
 
 @pytest.mark.parametrize("inputs", ["picture", "state", "both"])
-def test_sac_loads_it_acts_as_it_and_goes_on(inputs: Inputs, tmp_path: Path) -> None:
-    """On raw observations, one or many; and a few steps later it acts otherwise."""
+def test_sac_predicts_like_the_clone_and_learns(inputs: Inputs, tmp_path: Path) -> None:
+    """Raw observations are accepted, single and batched."""
     policy, data = _policy(STEERS, inputs), stripes(16, 1, STEERS)
     size = None if inputs == "state" else _SIZE
     as_sac(policy, size, batch_size=8, buffer_size=64).save(tmp_path / "sac.zip")
@@ -86,8 +86,8 @@ def test_sac_loads_it_acts_as_it_and_goes_on(inputs: Inputs, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("inputs", ["picture", "both"])
-def test_ppo_loads_it_and_acts_as_it(inputs: Inputs, tmp_path: Path) -> None:
-    """Numbers as numbers, squashed as the clone's are."""
+def test_ppo_predicts_like_the_clone_and_learns(inputs: Inputs, tmp_path: Path) -> None:
+    """Regression outputs are squashed as in the clone."""
     policy, data = _policy(STEERS, inputs), stripes(16, 1, STEERS)
     as_ppo(policy, _SIZE, n_steps=8, batch_size=8, n_epochs=1).save(tmp_path / "ppo.zip")
     model = PPO.load(tmp_path / "ppo.zip", env=_World(STEERS, inputs))
@@ -98,7 +98,7 @@ def test_ppo_loads_it_and_acts_as_it(inputs: Inputs, tmp_path: Path) -> None:
 
 
 def test_ppo_chooses_the_classes_of_a_clone(tmp_path: Path) -> None:
-    """By their numbers, which a wrapper turns into keys."""
+    """A wrapper maps class numbers to keys."""
     policy, data = _policy(KEYS), stripes(16, 1)
     as_ppo(policy, _SIZE, n_steps=8, batch_size=8, n_epochs=1).save(tmp_path / "ppo.zip")
     model = PPO.load(tmp_path / "ppo.zip", env=ChosenActions(_World(KEYS, "picture"), policy))
@@ -109,14 +109,14 @@ def test_ppo_chooses_the_classes_of_a_clone(tmp_path: Path) -> None:
     model.learn(16)
 
 
-def test_sac_cannot_choose() -> None:
-    """And says what can."""
+def test_sac_refuses_classes() -> None:
+    """The error names PPO."""
     with pytest.raises(PolicyError, match="use PPO"):
         as_sac(_policy(KEYS), _SIZE)
 
 
-def test_what_sac_tries_is_close_to_the_clone() -> None:
-    """A clone that began by driving at random would have been cloned for nothing."""
+def test_sac_explores_close_to_the_clone() -> None:
+    """Stochastic actions stay near the clone's."""
     policy, data = _policy(STEERS), stripes(64, 1, STEERS)
     tried = as_sac(policy, _SIZE, buffer_size=64).predict(data.pictures, deterministic=False)[0]
     apart = np.abs(tried - _done(policy, "picture", data)).mean(axis=0)
@@ -126,12 +126,12 @@ def test_what_sac_tries_is_close_to_the_clone() -> None:
 
 
 def test_settings_reach_the_learner() -> None:
-    """Except for the shape of the actor, which is the clone's."""
+    """Settings are passed on, except for the shape of the actor."""
     model = as_sac(_policy(STEERS), _SIZE, gamma=0.9, buffer_size=64)
     assert (model.gamma, model.buffer_size) == (0.9, 64)
 
 
-def test_a_critic_is_freed_of_mean_and_spread() -> None:
-    """However large its numbers grow, they come out alike."""
+def test_critic_features_are_normalized() -> None:
+    """Shift and scale of the inputs do not matter."""
     x = torch.tensor([[1.0, 2.0, 4.0, 9.0]])
     torch.testing.assert_close(NormedReLU()(x), NormedReLU()(1000.0 * x + 5.0), atol=1e-3, rtol=0.0)

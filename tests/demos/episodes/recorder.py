@@ -1,7 +1,7 @@
-"""Records for ever, and says which step is on the disk; for the test that kills it.
+"""Record steps without end and report each written one, for the test that kills the recorder.
 
-It forks a recorder for each line on its standard input, and writes the recorder's process number,
-and that it is dead; each recorder writes a byte to the standard error for each step.
+Forks a recorder for each line on standard input, and prints its pid, and "dead" after its exit.
+Each recorder writes a byte to standard error for each step.
 """
 
 from __future__ import annotations

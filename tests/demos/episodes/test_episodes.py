@@ -47,10 +47,10 @@ def _content(one: Step) -> str:
 
 @settings(max_examples=40)
 @given(steps=st.lists(_STEPS, max_size=5), new=st.lists(st.booleans(), min_size=5, max_size=5))
-def test_what_is_recorded_is_read_back(
+def test_episodes_round_trip(
     steps: list[Step], new: list[bool], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """Every number, NaN, infinity, text and byte of a picture survives the round trip."""
+    """All numbers, NaN, infinities, texts and frames are kept."""
     recording = tmp_path_factory.mktemp("recording")
     pictures: list[bytes | None] = []
     with EpisodeWriter.create(recording, header(), spare_bytes=0) as writer:
@@ -70,8 +70,8 @@ def _as_utf8(text: str) -> str:
     return text.encode(errors="replace").decode()
 
 
-def test_the_header_comes_back(tmp_path: Path) -> None:
-    """The metadata is kept, and the writer adds the start time."""
+def test_headers_round_trip(tmp_path: Path) -> None:
+    """The writer adds the start time and the version."""
     given_header = header(env="shapechanger/Car-v1", env_kwargs={"put_back": True}, seed=3)
     now = datetime(2026, 11, 21, 10, 30, 5, tzinfo=UTC)
     with EpisodeWriter.create(tmp_path, given_header, spare_bytes=0, now=lambda: now) as writer:
@@ -103,7 +103,7 @@ def test_an_episode_that_is_being_recorded_can_be_read(tmp_path: Path) -> None:
 
 
 def test_undo_drops_the_newest_seconds(tmp_path: Path) -> None:
-    """At 20 Hz one second is 20 steps; a second undo takes the ones before."""
+    """At 20 Hz one second is 20 steps; another undo drops the steps before."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         for number in range(60):
             writer.add(step(number))
@@ -117,14 +117,14 @@ def test_undo_drops_the_newest_seconds(tmp_path: Path) -> None:
 
 
 def test_undo_of_nothing_drops_nothing(tmp_path: Path) -> None:
-    """The button may be pressed before the first step."""
+    """Undo without steps returns 0."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         assert writer.undo() == 0
         with pytest.raises(DemosError, match="must be positive, got nan"):
             writer.undo(math.nan)
 
 
-def test_dropped_steps_can_be_taken_back(tmp_path: Path) -> None:
+def test_dropped_steps_can_be_kept_again(tmp_path: Path) -> None:
     """Later edits override earlier ones, and recorded lines are never rewritten."""
     path = recorded(tmp_path)
     before = (path / "steps.jsonl").read_bytes()
@@ -137,8 +137,8 @@ def test_dropped_steps_can_be_taken_back(tmp_path: Path) -> None:
     assert (path / "steps.jsonl").read_bytes().startswith(before)
 
 
-def test_steps_that_are_not_there_cannot_be_dropped(tmp_path: Path) -> None:
-    """The error names the steps that exist."""
+def test_dropping_missing_steps_is_refused(tmp_path: Path) -> None:
+    """The error gives the range of existing steps."""
     path = recorded(tmp_path)
     with pytest.raises(DemosError, match="has the steps 0 to 4, and not 3 to 5"):
         drop(path, 3, 5, "bad")
@@ -155,10 +155,8 @@ def test_steps_that_are_not_there_cannot_be_dropped(tmp_path: Path) -> None:
         ({"captured_ns": -1}, "time runs backwards"),
     ],
 )
-def test_a_step_that_does_not_fit_is_refused(
-    tmp_path: Path, change: dict[str, object], reason: str
-) -> None:
-    """The error names the step and the reason, and the episode goes on without it."""
+def test_an_invalid_step_is_refused(tmp_path: Path, change: dict[str, object], reason: str) -> None:
+    """The error names the step and the reason, and recording continues."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         writer.add(step(0))
         with pytest.raises(DemosError, match=f"Step 1 of .* cannot be recorded: .*{reason}"):
@@ -167,8 +165,8 @@ def test_a_step_that_does_not_fit_is_refused(
     assert len(read_episode(writer.path).steps) == 2
 
 
-def test_a_picture_that_is_none_is_refused(tmp_path: Path) -> None:
-    """Data that is not a JPEG, or is far too large, is not written."""
+def test_an_invalid_frame_is_refused(tmp_path: Path) -> None:
+    """Data that are not a JPEG, or are too large, are not written."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         with pytest.raises(DemosError, match="its picture is not a JPEG"):
             writer.add(step(0), b"GIF89a")
@@ -178,7 +176,7 @@ def test_a_picture_that_is_none_is_refused(tmp_path: Path) -> None:
 
 
 def test_two_recorders_do_not_share_a_folder(tmp_path: Path) -> None:
-    """The second recorder is refused, the first goes on, and the folder is free afterwards."""
+    """The second recorder is refused, and the folder is free after the first closes."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         with pytest.raises(DemosError, match="is in use by another recorder"):
             EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
@@ -189,13 +187,13 @@ def test_two_recorders_do_not_share_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_disk_that_is_nearly_full_is_not_filled(tmp_path: Path) -> None:
-    """The error says how much is free; nothing is left behind."""
+    """The error gives the free space, and no file is created."""
     with pytest.raises(OutputError, match="MB of the disk are free"):
         EpisodeWriter.create(tmp_path, header(), spare_bytes=1 << 60)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_closed_episode_takes_no_more(tmp_path: Path) -> None:
+def test_a_closed_episode_refuses_steps(tmp_path: Path) -> None:
     """Closing twice is allowed; adding a step after closing is not."""
     writer = EpisodeWriter.create(tmp_path, header(), spare_bytes=0)
     writer.close()
@@ -204,7 +202,7 @@ def test_a_closed_episode_takes_no_more(tmp_path: Path) -> None:
         writer.add(step())
 
 
-def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
+def test_an_invalid_recording_is_named(tmp_path: Path) -> None:
     """A missing folder, a file and an empty folder have different errors."""
     (tmp_path / "file").touch()
     (tmp_path / "empty").mkdir()
@@ -220,7 +218,7 @@ def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
 
 
 def test_a_later_format_is_refused(tmp_path: Path) -> None:
-    """A reader refuses a newer version instead of reading half of it."""
+    """A newer format version raises an error."""
     path = recorded(tmp_path)
     file = path / "episode.json"
     file.write_text(file.read_text().replace('"format": 1', '"format": 2'))
@@ -229,7 +227,7 @@ def test_a_later_format_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("harm", ["missing", "short", "changed"])
-def test_a_damaged_picture_is_found(tmp_path: Path, harm: str) -> None:
+def test_a_damaged_frame_is_detected(tmp_path: Path, harm: str) -> None:
     """Damage is found on reading, and the error names the repair command."""
     path = recorded(tmp_path)
     file = path / "frames" / "000002.jpg"

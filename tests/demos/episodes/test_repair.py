@@ -14,7 +14,7 @@ from tests.demos.episodes.making import header, picture, recorded, step
 @settings(max_examples=40)
 @given(share=st.floats(0.0, 1.0))
 def test_cut_off_at_any_byte(share: float, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """All complete steps survive, and the torn line is moved to `lost`."""
+    """All complete steps are kept, and the partial line is moved to `lost`."""
     path = recorded(tmp_path_factory.mktemp("recording"), close=False)
     file = path / "steps.jsonl"
     content = file.read_bytes()
@@ -51,16 +51,16 @@ def test_one_flipped_bit_costs_one_step(
     assert len(read_episode(path).steps) >= 3
 
 
-def test_what_is_whole_stays_as_it_is(tmp_path: Path) -> None:
-    """Repairing an intact episode changes no byte."""
+def test_repairing_an_intact_episode_changes_nothing(tmp_path: Path) -> None:
+    """No byte of any file changes."""
     path = recorded(tmp_path)
     before = {p: p.read_bytes() for p in path.rglob("*") if p.is_file()}
     assert not repair(path).changed
     assert {p: p.read_bytes() for p in path.rglob("*") if p.is_file()} == before
 
 
-def test_a_picture_without_a_step_is_set_aside(tmp_path: Path) -> None:
-    """A crash between a picture and its line leaves the picture; nothing is deleted."""
+def test_a_frame_without_a_step_is_moved_to_lost(tmp_path: Path) -> None:
+    """Nothing is deleted."""
     path = recorded(tmp_path, close=False)
     (path / "frames" / "000005.jpg").write_bytes(picture(5)[:20])
     assert repair(path).pictures == 1
@@ -88,8 +88,8 @@ def test_a_step_without_its_picture_does_not_count(tmp_path: Path) -> None:
     assert [s.index for s in read_episode(path).steps] == [0, 1, 3, 4]
 
 
-def test_a_running_recording_is_left_alone(tmp_path: Path) -> None:
-    """Repairing an episode while it is being recorded is refused."""
+def test_a_running_recording_is_refused(tmp_path: Path) -> None:
+    """Repairing an episode while it is being recorded raises an error."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         writer.add(step())
         with pytest.raises(DemosError, match="is being recorded at this moment"):

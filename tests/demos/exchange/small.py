@@ -136,7 +136,7 @@ def all_of(data: Path) -> list[Episode]:
     return [read_episode(path) for path in episodes_of(data)]
 
 
-def told(episode: Episode) -> dict[str, Any]:
+def content_of(episode: Episode) -> dict[str, Any]:
     """Return the content of an episode, except its name and start time, so that NaN equals NaN."""
     head = episode.header.to_json()
     del head["created"]

@@ -1,4 +1,4 @@
-"""Damaged or unsuitable input is refused in one sentence, and nothing is written."""
+"""Damaged or unsuitable input raises a one-sentence error, and nothing is written."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _pipe(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "says"),
+    ("spoil", "expected"),
     [
         (lambda f: (f / SECOND).unlink(), f"line 2 names '{SECOND}', which is not in"),
         (_edit(SECOND, lambda jpeg: jpeg[:-300]), "is damaged"),
@@ -101,16 +101,16 @@ def _pipe(folder: Path) -> None:
         (_pipe, "which is not in"),
     ],
 )
-def test_a_folder_of_2017_that_is_not_whole(
-    tmp_path: Path, spoil: Callable[[Path], object], says: str
+def test_a_damaged_folder_of_2017(
+    tmp_path: Path, spoil: Callable[[Path], object], expected: str
 ) -> None:
-    """The error names the file or the line, and the remedy."""
+    """The error names the file or line, and the remedy."""
     folder = keys_folder(tmp_path / "keys")
     spoil(folder)
-    assert says in refused(folder, tmp_path / "data")
+    assert expected in refused(folder, tmp_path / "data")
 
 
-def test_a_byte_order_mark_is_no_label(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
     """Spreadsheets write a byte order mark."""
     folder = keys_folder(tmp_path / "keys")
     _edit("labels.csv", lambda text: b"\xef\xbb\xbf" + text)(folder)
@@ -121,7 +121,7 @@ _GOOD = [{"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 50 * n} for 
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("change", "expected"),
     [
         ({"user/angle": 1.5}, "user/angle is 1.5"),
         ({"user/angle": "left"}, "user/angle is 'left'"),
@@ -132,16 +132,16 @@ _GOOD = [{"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 50 * n} for 
         ({"_timestamp_ms": 500}, "Time runs backwards"),
     ],
 )
-def test_a_tub_that_is_not_whole(tmp_path: Path, change: dict[str, object], says: str) -> None:
+def test_a_damaged_tub(tmp_path: Path, change: dict[str, object], expected: str) -> None:
     """The error names the catalog and the line."""
     records = [*_GOOD[:1], _GOOD[1] | change, *_GOOD[2:]]
     text = refused(tub_folder(tmp_path / "tub", records), tmp_path / "data")
-    assert says in text
+    assert expected in text
     assert "catalog_0.catalog, line 2" in text
 
 
-def test_a_tub_whose_files_are_not_whole(tmp_path: Path) -> None:
-    """A torn line, a truncated manifest, a path out of the folder, and no records left."""
+def test_a_tub_with_damaged_files(tmp_path: Path) -> None:
+    """Partial lines, truncated manifests, outside paths and empty tubs are refused."""
     out = tmp_path / "data"
     folder = tub_folder(tmp_path / "torn", _GOOD)
     _edit("catalog_1.catalog", lambda text: text[:20])(folder)
@@ -157,7 +157,7 @@ def test_a_tub_whose_files_are_not_whole(tmp_path: Path) -> None:
 
 
 def test_sessions_at_different_rates(tmp_path: Path) -> None:
-    """A policy cannot learn from steps of different lengths."""
+    """A data set has a single control rate."""
     records = [
         {"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": ms * n, "_session_id": str(ms)}
         for ms in (50, 100)
@@ -170,7 +170,7 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "says"),
+    ("spoil", "expected"),
     [
         (lambda f: (f / "header.json").unlink(), "There is no header.json"),
         (_edit("header.json", lambda t: t[:40]), "is not valid JSON"),
@@ -192,12 +192,12 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
         (_edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)), "8 x 8 pixels, and not 40"),
     ],
 )
-def test_csv_that_is_not_whole(tmp_path: Path, spoil: Callable[[Path], object], says: str) -> None:
+def test_damaged_csv(tmp_path: Path, spoil: Callable[[Path], object], expected: str) -> None:
     """Damage by a spreadsheet or an incomplete copy is named."""
     drive(tmp_path / "recorded")
     export_recording(tmp_path / "recorded", tmp_path / "csv", "csv")
     spoil(tmp_path / "csv")
-    assert says in refused(tmp_path / "csv", tmp_path / "data")
+    assert expected in refused(tmp_path / "csv", tmp_path / "data")
 
 
 def _in_file(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
@@ -222,7 +222,7 @@ def _spoilt(file: h5py.File) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "says"),
+    ("spoil", "expected"),
     [
         (lambda f: (f / "data/main_data.hdf5").unlink(), "which is not in"),
         (_edit("data/main_data.hdf5", lambda b: b[:3000]), "is not an intact HDF5 file"),
@@ -235,18 +235,18 @@ def _spoilt(file: h5py.File) -> None:
         (_in_file(_spoilt), "is damaged"),
     ],
 )
-def test_a_minari_dataset_that_is_not_whole(
-    tmp_path: Path, spoil: Callable[[Path], object], says: str
+def test_a_damaged_minari_dataset(
+    tmp_path: Path, spoil: Callable[[Path], object], expected: str
 ) -> None:
     """The error names what is missing, and no other file is opened."""
     drive(tmp_path / "recorded")
     export_recording(tmp_path / "recorded", tmp_path / "set-v0", "minari")
     spoil(tmp_path / "set-v0")
-    assert says in refused(tmp_path / "set-v0", tmp_path / "data")
+    assert expected in refused(tmp_path / "set-v0", tmp_path / "data")
 
 
-def test_folders_that_are_none_of_these(tmp_path: Path) -> None:
-    """An empty folder, a file, a missing folder, a recording, two formats, and a parent folder."""
+def test_folders_of_unknown_format(tmp_path: Path) -> None:
+    """Empty, missing, ambiguous and parent folders each have an error."""
     out = tmp_path / "data"
     (tmp_path / "empty").mkdir()
     assert "is empty" in refused(tmp_path / "empty", out)
@@ -262,8 +262,8 @@ def test_folders_that_are_none_of_these(tmp_path: Path) -> None:
     assert import_recording(both, out, "2017").steps == 3
 
 
-def test_formats_that_there_are_not(tmp_path: Path) -> None:
-    """An unknown format is answered with the nearest one, on import and on export."""
+def test_unknown_formats(tmp_path: Path) -> None:
+    """The error suggests the nearest format, on import and export."""
     keys_folder(tmp_path / "keys")
     assert "Did you mean 'minari'" in refused(tmp_path / "keys", tmp_path / "data", "minary")
     assert "is not tub" in refused(tmp_path / "keys", tmp_path / "data", "tub")
@@ -273,8 +273,8 @@ def test_formats_that_there_are_not(tmp_path: Path) -> None:
         next(import_episodes(tmp_path / "keys", "minary"))
 
 
-def test_outputs_that_cannot_be(tmp_path: Path) -> None:
-    """Existing paths, paths inside the source, and names that Minari could not load are refused."""
+def test_invalid_outputs(tmp_path: Path) -> None:
+    """Existing paths, paths inside the source, and names that Minari cannot load are refused."""
     folder = keys_folder(tmp_path / "keys")
     (tmp_path / "there").mkdir()
     assert "exists already" in refused(folder, tmp_path / "there")
@@ -291,7 +291,7 @@ def test_outputs_that_cannot_be(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "changes", "says"),
+    ("name", "changes", "expected"),
     [
         ("2017", {}, "steering, throttle, and those of the format of 2017"),
         ("minari", {"control_hz": 10.0}, "20, and .* 10: a Minari dataset has one kind"),
@@ -299,18 +299,18 @@ def test_outputs_that_cannot_be(tmp_path: Path) -> None:
     ],
 )
 def test_recordings_that_do_not_fit_a_format(
-    tmp_path: Path, name: str, changes: dict[str, object], says: str
+    tmp_path: Path, name: str, changes: dict[str, object], expected: str
 ) -> None:
-    """Other actions, mixed rates and mixed picture sizes are refused."""
+    """Other actions, mixed rates and mixed image sizes are refused."""
     drive(tmp_path / "data")
     drive(tmp_path / "data", **changes)
-    with pytest.raises(DemosError, match=says):
+    with pytest.raises(DemosError, match=expected):
         export_recording(tmp_path / "data", tmp_path / "out-v0", name)
     assert [path.name for path in tmp_path.iterdir()] == ["data"]
 
 
 @pytest.mark.parametrize(
-    ("jpeg", "says"),
+    ("jpeg", "expected"),
     [
         (picture(1)[:-200], "is damaged"),
         (huge(), "claims 60000 x 60000"),
@@ -318,14 +318,14 @@ def test_recordings_that_do_not_fit_a_format(
         (picture(1, grey=True), "is grey, and the first one is not"),
     ],
 )
-def test_pictures_that_minari_could_not_read(tmp_path: Path, jpeg: bytes, says: str) -> None:
-    """Minari decodes all pictures of an episode at once, so one bad picture would spoil it."""
+def test_frames_that_minari_cannot_read(tmp_path: Path, jpeg: bytes, expected: str) -> None:
+    """Minari decodes all frames of an episode at once, so one bad frame is refused."""
     steps = [
         (Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0)), data)
         for data in (picture(0), jpeg)
     ]
     record(tmp_path / "data", header(), steps)
-    with pytest.raises(DemosError, match=says):
+    with pytest.raises(DemosError, match=expected):
         export_recording(tmp_path / "data", tmp_path / "out-v0", "minari")
     assert [path.name for path in tmp_path.iterdir()] == ["data"]
 
@@ -343,8 +343,8 @@ def test_nothing_to_export(tmp_path: Path) -> None:
         export_recording(tmp_path / "bare", tmp_path / "out", "tub", dropped=True)
 
 
-def test_no_text_is_a_formula(tmp_path: Path) -> None:
-    """A spreadsheet runs a cell that begins with =, +, - or @."""
+def test_texts_are_not_formulas(tmp_path: Path) -> None:
+    """Spreadsheets execute cells that begin with =, +, - or @."""
     steps = [
         (Step(action=(0.0, 0.0), driver="person", state=(0.0, 0.0), stop_reason=text), picture(0))
         for text in ("=1+1", "+1", "-1", "@x", "\t=1", "\r=1")
@@ -357,8 +357,8 @@ def test_no_text_is_a_formula(tmp_path: Path) -> None:
     assert {reason[0] for reason in reasons} == {'"'}
 
 
-def test_a_file_that_vanishes_is_told(tmp_path: Path) -> None:
-    """A lazy import raises a clear error when its source disappears meanwhile."""
+def test_a_file_that_disappears_is_named(tmp_path: Path) -> None:
+    """A lazy import raises a clear error when its source is deleted."""
     folder = keys_folder(tmp_path / "keys")
     ((_, steps),) = list(import_episodes(folder))
     next(steps)

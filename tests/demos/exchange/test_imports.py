@@ -1,4 +1,4 @@
-"""Imports of all formats."""
+"""Imports from all formats."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_the_layout_of_2017(tmp_path: Path) -> None:
 
 
 def test_a_long_pause_ends_an_episode_of_2017(tmp_path: Path) -> None:
-    """More than thirty periods split a drive; the export joins the parts again."""
+    """Pauses of more than thirty periods split a drive; the export joins the parts again."""
     times = [100.0, 100.1, 100.2, 103.2, 103.3, 106.5]
     names = [f"{at}_.jpg" for at in times]
     folder = keys_folder(
@@ -90,7 +90,7 @@ _RECORDS: list[dict[str, Any]] = [
 
 
 def test_a_tub(tmp_path: Path) -> None:
-    """Sessions become episodes, deleted records are left out, and the pilot is a policy."""
+    """Sessions become episodes, deleted records are skipped, and pilot records are a policy's."""
     folder = tub_folder(tmp_path / "tub", _RECORDS, [1], {"imu/gyr_z": "float", "lap": "str"})
     before = snapshot(folder)
     assert find_format(folder) == "tub"
@@ -109,7 +109,7 @@ def test_a_tub(tmp_path: Path) -> None:
 
 
 def test_an_old_tub(tmp_path: Path) -> None:
-    """Records are ordered by number, not as text; a restart of the car begins a drive."""
+    """Records are ordered by number, and a restart of the car starts a new episode."""
     folder = tmp_path / "tub"
     folder.mkdir()
     for n, ms in enumerate([0, 50, 100, 150, 200, 250, 300, 350, 400, 450, 0, 50]):
@@ -124,11 +124,11 @@ def test_an_old_tub(tmp_path: Path) -> None:
     assert [step.action[0] for step in first.steps] == [n / 100 for n in range(10)]
     assert [step.action[0] for step in second.steps] == [0.1, 0.11]
     assert first.header.control_hz == pytest.approx(20.0)
-    assert {step.wall_ns for step in first.steps} == {None}  # It only says when since the start.
+    assert {step.wall_ns for step in first.steps} == {None}  # Times are relative to the start.
 
 
-def test_minari_makes_the_env_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The one that was recorded, with its arguments; none where several were."""
+def test_minari_recovers_the_env(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The env is recovered with its arguments, and not for mixed envs."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     arguments = {"image": False, "world": "yard"}
     drive(tmp_path / "one", env="shapechanger/Car-v1", env_kwargs=arguments)
@@ -145,8 +145,8 @@ def test_minari_makes_the_env_again(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert minari.load_dataset("two-v0").env_spec is None
 
 
-def test_minari_reads_what_was_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Minari itself loads every pixel and every number, by the name of the dataset."""
+def test_minari_loads_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Minari itself loads all pixels and values, by the name of the dataset."""
     drive(tmp_path / "data", 5)
     drive(tmp_path / "data", 3)
     export_recording(tmp_path / "data", tmp_path / "sets/corridor-v0", "minari")
@@ -205,7 +205,7 @@ def _foreign(
     return folder / "others/set-v3"
 
 
-def test_numbers_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A Dict of Boxes and a Discrete action become a state and a scalar action."""
     path = _foreign(
         tmp_path,
@@ -227,10 +227,10 @@ def test_numbers_of_other_minari_datasets(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("jpeg", [True, False])
-def test_pictures_of_other_minari_datasets(
+def test_images_of_other_minari_datasets(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jpeg: bool
 ) -> None:
-    """Stored JPEGs are kept; pixels become a JPEG that is close to them."""
+    """Stored JPEGs are kept; raw pixels are encoded with little loss."""
     pixels = np.zeros((3, 40, 48, 3), np.uint8)
     pixels[:, :, :, 0] = np.arange(48) * 5
     pixels[:, :, :, 2] = 120

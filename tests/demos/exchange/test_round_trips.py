@@ -1,4 +1,4 @@
-"""Export followed by import changes nothing."""
+"""Export followed by import is the identity."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from shapechanger.demos.episodes import DRIVERS, EpisodeWriter, Step, drop
 from shapechanger.demos.exchange import export_recording, import_recording
 from tests.demos.exchange.small import (
     all_of,
+    content_of,
     drive,
     header,
     keys_folder,
     picture,
     record,
     snapshot,
-    told,
 )
 
-# Half of a surrogate pair is no text.
+# Lone surrogates are not valid text.
 _TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 _ANY = st.floats(width=64)
 _FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -79,14 +79,14 @@ def _headers(draw: st.DrawFn) -> dict[str, Any]:
 @pytest.mark.parametrize("name", ["csv", "minari"])
 @settings(max_examples=8, suppress_health_check=list(HealthCheck))
 @given(steps=_steps(), head=_headers(), outcome=_TEXTS, data=st.data())
-def test_whatever_was_recorded_comes_back(
+def test_any_recording_round_trips(
     name: str,
     steps: list[tuple[Step, bytes | None, list[str]]],
     head: dict[str, Any],
     outcome: str,
     data: st.DataObject,
 ) -> None:
-    """Numbers, texts, pictures, marks and drops survive exactly."""
+    """Numbers, texts, frames, marks and drops are kept exactly."""
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         with EpisodeWriter.create(place / "data", header(**head)) as writer:
@@ -102,19 +102,19 @@ def test_whatever_was_recorded_comes_back(
         export_recording(place / "data", place / "x-v0", name, dropped=True)
         import_recording(place / "x-v0", place / "back")
         (before,), (after,) = all_of(place / "data"), all_of(place / "back")
-        assert told(after) == told(before)
+        assert content_of(after) == content_of(before)
 
 
 @pytest.mark.parametrize("name", ["csv", "minari"])
 def test_many_episodes_keep_their_order(tmp_path: Path, name: str) -> None:
-    """All episodes come back in order, even those of more than one chunk."""
+    """The order is kept, also across several chunks."""
     for count in (3, 1, 300):  # More than fit into one chunk.
         drive(tmp_path / "data", count)
     export_recording(tmp_path / "data", tmp_path / "x-v0", name)
     done = import_recording(tmp_path / "x-v0", tmp_path / "back")
     assert (done.format, done.episodes, done.steps) == (name, 3, 304)
     before, after = all_of(tmp_path / "data"), all_of(tmp_path / "back")
-    assert [told(e) for e in after] == [told(e) for e in before]
+    assert [content_of(e) for e in after] == [content_of(e) for e in before]
 
 
 @pytest.mark.parametrize(
@@ -122,10 +122,10 @@ def test_many_episodes_keep_their_order(tmp_path: Path, name: str) -> None:
     [((40, 32), False, False), (None, True, False), ((16, 8), True, False), ((40, 32), True, True)],
 )
 @pytest.mark.parametrize("name", ["csv", "minari"])
-def test_every_kind_of_observation_comes_back(
+def test_every_kind_of_observation_round_trips(
     tmp_path: Path, name: str, image: tuple[int, int] | None, state: bool, grey: bool
 ) -> None:
-    """Without a state, a camera or colours, or with pictures too small for Minari's JPEG."""
+    """Without state, camera or colour, and with images too small for Minari's JPEG."""
     what = header(image_size=image, **({} if state else {"state_layout": ""}))
     steps = [
         (
@@ -138,15 +138,13 @@ def test_every_kind_of_observation_comes_back(
     export_recording(tmp_path / "data", tmp_path / "x-v0", name)
     import_recording(tmp_path / "x-v0", tmp_path / "back")
     (before,), (after,) = all_of(tmp_path / "data"), all_of(tmp_path / "back")
-    assert told(after) == told(before)
+    assert content_of(after) == content_of(before)
 
 
 @pytest.mark.parametrize("newline", ["\r\n", "\n"])
 @pytest.mark.parametrize("style", ["0.0", "0", "header"])
-def test_the_layout_of_2017_comes_back_byte_for_byte(
-    tmp_path: Path, newline: str, style: str
-) -> None:
-    """Labels, names and pictures are the same, however the labels were written."""
+def test_the_layout_of_2017_round_trips(tmp_path: Path, newline: str, style: str) -> None:
+    """Labels, names and images are equal byte for byte, in each notation of the labels."""
     keys_folder(tmp_path / "keys", newline=newline)
     labels = tmp_path / "keys/labels.csv"
     text = labels.read_bytes()
@@ -164,7 +162,7 @@ def test_the_layout_of_2017_comes_back_byte_for_byte(
 def test_folders_may_be_relative(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """Relative paths work."""
+    """Relative paths are accepted."""
     monkeypatch.chdir(tmp_path)
     drive(Path("data"))
     export_recording(Path("data"), Path("x-v0"), name)
@@ -172,8 +170,8 @@ def test_folders_may_be_relative(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["back", "data", "x-v0"]
 
 
-def test_a_tub_comes_back(tmp_path: Path) -> None:
-    """Actions, drivers, policy outputs, states, pictures and times survive."""
+def test_a_tub_round_trips(tmp_path: Path) -> None:
+    """Actions, drivers, policy outputs, states, images and times are kept."""
     steps = [
         (Step(action=(-0.5, 1.0), driver="person", state=(0.1, math.nan), wanted=(0.25, 0.5)), 0),
         (Step(action=(0.75, 0.0), driver="policy", state=(1 / 3, 20.0)), 1),
@@ -187,13 +185,13 @@ def test_a_tub_comes_back(tmp_path: Path) -> None:
     export_recording(tmp_path / "data", tmp_path / "tub", "tub")
     import_recording(tmp_path / "tub", tmp_path / "back")
     (before,), (after,) = all_of(tmp_path / "data"), all_of(tmp_path / "back")
-    assert told(after)["steps"] == told(before)["steps"]
-    assert told(after)["pictures"] == told(before)["pictures"]
+    assert content_of(after)["steps"] == content_of(before)["steps"]
+    assert content_of(after)["pictures"] == content_of(before)["pictures"]
     assert after.header.control_hz == 10.0
 
 
-def test_steps_that_were_dropped_stay_at_home(tmp_path: Path) -> None:
-    """Dropped steps are not exported by default; later steps keep a picture shared with them."""
+def test_dropped_steps_are_not_exported(tmp_path: Path) -> None:
+    """Later steps keep a frame shared with a dropped one."""
     steps = [
         (Step(action=(float(n), 0.0), driver="person", state=(0.0, 0.0)), jpeg)
         for n, jpeg in enumerate((picture(0), None, None, picture(3)))
@@ -209,8 +207,8 @@ def test_steps_that_were_dropped_stay_at_home(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("clock", ["twin", "none"])
-def test_a_simulated_drive_comes_back_at_its_own_rate(tmp_path: Path, clock: Any) -> None:
-    """However fast the simulation ran, and though some steps have no time at all."""
+def test_a_simulated_drive_keeps_its_rate(tmp_path: Path, clock: Any) -> None:
+    """Times follow the control rate, not the wall clock."""
     steps = [
         Step(
             action=(0.0, 0.5),

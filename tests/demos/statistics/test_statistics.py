@@ -1,4 +1,4 @@
-"""A recording in numbers."""
+"""Statistics of a recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.demos.episodes.making import header, recorded, step
 
 
 def test_numbers_are_counted_in_bins() -> None:
-    """Each once, the outer ones too; 0 has a bin of its own."""
+    """Bounds fall into the outer bins, and 0 has its own bin."""
     found = spread([-1.0, -0.01, 0.0, 0.01, 0.02, 1.0, 1.0, math.nan], -1.0, 1.0)
     assert found is not None
     assert (found.counts[0], found.counts[10], found.counts[-1]) == (1, 4, 2)
@@ -21,8 +21,8 @@ def test_numbers_are_counted_in_bins() -> None:
     assert (found.least, found.median, found.most) == (-1.0, 0.01, 1.0)
 
 
-def test_the_range_is_that_of_the_numbers_where_there_is_none() -> None:
-    """Numbers that are all alike have a range around them; none at all have nothing."""
+def test_without_bounds_the_range_is_that_of_the_numbers() -> None:
+    """Equal numbers get a range around them; no finite number gives None."""
     found = spread([2.0, 4.0])
     assert found is not None
     assert (found.low, found.high) == (2.0, 4.0)
@@ -32,8 +32,8 @@ def test_the_range_is_that_of_the_numbers_where_there_is_none() -> None:
     assert spread([math.nan, math.inf]) is None
 
 
-def test_an_episode_in_numbers(tmp_path: Path) -> None:
-    """Of the steps that count; who drove most comes first."""
+def test_summary_of_an_episode(tmp_path: Path) -> None:
+    """Only kept steps count, and drivers are ordered by steps."""
     with EpisodeWriter.create(tmp_path, header(env="x/Car-v1"), spare_bytes=0) as writer:
         for number in range(10):
             writer.add(
@@ -56,8 +56,8 @@ def test_an_episode_in_numbers(tmp_path: Path) -> None:
     assert (found.outcome, found.closed) == ("collision", True)
 
 
-def test_times_between_steps_are_those_of_neighbours(tmp_path: Path) -> None:
-    """What does not count leaves no long gap behind."""
+def test_gaps_skip_dropped_steps(tmp_path: Path) -> None:
+    """Dropped steps leave no long gap."""
     path = recorded(tmp_path, 6)
     drop(path, 2, 3, "bad")
     assert gaps_s(read_episode(path)) == pytest.approx([0.05, 0.05])

@@ -1,4 +1,4 @@
-"""The tests look for a twin at once."""
+"""Make the fast model available from the first step on."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from shapechanger.envs.stepping.tuned import TunedStep
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the first step of a body look for its twin."""
+    """Search for the fast model at the first step of a body."""
     monkeypatch.setattr(TunedStep, "patience", 0)

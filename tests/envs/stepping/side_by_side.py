@@ -1,4 +1,4 @@
-"""Two envs that get the same actions, compared to the last bit."""
+"""Bitwise comparison of two envs under the same actions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from shapechanger.morphology import (
 
 
 def same(ours: Any, theirs: Any) -> bool:
-    """Whether two results of `step` or `reset` hold the same bits, types and keys."""
+    """Return whether two results of `step` or `reset` have equal bits, types and keys."""
     if isinstance(ours, dict):
         return ours.keys() == theirs.keys() and all(same(ours[key], theirs[key]) for key in ours)
     if isinstance(ours, tuple | list):
@@ -39,7 +39,7 @@ def step_together(
     """Step two envs with the same random actions, resetting both where an episode ends.
 
     Returns:
-        How many episodes ended, and in how many steps something touched something.
+        Number of episodes that ended, and of steps with contacts.
     """
     rng = np.random.default_rng(seed)
     shape = ours.action_space.shape
@@ -60,7 +60,7 @@ def step_together(
 
 
 def random_ant(seed: int) -> Body:
-    """A body that anybody could come up with: longer, heavier, weaker, stiffer, or a leg less."""
+    """Return an ant with random limbs, masses, gears, dampings and losses."""
     rng = np.random.default_rng(seed)
     edits: list[Any] = []
     for leg in LEGS:
@@ -83,7 +83,7 @@ def random_ant(seed: int) -> Body:
 
 
 def random_pendulum(seed: int) -> Body:
-    """A pole of any length and mass, on a cart with any drive."""
+    """Return a pole of random length and mass on a cart with a random drive."""
     rng = np.random.default_rng(seed)
     return (
         Stretch("pole", rng.uniform(0.3, 3.0), axis="z"),

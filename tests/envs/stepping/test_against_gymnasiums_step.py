@@ -1,4 +1,4 @@
-"""The tuned step on the fast model gives the bits of Gymnasium's own methods on the stock model."""
+"""The tuned step on the fast model equals Gymnasium's step on the stock model, bitwise."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _POLES = ("InvertedPendulum", "SmallInvertedPendulum", "BigInvertedPendulum")
 
 
 class _GymnasiumsAnt(AntEnv):
-    """An ant that steps by Gymnasium's methods, because it overrides one of them."""
+    """Ant that uses Gymnasium's step, because it overrides a method."""
 
     def do_simulation(self, ctrl: Any, n_frames: int) -> None:
         super().do_simulation(ctrl, n_frames)
 
 
 class _GymnasiumsPendulum(InvertedPendulumEnv):
-    """A pendulum that steps by Gymnasium's methods."""
+    """Pendulum that uses Gymnasium's step."""
 
     def do_simulation(self, ctrl: Any, n_frames: int) -> None:
         super().do_simulation(ctrl, n_frames)
@@ -41,7 +41,7 @@ def _steps_fast(env: Any) -> bool:
 
 @pytest.mark.parametrize("name", _ANTS)
 def test_named_ants(name: str) -> None:
-    """All four, falling over and starting again."""
+    """All named ants step alike through falls and resets."""
     ours, theirs = _ants(name)
     ends, touches = step_together(ours, theirs, 250, seed=1)
     assert _steps_fast(ours)
@@ -51,7 +51,7 @@ def test_named_ants(name: str) -> None:
 
 @pytest.mark.parametrize("name", _POLES)
 def test_named_pendulums(name: str) -> None:
-    """All three, falling over and starting again."""
+    """All named pendulums step alike through falls and resets."""
     ours, theirs = InvertedPendulumEnv(name), _GymnasiumsPendulum(name)
     ends, _ = step_together(ours, theirs, 400, seed=1)
     assert _steps_fast(ours)
@@ -68,10 +68,10 @@ def test_named_pendulums(name: str) -> None:
         {"healthy_z_range": (0.3, 0.9), "contact_cost_weight": 1e-2},
         {"terminate_when_unhealthy": False, "healthy_z_range": (0.5, 0.7)},
     ],
-    ids=["stock model", "place seen", "contacts unseen", "a shank", "low", "goes on"],
+    ids=["stock model", "positions", "no contacts", "main body", "z range", "never terminates"],
 )
 def test_arguments_of_the_ant(arguments: dict[str, Any]) -> None:
-    """Whatever Gymnasium's env can be asked for."""
+    """Arguments of Gymnasium's env have the same effect."""
     ours = AntEnv(**arguments)
     theirs = _GymnasiumsAnt(**{**arguments, "fast_model": False})
     step_together(ours, theirs, 60, seed=2)
@@ -79,7 +79,7 @@ def test_arguments_of_the_ant(arguments: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64, np.float16, np.int64, bool])
 def test_types_of_actions(kind: type) -> None:
-    """The cost of an action is summed in the precision that it has; lists are taken too."""
+    """Action costs are summed in the precision of the action; lists and tuples are accepted."""
     ours, theirs = _ants("Ant")
     for env in (ours, theirs):
         env.reset(seed=0)
@@ -92,7 +92,7 @@ def test_types_of_actions(kind: type) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_few_random_ants(seed: int) -> None:
-    """Bodies that no id names."""
+    """Random ants step alike."""
     ours, theirs = _ants(random_ant(seed))
     step_together(ours, theirs, 120, seed=seed)
     assert _steps_fast(ours)
@@ -101,7 +101,7 @@ def test_a_few_random_ants(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_many_random_ants(seed: int) -> None:
-    """1,000 steps each, with falls, resets and contacts."""
+    """Random ants step alike for 1,000 steps with falls, resets and contacts."""
     ours, theirs = _ants(random_ant(seed), healthy_z_range=(0.1, 3.0) if seed % 2 else None)
     ends, touches = step_together(ours, theirs, 1000, seed=seed)
     assert _steps_fast(ours)
@@ -111,7 +111,7 @@ def test_many_random_ants(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_few_random_pendulums(seed: int) -> None:
-    """Poles that no id names."""
+    """Random pendulums step alike."""
     body = random_pendulum(seed)
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
     step_together(ours, theirs, 200, seed=seed)
@@ -121,7 +121,7 @@ def test_a_few_random_pendulums(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_many_random_pendulums(seed: int) -> None:
-    """1,000 steps each, at the ends of the rail too."""
+    """Random pendulums step alike for 1,000 steps, at the ends of the rail too."""
     body = random_pendulum(seed)
     ours, theirs = InvertedPendulumEnv(body), _GymnasiumsPendulum(body)
     step_together(ours, theirs, 1000, seed=seed, reach=1.0 if seed % 2 else 0.1)
@@ -131,8 +131,8 @@ def test_many_random_pendulums(seed: int) -> None:
 @pytest.mark.parametrize(
     "env_id", [f"shapechanger/{name}-v1" for name in (*_ANTS, *_POLES, "Hopper", "Humanoid")]
 )
-def test_stepping_into_a_row_is_stepping(env_id: str) -> None:
-    """Whether the env is tuned or not; the row is all that is written."""
+def test_step_into_equals_step(env_id: str) -> None:
+    """`step_into` writes the observation to the given row and nothing else."""
     with gym.make(env_id) as one, gym.make(env_id) as two:
         ours: Any = one.unwrapped
         theirs: Any = two.unwrapped
@@ -148,8 +148,8 @@ def test_stepping_into_a_row_is_stepping(env_id: str) -> None:
         assert (rows[[0, 2]] == 7.0).all()
 
 
-def test_the_twin_is_shared() -> None:
-    """One for all envs of a body, found once."""
+def test_the_fast_model_is_shared() -> None:
+    """All envs of a body use one fast model."""
     envs = [AntEnv("BigAnt") for _ in range(3)]
     for env in envs:
         env.reset(seed=0)
@@ -157,8 +157,8 @@ def test_the_twin_is_shared() -> None:
     assert len({id(env._bound.stepping) for env in envs}) == 1
 
 
-def test_a_new_body_is_stepped_by_its_own_twin() -> None:
-    """At a reset the body changes, and what steps it."""
+def test_a_new_body_has_its_own_fast_model() -> None:
+    """After a change of the body, its own fast model steps it."""
     ours, theirs = _ants("Ant")
     for body in ("Ant", "BigAnt", "AmputatedAnt", "Ant"):
         for env in (ours, theirs):
@@ -169,8 +169,8 @@ def test_a_new_body_is_stepped_by_its_own_twin() -> None:
         assert _steps_fast(ours)
 
 
-def test_a_state_that_is_set_is_stepped_from() -> None:
-    """`set_state`, and whatever is written to the public data."""
+def test_steps_start_from_a_set_state() -> None:
+    """`set_state` and writes to the public data take effect."""
     ours, theirs = _ants("Ant")
     for env in (ours, theirs):
         env.reset(seed=0)

@@ -1,4 +1,4 @@
-"""Actions that no env can take, steps before a reset, and simulations that diverge."""
+"""Invalid actions, steps before a reset, and diverging simulations."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _TUNED = ["shapechanger/Ant-v1", "shapechanger/ExtendedAnt-v1", "shapechanger/In
     ids=["nan", "inf", "long", "column", "number", "none", "words", "ragged"],
 )
 def test_a_bad_action_is_refused(env_id: str, make: Any, sentence: str) -> None:
-    """The error names the env, and nothing has moved; the next good action is taken."""
+    """The error names the env, the state does not change, and the next step works."""
     with gym.make(env_id, disable_env_checker=True) as env:
         env.reset(seed=0)
         inner: Any = env.unwrapped
@@ -46,8 +46,8 @@ def test_a_bad_action_is_refused(env_id: str, make: Any, sentence: str) -> None:
         env.step(good)
 
 
-def test_a_large_action_is_taken_as_gymnasium_takes_it() -> None:
-    """Its cost may overflow the precision of the action; that is no reason to stop."""
+def test_a_large_action_is_accepted() -> None:
+    """A cost that overflows the precision of the action warns, as in Gymnasium."""
     with gym.make("shapechanger/Ant-v1") as ours:
         ours.reset(seed=0)
         with pytest.warns(RuntimeWarning, match="overflow"):
@@ -57,8 +57,8 @@ def test_a_large_action_is_taken_as_gymnasium_takes_it() -> None:
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
 @pytest.mark.parametrize("word", ["step", "render"])
-def test_before_a_reset_nothing_happens(env_id: str, word: str) -> None:
-    """An error in words, whichever wrappers are around."""
+def test_reset_is_needed_first(env_id: str, word: str) -> None:
+    """Steps and renders before a reset raise ResetNeeded."""
     with gym.make(env_id) as env:
         arguments = [env.action_space.sample()] if word == "step" else []
         with pytest.raises(gym.error.ResetNeeded, match=r"before calling `?env\.reset"):
@@ -66,8 +66,8 @@ def test_before_a_reset_nothing_happens(env_id: str, word: str) -> None:
 
 
 @pytest.mark.parametrize("env_id", _TUNED)
-def test_the_clock_still_truncates(env_id: str) -> None:
-    """Without two of Gymnasium's wrappers, the third does its work, in copies too."""
+def test_time_limits_truncate(env_id: str) -> None:
+    """TimeLimit works without the other default wrappers, in copies too."""
     more = {"healthy_z_range": (-9.0, 9.0)} if "Ant" in env_id else {}
     with gym.make(env_id, max_episode_steps=3, **more) as made:
         for env in (made, pickle.loads(pickle.dumps(made)), gym.make(made.spec)):
@@ -83,11 +83,11 @@ def test_the_clock_still_truncates(env_id: str) -> None:
 @pytest.mark.parametrize("env_id", [*_TUNED, "shapechanger/Hopper-v1"])
 @pytest.mark.parametrize("edited", [False, True])
 @pytest.mark.filterwarnings("ignore:.*(overflow|invalid value):RuntimeWarning")
-def test_a_simulation_that_diverges_says_so(
+def test_divergence_is_reported(
     env_id: str, edited: bool, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Until the next reset, and only then."""
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log.
+    """`diverged` is set until the next reset."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log file.
     with gym.make(env_id) as env:
         inner: Any = env.unwrapped
         action = np.zeros(env.action_space.shape)

@@ -1,4 +1,4 @@
-"""Whatever a user writes into the public model is stepped with, from the next step on."""
+"""Edits of the public model take effect at the next step."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shapechanger.envs.stepping import fast_model as twin
 from tests.envs.stepping.side_by_side import same
 
 _MODEL = AntEnv().model
-# Every array of the model that holds numbers, and every option.
+# Every numeric array of the model, and every option.
 _ARRAYS = [
     name
     for name in dir(_MODEL)
@@ -121,8 +121,8 @@ def _play(envs: tuple[Any, Any], steps: int, seed: int) -> None:
 
 
 @pytest.mark.parametrize("edit", _EDITS, ids=lambda edit: edit.__name__)
-def test_an_edit_is_stepped_with(edit: Edit) -> None:
-    """Between resets, in the middle of an episode, and no more once it is taken back."""
+def test_an_edit_takes_effect(edit: Edit) -> None:
+    """Edits count between and within episodes, and no more once they are undone."""
     ours, _ = envs = _ants()
     kept = [(env.model, _saved(env.model)) for env in envs]
     for env in envs:
@@ -144,8 +144,8 @@ def test_an_edit_is_stepped_with(edit: Edit) -> None:
     assert not np.array_equal(before, ours.data.qpos)
 
 
-def test_an_edit_before_the_first_step_is_stepped_with() -> None:
-    """The twin is looked for only when the model is as it was compiled."""
+def test_an_edit_before_the_first_step_takes_effect() -> None:
+    """The fast model is searched only while the model is unedited."""
     twin.forget_fast_models()
     ours, theirs = envs = _ants()
     for env in envs:
@@ -160,8 +160,8 @@ def test_an_edit_before_the_first_step_is_stepped_with() -> None:
     assert theirs._bound.has_fast_model is None
 
 
-def test_edits_of_a_pendulum_are_stepped_with() -> None:
-    """Its twin has no contacts at all."""
+def test_edits_of_a_pendulum_take_effect() -> None:
+    """Enabling contacts and changing gears counts, although its fast model has no contacts."""
     envs = (InvertedPendulumEnv(), InvertedPendulumEnv(fast_model=False))
     for env in envs:
         env.reset(seed=0)
@@ -174,8 +174,8 @@ def test_edits_of_a_pendulum_are_stepped_with() -> None:
     _play(envs, 10, seed=1)
 
 
-def test_a_model_and_data_in_their_place_are_stepped() -> None:
-    """Some programs put another model into the env."""
+def test_a_replaced_model_is_stepped() -> None:
+    """Replacing `model` and `data` takes effect."""
     envs = _ants()
     for env in envs:
         env.reset(seed=0)
@@ -191,12 +191,12 @@ def test_a_model_and_data_in_their_place_are_stepped() -> None:
     _play(envs, 10, seed=2)
 
 
-# The watch.
+# ModelWatch.
 
 
 @pytest.mark.parametrize("name", _ARRAYS)
-def test_every_number_of_every_array_is_watched(name: str) -> None:
-    """The first and the last of each; and taking it back is noticed."""
+def test_every_array_is_watched(name: str) -> None:
+    """Changes of the first and last number of each array, and their undoing, are noticed."""
     watch = ModelWatch(_MODEL)
     flat = getattr(_MODEL, name).reshape(-1)
     for place in (0, -1):
@@ -209,18 +209,18 @@ def test_every_number_of_every_array_is_watched(name: str) -> None:
 
 @pytest.mark.parametrize("name", _OPTIONS)
 def test_every_option_is_watched(name: str) -> None:
-    """Numbers, vectors and flags."""
+    """Changes of numbers, vectors and flags are noticed."""
     _change_one(_MODEL.opt, name)
 
 
 @pytest.mark.parametrize("name", _STATISTICS)
 def test_every_statistic_is_watched(name: str) -> None:
-    """The solver scales its tolerance by one of them."""
+    """Changes are noticed: the solver scales its tolerance by a statistic."""
     _change_one(_MODEL.stat, name)
 
 
-def test_a_model_that_is_not_edited_is_not_edited() -> None:
-    """Steps, resets, pictures and a copy change nothing; the name is that of the numbers."""
+def test_an_unedited_model_is_unedited() -> None:
+    """Steps and resets change nothing; the digest follows from the numbers."""
     env = AntEnv()
     watch = ModelWatch(env.model)
     env.reset(seed=0)
@@ -248,7 +248,7 @@ def _change_one(part: Any, name: str) -> None:
 
 
 def _other(value: Any, kind: np.dtype[Any]) -> Any:
-    """Another value of the same kind."""
+    """Return another value of the same type."""
     if kind.kind == "S":
         return b"x" if value != b"x" else b"y"
     return np.nextafter(value, np.inf, dtype=kind) if kind.kind == "f" else value ^ 1
@@ -261,7 +261,7 @@ def _saved(model: Any) -> bytes:
 
 
 def _restore(model: Any, saved: bytes) -> None:
-    """Write all numbers of a saved model back."""
+    """Write back all numbers of a saved model."""
     original = mujoco.MjModel.from_binary_path("m", {"m": saved})
     for name in (*_ARRAYS,):
         getattr(model, name)[...] = getattr(original, name)
@@ -276,7 +276,7 @@ def _restore(model: Any, saved: bytes) -> None:
 
 
 def test_an_edit_before_the_first_step_can_be_undone() -> None:
-    """The fast model's step then uses the timestep of the compiled model, not the edited one."""
+    """The fast model then uses the compiled timestep instead of the edited one."""
     ours, theirs = AntEnv(), AntEnv(fast_model=False)
     AntEnv().reset(seed=0)
     for env in (ours, theirs):
@@ -292,7 +292,7 @@ def test_an_edit_before_the_first_step_can_be_undone() -> None:
 
 @pytest.mark.parametrize("undone", [False, True])
 def test_a_start_keeps_within_edited_limits(undone: bool) -> None:
-    """Start rules are read again from a model whose joint ranges a user has edited."""
+    """Starts respect joint ranges that a user has edited."""
     env = AntEnv(reset_noise_scale=1.0)
     env.reset(seed=0)
     before = env.model.jnt_range.copy()

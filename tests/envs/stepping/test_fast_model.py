@@ -1,4 +1,4 @@
-"""Which models get a fast model, and which must not."""
+"""Models with and without a fast model."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ _SILENT = 'conaffinity="0"'
 
 
 def _scene(**parts: str) -> mujoco.MjSpec:
-    """One trunk with a leg on a floor; its geoms touch nothing but the floor unless told to."""
+    """Return a trunk with a leg on a floor; geoms touch only the floor by default."""
     given = dict.fromkeys(("floor", "fixed", "trunk", "more", "legs", "other", "rest"), "")
     given |= {"trunk": _SILENT, "legs": _SILENT} | parts
     return mujoco.MjSpec.from_string(_SCENE.format(**given))
 
 
 def _searches(fast: mujoco.MjModel) -> bool:
-    """Whether it looks for contacts as the original does, and not for islands."""
+    """Return whether the model searches for contacts but not for islands."""
     flags = fast.opt.disableflags
     return bool(flags & _ISLAND) and not flags & (_MIDPHASE | _CONTACT)
 
@@ -74,8 +74,8 @@ def _knows_its_pairs(model: mujoco.MjModel) -> bool:
     return bool(model.npair) and not model.geom_contype.any()
 
 
-def test_one_tree_on_one_floor_knows_its_contacts() -> None:
-    """No search, no islands; the public model is untouched."""
+def test_one_tree_on_a_floor_has_explicit_pairs() -> None:
+    """Explicit pairs replace the contact search, and the public model is unchanged."""
     model, fast = _fast_model_of(_scene())
     assert fast is not None
     assert _knows_its_pairs(fast)
@@ -100,8 +100,8 @@ def test_one_tree_on_one_floor_knows_its_contacts() -> None:
     ],
     ids=["margins", "gaps", "friction", "mixed", "direct", "none", "legs", "floor", "condim"],
 )
-def test_pairs_get_the_numbers_that_the_search_would_mix(parts: dict[str, str]) -> None:
-    """Margins are summed, friction is the larger, stiffness is mixed: all by comparison."""
+def test_pairs_have_mixed_parameters(parts: dict[str, str]) -> None:
+    """Explicit pairs give bitwise the contacts of the search for all mixing rules."""
     model, fast = _fast_model_of(_scene(**parts))
     assert fast is not None
     assert _knows_its_pairs(fast)
@@ -118,8 +118,8 @@ def test_pairs_get_the_numbers_that_the_search_would_mix(parts: dict[str, str]) 
     ],
     ids=["touches itself", "two geoms on a body", "a stone on the floor", "priorities"],
 )
-def test_where_the_order_is_open_the_search_stays(parts: dict[str, str]) -> None:
-    """Every pair that the stock model could generate is still looked for."""
+def test_ambiguous_pair_orders_keep_the_search(parts: dict[str, str]) -> None:
+    """Models whose order of contacts is not determined keep the contact search."""
     model, fast = _fast_model_of(_scene(**parts))
     assert fast is not None
     assert not fast.npair
@@ -142,13 +142,13 @@ _FREE = '<body name="ball" pos="1 0 0.5"><freejoint/><geom name="ball" size="0.1
     ],
     ids=["two trees", "tendon", "equality", "mocap", "energy"],
 )
-def test_what_the_rules_do_not_know_has_no_fast_model(parts: dict[str, str]) -> None:
-    """The stock model steps it."""
+def test_unsupported_models_have_no_fast_model(parts: dict[str, str]) -> None:
+    """Models with unsupported elements have no fast model."""
     assert _fast_model_of(_scene(**parts))[1] is None
 
 
-def test_pairs_of_the_model_stay_as_they_are() -> None:
-    """They have their own numbers, and the search adds others."""
+def test_own_pairs_are_kept() -> None:
+    """A model with explicit pairs keeps them and the contact search."""
     pair = '<contact><pair geom1="shin" geom2="trunk" friction="2 2 0.1 0.1 0.1"/></contact>'
     model, fast = _fast_model_of(_scene(rest=pair))
     assert fast is not None
@@ -157,8 +157,8 @@ def test_pairs_of_the_model_stay_as_they_are() -> None:
     _roll(model, fast, 400)
 
 
-def test_a_pendulum_touches_nothing() -> None:
-    """Where nothing can collide, nothing is looked for."""
+def test_a_pendulum_has_contacts_disabled() -> None:
+    """Contacts are disabled where no geoms can collide."""
     env = InvertedPendulumEnv()
     env.reset(seed=0)
     env.step(np.zeros(1))
@@ -170,7 +170,7 @@ def _stiff(spec: Any) -> None:
 
 
 def _stiffening(spec: Any) -> None:
-    """Only where it is bent."""
+    """Add a spring with a quadratic term only."""
     spec.joint("hip").stiffness = [0.0, 20.0, 0.0]
 
 
@@ -188,8 +188,8 @@ def _sensing(spec: Any) -> None:
     ("add", "flag"),
     [(_stiff, _SPRING), (_stiffening, _SPRING), (_rough, _FRICTION), (_sensing, _SENSOR)],
 )
-def test_only_what_there_is_none_of_is_left_out(add: Any, flag: int) -> None:
-    """A spring, friction and a sensor are felt as before."""
+def test_only_unused_features_are_disabled(add: Any, flag: int) -> None:
+    """Springs, friction and sensors are disabled only where there are none."""
     _, plain = _fast_model_of(_scene())
     spec = _scene()
     add(spec)
@@ -201,8 +201,8 @@ def test_only_what_there_is_none_of_is_left_out(add: Any, flag: int) -> None:
     _roll(model, fast, 400)
 
 
-def test_without_dampers_the_springs_stay() -> None:
-    """Where MuJoCo is told to leave out both, it leaves out gravity compensation as well."""
+def test_springs_stay_if_dampers_are_disabled() -> None:
+    """Disabling both would disable gravity compensation in MuJoCo."""
     spec = _scene()
     spec.option.disableflags = _DAMPER
     spec.body("shin").gravcomp = 1.0
@@ -214,8 +214,8 @@ def test_without_dampers_the_springs_stay() -> None:
 
 @pytest.mark.parametrize(("medium", "amount"), [("density", 1000.0), ("viscosity", 10.0)])
 @pytest.mark.parametrize("flags", [0, _DAMPER])
-def test_a_fluid_is_felt(medium: str, amount: float, flags: int) -> None:
-    """A density alone or a viscosity alone acts on the fast model as on the original."""
+def test_fluid_forces_are_kept(medium: str, amount: float, flags: int) -> None:
+    """Density or viscosity alone acts on the fast model as on the original."""
     spec = _scene()
     spec.option.disableflags = flags
     setattr(spec.option, medium, amount)
@@ -232,8 +232,8 @@ def test_a_fluid_is_felt(medium: str, amount: float, flags: int) -> None:
     assert dry.qvel[0] > wet.qvel[0] + 1e-3
 
 
-def test_a_filter_of_contacts_is_obeyed() -> None:
-    """Explicit pairs would not ask it."""
+def test_a_contact_filter_prevents_a_fast_model() -> None:
+    """Explicit pairs would bypass the filter."""
     mujoco.set_mjcb_contactfilter(lambda *_: 0)
     try:
         assert _fast_model_of(_scene(floor='friction="0.77 0.1 0.1"'))[1] is None
@@ -241,8 +241,8 @@ def test_a_filter_of_contacts_is_obeyed() -> None:
         mujoco.set_mjcb_contactfilter(None)
 
 
-def test_a_wrong_margin_is_found_out() -> None:
-    """The test sees what the rules would have got wrong: here the larger margin, not the sum."""
+def test_a_wrong_margin_is_detected() -> None:
+    """`moves_equally` detects margins that are not summed."""
     ant = AntEnv()
     fast = copy.copy(find_fast_model(ant._watch, ant.body_spec))
     assert moves_equally(ant.model, fast)
@@ -262,16 +262,16 @@ def test_a_wrong_margin_is_found_out() -> None:
     ],
     ids=["friction", "impedance", "gap", "mass", "iterations", "sparse"],
 )
-def test_any_other_difference_is_found_out(change: Any) -> None:
-    """Of one pair, of one body, of the solver."""
+def test_any_other_difference_is_detected(change: Any) -> None:
+    """`moves_equally` detects differences of a pair, a body and the solver."""
     ant = AntEnv()
     fast = copy.copy(find_fast_model(ant._watch, ant.body_spec))
     change(fast)
     assert not moves_equally(ant.model, fast)
 
 
-def test_a_fast_model_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not in the first steps of a body, unless another env has found it."""
+def test_the_search_waits_for_enough_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search starts after `patience` steps, unless another env has the result."""
     monkeypatch.setattr(AntEnv, "patience", 3)
     twin.forget_fast_models()
     first, second = AntEnv(), AntEnv()
@@ -282,8 +282,8 @@ def test_a_fast_model_is_looked_for_once_it_pays(monkeypatch: pytest.MonkeyPatch
             assert env._bound.has_fast_model is (True if step >= 3 or env is second else None)
 
 
-def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What one finds serves all, so their steps count together."""
+def test_envs_of_a_body_count_steps_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps of all envs of a body count towards `patience`."""
     monkeypatch.setattr(AntEnv, "patience", 6)
     envs = [AntEnv(), AntEnv(), AntEnv()]
     for env in envs:
@@ -295,8 +295,8 @@ def test_envs_of_a_body_wait_together(monkeypatch: pytest.MonkeyPatch) -> None:
             assert env._bound.has_fast_model is (True if step >= 2 else None)
 
 
-def test_fast_models_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A training with a new body in each episode must not grow."""
+def test_the_cache_of_fast_models_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cache keeps the most recent bodies."""
     monkeypatch.setattr(twin, "_REMEMBERED", 2)
     twin.forget_fast_models()
     for friction in (0.3, 0.4, 0.5, 0.4):
@@ -305,7 +305,7 @@ def test_fast_models_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatc
 
 
 def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> None:
-    """Both models give the same bits under random pushes."""
+    """Assert that both models move alike, bitwise, under random controls."""
     rng = np.random.default_rng(1)
     one, two = mujoco.MjData(model), mujoco.MjData(model)
     contacts = 0
@@ -322,7 +322,7 @@ def _roll(model: mujoco.MjModel, fast: mujoco.MjModel, steps: int) -> None:
 
 
 def test_a_spec_of_another_model_gives_no_pairs() -> None:
-    """The recompiled model must equal the public one, or the search for contacts stays."""
+    """A spec that compiles to another model keeps the contact search."""
     spec = _scene()
     model = spec.compile()
     heavier = spec.copy()
@@ -333,7 +333,7 @@ def test_a_spec_of_another_model_gives_no_pairs() -> None:
 
 
 def test_forgetting_resets_the_counted_steps() -> None:
-    """The steps of a model that is still watched start at 0 again."""
+    """`forget_fast_models` resets the step count of watched models."""
     watch = ModelWatch(mujoco.MjModel.from_xml_string("<mujoco/>"))
     watch.snapshot.steps = 3
     twin.forget_fast_models()

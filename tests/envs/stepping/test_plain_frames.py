@@ -1,4 +1,4 @@
-"""Frames for cameras that learn, and frames for people."""
+"""Frames without shadows for learners, and with shadows for people."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SHADOW = mujoco.mjtRndFlag.mjRND_SHADOW
     ],
 )
 def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shadows: bool) -> None:
-    """Unless they are asked for; the public model is as it was, and a copy draws alike."""
+    """Frames of up to 256 pixels have no shadows by default; copies of the env render alike."""
     more = {"render_mode": "rgb_array", "width": size, "height": size, **arguments}
     with gym.make("shapechanger/Ant-v1", **more) as env:
         quality = env.unwrapped.model.vis.quality
@@ -44,8 +44,8 @@ def test_small_frames_have_no_shadows(size: int, arguments: dict[str, Any], shad
         again.close()
 
 
-def test_a_frame_shows_what_a_user_has_painted() -> None:
-    """It is drawn from the public model, without its shadows."""
+def test_a_frame_shows_edited_colours() -> None:
+    """Colours edited in the public model are rendered."""
     size = {"width": 64, "height": 64}
     with gym.make("shapechanger/Ant-v1", render_mode="rgb_array", **size) as env:
         env.reset(seed=0)

@@ -1,4 +1,4 @@
-"""MuJoCo's stopwatch rests while our envs step, and only then."""
+"""MuJoCo's timers are paused while our envs step, and only then."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _measured(data: mujoco.MjData) -> float:
 
 @pytest.fixture
 def clocked() -> Iterator[Callable[[], int]]:
-    """How often a user's own clock has been read; it is installed."""
+    """Install a clock, and return a function that counts its readings."""
     reads = 0
 
     def clock() -> float:
@@ -41,8 +41,8 @@ def clocked() -> Iterator[Callable[[], int]]:
 
 
 @pytest.mark.parametrize("name", ["Ant", "InvertedPendulum"])
-def test_nothing_is_measured_in_a_step_but_everything_after_it(name: str) -> None:
-    """What that would cost is saved, and whoever steps the data by hand may measure it."""
+def test_timers_are_paused_during_steps_only(name: str) -> None:
+    """Timers stay at zero in env steps and run in manual steps."""
     with contextlib.closing(gym.make(f"shapechanger/{name}-v1")) as env:
         inner: Any = env.unwrapped
         env.reset(seed=0)
@@ -52,8 +52,8 @@ def test_nothing_is_measured_in_a_step_but_everything_after_it(name: str) -> Non
         assert _measured(inner.data) > 0.0
 
 
-def test_it_goes_on_without_the_fast_model() -> None:
-    """Whoever wants Gymnasium's step has its measurements too."""
+def test_timers_run_without_the_fast_model() -> None:
+    """With `fast_model=False` the timers run as in Gymnasium."""
     with contextlib.closing(gym.make("shapechanger/Ant-v1", fast_model=False)) as env:
         inner: Any = env.unwrapped
         env.reset(seed=0)
@@ -63,8 +63,8 @@ def test_it_goes_on_without_the_fast_model() -> None:
 
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("fast", [True, False])
-def test_it_rests_in_a_vector_env_too(threads: int, fast: bool) -> None:
-    """In every thread, and it goes on when the last of them is done."""
+def test_timers_are_paused_in_vector_envs(threads: int, fast: bool) -> None:
+    """Timers are paused in all threads, and run again after the step."""
     with contextlib.closing(
         shapechanger.make_vec("Ant", 4, threads=threads, fast_model=fast)
     ) as envs:
@@ -77,8 +77,8 @@ def test_it_rests_in_a_vector_env_too(threads: int, fast: bool) -> None:
         assert _measured(datas[0]) > 0.0
 
 
-def test_it_goes_on_where_one_env_wants_it() -> None:
-    """The others are measured too then: there is one for all."""
+def test_timers_run_if_one_env_needs_them() -> None:
+    """One env without a fast model keeps the global timers running."""
     makers = [partial(gym.make, "shapechanger/Ant-v1", fast_model=fast) for fast in (True, False)]
     with contextlib.closing(ThreadVectorEnv(makers)) as envs:
         datas: list[mujoco.MjData] = [env.unwrapped.data for env in cast("Any", envs.envs)]
@@ -87,8 +87,8 @@ def test_it_goes_on_where_one_env_wants_it() -> None:
         assert all(_measured(data) > 0.0 for data in datas)
 
 
-def test_a_users_own_clock_goes_on(clocked: Callable[[], int]) -> None:
-    """Who installs one wants to measure."""
+def test_a_user_clock_keeps_running(clocked: Callable[[], int]) -> None:
+    """A clock that a user installs is read in env steps."""
     with contextlib.closing(gym.make("shapechanger/Ant-v1")) as env:
         env.reset(seed=0)
         before = clocked()
@@ -97,8 +97,8 @@ def test_a_users_own_clock_goes_on(clocked: Callable[[], int]) -> None:
         assert mujoco.get_mjcb_time() is not None
 
 
-def test_a_clock_that_was_there_first_is_left_alone(clocked: Callable[[], int]) -> None:
-    """The usual one is not known then."""
+def test_an_earlier_clock_is_kept(clocked: Callable[[], int]) -> None:
+    """If a clock is installed first, the timers are not paused."""
     paused_timer.cache_clear()
     try:
         assert not isinstance(paused_timer(), PausedTimer)
@@ -106,9 +106,9 @@ def test_a_clock_that_was_there_first_is_left_alone(clocked: Callable[[], int]) 
         paused_timer.cache_clear()
 
 
-def test_it_goes_on_when_the_last_of_several_threads_is_done() -> None:
-    """And after an error."""
-    clock = ctypes.c_void_p(4096)  # An address that nothing calls.
+def test_timers_resume_after_the_last_thread() -> None:
+    """Timers resume when the last thread leaves, after errors too."""
+    clock = ctypes.c_void_p(4096)  # A fake address that is never called.
     resting = PausedTimer(clock)
     inside, leave = threading.Event(), threading.Event()
 
@@ -122,12 +122,12 @@ def test_it_goes_on_when_the_last_of_several_threads_is_done() -> None:
     inside.wait()
     with pytest.raises(ZeroDivisionError), resting:
         _ = 1 / 0
-    assert clock.value is None  # The other is still inside.
+    assert clock.value is None  # The other thread is still inside.
     leave.set()
     other.join()
     assert clock.value == 4096
 
 
-def test_there_is_a_way_to_it_here() -> None:
-    """Else every step would be slower, and nobody would know."""
+def test_timers_can_be_paused_here() -> None:
+    """Pausing works on this platform; otherwise steps would silently be slower."""
     assert isinstance(paused_timer(), PausedTimer)

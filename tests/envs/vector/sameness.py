@@ -1,4 +1,4 @@
-"""Comparing two vector envs to the last bit, and random bodies to do it with."""
+"""Bitwise comparison of two vector envs, and random bodies for it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MODES = ["NextStep", "SameStep", "Disabled"]
 
 
 def require_same(ours: Any, theirs: Any, where: str = "") -> None:
-    """Refuse what differs in a bit, a type, a key or the order of keys."""
+    """Assert equal bits, types, keys and order of keys."""
     assert type(ours) is type(theirs), f"{where}: {type(ours)} and {type(theirs)}"
     if isinstance(theirs, dict):
         assert list(ours) == list(theirs), where
@@ -35,7 +35,7 @@ def require_same(ours: Any, theirs: Any, where: str = "") -> None:
 
 
 def play_side_by_side(ours: Any, theirs: Any, steps: int, mode: str, seed: int = 0) -> int:
-    """Step two vector envs with the same random actions; how many episodes ended."""
+    """Step two vector envs with the same random actions; return the number of ended episodes."""
     rng = np.random.default_rng(seed)
     space = ours.single_action_space
     require_same(ours.reset(seed=seed), theirs.reset(seed=seed), "reset")
@@ -55,9 +55,9 @@ def play_side_by_side(ours: Any, theirs: Any, steps: int, mode: str, seed: int =
 
 
 def random_bodies(env_id: str, count: int, seed: int = 0) -> list[Body]:
-    """Bodies of an id's family with the same joints: two limbs longer or shorter, and one heavier.
+    """Return random bodies of a family with the same spaces.
 
-    Drawn again where edits do not fit.
+    Two limbs change their length and one its mass; bodies that do not fit are drawn again.
     """
     rng = np.random.default_rng(seed)
     with gym.make(env_id) as env:

@@ -1,4 +1,4 @@
-"""What nobody can step is refused in words, before anything has moved."""
+"""Invalid input is refused before any env has moved."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from shapechanger.morphology import JointRange, Remove
 
 @pytest.fixture
 def ants() -> Iterator[ThreadVectorEnv]:
-    """Three ants and two threads, reset."""
+    """Three ants in two threads, after a reset."""
     envs = shapechanger.make_vec("Ant", 3, threads=2)
     envs.reset(seed=0)
     yield envs
@@ -27,8 +27,8 @@ def ants() -> Iterator[ThreadVectorEnv]:
 
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, None])
-def test_there_is_at_least_one_env_and_one_thread(count: Any) -> None:
-    """The message names what there is too little of."""
+def test_at_least_one_env_and_thread_are_needed(count: Any) -> None:
+    """The error states which number is too small."""
     with pytest.raises(VectorEnvError, match=f"at least one env, got {count}"):
         shapechanger.make_vec("Ant", count)
     if count is not None:
@@ -41,7 +41,7 @@ def test_there_is_at_least_one_env_and_one_thread(count: Any) -> None:
 
 
 def test_each_env_has_one_body() -> None:
-    """Neither more nor fewer."""
+    """The number of bodies must be the number of envs."""
     with pytest.raises(VectorEnvError, match="3 envs and 2 bodies"):
         shapechanger.make_vec("Ant", 3, bodies=["Ant", "BigAnt"])
 
@@ -64,8 +64,8 @@ def test_each_env_has_one_body() -> None:
     ],
     ids=["size", "same", "meaning"],
 )
-def test_bodies_share_their_spaces(bodies: list[Any], sentence: str | None) -> None:
-    """The message names both envs; a narrower joint changes no space."""
+def test_bodies_must_share_their_spaces(bodies: list[Any], sentence: str | None) -> None:
+    """The error names both envs; a narrower joint range is accepted."""
     if sentence is None:
         shapechanger.make_vec("Ant", len(bodies), bodies=bodies).close()
         return
@@ -73,8 +73,8 @@ def test_bodies_share_their_spaces(bodies: list[Any], sentence: str | None) -> N
         shapechanger.make_vec("Ant", len(bodies), bodies=bodies)
 
 
-def test_unknown_ids_and_modes_are_told_what_there_is() -> None:
-    """With the nearest spelling."""
+def test_unknown_ids_and_modes_are_refused() -> None:
+    """Errors suggest the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'BigAnt'"):
         shapechanger.make_vec("BigAnd", 2)
     with pytest.raises(UnknownName, match="shapechanger/Nothing-v1"):
@@ -83,8 +83,8 @@ def test_unknown_ids_and_modes_are_told_what_there_is() -> None:
         shapechanger.make_vec("Ant", 2, autoreset_mode="SomeStep")
 
 
-def test_spaces_are_boxes() -> None:
-    """Anything else is for Gymnasium's own."""
+def test_spaces_must_be_boxes() -> None:
+    """Other action spaces are refused."""
     with pytest.raises(VectorEnvError, match="action space of a vector env must be a Box"):
         ThreadVectorEnv([lambda: gym.make("CartPole-v1")])
 
@@ -109,8 +109,8 @@ def _with(place: tuple[int, ...], value: float) -> Any:
     ],
     ids=["nan", "inf", "narrow", "few", "ragged", "flat", "number", "words"],
 )
-def test_bad_actions_move_nothing(ants: ThreadVectorEnv, actions: Any, sentence: str) -> None:
-    """The env is named, and all envs are where they were."""
+def test_invalid_actions_are_refused(ants: ThreadVectorEnv, actions: Any, sentence: str) -> None:
+    """The error names the env, and no env has moved."""
     before = [env.unwrapped.data.time for env in ants.envs]
     with pytest.raises(BadAction, match=sentence):
         ants.step(actions)
@@ -118,8 +118,8 @@ def test_bad_actions_move_nothing(ants: ThreadVectorEnv, actions: Any, sentence:
     ants.step(np.zeros((3, 8), np.float32))
 
 
-def test_the_action_of_an_env_that_is_about_to_start_again_does_not_count() -> None:
-    """In Gymnasium's default mode it is ignored, and a policy may have nothing to say there."""
+def test_actions_are_ignored_at_an_autoreset() -> None:
+    """In NextStep mode the action of an env that resets may be NaN."""
     envs = shapechanger.make_vec("InvertedPendulum", 2, max_episode_steps=2)
     envs.reset(seed=0)
     for _ in range(2):
@@ -140,22 +140,24 @@ def test_the_action_of_an_env_that_is_about_to_start_again_does_not_count() -> N
         (np.zeros(3, np.bool_), ValueError, "true for no env"),
     ],
 )
-def test_bad_masks(ants: ThreadVectorEnv, mask: Any, error: type[Exception], sentence: str) -> None:
-    """The kinds of errors are Gymnasium's."""
+def test_invalid_masks_are_refused(
+    ants: ThreadVectorEnv, mask: Any, error: type[Exception], sentence: str
+) -> None:
+    """The errors have Gymnasium's types."""
     with pytest.raises(error, match=sentence):
         ants.reset(options={"reset_mask": mask})
 
 
-def test_bad_seeds_and_values(ants: ThreadVectorEnv) -> None:
-    """As many as envs."""
+def test_wrong_numbers_of_seeds_and_values_are_refused(ants: ThreadVectorEnv) -> None:
+    """There must be one seed or value per env."""
     with pytest.raises(VectorEnvError, match="3 envs and 2 seeds"):
         ants.reset(seed=[1, 2])
     with pytest.raises(VectorEnvError, match="3 envs and 2 values"):
         ants.set_attr("speed", [1, 2])
 
 
-def test_before_the_first_reset_nothing_steps() -> None:
-    """And a mask cannot leave out what has never started."""
+def test_reset_is_needed_first() -> None:
+    """Steps before the first reset raise, and so does a masked first reset."""
     envs = shapechanger.make_vec("Ant", 2)
     with pytest.raises(gym.error.ResetNeeded, match="call `reset` first"):
         envs.step(np.zeros((2, 8)))
@@ -164,8 +166,8 @@ def test_before_the_first_reset_nothing_steps() -> None:
     envs.close()
 
 
-def test_what_nobody_resets_does_not_step() -> None:
-    """The message says which envs, and how."""
+def test_ended_envs_must_be_reset() -> None:
+    """In Disabled mode the error names the envs that have ended."""
     envs = shapechanger.make_vec(
         "InvertedPendulum", 2, autoreset_mode=AutoresetMode.DISABLED, max_episode_steps=1
     )
@@ -179,8 +181,8 @@ def test_what_nobody_resets_does_not_step() -> None:
     envs.close()
 
 
-def test_closing_twice_is_fine_and_stepping_after_is_not() -> None:
-    """The message says what to do."""
+def test_a_closed_vector_env_refuses_calls() -> None:
+    """Closing is idempotent; later calls raise ClosedEnvironmentError."""
     envs = shapechanger.make_vec("Ant", 2, threads=2)
     envs.reset(seed=0)
     envs.close()

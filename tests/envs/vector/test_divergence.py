@@ -1,4 +1,4 @@
-"""A simulation that comes apart ends its own episode, and nobody else's."""
+"""A diverging simulation ends its own episode only."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.envs.vector.sameness import MODES, require_same
 
 @pytest.fixture(autouse=True)
 def log_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """MuJoCo writes its warnings into the present folder."""
+    """Change to a temporary folder, since MuJoCo writes a log file."""
     monkeypatch.chdir(tmp_path)
 
 
@@ -29,8 +29,8 @@ def _break(env: Any) -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", ["Ant", "Hopper", "InvertedPendulum"])
-def test_the_others_go_on(name: str, mode: str, threads: int) -> None:
-    """Env 1 of 3 diverges; the numbers of the others are those of a run where it does not."""
+def test_other_envs_are_unaffected(name: str, mode: str, threads: int) -> None:
+    """When one env diverges, the results of the others do not change."""
     whole, broken = (
         shapechanger.make_vec(name, 3, threads=threads, autoreset_mode=mode) for _ in range(2)
     )
@@ -45,8 +45,8 @@ def test_the_others_go_on(name: str, mode: str, threads: int) -> None:
     assert terminated.tolist() == [False, True, False]
     assert rewards[1] == 0.0
     assert np.isfinite(observations).all()
-    told = infos["final_info"] if mode == "SameStep" else infos
-    assert told["diverged"].tolist() == told["_diverged"].tolist() == [False, True, False]
+    final = infos["final_info"] if mode == "SameStep" else infos
+    assert final["diverged"].tolist() == final["_diverged"].tolist() == [False, True, False]
     if mode == "Disabled":
         broken.reset(options={"reset_mask": terminated})
     for _ in range(5):
@@ -57,7 +57,7 @@ def test_the_others_go_on(name: str, mode: str, threads: int) -> None:
 
 
 class _Uncertain(gym.Env[Any, Any]):
-    """Observes what is not finite in its second step, and does not say."""
+    """Env with a non-finite observation in its second step, without a report."""
 
     observation_space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -66,12 +66,12 @@ class _Uncertain(gym.Env[Any, Any]):
         self.terminates = terminates
 
     def reset(self, *, seed: Any = None, options: Any = None) -> Any:
-        """Begin."""
+        """Start an episode."""
         self.steps = 0
         return np.zeros(2), {}
 
     def step(self, action: Any) -> Any:
-        """Go on."""
+        """Return NaN in the second step."""
         self.steps += 1
         bad = self.steps == 2
         return np.array([1.0, np.nan if bad else 1.0]), 1.0, bad and self.terminates, False, {}
@@ -80,7 +80,7 @@ class _Uncertain(gym.Env[Any, Any]):
 @pytest.mark.parametrize("terminates", [True, False])
 @pytest.mark.parametrize("mode", MODES)
 def test_an_observation_that_is_not_finite_ends_the_episode(mode: str, terminates: bool) -> None:
-    """The last observation reads 0 there, so that no learner takes it in."""
+    """The non-finite number is replaced by 0 in the last observation."""
     envs = ThreadVectorEnv(
         [lambda: _Uncertain(terminates)] * 2, threads=2, autoreset_mode=AutoresetMode(mode)
     )
@@ -99,8 +99,8 @@ def test_an_observation_that_is_not_finite_ends_the_episode(mode: str, terminate
     envs.close()
 
 
-def test_a_model_that_may_not_start_over_ends_too() -> None:
-    """Without MuJoCo's automatic reset the state itself is not finite."""
+def test_divergence_is_found_without_autoreset() -> None:
+    """A non-finite state ends the episode if MuJoCo's autoreset is disabled."""
     envs = shapechanger.make_vec("HalfCheetah", 2)
     envs.envs[0].unwrapped.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     envs.reset(seed=0)

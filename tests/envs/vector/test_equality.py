@@ -1,4 +1,4 @@
-"""The numbers are those of Gymnasium's `SyncVectorEnv` over the same class, to the last bit."""
+"""Results equal those of Gymnasium's `SyncVectorEnv`, bitwise."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _QUICK = [
 
 
 def _pair(env_id: str, bodies: list[Any], threads: int, mode: str, **more: Any) -> tuple[Any, Any]:
-    """Ours, and Gymnasium's over the same envs."""
+    """Return our vector env and Gymnasium's over the same envs."""
     ours = shapechanger.make_vec(
         env_id, len(bodies), threads=threads, bodies=bodies, autoreset_mode=mode, **more
     )
@@ -48,8 +48,8 @@ def _compare(env_id: str, threads: int, mode: str, steps: int, clock: int) -> in
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("env_id", _QUICK)
-def test_the_numbers_are_gymnasiums(env_id: str, mode: str, threads: int) -> None:
-    """Five random bodies and the plain one, with ends of both kinds."""
+def test_results_equal_gymnasiums(env_id: str, mode: str, threads: int) -> None:
+    """Five random bodies and the plain one agree, through terminations and truncations."""
     assert _compare(env_id, threads, mode, steps=200, clock=90) >= 12
 
 
@@ -57,8 +57,8 @@ def test_the_numbers_are_gymnasiums(env_id: str, mode: str, threads: int) -> Non
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("env_id", CATALOGUE)
-def test_the_numbers_of_every_env_are_gymnasiums(env_id: str, mode: str) -> None:
-    """Every id, a thousand steps, with one thread and with two."""
+def test_results_of_every_env_equal_gymnasiums(env_id: str, mode: str) -> None:
+    """Every id agrees for 1,000 steps, with one and two threads."""
     for threads in (1, 2):
         assert _compare(env_id, threads, mode, steps=1000, clock=300) >= 18
 
@@ -66,8 +66,8 @@ def test_the_numbers_of_every_env_are_gymnasiums(env_id: str, mode: str) -> None
 @pytest.mark.parametrize(
     "seed", [None, 7, [3, 1, 2], [5, None, 6]], ids=["none", "one", "each", "some"]
 )
-def test_seeds_are_handed_out_as_gymnasium_does(seed: Any) -> None:
-    """A number counts up, a list is one each, None goes on."""
+def test_seeds_are_distributed_as_in_gymnasium(seed: Any) -> None:
+    """An int counts up, a list has one seed per env, and None continues."""
     ours, theirs = _pair(
         "shapechanger/InvertedPendulum-v1", ["InvertedPendulum"] * 3, 2, "NextStep"
     )
@@ -83,7 +83,7 @@ def test_seeds_are_handed_out_as_gymnasium_does(seed: Any) -> None:
 
 
 def test_options_reach_every_env() -> None:
-    """A new body at a reset, for all or for those of a mask, steps like Gymnasium's."""
+    """A new body for all envs, or for those of a mask, gives Gymnasium's results."""
     ours, theirs = _pair("shapechanger/Ant-v1", ["Ant"] * 3, 2, "Disabled")
     mask = np.array([True, False, True])
     for options in ({"body": "BigAnt"}, {"body": "AmputatedAnt", "reset_mask": mask}):
@@ -99,7 +99,7 @@ def test_options_reach_every_env() -> None:
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64, list])
 def test_actions_keep_their_precision(kind: Any) -> None:
-    """The cost of an action is summed in its own precision, so it must arrive as it was given."""
+    """Actions reach the envs with their type, which determines their cost."""
     ours, theirs = _pair("shapechanger/Ant-v1", ["Ant"] * 2, 1, "NextStep")
     require_same(ours.reset(seed=0), theirs.reset(seed=0))
     actions = np.random.default_rng(1).uniform(-1.0, 1.0, (2, 8))
@@ -109,8 +109,8 @@ def test_actions_keep_their_precision(kind: Any) -> None:
     theirs.close()
 
 
-def test_strangers_step_too() -> None:
-    """An env that nobody has tuned, in wrappers that nobody knows, goes through its own step."""
+def test_external_envs_are_stepped() -> None:
+    """Envs and wrappers of other packages are stepped by their own `step`."""
 
     def make() -> gym.Env[Any, Any]:
         env = gym.make("Hopper-v5", max_episode_steps=25)

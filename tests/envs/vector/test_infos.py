@@ -1,4 +1,4 @@
-"""Infos are batched as Gymnasium does it, whatever is in them."""
+"""Batching of infos as in Gymnasium."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def _gymnasiums(infos: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("infos", _CASES.values(), ids=_CASES)
-def test_odd_infos_are_batched_as_gymnasium_does(infos: list[dict[str, Any]]) -> None:
-    """Keys and their order, types, masks."""
+def test_special_infos_are_batched_as_in_gymnasium(infos: list[dict[str, Any]]) -> None:
+    """Keys, their order, types and masks are equal."""
     require_same(_ours(infos), _gymnasiums(infos))
 
 
@@ -64,29 +64,29 @@ _infos = st.dictionaries(_keys, _numbers.map(np.float64)) | st.fixed_dictionarie
 
 
 @given(st.lists(_infos, min_size=1, max_size=6))
-def test_any_infos_are_batched_as_gymnasium_does(infos: list[dict[str, Any]]) -> None:
-    """Any mixture of keys."""
+def test_any_infos_are_batched_as_in_gymnasium(infos: list[dict[str, Any]]) -> None:
+    """Random mixtures of keys give equal batches."""
     require_same(_ours(infos), _gymnasiums(infos))
 
 
 @given(st.lists(st.sampled_from([0, 1, 2]), min_size=1, max_size=8), st.randoms())
-def test_what_is_told_in_columns_is_batched_alike(told: list[int], order: Any) -> None:
-    """Whichever thread was the first, and with envs among them that are told of by themselves."""
-    infos = [{"a": np.float64(i), "b": i} if part else {"b": 0.5} for i, part in enumerate(told)]
+def test_columns_are_batched_alike(kinds: list[int], order: Any) -> None:
+    """Columns of several threads and single infos, in any order, give equal batches."""
+    infos = [{"a": np.float64(i), "b": i} if part else {"b": 0.5} for i, part in enumerate(kinds)]
     parts: list[InfoColumns] = []
     for part in (1, 2):
-        numbers = [i for i, each in enumerate(told) if each == part]
+        numbers = [i for i, each in enumerate(kinds) if each == part]
         if numbers:
             values = {"a": np.array(numbers, np.float64), "b": np.array(numbers)}
             parts.append(InfoColumns(numbers, values))
-    alone = [i for i, each in enumerate(told) if each == 0]
+    alone = [i for i, each in enumerate(kinds) if each == 0]
     parts += in_columns(alone, [infos[i] for i in alone])
     order.shuffle(parts)
     require_same(batched(parts, len(infos)), _gymnasiums(infos))
 
 
-def test_an_info_of_columns_is_read_env_by_env() -> None:
-    """An env may have ended by itself after infos had been put in columns."""
+def test_columns_are_split_by_env() -> None:
+    """A single result replaces the columns' info of its env."""
     results = StepResults(2)
     infos = InfoColumns([0, 1], {"a": np.array([1.0, 2.0])})
     results.put_columns(infos, np.zeros(2), np.zeros(2, np.bool_), [False, False])

@@ -1,4 +1,4 @@
-"""Making vector envs, and what they offer besides stepping."""
+"""Making of vector envs, and their interface besides stepping."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from tests.envs.vector.sameness import require_same
 
 
 @pytest.mark.parametrize("env_id", CATALOGUE)
-def test_gymnasium_makes_ours(env_id: str) -> None:
-    """Both ways of making give the same, and the spec makes it again."""
+def test_gymnasium_makes_the_same_envs(env_id: str) -> None:
+    """`gym.make_vec` and our `make_vec` agree, and specs make the env again."""
     ours = shapechanger.make_vec(env_id, 2, threads=1)
     envs: list[Any] = [ours, gym.make_vec(env_id, num_envs=2, threads=1)]
     envs += [gym.make_vec(one.spec) for one in envs]
@@ -44,7 +44,7 @@ def test_gymnasium_makes_ours(env_id: str) -> None:
 
 
 def test_threads_are_an_argument_of_gymnasiums_make_vec() -> None:
-    """As the docs show it; Gymnasium refuses `vector_kwargs` for any vector entry point."""
+    """`threads` is a keyword; Gymnasium refuses `vector_kwargs` for entry points."""
     envs: Any = gym.make_vec("shapechanger/Ant-v1", num_envs=3, threads=2)
     assert envs.threads == 2
     envs.close()
@@ -53,7 +53,7 @@ def test_threads_are_an_argument_of_gymnasiums_make_vec() -> None:
 
 
 def test_a_vector_env_of_one_env() -> None:
-    """It has the results of the env alone, and two dimensions."""
+    """Results equal those of the single env, with a batch axis."""
     envs, alone = shapechanger.make_vec("Ant"), gym.make("shapechanger/Ant-v1")
     assert envs.num_envs == envs.threads == 1
     observations, _ = envs.reset(seed=3)
@@ -69,15 +69,15 @@ def test_a_vector_env_of_one_env() -> None:
     alone.close()
 
 
-def test_gymnasiums_own_are_still_there() -> None:
-    """Who asks for them gets them."""
+def test_gymnasiums_vector_envs_are_available() -> None:
+    """`vectorization_mode="sync"` makes Gymnasium's SyncVectorEnv."""
     envs = gym.make_vec("shapechanger/Ant-v1", num_envs=2, vectorization_mode="sync")
     assert isinstance(envs, gym.vector.SyncVectorEnv)
     envs.close()
 
 
-def test_spaces_are_those_of_gymnasiums() -> None:
-    """Single and batched."""
+def test_spaces_equal_gymnasiums() -> None:
+    """Single and batched spaces equal those of SyncVectorEnv."""
     ours = shapechanger.make_vec("Ant", 3)
     theirs = gym.make_vec("shapechanger/Ant-v1", num_envs=3, vectorization_mode="sync")
     for name in ("observation_space", "action_space"):
@@ -87,8 +87,8 @@ def test_spaces_are_those_of_gymnasiums() -> None:
     theirs.close()
 
 
-def test_a_spec_survives_json_with_its_vector_env() -> None:
-    """Its entry point is a string, which names the id."""
+def test_a_spec_round_trips_through_json() -> None:
+    """The vector entry point is a string that names the id."""
     spec = gym.spec("shapechanger/BigAnt-v1")
     again = gym.envs.registration.EnvSpec.from_json(spec.to_json())
     assert again == spec
@@ -99,7 +99,7 @@ def test_a_spec_survives_json_with_its_vector_env() -> None:
 
 
 def test_each_env_may_have_a_body_of_its_own() -> None:
-    """Names, edits and JSON; their specs remember."""
+    """Bodies are given as names, edits and JSON."""
     bodies = [
         "Ant",
         "BigAnt",
@@ -120,8 +120,8 @@ def test_each_env_may_have_a_body_of_its_own() -> None:
         envs.close()
 
 
-def test_an_id_of_a_user_needs_no_entry_point() -> None:
-    """Any class of boxes may be stepped by threads."""
+def test_external_ids_are_accepted() -> None:
+    """Ids of other packages work without a vector entry point."""
     envs = shapechanger.make_vec("Hopper-v5", 2, threads=2)
     observations, _ = envs.reset(seed=0)
     assert observations.shape == (2, 11)
@@ -131,7 +131,7 @@ def test_an_id_of_a_user_needs_no_entry_point() -> None:
 
 @pytest.mark.parametrize("copy", [True, False])
 def test_observations_are_copies_if_asked_for(copy: bool) -> None:
-    """As Gymnasium's: a learner may keep them, or save the copying."""
+    """`copy=False` reuses the memory of observations, as in Gymnasium."""
     envs = shapechanger.make_vec("InvertedPendulum", 2, copy=copy)
     first, _ = envs.reset(seed=0)
     before = first.copy()
@@ -142,7 +142,7 @@ def test_observations_are_copies_if_asked_for(copy: bool) -> None:
 
 
 def test_attributes_and_methods_are_reached() -> None:
-    """Of each env its own; tuples."""
+    """Values of all envs are returned as tuples."""
     envs = shapechanger.make_vec("Ant", 2)
     envs.reset(seed=0)
     assert envs.get_attr("dt") == (0.05, 0.05)
@@ -154,8 +154,8 @@ def test_attributes_and_methods_are_reached() -> None:
     envs.close()
 
 
-def test_gymnasiums_vector_wrappers_fit() -> None:
-    """Statistics of episodes, and the same with rewards normalised."""
+def test_gymnasiums_vector_wrappers_work() -> None:
+    """RecordEpisodeStatistics and NormalizeReward work."""
     envs: Any = shapechanger.make_vec(
         "InvertedPendulum", 2, max_episode_steps=4, autoreset_mode="SameStep"
     )
@@ -168,8 +168,8 @@ def test_gymnasiums_vector_wrappers_fit() -> None:
 
 
 @pytest.mark.gl
-def test_frames_come_one_per_env(gl: None) -> None:
-    """Each shows its own body."""
+def test_render_returns_a_frame_per_env(gl: None) -> None:
+    """Each frame shows its own body."""
     envs = shapechanger.make_vec(
         "Ant", 2, bodies=["Ant", "BigAnt"], render_mode="rgb_array", width=64, height=64
     )
@@ -182,7 +182,7 @@ def test_frames_come_one_per_env(gl: None) -> None:
 
 
 def test_the_envs_keep_their_specs() -> None:
-    """Each can be made again from its own, and pickled."""
+    """Each env can be pickled and made again from its own spec."""
     envs = shapechanger.make_vec("Ant", 2, bodies=["Ant", "BigAnt"])
     for env, edits in zip(envs.envs, (0, 1), strict=True):
         assert env.spec is not None
@@ -192,15 +192,15 @@ def test_the_envs_keep_their_specs() -> None:
     envs.close()
 
 
-def test_exporting_it_loads_no_simulator() -> None:
-    """Whoever imports the package for its layouts must not wait for MuJoCo."""
+def test_importing_make_vec_loads_no_simulator() -> None:
+    """`from shapechanger import make_vec` does not import MuJoCo."""
     script = "import sys\nfrom shapechanger import make_vec\nprint('mujoco' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert run.stdout == "False\n"
 
 
-def test_no_envs_are_refused() -> None:
-    """A vector env has at least one env."""
+def test_empty_vector_envs_are_refused() -> None:
+    """At least one env and one thread are needed."""
     with pytest.raises(VectorEnvError, match="at least one env, got 0"):
         ThreadVectorEnv([])
     with pytest.raises(VectorEnvError, match="at least one thread, got 0"):
@@ -216,14 +216,14 @@ class _Bounded(gym.Env[Any, Any]):
 
 
 def test_other_bounds_are_refused() -> None:
-    """Envs of one vector env share their bounds; the message names an env without a body."""
+    """The error names the class of an env without a body."""
     require_same_spaces([_Bounded(1.0), _Bounded(1.0)])
     with pytest.raises(SpaceMismatch, match=r"env 1 \(_Bounded\) has other bounds than .* env 0"):
         require_same_spaces([_Bounded(1.0), _Bounded(2.0)])
 
 
 def test_a_thread_without_tasks_ends() -> None:
-    """Another thread may take the last task between the look and the take."""
+    """A thread ends quietly if another one takes the last task first."""
 
     def take() -> Any:
         raise IndexError

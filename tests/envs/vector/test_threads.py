@@ -1,4 +1,4 @@
-"""Threads: what one raises reaches the caller, and none outlives what it was made for."""
+"""Threads of vector envs: errors, interruptions and termination."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from shapechanger.envs.vector.threads import EnvThreads
 
 
 class _Plain(gym.Env[Any, Any]):
-    """Counts its steps, and raises in the one that it is told to."""
+    """Env that counts its steps, or raises a given exception."""
 
     observation_space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -35,20 +35,20 @@ class _Plain(gym.Env[Any, Any]):
         self.threads: list[int] = []
 
     def reset(self, *, seed: Any = None, options: Any = None) -> Any:
-        """Begin."""
+        """Record the thread."""
         self.threads.append(threading.get_ident())
         return np.zeros(1), {}
 
     def render(self) -> Any:
-        """Look."""
+        """Record the thread."""
         self.threads.append(threading.get_ident())
 
     def close(self) -> None:
-        """End."""
+        """Record the thread."""
         self.threads.append(threading.get_ident())
 
     def step(self, action: Any) -> Any:
-        """Go on."""
+        """Count the step, or raise."""
         self.thread = threading.get_ident()
         if self.raises is not None:
             raise self.raises
@@ -78,7 +78,7 @@ def _wait_until(condition: Callable[[], bool]) -> None:
 @pytest.mark.parametrize("threads", [1, 2, 4])
 @pytest.mark.parametrize("number", [0, 1, 3])
 def test_an_error_names_its_env_and_the_others_finish(number: int, threads: int) -> None:
-    """Whichever thread it comes from; after that only a reset helps."""
+    """The error has a note with the env, the others finish, and a reset is needed."""
     envs, members = _plain({number: RuntimeError("it broke")}, threads)
     with pytest.raises(RuntimeError, match="it broke") as caught:
         envs.step(np.zeros((4, 1)))
@@ -92,8 +92,8 @@ def test_an_error_names_its_env_and_the_others_finish(number: int, threads: int)
     envs.close()
 
 
-def test_of_several_errors_the_first_env_counts() -> None:
-    """As if they had been stepped one after another."""
+def test_the_error_of_the_first_env_is_raised() -> None:
+    """If several envs fail, the error of the lowest index is raised."""
     envs, _ = _plain({1: RuntimeError("one"), 2: ValueError("two")})
     with pytest.raises(RuntimeError, match="one"):
         envs.step(np.zeros((4, 1)))
@@ -102,7 +102,7 @@ def test_of_several_errors_the_first_env_counts() -> None:
 
 @pytest.mark.parametrize("number", [0, 3])
 def test_an_interruption_leaves_the_envs_usable(number: int) -> None:
-    """Ctrl-C in the caller's thread, or an env that asks to exit in another."""
+    """After KeyboardInterrupt in any thread, a reset restores the vector env."""
     envs, members = _plain({number: KeyboardInterrupt()})
     with pytest.raises(KeyboardInterrupt):
         envs.step(np.zeros((4, 1)))
@@ -115,7 +115,7 @@ def test_an_interruption_leaves_the_envs_usable(number: int) -> None:
 
 
 def test_envs_stay_with_their_thread() -> None:
-    """Neighbours share one, and it is the same at every step."""
+    """Neighbouring envs share a thread, the same at every step."""
     envs, members = _plain({})
     seen: list[list[int | None]] = []
     for _ in range(3):
@@ -127,8 +127,8 @@ def test_envs_stay_with_their_thread() -> None:
     envs.close()
 
 
-def test_whatever_may_draw_happens_in_the_thread_of_an_env() -> None:
-    """Resets of some and with a body, pictures and calls, and the end: OpenGL demands it."""
+def test_all_calls_run_in_the_thread_of_the_env() -> None:
+    """Resets, renders, calls and `close` stay in one thread, as OpenGL requires."""
     envs, members = _plain({})
     envs.step(np.zeros((4, 1)))
     homes = [one.thread for one in members]
@@ -145,8 +145,8 @@ def test_whatever_may_draw_happens_in_the_thread_of_an_env() -> None:
 
 
 @pytest.mark.parametrize(("asked", "started"), [(1, 0), (2, 1), (3, 2), (9, 2)])
-def test_there_are_as_many_threads_as_asked_for(asked: int, started: int) -> None:
-    """The caller's is one of them, and more than envs are none."""
+def test_the_number_of_threads_is_as_requested(asked: int, started: int) -> None:
+    """The caller's thread counts, and there are at most as many threads as envs."""
     envs = shapechanger.make_vec("InvertedPendulum", 3, threads=asked)
     envs.reset(seed=0)
     assert len(_ours()) == started
@@ -154,8 +154,8 @@ def test_there_are_as_many_threads_as_asked_for(asked: int, started: int) -> Non
     assert _ours() == []
 
 
-def test_who_forgets_to_close_leaves_no_threads() -> None:
-    """They end with the vector env."""
+def test_an_unclosed_vector_env_leaves_no_threads() -> None:
+    """Threads end when the vector env is garbage-collected."""
     envs = shapechanger.make_vec("InvertedPendulum", 3, threads=2)
     envs.reset(seed=0)
     assert len(_ours()) == 1
@@ -165,7 +165,7 @@ def test_who_forgets_to_close_leaves_no_threads() -> None:
 
 
 def test_a_second_interruption_does_not_wait() -> None:
-    """A thread that never ends is left behind, and nothing touches its envs."""
+    """A second Ctrl-C abandons a thread that hangs."""
     pool, hold, working = EnvThreads(2, 2), threading.Event(), threading.Event()
     presses = 0
 
@@ -174,7 +174,7 @@ def test_a_second_interruption_does_not_wait() -> None:
         hold.wait()
 
     def press_on() -> None:
-        # Two that come before the first is seen are one, on a machine that is slow enough.
+        # On a slow machine, two signals can arrive as one, so keep sending.
         nonlocal presses
         working.wait()
         while not pool.lost:
@@ -210,8 +210,8 @@ def _run(body: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_ctrl_c_at_any_moment_hangs_nothing() -> None:
-    """Thirty interruptions at random moments of steps; the envs step on after each."""
+def test_ctrl_c_at_random_moments() -> None:
+    """Thirty interruptions at random moments of steps leave the vector env usable."""
     run = _run(
         """
         import random, time
@@ -246,15 +246,15 @@ def test_ctrl_c_at_any_moment_hangs_nothing() -> None:
     ["sys.exit(0)", "pass", "del envs", "raise SystemExit(0)"],
     ids=["exit", "end", "del", "raise"],
 )
-def test_a_program_ends_though_nobody_closes(end: str) -> None:
-    """No thread keeps the interpreter alive, and nothing is said."""
+def test_a_program_exits_without_close(end: str) -> None:
+    """Unclosed vector envs neither block the exit nor print anything."""
     run = _run(f"envs.step(actions)\n{end}")
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="Nothing forks here.")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 def test_a_forked_process_steps_with_threads_of_its_own() -> None:
-    """Those of its parent are not in it."""
+    """A forked process starts its own threads."""
     run = _run(
         """
         envs.step(actions)

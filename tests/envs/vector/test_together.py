@@ -1,4 +1,4 @@
-"""Ants of a vector env are concluded together: the numbers are those of each alone."""
+"""Batched conclusion of ant steps equals that of single envs."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ _ANT = "shapechanger/Ant-v1"
 
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fast models are looked for at the first step; what is not looked for is not at fault."""
+    """Search for fast models at the first step."""
     monkeypatch.setattr(TunedStep, "patience", 0)
 
 
 @pytest.fixture
 def concluded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many ants were concluded together, each time."""
+    """Record the number of ants in each batched conclusion."""
     counts: list[int] = []
     original = AntEnv.conclude
 
@@ -43,7 +43,7 @@ def concluded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def _pair(each: list[dict[str, Any]], threads: int = 1, mode: str = "NextStep") -> tuple[Any, Any]:
-    """Ours with fast models, and Gymnasium's over the same envs without."""
+    """Return our vector env with fast models, and Gymnasium's over the same envs without."""
     ours = ThreadVectorEnv(
         [partial(gym.make, _ANT, **one) for one in each],
         threads=threads,
@@ -64,7 +64,7 @@ def _close(*envs: Any) -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("mode", MODES)
 def test_bodies_and_rewards_may_differ(mode: str, threads: int, concluded: list[int]) -> None:
-    """Kinds are told apart, and ends do not disturb the others."""
+    """Different envs are grouped, and ended episodes do not affect the others."""
     kinds: list[dict[str, Any]] = [
         *({"body": body} for body in random_bodies(_ANT, 3)),
         {"healthy_reward": 0, "forward_reward_weight": 2, "ctrl_cost_weight": 3},
@@ -85,10 +85,10 @@ def test_bodies_and_rewards_may_differ(mode: str, threads: int, concluded: list[
         {"exclude_current_positions_from_observation": False},
         {"include_cfrc_ext_in_observation": False},
     ],
-    ids=["place seen", "contacts unseen"],
+    ids=["positions", "no contacts"],
 )
-def test_other_observations(arguments: dict[str, Any], concluded: list[int]) -> None:
-    """With a place, and without contacts."""
+def test_optional_observations(arguments: dict[str, Any], concluded: list[int]) -> None:
+    """Observations with positions, and without contacts, agree."""
     ours, theirs = _pair([arguments] * 4)
     play_side_by_side(ours, theirs, 40, "NextStep")
     assert max(concluded) == 4
@@ -98,7 +98,7 @@ def test_other_observations(arguments: dict[str, Any], concluded: list[int]) -> 
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64, np.int64])
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_precision_and_order_of_actions(kind: Any, order: Any) -> None:
-    """Costs are summed in the precision of the actions, wherever they lie in memory."""
+    """Costs are summed in the precision of the actions, for any memory order."""
     ours, theirs = _pair([{}] * 5)
     for envs in (ours, theirs):
         envs.reset(seed=0)
@@ -118,8 +118,8 @@ def _slower(model: Any) -> None:
 
 
 @pytest.mark.parametrize("edit", [_lighter, _slower])
-def test_an_edit_counts_from_the_next_step_on(edit: Callable[[Any], None]) -> None:
-    """Only in the env in which it was made, and until it is undone."""
+def test_an_edit_takes_effect_at_the_next_step(edit: Callable[[Any], None]) -> None:
+    """An edit of one env counts until it is undone."""
     ours, theirs = _pair([{"terminate_when_unhealthy": False}] * 3, mode="Disabled")
     for envs in (ours, theirs):
         envs.reset(seed=0)
@@ -135,7 +135,7 @@ def test_an_edit_counts_from_the_next_step_on(edit: Callable[[Any], None]) -> No
     model = ours.envs[1].unwrapped.model
     mass, timestep = float(model.body_mass[1]), model.opt.timestep
     assert fast is not model
-    for envs in (ours, theirs):  # In the middle of an episode.
+    for envs in (ours, theirs):  # Within an episode.
         edit(envs.envs[1].unwrapped.model)
     play()
     middle = np.array([False, True, False])
@@ -150,8 +150,8 @@ def test_an_edit_counts_from_the_next_step_on(edit: Callable[[Any], None]) -> No
     _close(ours, theirs)
 
 
-def test_another_model_in_its_place_is_stepped_at_once() -> None:
-    """Even in the middle of an episode."""
+def test_a_replaced_model_takes_effect_at_once() -> None:
+    """Replacing `model` and `data` within an episode takes effect at the next step."""
     ours, theirs = _pair([{}] * 2)
     for envs in (ours, theirs):
         envs.reset(seed=0)
@@ -166,8 +166,8 @@ def test_another_model_in_its_place_is_stepped_at_once() -> None:
     _close(ours, theirs)
 
 
-def test_who_overrides_the_step_is_asked() -> None:
-    """A class, or one env."""
+def test_overridden_steps_are_called() -> None:
+    """Overrides of `step` by a class or an instance are used."""
 
     class Generous(AntEnv):
         def step(self, action: Any) -> Any:
@@ -183,11 +183,11 @@ def test_who_overrides_the_step_is_asked() -> None:
     envs.close()
 
 
-def test_an_ant_that_diverges_among_others(
+def test_one_diverging_ant(
     concluded: list[int], tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is terminated, and the rest of its info is that of its own step."""
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log.
+    """It is terminated, and its info equals that of its own step."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log file.
     ours, alone = shapechanger.make_vec("Ant", 3, threads=1), gym.make(_ANT)
     ours.reset(seed=[5, 6, 7])
     alone.reset(seed=6)
@@ -202,8 +202,8 @@ def test_an_ant_that_diverges_among_others(
     _close(ours, alone)
 
 
-def test_what_an_ant_raises_is_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others finish their step."""
+def test_an_error_of_one_ant_is_attributed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error names the env, and the others finish their step."""
     envs = shapechanger.make_vec("Ant", 4, threads=1)
     envs.reset(seed=0)
     envs.step(np.zeros((4, 8), np.float32))
@@ -224,14 +224,14 @@ def test_what_an_ant_raises_is_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_ant_that_another_thread_still_steps_is_not_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its own thread is done with all else, and waits."""
+    """An ant that another thread helps with is read only after its step has finished."""
     ours, theirs = _pair([{}] * 4, threads=2)
     require_same(ours.reset(seed=0), theirs.reset(seed=0))
     actions = np.full((4, 8), 0.5, np.float32)
     require_same(ours.step(actions), theirs.step(actions))
     first, second, third = (ours.envs[i].unwrapped._bound for i in (0, 1, 2))
     move_first, move_second, move_third = first.move, second.move, third.move
-    begun, taken, done, told = (threading.Event() for _ in range(4))
+    begun, taken, done, never_set = (threading.Event() for _ in range(4))
 
     def own() -> None:
         begun.set()
@@ -242,11 +242,11 @@ def test_an_ant_that_another_thread_still_steps_is_not_read(
     def helped() -> None:
         taken.set()
         assert done.wait(20.0)
-        told.wait(0.3)  # Nobody tells: so long the other thread could read what has not moved.
+        never_set.wait(0.3)  # Never set: gives the other thread time to read too early.
         move_second()
 
     def of_the_other() -> None:
-        assert begun.wait(20.0)  # Before that there is nothing to help with.
+        assert begun.wait(20.0)  # Nothing to help with before that.
         move_third()
 
     monkeypatch.setattr(first, "move", own)

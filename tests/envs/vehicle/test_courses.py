@@ -18,14 +18,14 @@ def _courses(draw: CourseSampler, n: int = 500) -> list[int]:
 
 
 @pytest.mark.parametrize(("name", "seeds"), [("training", TRAINING), ("held-out", HELD_OUT)])
-def test_kinds_of_courses_keep_apart(name: Any, seeds: range) -> None:
-    """Training and held-out courses are disjoint."""
+def test_training_and_held_out_courses_are_disjoint(name: Any, seeds: range) -> None:
+    """Each kind draws from its own range of seeds, and covers it."""
     drawn = _courses(CourseSampler(name, randomise=False))
     assert all(course in seeds for course in drawn)
     assert max(drawn) - min(drawn) > 0.9 * len(seeds)
 
 
-def test_holding_out_never_draws_what_vehicles_learn_on() -> None:
+def test_hold_out_draws_held_out_courses_only() -> None:
     """After `hold_out`, only held-out courses are drawn, also with given courses."""
     for courses in ("training", "held-out", (3, 4)):
         draw = CourseSampler(courses, randomise=False)
@@ -34,15 +34,15 @@ def test_holding_out_never_draws_what_vehicles_learn_on() -> None:
         assert all(course in HELD_OUT for course in _courses(draw))
 
 
-def test_chosen_courses_are_all_drawn_and_no_others() -> None:
+def test_given_courses_are_drawn() -> None:
     """All given courses are drawn, and no others."""
     draw = CourseSampler((7, np.int64(9), 8), randomise=False)
     assert set(_courses(draw)) == {7, 8, 9}
     assert draw.first == 7
 
 
-def test_options_replace_what_is_drawn_and_nothing_else() -> None:
-    """Options do not change the other draws."""
+def test_options_do_not_change_other_draws() -> None:
+    """A given course or start leaves the other random choices unchanged."""
     draw = CourseSampler("training", randomise=True)
     free = draw.draw(np.random.default_rng(5), "corridor", {})
     asked = draw.draw(np.random.default_rng(5), "corridor", {"course": 3})
@@ -51,8 +51,8 @@ def test_options_replace_what_is_drawn_and_nothing_else() -> None:
     assert draw.draw(np.random.default_rng(5), "corridor", {"start": 4}).course == free.course
 
 
-def test_looks_are_drawn_only_where_they_are_to_be() -> None:
-    """Looks are random only if requested."""
+def test_looks_are_random_only_if_requested() -> None:
+    """Without `randomise`, look and camera are None."""
     plain = CourseSampler("training", randomise=False).draw(np.random.default_rng(5), "yard", {})
     assert (plain.look, plain.camera) == (None, None)
     draw, rng = CourseSampler("training", randomise=True), np.random.default_rng(5)
@@ -61,7 +61,7 @@ def test_looks_are_drawn_only_where_they_are_to_be() -> None:
     assert one.camera != two.camera
 
 
-def test_what_is_no_course_is_refused() -> None:
+def test_invalid_courses_are_refused() -> None:
     """Invalid courses raise errors that state what is valid."""
     with pytest.raises(UnknownName, match=r"No kind of courses matches 'hold-out'. Did you mean"):
         CourseSampler("hold-out", randomise=False)  # pyright: ignore[reportArgumentType]
@@ -82,7 +82,7 @@ def test_what_is_no_course_is_refused() -> None:
         ({"start": 0.5}, "The seed of a start must be a whole number from 0, got 0.5"),
     ],
 )
-def test_options_that_are_none_are_refused(options: dict[str, Any], sentence: str) -> None:
+def test_invalid_options_are_refused(options: dict[str, Any], sentence: str) -> None:
     """Unknown or invalid options raise errors."""
     draw = CourseSampler("training", randomise=False)
     with pytest.raises((UnknownName, WorldError), match=sentence):

@@ -13,8 +13,8 @@ from shapechanger.worlds.course import HOME
 
 
 @pytest.mark.parametrize("vehicle", HOME)
-def test_it_can_drive_what_it_shows(vehicle: str) -> None:
-    """The disturbed demonstrator makes progress without collisions."""
+def test_a_disturbed_demonstrator_makes_progress(vehicle: str) -> None:
+    """It makes mistakes and drives without collisions."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         driver: TaskDemonstrator = env.demonstrator(3)
         env.reset(seed=2)
@@ -31,7 +31,7 @@ def test_it_can_drive_what_it_shows(vehicle: str) -> None:
         assert mistakes > 0
 
 
-def test_its_mistakes_follow_from_its_seed() -> None:
+def test_mistakes_follow_from_the_seed() -> None:
     """Mistakes are a function of seed and episode."""
     shown: list[list[list[float]]] = []
     with closing(VehicleEnv("car", image=False)) as env:
@@ -54,8 +54,8 @@ def test_its_mistakes_follow_from_its_seed() -> None:
     assert second != other_second
 
 
-def test_it_begins_on_the_course_that_is_there() -> None:
-    """`begin` takes the present course."""
+def test_begin_takes_the_present_course() -> None:
+    """The demonstrator follows the course of the last reset."""
     with closing(VehicleEnv("car", image=False)) as env:
         driver = env.demonstrator(1)
         for course in (3, 4):

@@ -40,18 +40,18 @@ def car() -> Generator[VehicleEnv]:
         (50, 37.11, 65.92),
     ],
 )
-def test_the_interval_is_that_of_the_tables(count: int, low: float, high: float) -> None:
-    """The interval agrees with published tables."""
+def test_the_interval_agrees_with_tables(count: int, low: float, high: float) -> None:
+    """Limits equal published values."""
     assert poisson_interval(count) == pytest.approx((low, high), abs=0.006)
 
 
-def test_more_confidence_is_a_wider_interval() -> None:
+def test_the_interval_grows_with_the_confidence() -> None:
     """The interval grows with the confidence."""
     narrow, usual, wide = (poisson_interval(7, c) for c in (0.5, 0.95, 0.99))
     assert wide[0] < usual[0] < narrow[0] < 7 < narrow[1] < usual[1] < wide[1]
 
 
-def test_a_score_sums_before_it_divides() -> None:
+def test_scores_are_ratios_of_sums() -> None:
     """Scores are ratios of sums."""
     score = DriveScore.of(
         [DriveResult(1, 30.0, 20.0, 0, True), DriveResult(2, 10.0, 60.0, 2, False)]
@@ -73,14 +73,14 @@ def test_a_score_without_progress_has_no_bound() -> None:
     assert (still.per_100_m, still.low, still.high) == (0.0, 0.0, float("inf"))
 
 
-def test_no_drives_are_no_score() -> None:
+def test_a_score_needs_a_drive() -> None:
     """A score needs at least one drive."""
     with pytest.raises(WorldError, match="at least one"):
         DriveScore.of([])
 
 
-def test_the_expert_gets_there(car: VehicleEnv) -> None:
-    """The expert reaches the distance and stops there."""
+def test_the_expert_reaches_the_distance(car: VehicleEnv) -> None:
+    """The drive ends there, without collisions."""
     done = drive(car, ExpertDriver(car.world), course=HELD_OUT[0], metres=5.0)
     assert done.reached
     assert 5.0 <= done.metres < 5.2
@@ -90,8 +90,8 @@ def test_the_expert_gets_there(car: VehicleEnv) -> None:
     assert done.course == HELD_OUT[0]
 
 
-def test_a_collision_counts_once_and_the_drive_goes_on(car: VehicleEnv) -> None:
-    """A drive continues after a collision, which counts once."""
+def test_a_drive_continues_after_a_collision(car: VehicleEnv) -> None:
+    """The collision counts once."""
     pilot = ExpertDriver(car.world)
 
     def blind_at_first(observation: Any) -> NDArray[np.float32]:
@@ -102,7 +102,7 @@ def test_a_collision_counts_once_and_the_drive_goes_on(car: VehicleEnv) -> None:
     assert done.reached
 
 
-def test_time_is_up_for_who_stands_still(car: VehicleEnv) -> None:
+def test_a_drive_ends_at_the_time_limit(car: VehicleEnv) -> None:
     """A drive ends at the time limit."""
     done = drive(car, lambda _: _STILL, course=HELD_OUT[0], limit_s=2.0)
     assert done.seconds == pytest.approx(2.0)
@@ -110,7 +110,7 @@ def test_time_is_up_for_who_stands_still(car: VehicleEnv) -> None:
     assert abs(done.metres) < 0.01
 
 
-def test_the_start_can_be_chosen(car: VehicleEnv) -> None:
+def test_the_start_can_be_given(car: VehicleEnv) -> None:
     """The default start has the course's seed; others can be given."""
     starts: list[tuple[float, ...]] = []
     for start in (None, HELD_OUT[0], 7, 7):

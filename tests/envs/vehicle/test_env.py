@@ -47,7 +47,7 @@ def _played(env: VehicleEnv, seed: int, steps: int = 25) -> list[Any]:
 
 
 @pytest.mark.parametrize("vehicle", HOME)
-def test_each_vehicle_drives_at_home(vehicle: str) -> None:
+def test_each_vehicle_drives_in_its_default_world(vehicle: str) -> None:
     """Half throttle makes progress, and reward and info agree."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         seen, info = env.reset(seed=1)
@@ -66,27 +66,27 @@ def test_each_vehicle_drives_at_home(vehicle: str) -> None:
         assert env.metadata["render_fps"] == 20
 
 
-def test_no_episode_depends_on_those_before_it() -> None:
+def test_episodes_are_independent() -> None:
     """An episode does not depend on earlier ones."""
     with closing(_car()) as fresh, closing(_car()) as used:
         wanted = _played(fresh, 3)
         _played(used, 4)
         assert _played(used, 3) == wanted
         for _ in range(20):
-            used.step(_AHEAD)  # It rolls when it is switched off.
+            used.step(_AHEAD)  # The vehicle is still rolling at the reset.
         assert _played(used, 3) == wanted
 
 
 @pytest.mark.parametrize("vehicle", ["truck", "boat"])
-def test_a_trailer_and_a_current_remember_nothing(vehicle: str) -> None:
-    """Trailer and current are reset as well."""
+def test_trailer_and_current_are_reset(vehicle: str) -> None:
+    """Episodes of equal seeds are equal."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         wanted = _played(env, 3)
         assert _played(env, 3) == wanted
 
 
-def test_the_seed_draws_the_course_and_the_start() -> None:
-    """Seeds and options give course and start."""
+def test_course_and_start_follow_from_the_seed() -> None:
+    """Both can be given as options."""
     with closing(_car()) as env:
         drawn = [env.reset(seed=seed)[1] for seed in (1, 2, 1)]
         assert drawn[0]["pose"] == drawn[2]["pose"]
@@ -119,7 +119,7 @@ def test_a_collision_ends_the_episode() -> None:
             assert reward == pytest.approx(sum(info["reward_terms"].values()))
 
 
-def test_who_is_put_back_drives_on() -> None:
+def test_put_back_continues_the_episode() -> None:
     """With `put_back` the episode continues, and further collisions count."""
     with closing(_car(put_back=True)) as env:
         env.reset(seed=1)
@@ -135,8 +135,8 @@ def test_who_is_put_back_drives_on() -> None:
         assert found > 1
 
 
-def test_the_state_is_named_and_within_its_bounds() -> None:
-    """The state's layout is that of a served robot, and values are in its bounds."""
+def test_layouts_match_the_spaces() -> None:
+    """The state has the size of its layout, and the actions are steering and throttle."""
     with closing(_car()) as env:
         assert env.observation_space.shape == (env.observation_layout.size,)
         assert "speed" in env.observation_layout.names
@@ -144,7 +144,7 @@ def test_the_state_is_named_and_within_its_bounds() -> None:
         assert env.action_space.contains(_AHEAD)
 
 
-def test_bang_steering_knows_three_angles() -> None:
+def test_bang_steering_has_three_angles() -> None:
     """Steering "bang" has three angles."""
     for steering, applied in (("bang", 1.0), ("proportional", 0.5)):
         with closing(_car(steering=steering)) as env:
@@ -153,15 +153,15 @@ def test_bang_steering_knows_three_angles() -> None:
             assert info["action_applied"][0] == applied
 
 
-def test_holding_out_holds_out() -> None:
-    """`hold_out` applies from the next reset on."""
+def test_hold_out_applies_from_the_next_reset() -> None:
+    """All later courses are held-out ones."""
     with closing(_car()) as env:
         env.hold_out()
         assert all(env.reset(seed=seed)[1]["course"] in HELD_OUT for seed in range(5))
 
 
-def test_a_pickled_env_is_made_with_the_same_arguments() -> None:
-    """Pickling keeps all arguments."""
+def test_pickling_keeps_all_arguments() -> None:
+    """The copy drives like the original."""
     with (
         closing(VehicleEnv("tank", world="yard", image=False, put_back=True)) as env,
         closing(pickle.loads(pickle.dumps(env))) as copy,
@@ -171,14 +171,14 @@ def test_a_pickled_env_is_made_with_the_same_arguments() -> None:
         assert _played(copy, 2) == _played(env, 2)
 
 
-def test_an_episode_is_cut_after_a_thousand_steps() -> None:
-    """Episodes of the id are truncated after 1,000 steps."""
+def test_episodes_are_limited_to_1000_steps() -> None:
+    """The registered ids have a time limit."""
     for env_id in VEHICLE_ENVS:
         assert gym.spec(env_id).max_episode_steps == 1000
 
 
-def test_misuse_is_told_in_words() -> None:
-    """Misuse raises errors that explain it."""
+def test_invalid_steps_are_refused() -> None:
+    """Steps before a reset and invalid actions raise errors."""
     with closing(_car()) as env:
         with pytest.raises(gym.error.ResetNeeded, match="reset"):
             env.step(_AHEAD)
@@ -189,7 +189,7 @@ def test_misuse_is_told_in_words() -> None:
         assert env.render() is None
 
 
-def test_a_vehicle_that_is_stuck_at_the_start_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_blocked_start_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A start in contact with an obstacle is refused."""
     with closing(_car()) as env:
         wall = env.world.course.walls[0]
@@ -225,7 +225,7 @@ def test_a_vehicle_that_is_stuck_at_the_start_is_told_of(monkeypatch: pytest.Mon
         ("car", {"size": 160}, SpaceMismatch, "each 1 to 1920 pixels, got 160"),
     ],
 )
-def test_what_cannot_be_made_is_refused_in_a_sentence(
+def test_invalid_arguments_are_refused(
     vehicle: str, arguments: Mapping[str, Any], kind: type[ShapechangerError], sentence: str
 ) -> None:
     """Invalid arguments raise the package's errors."""
@@ -235,7 +235,7 @@ def test_what_cannot_be_made_is_refused_in_a_sentence(
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_pictures_come_with_the_state_where_both_are_asked_for() -> None:
+def test_observations_can_have_image_and_state() -> None:
     """`image`, `state` and `size` select the observation."""
     with closing(VehicleEnv("car", size=(48, 32))) as env:
         seen, _ = env.reset(seed=1)
@@ -252,8 +252,8 @@ def test_pictures_come_with_the_state_where_both_are_asked_for() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_rendering_shows_what_the_camera_sees() -> None:
-    """`render` shows the camera's picture, after the first reset."""
+def test_render_shows_the_cameras_picture() -> None:
+    """Rendering before the first reset raises RenderError."""
     with closing(_car(size=(48, 32), render_mode="rgb_array")) as env:
         with pytest.raises(RenderError, match="before render"):
             env.render()
@@ -277,8 +277,8 @@ def test_random_looks_follow_from_the_seed() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_lenses_spoil_what_it_sees_and_not_where_it_is() -> None:
-    """Lenses change pictures only; a single name is accepted."""
+def test_lenses_change_pictures_only() -> None:
+    """A single name is accepted."""
     with (
         closing(VehicleEnv("car", size=(48, 32))) as clear,
         closing(VehicleEnv("car", size=(48, 32), lenses="night")) as night,
@@ -289,7 +289,7 @@ def test_lenses_spoil_what_it_sees_and_not_where_it_is() -> None:
         assert dark.mean() < bright.mean()
 
 
-def test_gpiozero_is_asked_for_where_it_is_missing() -> None:
+def test_without_gpiozero_the_extra_is_named() -> None:
     """Without gpiozero, the error names the extra to install."""
     script = (
         "import sys, importlib.util\n"

@@ -22,8 +22,8 @@ _STEPS = 60
 
 
 @pytest.mark.parametrize("vehicle", HOME)
-def test_it_drives_as_the_whole_robot_does(vehicle: str) -> None:
-    """The same actions lead to nearly the same place as with the whole robot."""
+def test_the_fast_env_matches_the_full_robot(vehicle: str) -> None:
+    """Equal actions lead to nearly equal poses."""
     with (
         closing(VehicleEnv(vehicle, image=False)) as robot,
         closing(RangesEnv(vehicle)) as fast,
@@ -84,7 +84,7 @@ def test_a_collision_costs_and_ends_the_episode() -> None:
         assert costs == -3.0 * info["collisions"]
 
 
-def test_after_a_collision_it_waits_as_the_whole_robot_does() -> None:
+def test_the_pause_after_a_collision_matches_the_full_robot() -> None:
     """The bumper's reflex stops the vehicle for 0.75 s after `put_back`."""
     ahead = np.array([0.0, 0.8], np.float32)
     waits: list[int] = []
@@ -108,7 +108,7 @@ def test_after_a_collision_it_waits_as_the_whole_robot_does() -> None:
     assert abs(waits[0] - waits[1]) <= 2
 
 
-def test_standing_costs() -> None:
+def test_standing_still_costs() -> None:
     """Standing still has a negative reward."""
     with closing(RangesEnv("tank")) as env:
         env.reset(options=_COURSE)
@@ -116,7 +116,7 @@ def test_standing_costs() -> None:
         assert total == pytest.approx(-1.0, abs=0.01)
 
 
-def test_the_guard_shapes_the_outputs() -> None:
+def test_outputs_follow_the_guards_limits() -> None:
     """Outputs have the guard's caps, slew and bump block."""
     plan = GuardPlan(
         "test",
@@ -125,7 +125,7 @@ def test_the_guard_shapes_the_outputs() -> None:
         limits=LimitPlan(bump_hold_ms=100),
     )
     shaper = OutputShaper(plan)
-    # Ticks of 10 ms: 0, 0.04, ... 0.16 before each of five.
+    # Five ticks of 10 ms, at 0, 0.04, ... 0.16.
     assert shaper.outputs((1.0,), False, 5)["wheels"] == pytest.approx(0.08)
     for _ in range(4):
         last = shaper.outputs((1.0,), False, 5)["wheels"]
@@ -137,7 +137,7 @@ def test_the_guard_shapes_the_outputs() -> None:
     assert shaper.applied == (0.0,)
 
 
-def test_what_it_refuses() -> None:
+def test_invalid_use_is_refused() -> None:
     """Misuse raises errors that explain it."""
     with pytest.raises(UnknownName, match="No vehicle matches 'carr'"):
         RangesEnv("carr")

@@ -18,7 +18,7 @@ def blind() -> dict[str, bool]:
     return {"image": False, "put_back": True}
 
 
-def test_another_vehicle_is_told_in_sizes_and_answers(blind: dict[str, bool]) -> None:
+def test_another_vehicle_is_a_shift(blind: dict[str, bool]) -> None:
     """The certificate lists properties and rollouts."""
     with closing(VehicleEnv("car", **blind)) as car, closing(VehicleEnv("tank", **blind)) as tank:
         text = str(VehicleEnv.certify_shift(car, tank))
@@ -26,7 +26,7 @@ def test_another_vehicle_is_told_in_sizes_and_answers(blind: dict[str, bool]) ->
     assert "driven by: steering and wheels -> left track and right track" in text
     assert "turns on the spot" in text
     assert "straight ahead at a throttle of 0.5 for 20 steps:" in text
-    assert "place" not in text  # Both are at home in a corridor.
+    assert "place" not in text  # Both have the corridor as their default world.
 
 
 def test_the_same_vehicle_is_no_shift(blind: dict[str, bool]) -> None:
@@ -40,8 +40,8 @@ def test_the_same_vehicle_is_no_shift(blind: dict[str, bool]) -> None:
 
 
 @pytest.mark.gl
-def test_a_lens_changes_what_is_seen() -> None:
-    """A lens changes observations only."""
+def test_a_lens_is_a_shift_of_observations() -> None:
+    """A lens changes no response of the vehicle."""
     size = (40, 30)
     with (
         closing(VehicleEnv("car", size=size, put_back=True)) as clear,
@@ -53,7 +53,7 @@ def test_a_lens_changes_what_is_seen() -> None:
     assert straight[0] == straight[1]
 
 
-def test_wrappers_count(blind: dict[str, bool]) -> None:
+def test_wrappers_are_included(blind: dict[str, bool]) -> None:
     """Wrappers that change actions are a shift."""
     with (
         closing(VehicleEnv("car", **blind)) as car,
@@ -69,7 +69,7 @@ def _halved(action: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_a_vehicle_is_not_compared_with_an_ant(order: int, blind: dict[str, bool]) -> None:
+def test_other_envs_are_refused(order: int, blind: dict[str, bool]) -> None:
     """Comparing with another kind of env is refused."""
     with (
         closing(VehicleEnv("car", **blind)) as car,
@@ -82,8 +82,8 @@ def test_a_vehicle_is_not_compared_with_an_ant(order: int, blind: dict[str, bool
 
 @pytest.mark.gl
 @pytest.mark.parametrize("vehicle", ["car", "tank", "truck", "boat"])
-def test_a_vehicle_is_drawn_from_outside(vehicle: str) -> None:
-    """`picture` shows the vehicle, smaller with a larger reach."""
+def test_picture_shows_the_vehicle(vehicle: str) -> None:
+    """The vehicle is smaller with a larger reach."""
     with closing(VehicleEnv(vehicle, image=False)) as env:
         near, far = env.picture(160, 120), env.picture(160, 120, reach=3.0 * env.reach)
     assert near.shape == (120, 160, 3)

@@ -12,8 +12,8 @@ import shapechanger
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_the_pictures_of_two_threads_are_those_of_one() -> None:
-    """Pictures of threads equal those of single envs."""
+def test_pictures_do_not_depend_on_threads() -> None:
+    """Pictures of two threads equal those of one."""
 
     def pictures(threads: int) -> list[Any]:
         envs = shapechanger.make_vec(

@@ -20,27 +20,27 @@ from shapechanger.worlds.course import HOME
 _COURSE = {"course": 2, "start": 2}
 
 
-def test_a_response_turns_a_bearing_into_steering() -> None:
+def test_steering_follows_from_the_bearing() -> None:
     """Steering has the bearing's sign and saturates."""
     car, tank = SteeringResponse(2.0, 0.0), SteeringResponse(0.0, 4.0)
     assert car.steering(0.0, 1.0) == 0.0
     assert car.steering(0.1, 1.0) == -car.steering(-0.1, 1.0) > 0.0
     assert car.steering(1.0, 1.0) == 1.0
-    # A car steers the same at each speed, tracks the more the faster they go.
+    # For a car the steering does not depend on the speed, for tracks it grows with it.
     assert car.steering(0.2, 2.0) == pytest.approx(car.steering(0.2, 1.0))
     assert tank.steering(0.2, 1.0) == pytest.approx(2.0 * tank.steering(0.2, 0.5))
     assert tank.steering(0.2, 1.0) == pytest.approx(2.0 * math.sin(0.2) / AHEAD_M / 4.0)
 
 
 @pytest.mark.parametrize("numbers", [(0.0, 0.0), (-1.0, 2.0), (math.nan, 1.0)])
-def test_a_body_that_does_not_turn_is_refused(numbers: tuple[float, float]) -> None:
+def test_invalid_responses_are_refused(numbers: tuple[float, float]) -> None:
     """A response without a turn, or with the wrong sign, is refused."""
     with pytest.raises(StudyError, match="must turn to the right when it steers to the right"):
         SteeringResponse(*numbers)
 
 
 @pytest.mark.parametrize("vehicle", HOME)
-def test_profiles_look_as_the_simulated_cameras_do(vehicle: str) -> None:
+def test_profiles_have_the_simulated_cameras(vehicle: str) -> None:
     """The camera of each profile agrees with that of its body."""
     camera = load_profile(find_profile(f"lab-{vehicle}")).camera
     mount = vehicle_model(vehicle).camera
@@ -58,7 +58,7 @@ def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
         WaypointEnv("car", robot=path)
 
 
-def test_a_car_measures_its_own_circle() -> None:
+def test_the_measured_response_matches_the_geometry() -> None:
     """The measured response of the car is close to its geometry."""
     with closing(RangesEnv("car", put_back=True)) as env:
         places = env.observation_layout.slices
@@ -71,7 +71,7 @@ def test_a_car_measures_its_own_circle() -> None:
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize(("env_id", "vehicle"), [(i, v) for i, (v, _) in WAYPOINT_ENVS.items()])
-def test_who_follows_true_waypoints_hits_nothing(env_id: str, vehicle: str) -> None:
+def test_following_true_waypoints_has_no_collisions(env_id: str, vehicle: str) -> None:
     """Following the expert's waypoints causes no collisions."""
     with closing(WaypointEnv(vehicle, put_back=True)) as env:
         seen, _ = env.reset(options=_COURSE)
@@ -88,7 +88,7 @@ def test_who_follows_true_waypoints_hits_nothing(env_id: str, vehicle: str) -> N
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_the_whole_robot_follows_them_too() -> None:
+def test_the_full_robot_follows_waypoints() -> None:
     """The whole robot follows waypoints by its own sensors."""
     with closing(WaypointEnv("car", full_robot=True, put_back=True)) as env:
         env.reset(options=_COURSE)
@@ -102,8 +102,8 @@ def test_the_whole_robot_follows_them_too() -> None:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_what_is_no_waypoint_is_refused() -> None:
-    """Invalid waypoints are refused."""
+def test_invalid_waypoints_are_refused() -> None:
+    """Other shapes and infinite values raise SpaceMismatch."""
     with closing(WaypointEnv("car")) as env:
         env.reset(options=_COURSE)
         for wrong in (np.zeros(3, np.float32), np.array([0.0, np.inf], np.float32)):

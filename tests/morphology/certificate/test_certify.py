@@ -1,4 +1,4 @@
-"""Certificates of shifts, and shifts that get none."""
+"""Certificates of shifts, and refused shifts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.morphology.swing import Noisy, Swing, Wrapper
 
 
 def test_a_longer_arm_is_certified() -> None:
-    """Model and rollout both differ, and both are told."""
+    """The certificate lists differences of the models and of the rollout."""
     certificate = certify(Swing(standing_height=0.5), Swing(length=0.8, standing_height=0.8))
     assert not certificate.is_empty
     assert not certificate.same_model
@@ -34,19 +34,19 @@ def test_a_longer_arm_is_certified() -> None:
 
 
 def test_an_empty_shift_is_refused() -> None:
-    """Source and target that behave alike are no transfer."""
+    """Envs that behave alike raise EmptyShift."""
     with pytest.raises(EmptyShift, match="behave alike: both models have the fingerprint"):
         certify(Swing(), Swing())
 
 
-def test_an_env_without_a_model_gets_no_certificate() -> None:
-    """Nothing is compared, and the env is named."""
+def test_an_env_without_a_model_is_refused() -> None:
+    """The error names the env."""
     with pytest.raises(MorphologyError, match="CartPole-v1 has no model to compare"):
         certify(gymnasium.make("CartPole-v1"), Swing())
 
 
-def test_an_empty_shift_may_be_asked_for() -> None:
-    """Then the certificate itself says that it is empty."""
+def test_an_empty_shift_can_be_allowed() -> None:
+    """With `allow_empty` the certificate states that it is empty."""
     certificate = certify(Swing(), Swing(), steps=5, allow_empty=True)
     assert certificate.is_empty
     assert certificate.changes == ()
@@ -54,8 +54,8 @@ def test_an_empty_shift_may_be_asked_for() -> None:
     assert "Changes" not in str(certificate)
 
 
-def test_noise_alone_is_a_shift_of_senses() -> None:
-    """The models are the same, and the certificate says so."""
+def test_noise_alone_is_a_shift() -> None:
+    """The certificate states that the models are equal and only observations differ."""
     certificate = certify(Swing(), Noisy(Swing()), labels=("quiet", "noisy"))
     assert certificate.same_model
     assert not certificate.is_empty
@@ -63,8 +63,8 @@ def test_noise_alone_is_a_shift_of_senses() -> None:
     assert certificate.verdict.endswith("only what is sensed, done or rewarded differs.")
 
 
-def test_a_difference_that_the_rollout_does_not_reach_is_told() -> None:
-    """Another range of a joint that never gets there: a shift, but unseen in these steps."""
+def test_a_difference_beyond_the_rollout_is_stated() -> None:
+    """A model difference without effect in the rollout is a shift, and the verdict says so."""
     target = Swing()
     target.model.jnt_limited[:] = 1
     target.model.jnt_range[:] = (-50.0, 50.0)
@@ -73,34 +73,34 @@ def test_a_difference_that_the_rollout_does_not_reach_is_told() -> None:
     assert certificate.verdict.endswith("differ, but 3 steps did not show it.")
 
 
-def test_inconsistent_models_are_told_of() -> None:
-    """A mass that was written into the compiled model, without inertia and without constants."""
+def test_inconsistent_models_are_reported() -> None:
+    """A mass written into a compiled model, without inertia and constants, is reported."""
     target = Swing()
     target.model.body_mass[1] = 5.0
     certificate = certify(Swing(), target, steps=5, labels=("light", "heavy"))
     assert certificate.source_inconsistencies == ()
-    told = " ".join(certificate.target_inconsistencies)
-    assert "body_subtreemass" in told
-    assert "its inertia stays" in told
+    sentences = " ".join(certificate.target_inconsistencies)
+    assert "body_subtreemass" in sentences
+    assert "its inertia stays" in sentences
     assert "Does not fit together in heavy:" in str(certificate)
 
 
-def test_json_keeps_everything() -> None:
-    """A certificate is a record: what is written is what is read."""
+def test_a_certificate_round_trips_through_json() -> None:
+    """Reading a written certificate gives an equal one."""
     certificate = certify(Swing(), Swing(wrist=True, gear=3.0))
     assert Certificate.from_json(certificate.to_json()) == certificate
     assert Certificate.from_json(certificate.to_json().encode()) == certificate
 
 
 @pytest.mark.parametrize("text", ["{}", "no", '{"source": 1}'])
-def test_what_is_no_certificate_is_refused(text: str) -> None:
-    """With the reason."""
+def test_invalid_json_is_refused(text: str) -> None:
+    """The error states the reason."""
     with pytest.raises(MorphologyError, match="This is not a certificate: "):
         Certificate.from_json(text)
 
 
 def test_environments_without_a_standing_height_are_certified() -> None:
-    """A swing does not stand; an environment may say so by not having the attribute."""
+    """The attribute `standing_height` is optional."""
     source = Swing()
     del source.standing_height
     certificate = certify(Wrapper(source), Swing(gear=2.0, standing_height=1.0))
@@ -119,8 +119,8 @@ class _Ant(AntEnv):
 
 
 def test_gymnasium_environments_and_wrappers_are_certified(tmp_path: Path) -> None:
-    """The ant equals the ant with slippery feet, but not one that senses otherwise."""
-    # Edited as text: a spec that is written to a file has its numbers rounded.
+    """An ant with masked friction is no shift; a wrapper that changes observations is one."""
+    # Edited as text, because writing a spec to a file rounds its numbers.
     text = Path(ASSETS, "ant.xml").read_text(encoding="utf-8")
     edited = text.replace('_ankle_geom" size', '_ankle_geom" friction="0.1 0.5 0.5" size')
     assert edited != text
@@ -136,7 +136,7 @@ def test_gymnasium_environments_and_wrappers_are_certified(tmp_path: Path) -> No
 
 
 def test_registered_ids_are_the_labels() -> None:
-    """What `gymnasium.make` was asked for is what the certificate calls it."""
+    """Envs made with `gymnasium.make` are labelled with their ids."""
     with gymnasium.make("InvertedPendulum-v5") as env:
         inner: Any = env.unwrapped
         inner.observation_layout = Layout(tuple(Feature(f"o{i}", "1") for i in range(4)))
@@ -152,7 +152,7 @@ def test_registered_ids_are_the_labels() -> None:
     ids=["mass-x1", "masked-friction"],
 )
 def test_an_edit_that_changes_only_the_rounding_is_empty(edit: Edit) -> None:
-    """Writing out HalfCheetah's total mass moves its masses by 4e-16 kg, which is no shift.
+    """Resolving HalfCheetah's total mass changes masses by 4e-16 kg, which is no shift.
 
     The friction of a foot at 0.2 is masked by that of the floor, 0.4.
     """
@@ -167,8 +167,8 @@ def test_an_edit_that_changes_only_the_rounding_is_empty(edit: Edit) -> None:
     assert certificate.changes == ()
 
 
-def test_a_small_real_change_is_no_rounding() -> None:
-    """A mass that differs by a millionth is a shift, although a small one."""
+def test_a_small_change_is_a_shift() -> None:
+    """A relative change of mass of 1e-6 is a shift."""
     target = gymnasium.make("shapechanger/HalfCheetah-v1", body=Mass("torso", scale=1.000001))
     certificate = certify(gymnasium.make("shapechanger/HalfCheetah-v1"), target)
     assert "mass" in {change.quantity for change in certificate.changes}

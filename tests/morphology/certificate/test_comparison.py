@@ -22,26 +22,26 @@ def _ant(edit: Callable[[mujoco.MjSpec], object]) -> mujoco.MjModel:
 
 
 def _longer(spec: mujoco.MjSpec) -> None:
-    """Double all four shanks, as the 2017 release did."""
+    """Double all four shanks, as in the 2017 release."""
     for geom in spec.geoms:
         if "ankle" in geom.name:
             geom.fromto = 2.0 * geom.fromto
 
 
 def _found(changes: tuple[Change, ...], quantity: str, element: str) -> Change:
-    """The one change of this quantity of this element."""
+    """Return the only change of a quantity of an element."""
     (item,) = [c for c in changes if (c.quantity, c.element) == (quantity, element)]
     return item
 
 
-def test_the_same_model_has_no_changes() -> None:
-    """Nothing is told of what is equal."""
+def test_equal_models_have_no_changes() -> None:
+    """Comparing equal models gives an empty tuple."""
     assert compare(asset("ant"), asset("ant")) == ()
     assert compare(everything(), everything()) == ()
 
 
-def test_longer_shanks_are_told_in_lengths_masses_and_inertias() -> None:
-    """What was meant and what follows from it are both told, per segment and in total."""
+def test_longer_shanks_change_lengths_masses_and_inertias() -> None:
+    """Direct and derived changes are listed, per segment and in total."""
     changes = compare(asset("ant"), _ant(_longer))
     length = _found(changes, "length", "ankle_1")
     assert (length.before, length.after) == pytest.approx((math.hypot(0.4, 0.4), 1.1314), rel=1e-3)
@@ -55,14 +55,14 @@ def test_longer_shanks_are_told_in_lengths_masses_and_inertias() -> None:
     assert inertia.unit == "kg·m²"
 
 
-def test_equal_changes_are_grouped_for_reading() -> None:
-    """Four shanks that grew alike are one line."""
+def test_equal_changes_are_grouped() -> None:
+    """Equal changes of several elements are one line."""
     lines = [item.sentence for item in grouped(compare(asset("ant"), _ant(_longer)))]
     assert "ankle_1, ankle_2, ankle_3, ankle_4: length 0.5657 m -> 1.131 m (x2)" in lines
 
 
-def test_a_thicker_leg_is_told_by_its_radius() -> None:
-    """The size of a capsule is two things, of which one changed."""
+def test_a_capsule_has_radius_and_length() -> None:
+    """A change of the radius of a capsule is not listed as a change of size or length."""
     changes = compare(
         asset("ant"), _ant(lambda s: setattr(s.geom("left_ankle_geom"), "size", [0.1, 0, 0]))
     )
@@ -71,8 +71,8 @@ def test_a_thicker_leg_is_told_by_its_radius() -> None:
     assert not [c for c in changes if c.quantity in ("length", "size")]
 
 
-def test_the_size_of_other_shapes_is_told_as_it_stands() -> None:
-    """A sphere has a radius, a box three half lengths; both are a size."""
+def test_other_shapes_have_a_size() -> None:
+    """Sizes of spheres are listed as `size`."""
     changes = compare(
         asset("ant"), _ant(lambda s: setattr(s.geom("torso_geom"), "size", [0.3, 0, 0]))
     )
@@ -80,8 +80,8 @@ def test_the_size_of_other_shapes_is_told_as_it_stands() -> None:
     assert size.sentence == "torso_geom: size 0.25 m -> 0.3 m (x1.2)"
 
 
-def test_a_pole_that_touches_nothing_still_has_a_length() -> None:
-    """Its body changed with it, so the length explains why."""
+def test_lengths_of_visual_geoms_explain_their_bodies() -> None:
+    """A visual geom has a length if its body changed too."""
     spec = asset_spec("inverted_pendulum")
     spec.geom("cpole").fromto = [0, 0, 0, 0.001, 0, 1.2]
     changes = compare(asset("inverted_pendulum"), spec.compile())
@@ -89,8 +89,8 @@ def test_a_pole_that_touches_nothing_still_has_a_length() -> None:
     assert (length.before, length.after) == pytest.approx((0.6, 1.2), rel=1e-5)
 
 
-def test_a_leg_of_another_shape_has_no_length_to_compare() -> None:
-    """A capsule that became a box is told by its type and its sizes; one that went, by that."""
+def test_a_change_of_shape_is_a_change_of_type() -> None:
+    """Type and size are listed instead of a length; a removed geom is listed as such."""
 
     def square(spec: mujoco.MjSpec) -> None:
         spec.geom("left_ankle_geom").type = mujoco.mjtGeom.mjGEOM_BOX
@@ -102,8 +102,8 @@ def test_a_leg_of_another_shape_has_no_length_to_compare() -> None:
     assert _found(gone, "geom", "aux_1_geom").sentence == "aux_1_geom: geom removed (capsule)"
 
 
-def test_a_drawing_that_grows_is_no_change() -> None:
-    """A capsule that touches nothing, on a body that stayed the same, is paint."""
+def test_visual_geoms_alone_are_no_change() -> None:
+    """A visual geom on an unchanged body is ignored."""
     xml = (
         "<mujoco><worldbody><body><joint/><inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/>"
         "<geom type='capsule' size='.1 {}' contype='0' conaffinity='0'/></body>"
@@ -113,8 +113,8 @@ def test_a_drawing_that_grows_is_no_change() -> None:
     assert compare(*models) == ()
 
 
-def test_joint_ranges_are_told_in_degrees() -> None:
-    """ODRL's narrowed hip, in the unit of the model's file."""
+def test_joint_ranges_are_in_degrees() -> None:
+    """Ranges of hinges have the unit of the model's file."""
     changes = compare(asset("ant"), _ant(lambda s: setattr(s.joint("hip_1"), "range", [-24, 24])))
     (item,) = changes
     assert item.quantity == "joint range"
@@ -125,7 +125,7 @@ def test_joint_ranges_are_told_in_degrees() -> None:
 
 
 def test_a_slide_has_other_units_than_a_hinge() -> None:
-    """Metres and newtons where a hinge has degrees and newton metres."""
+    """Slides have metres and N·s/m, hinges N·m·s/rad."""
     target = asset("inverted_pendulum")
     target.jnt_range[0] *= 2.0
     target.dof_damping[:] = 3.0
@@ -135,8 +135,8 @@ def test_a_slide_has_other_units_than_a_hinge() -> None:
     assert _found(changes, "damping", "hinge").unit == "N·m·s/rad"
 
 
-def test_a_limit_that_disappears_is_told_as_none() -> None:
-    """One side has the field, the other has not."""
+def test_a_removed_limit_is_none() -> None:
+    """A field that one side lacks is None."""
     target = asset("ant")
     target.jnt_limited[1] = 0
     item = _found(compare(asset("ant"), target), "joint range", "hip_1")
@@ -146,8 +146,8 @@ def test_a_limit_that_disappears_is_told_as_none() -> None:
     assert back.before is None
 
 
-def test_friction_that_the_floor_outvotes_is_no_change() -> None:
-    """The mistake that made two of ODRL's hopper tasks the same one."""
+def test_masked_friction_is_no_change() -> None:
+    """Friction below that of the floor has no effect, as in two hopper tasks of ODRL."""
     slippery = _ant(lambda s: setattr(s.geom("left_ankle_geom"), "friction", [0.2, 0.5, 0.5]))
     assert compare(asset("ant"), slippery) == ()
     rough = _ant(lambda s: setattr(s.geom("left_ankle_geom"), "friction", [2.0, 0.5, 0.5]))
@@ -156,8 +156,8 @@ def test_friction_that_the_floor_outvotes_is_no_change() -> None:
     assert item.sentence == "floor + left_ankle_geom: contact friction 1 each -> 2 each (x2)"
 
 
-def test_gear_and_gravity_are_told() -> None:
-    """The weaker motor and the lighter planet."""
+def test_gear_and_gravity_are_listed() -> None:
+    """Gears and gravity are listed with their ratio."""
     target = asset("ant")
     target.actuator_gear[0, 0] = 75.0
     target.opt.gravity[2] = -4.905
@@ -168,8 +168,8 @@ def test_gear_and_gravity_are_told() -> None:
     ]
 
 
-def test_parts_that_are_added_or_removed_are_told() -> None:
-    """A new segment brings a body, a joint, a geom and a contact, and more dimensions."""
+def test_added_and_removed_elements_are_listed() -> None:
+    """A new segment adds a body, a joint, a geom, a contact and dimensions."""
 
     def extend(spec: mujoco.MjSpec) -> None:
         foot = spec.body("aux_1").bodies[0].add_body(name="foot", pos=[0.4, 0.4, 0])
@@ -189,8 +189,8 @@ def test_parts_that_are_added_or_removed_are_told() -> None:
     assert _found(back, "body", "foot").after is None
 
 
-def test_another_order_of_motors_is_told() -> None:
-    """The same motors in another order answer to other numbers of an action."""
+def test_another_order_of_motors_is_a_change() -> None:
+    """Another order of the same motors changes the meaning of actions."""
     source, target = asset("ant"), asset("ant")
     target.actuator_trnid[[0, 1]] = target.actuator_trnid[[1, 0]]
     for array in ("actuator_acc0", "actuator_length0"):
@@ -202,8 +202,8 @@ def test_another_order_of_motors_is_told() -> None:
     assert item.after[:2] == ("ankle_4", "hip_4")
 
 
-def test_derived_constants_are_told_only_when_alone() -> None:
-    """They follow from the rest; where they do not, somebody wrote to them."""
+def test_derived_constants_are_listed_only_when_alone() -> None:
+    """Derived constants are listed only if nothing else explains them."""
     target = asset("ant")
     target.dof_M0[0] *= 2.0
     (item,) = compare(asset("ant"), target)
@@ -213,14 +213,14 @@ def test_derived_constants_are_told_only_when_alone() -> None:
 
 
 def test_a_tendon_has_no_unit() -> None:
-    """A fixed tendon adds lengths and angles as the model pleases."""
+    """The coefficients of fixed tendons have no common unit."""
     target = everything()
     target.tendon_damping[:] = 5.0
     assert {item.unit for item in compare(everything(), target)} == {""}
 
 
-def test_standing_height_is_told_where_both_sides_know_it() -> None:
-    """The caller measures it; the model does not know."""
+def test_standing_heights_are_compared_if_both_are_given() -> None:
+    """The caller passes the heights."""
     model = asset("ant")
     (item,) = compare(model, model, standing_height=(0.532, 1.017))
     assert item.sentence == "robot: standing height 0.532 m -> 1.017 m (x1.91)"
@@ -229,8 +229,8 @@ def test_standing_height_is_told_where_both_sides_know_it() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_no_difference_is_silent(seed: int) -> None:
-    """Whatever is written to a model: if the effective models differ, something is told."""
+def test_every_difference_is_listed(seed: int) -> None:
+    """Changes are listed if and only if the effective models differ."""
     random = np.random.default_rng(seed)
     names = [
         name
@@ -250,16 +250,16 @@ def test_no_difference_is_silent(seed: int) -> None:
     assert (compare(everything(), target) == ()) == same
 
 
-def test_as_many_digits_are_shown_as_tell_two_numbers_apart() -> None:
-    """A difference in the tenth digit is a difference, and reads as one."""
+def test_digits_distinguish_the_numbers() -> None:
+    """Enough digits are shown to tell the two numbers apart."""
     item = change("mass", "leg", (0.1,), (0.1 + 1e-7,), "kg")
     assert item.sentence == "leg: mass 0.1 kg -> 0.1000001 kg"
     tiny = change("mass", "leg", (0.1,), (math.nextafter(0.1, 1.0),), "kg")
     assert tiny.sentence.count("0.1000000000000000") == 2
 
 
-def test_numbers_that_json_lacks_become_words() -> None:
-    """An infinite number is told as a word."""
+def test_infinite_numbers_become_words() -> None:
+    """Infinite numbers are shown as words."""
     item = change("force range", "motor", (-math.inf, math.inf), (-1.0, 1.0))
     assert item.before == ("-inf", "inf")
     assert item.sentence == "motor: force range (-inf, inf) -> (-1, 1)"
@@ -277,21 +277,21 @@ def test_numbers_that_json_lacks_become_words() -> None:
         (("a",), ("b",), ""),
     ],
 )
-def test_a_ratio_is_told_where_there_is_one(
+def test_a_common_ratio_is_shown(
     before: tuple[float, ...], after: tuple[float, ...], ratio: str
 ) -> None:
-    """All numbers that are not zero must have grown by the same factor."""
+    """The ratio is shown if all nonzero numbers have the same one."""
     sentence = change("mass", "leg", before, after).sentence
     assert sentence.endswith(ratio)
     assert ("(x" in sentence) == bool(ratio)
 
 
 def test_comparing_two_ants_is_fast() -> None:
-    """A sweep over bodies compares thousands; this one takes about 10 ms."""
+    """A comparison takes about 10 ms, since sweeps make thousands."""
     source, target = asset("ant"), _ant(_longer)
     times = []
     for _ in range(5):
         start = time.process_time()
         compare(source, target)
         times.append(time.process_time() - start)
-    assert min(times) < 0.1  # Seconds of a core; ten times what it takes.
+    assert min(times) < 0.1  # CPU seconds, with a margin of 10.

@@ -1,4 +1,4 @@
-"""Compiled models whose numbers do not fit together."""
+"""Compiled models with inconsistent numbers."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from tests.morphology.scenes import EVERYTHING, asset, everything
 
 
 @pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "inverted_pendulum", "pusher_v5"])
-def test_compiled_models_fit_together(name: str) -> None:
-    """Nothing is wrong with what MuJoCo itself computed."""
+def test_compiled_models_are_consistent(name: str) -> None:
+    """Models from the compiler have no inconsistencies."""
     assert inconsistencies(asset(name)) == ()
     assert inconsistencies(everything()) == ()
 
 
 def test_a_mass_written_into_a_compiled_model_is_found() -> None:
-    """RRLS's way to change a mass, with the numbers measured on Ant-v5."""
+    """Stale constants are found, with the values measured on Ant-v5."""
     model = asset("ant")
     model.body("torso").mass[:] = 3.0
-    told = " ".join(inconsistencies(model))
-    assert "body_subtreemass is 0.9109, but the model makes it 3.584" in told
-    assert "torso: body_invweight0 is 1.101, but the model makes it 0.2793" in told
-    assert "mj_setConst" in told
+    message = " ".join(inconsistencies(model))
+    assert "body_subtreemass is 0.9109, but the model makes it 3.584" in message
+    assert "torso: body_invweight0 is 1.101, but the model makes it 0.2793" in message
+    assert "mj_setConst" in message
 
 
-def test_set_const_mends_the_constants_but_not_the_inertia() -> None:
-    """Mass without inertia shows only beside the model it came from."""
+def test_set_const_updates_constants_but_not_inertia() -> None:
+    """A changed mass with an old inertia is found only by comparison with the source."""
     model = asset("ant")
     model.body("torso").mass[:] = 3.0
     mujoco.mj_setConst(model, mujoco.MjData(model))
     assert inconsistencies(model) == ()
-    (told,) = lone_masses(asset("ant"), model)
-    assert told.startswith("torso: mass goes from 0.3272 to 3 kg, but its inertia stays 0.00818")
+    (message,) = lone_masses(asset("ant"), model)
+    assert message.startswith("torso: mass goes from 0.3272 to 3 kg, but its inertia stays 0.00818")
     assert lone_masses(asset("ant"), asset("ant")) == ()
 
 
 def test_mass_and_inertia_together_are_fine() -> None:
-    """A denser torso has more of both."""
+    """Scaling both together is consistent."""
     model = asset("ant")
     model.body("torso").mass[:] *= 2.0
     model.body("torso").inertia[:] *= 2.0
@@ -80,44 +80,42 @@ _IGNORED: dict[str, tuple[Callable[[mujoco.MjModel], object], str]] = {
 
 @pytest.mark.parametrize("what", _IGNORED)
 def test_writes_without_effect_are_found(what: str) -> None:
-    """What a compiled model takes and then ignores, or answers with stale numbers."""
-    edit, told = _IGNORED[what]
+    """Writes that a compiled model ignores, or that make constants stale, are found."""
+    edit, message = _IGNORED[what]
     spec = mujoco.MjSpec.from_string(_plain_everything())
     model = spec.compile()
     assert inconsistencies(model) == ()
     edit(model)
-    assert told in " ".join(inconsistencies(model))
+    assert message in " ".join(inconsistencies(model))
 
 
 def _plain_everything() -> str:
-    """The model of everything, without gravity compensation."""
+    """Return the model of everything, without gravity compensation."""
     return EVERYTHING.replace('gravcomp=".1"', "")
 
 
 def test_bits_that_were_not_compiled_are_found() -> None:
-    """A geom that is made to collide later does not, or not always: recompile."""
+    """Enabling collisions of a geom after compilation is found."""
     model = everything()
     model.geom("wheel").contype[:] = 1
-    (told,) = inconsistencies(model)
-    assert told.startswith("wheel: geom_contype or geom_conaffinity has bits that its body")
+    (message,) = inconsistencies(model)
+    assert message.startswith("wheel: geom_contype or geom_conaffinity has bits that its body")
     model = everything()
     model.geom("paint").contype[:] = 1
-    (told,) = inconsistencies(model)
-    assert told.startswith("MuJoCo cannot derive its constants from the model: ")
+    (message,) = inconsistencies(model)
+    assert message.startswith("MuJoCo cannot derive its constants from the model: ")
 
 
 @pytest.mark.parametrize(
-    ("inertia", "told"),
+    ("inertia", "message"),
     [
         ((0.0, 0.0, 0.0), "comes with inertia 0 kg·m²"),
         ((-1.0, 1.0, 1.0), "comes with inertia -1 kg·m²"),
         ((0.1, 0.1, 0.3), "more than the other two together"),
     ],
 )
-def test_inertias_that_no_body_has_are_found(
-    inertia: tuple[float, float, float], told: str
-) -> None:
-    """The largest principal moment is at most the sum of the others."""
+def test_impossible_inertias_are_found(inertia: tuple[float, float, float], message: str) -> None:
+    """Moments must be positive, and the largest at most the sum of the others."""
     xml = (
         "<mujoco><worldbody><body name='b'><joint type='slide'/><geom size='.1'/></body>"
         "</worldbody></mujoco>"
@@ -125,12 +123,13 @@ def test_inertias_that_no_body_has_are_found(
     model = mujoco.MjModel.from_xml_string(xml)
     model.body("b").inertia[:] = inertia
     assert any(
-        sentence.startswith("b: mass") and told in sentence for sentence in inconsistencies(model)
+        sentence.startswith("b: mass") and message in sentence
+        for sentence in inconsistencies(model)
     )
 
 
 def test_a_thin_rod_is_possible() -> None:
-    """Its largest moment equals the other two together."""
+    """The largest moment may equal the sum of the others."""
     xml = (
         "<mujoco><worldbody><body><joint/><inertial mass='1' pos='0 0 0' diaginertia='1 1 2'/>"
         "</body></worldbody></mujoco>"
@@ -138,6 +137,6 @@ def test_a_thin_rod_is_possible() -> None:
     assert inconsistencies(mujoco.MjModel.from_xml_string(xml)) == ()
 
 
-def test_a_model_without_parts_fits_together() -> None:
-    """No joints, no tendons, nothing to compare."""
+def test_an_empty_model_is_consistent() -> None:
+    """A model without elements has no inconsistencies."""
     assert inconsistencies(mujoco.MjModel.from_xml_string("<mujoco/>")) == ()

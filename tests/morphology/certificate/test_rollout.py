@@ -1,4 +1,4 @@
-"""Two environments that get the same commands."""
+"""Rollouts of two environments under the same commands."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from shapechanger.morphology.certificate.rollout import (
 from tests.morphology.swing import Broken, Dictionary, Longer, Noisy, Swing, Wrapper
 
 
-def test_the_same_environment_answers_the_same() -> None:
-    """Reset with one seed and pushed alike, two equal pendulums stay together."""
+def test_equal_environments_have_equal_rollouts() -> None:
+    """Equal seeds and commands give equal observations."""
     rollout = compare_rollouts(Swing(), Swing(), steps=20)
     assert rollout.identical
     assert rollout.steps == 20
@@ -30,14 +30,14 @@ def test_the_same_environment_answers_the_same() -> None:
     )
 
 
-def test_one_environment_may_be_both() -> None:
-    """The source runs to its end before the target starts."""
+def test_one_environment_can_be_source_and_target() -> None:
+    """The source's rollout ends before the target's starts."""
     env = Swing()
     assert compare_rollouts(env, env, steps=20).identical
 
 
-def test_where_two_part_is_told() -> None:
-    """A stronger motor shows at the first step, not at the reset, and in the velocity most."""
+def test_the_first_difference_is_reported() -> None:
+    """The report has step and feature of the first difference."""
     rollout = compare_rollouts(Swing(), Swing(gear=2.0), steps=30)
     assert not rollout.identical
     assert rollout.first_step == 1
@@ -48,8 +48,8 @@ def test_where_two_part_is_told() -> None:
     assert "Rewards differ by up to" in str(rollout)
 
 
-def test_the_largest_difference_is_the_largest() -> None:
-    """Checked against the two rollouts themselves."""
+def test_the_largest_difference_is_correct() -> None:
+    """Step, feature and value equal those of separate rollouts."""
     source, target = Swing(), Swing(length=0.8)
     rollout = compare_rollouts(source, target, steps=25, seed=3)
     observations = []
@@ -67,8 +67,8 @@ def test_the_largest_difference_is_the_largest() -> None:
     assert rollout.largest_feature == source.observation_layout.names[feature]
 
 
-def test_motors_of_the_same_name_get_the_same_numbers() -> None:
-    """A second motor beside it changes nothing for the first, and itself gets zero."""
+def test_motors_of_the_same_name_get_the_same_commands() -> None:
+    """Motors that only one side has get zero."""
     source, target = Swing(), Swing(wrist=True)
     compare_rollouts(source, target, steps=10)
     one, two = np.asarray(source.commands), np.asarray(target.commands)
@@ -80,7 +80,7 @@ def test_motors_of_the_same_name_get_the_same_numbers() -> None:
 
 
 def test_another_seed_gives_other_commands() -> None:
-    """The seed reaches both the reset and the motors."""
+    """The seed determines the commands."""
     env = Swing()
     compare_rollouts(env, env, steps=5, seed=0)
     one = np.asarray(env.commands)
@@ -88,8 +88,8 @@ def test_another_seed_gives_other_commands() -> None:
     assert not np.array_equal(one, np.asarray(env.commands))
 
 
-def test_more_numbers_on_one_side_are_told() -> None:
-    """Same-named numbers are compared, the others are listed."""
+def test_features_of_one_side_are_listed() -> None:
+    """Features of the same name are compared, others are listed."""
     rollout = compare_rollouts(Swing(), Swing(wrist=True), steps=5)
     assert rollout.compared == 2
     assert rollout.only_in_target == ("wrist/angle", "wrist/velocity")
@@ -98,7 +98,7 @@ def test_more_numbers_on_one_side_are_told() -> None:
 
 
 def test_the_shorter_episode_ends_the_comparison() -> None:
-    """A target that falls after seven steps is compared over seven."""
+    """Steps after the end of either episode are not compared."""
     rollout = compare_rollouts(Swing(), Swing(limit=7), steps=20)
     assert rollout.steps == 7
     assert (rollout.source_ended, rollout.target_ended) == (False, True)
@@ -110,29 +110,29 @@ def test_the_shorter_episode_ends_the_comparison() -> None:
 
 
 def test_another_reward_is_a_difference() -> None:
-    """Bodies and senses alike, but not what is asked for."""
+    """Equal observations with different rewards are not identical."""
     rollout = compare_rollouts(Swing(), Swing(bonus=1.0), steps=5)
     assert rollout.first_step is None
     assert rollout.reward_difference == pytest.approx(1.0)
     assert not rollout.identical
 
 
-def test_noise_of_a_wrapper_shows_at_the_reset() -> None:
-    """What the outermost wrapper gives is what is compared."""
+def test_wrappers_are_included() -> None:
+    """Observations of the outermost wrapper are compared."""
     rollout = compare_rollouts(Swing(), Noisy(Swing()), steps=5)
     assert rollout.first_step == 0
     assert "part at the reset" in str(rollout)
 
 
-def test_dictionaries_are_compared_part_by_part() -> None:
-    """In alphabetical order of their keys."""
+def test_dict_observations_are_compared() -> None:
+    """Parts of Dict observations are compared in alphabetical order of their keys."""
     rollout = compare_rollouts(Dictionary(Swing()), Dictionary(Swing()), steps=5)
     assert rollout.identical
     assert rollout.compared == 2
 
 
-def test_observations_that_no_layout_describes_go_by_their_places() -> None:
-    """A wrapper that adds a number makes the layout useless, not the comparison."""
+def test_observations_without_a_layout_are_compared_by_index() -> None:
+    """If the layout does not fit, numbers are compared by index."""
     rollout = compare_rollouts(Longer(Swing()), Longer(Swing(gear=2.0)), steps=5)
     assert rollout.compared == 3
     assert rollout.largest_feature == "observation[1]"
@@ -140,8 +140,8 @@ def test_observations_that_no_layout_describes_go_by_their_places() -> None:
     assert uneven.only_in_target == ("observation[2]",)
 
 
-def test_nothing_in_common_is_no_agreement() -> None:
-    """Two environments that sense different things are different."""
+def test_without_common_features_rollouts_differ() -> None:
+    """Environments without a common feature are not identical."""
     target = Swing()
     target.observation_layout = Layout((Feature("x", "m"), Feature("y", "m")))
     rollout = compare_rollouts(Swing(), target, steps=5)
@@ -150,22 +150,22 @@ def test_nothing_in_common_is_no_agreement() -> None:
     assert "Only the source observes 2 more" in str(rollout)
 
 
-def test_what_is_no_number_equals_only_itself() -> None:
-    """NaN on both sides agrees; on one it is as far away as can be, and still fits into JSON."""
+def test_nan_equals_only_nan() -> None:
+    """NaN on one side is the largest finite difference, which JSON can hold."""
     assert compare_rollouts(Broken(Swing()), Broken(Swing()), steps=3).identical
     rollout = compare_rollouts(Swing(), Broken(Swing()), steps=3)
     assert rollout.largest_difference == sys.float_info.max
 
 
 def test_no_steps_compare_the_resets() -> None:
-    """Zero commands are allowed."""
+    """With zero steps only the resets are compared."""
     rollout = compare_rollouts(Swing(), Swing(), steps=0)
     assert rollout.identical
     assert rollout.steps == 0
 
 
 def test_attributes_are_found_inside_wrappers() -> None:
-    """Gymnasium's wrappers do not pass attributes on."""
+    """`attribute` searches through wrappers."""
     env = Swing()
     assert attribute(Wrapper(Wrapper(env)), "model") is env.model
     assert attribute(env, "model") is env.model
@@ -184,15 +184,15 @@ def test_attributes_are_found_inside_wrappers() -> None:
     ],
 )
 def test_commands_stay_in_range(low: float, high: float, expected: tuple[float, float]) -> None:
-    """Also where a range has no end."""
+    """Commands cover finite ranges and stay within infinite ones."""
     layout = Layout((Feature("motor", "1", low, high),))
     commands, _ = matched_commands(layout, layout, 1000, 0)
     assert expected[0] <= commands.min() < expected[0] + 0.05 * (expected[1] - expected[0])
     assert expected[1] >= commands.max() > expected[1] - 0.05 * (expected[1] - expected[0])
 
 
-def test_commands_lie_where_the_ranges_overlap() -> None:
-    """A number that both can do; and where they share none, each does what it can."""
+def test_commands_are_in_both_ranges() -> None:
+    """Commands are in the intersection, or each in its own range if it is empty."""
     wide, narrow = Feature("motor", "1", -3.0, 3.0), Feature("motor", "1", 0.5, 1.0)
     one, two = matched_commands(Layout((wide,)), Layout((narrow,)), 50, 0)
     np.testing.assert_array_equal(one, two)
@@ -205,13 +205,13 @@ def test_commands_lie_where_the_ranges_overlap() -> None:
 
 
 def test_a_motor_that_cannot_rest_gets_the_nearest_to_zero() -> None:
-    """Zero out of range is no command."""
+    """Where 0 is out of range, the nearest value is used."""
     extra = Layout((Feature("only", "1", 0.2, 1.0),))
     _, commands = matched_commands(Layout(()), extra, 3, 0)
     np.testing.assert_array_equal(commands, np.full((3, 1), 0.2, np.float32))
 
 
 def test_blocks_have_a_name_per_number() -> None:
-    """A block of a layout is numbered through."""
+    """Numbers of a block are indexed."""
     layout = Layout((Feature("x", "m"), Feature("block", "1", shape=(2, 2))))
     assert number_names(layout) == ["x", "block[0]", "block[1]", "block[2]", "block[3]"]

@@ -1,4 +1,4 @@
-"""What every edit is: a value with an amount, whose numbers are checked when it is written down."""
+"""Properties of all edits: values with an amount, validated when created."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.morphology.models import leg
 
 
 def test_edits_are_values() -> None:
-    """Equal when their fields are, fit for a set, printed without defaults, never changed."""
+    """Edits compare by value, are hashable and frozen, and print without defaults."""
     edit = Stretch("thigh", 2.0)
     assert edit == Stretch("thigh", 2.0) != Stretch("shin", 2.0)
     assert len({edit, Stretch("thigh", 2.0)}) == 1
@@ -33,39 +33,39 @@ def test_edits_are_values() -> None:
 
 
 @pytest.mark.parametrize("amount", [-0.1, 1.1, math.nan, math.inf])
-def test_amounts_are_parts(amount: float) -> None:
-    """Neither less than nothing nor more than all of a change can be made."""
+def test_amounts_are_fractions(amount: float) -> None:
+    """Amounts outside 0 to 1 are refused."""
     with pytest.raises(MorphologyError, match="amount must be between 0 and 1, got"):
         Stretch("thigh", 2.0, amount=amount)
 
 
-def test_parts_of_parts_multiply() -> None:
-    """Half of half a change is a quarter of it."""
+def test_amounts_multiply() -> None:
+    """Half of half an edit has the amount 0.25."""
     assert Mass("*", scale=2.0).partly(0.5).partly(0.5) == Mass("*", scale=2.0, amount=0.25)
 
 
-def test_an_edit_says_how_it_is_applied() -> None:
-    """The base knows no change."""
+def test_the_base_class_is_abstract() -> None:
+    """`Edit.apply` raises NotImplementedError."""
     with pytest.raises(NotImplementedError):
         Edit().apply(leg())
 
 
-def test_the_way_ends_exactly() -> None:
-    """No rounding is left at the end, however odd the numbers."""
+def test_interpolation_ends_exactly() -> None:
+    """The ends are exact, without rounding."""
     assert part_of_the_way(0.1, 0.7, 1.0) == 0.7
     assert part_of_the_way(0.1, 0.7, 0.0) == 0.1
     assert part_of_the_way(2.0, 4.0, 0.25) == 2.5
 
 
 @pytest.mark.parametrize("factor", [0.01, 1.0, 100.0])
-def test_factors_may_be_large_or_small(factor: float) -> None:
-    """A hundred times is the limit, and within it."""
+def test_factors_are_limited_inclusively(factor: float) -> None:
+    """Factors of 0.01 and 100 are accepted."""
     require_factor("The factor", factor)
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, math.nan, math.inf, -math.inf, 1e-3, 1e3])
 def test_absurd_factors_are_refused(factor: float) -> None:
-    """A limb a thousand times longer is a typing mistake."""
+    """Factors outside 0.01 to 100 are refused."""
     with pytest.raises(MorphologyError, match=r"The factor must be a ratio between 0\.01 and 100"):
         require_factor("The factor", factor)
 
@@ -74,24 +74,24 @@ def test_absurd_factors_are_refused(factor: float) -> None:
     "vector",
     [
         *((math.nan, 0.0, 1.0), (0.0, math.inf, 1.0), (1.0, 2.0), (1.0, 2.0, 3.0, 4.0), ()),
-        [1.0, 2.0, 3.0],  # A list could change, and would not equal what JSON gives back.
+        [1.0, 2.0, 3.0],  # Lists are mutable, and would not equal the tuples from JSON.
     ],
 )
 def test_vectors_are_three_finite_numbers(vector: Any) -> None:
-    """Anything else is refused before it meets a model."""
+    """Other vectors are refused when the edit is created."""
     with pytest.raises(MorphologyError, match="Gravity must be a tuple of three finite numbers"):
         Gravity(vector)
 
 
 def test_directions_are_not_zero() -> None:
-    """A vector of no length points nowhere, but can be a gravity."""
+    """A zero vector is refused as an axis and accepted as gravity."""
     with pytest.raises(MorphologyError, match="The axis must not be zero"):
         require_vector("The axis", (0.0, 0.0, 0.0))
     require_vector("Gravity", (0.0, 0.0, 0.0), nonzero=False)
 
 
 def test_tags_are_the_names_of_the_kinds() -> None:
-    """`AddSegment` is written as `add_segment`, and no two kinds share a tag."""
+    """Tags are the snake-case class names, and unique."""
     tags = [cast("str", kind.__struct_config__.tag) for kind in EDITS]
     assert tags == [
         *("stretch", "radius", "cut", "remove", "split", "add_segment", "add_limb"),
@@ -107,7 +107,7 @@ def test_several_numbers_for_one_are_refused() -> None:
 
 
 def test_numpy_numbers_are_values() -> None:
-    """Scalars and arrays of NumPy become plain numbers and tuples, which JSON can hold."""
+    """NumPy scalars and arrays become floats and tuples."""
     stretch = Stretch("thigh", np.linspace(0.5, 2.0, 2)[0])
     assert stretch == Stretch("thigh", 0.5)
     assert to_json([stretch]) == to_json([Stretch("thigh", 0.5)])

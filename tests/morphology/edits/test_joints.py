@@ -1,4 +1,4 @@
-"""The range of joints, and locking them."""
+"""Joint ranges and locked joints."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from tests.morphology.scenes import asset_spec
 
 
 def _range(model: mujoco.MjModel, joint: str) -> list[float]:
-    """The compiled limits of a joint, rad or m."""
+    """Return the compiled limits of a joint, rad or m."""
     return model.joint(joint).range.tolist()
 
 
 def test_limits_are_given_in_radians() -> None:
-    """Whatever the model is written in; the limit that is not given stays."""
+    """Units do not depend on the model; a limit that is not given stays."""
     assert _range(built(leg(), JointRange("knee", -1.0, 0.5)), "knee") == pytest.approx([-1.0, 0.5])
     assert _range(built(leg(), JointRange("knee", lower=-1.0)), "knee") == pytest.approx([-1.0, 0])
     model = built(gantry(), JointRange("swing", upper=0.25))
@@ -29,29 +29,29 @@ def test_limits_are_given_in_radians() -> None:
 
 @pytest.mark.parametrize("degrees", range(-180, 181, 6))
 def test_degrees_are_exact(degrees: int) -> None:
-    """A limit of 30° is that of a model file that says 30, to the last bit."""
+    """Limits of whole degrees equal bitwise those of a file in degrees."""
     spec = limb('<geom size=".1"/>')
     spec.joint("link").range = [degrees, 200.0]
     edited = built(limb('<geom size=".1"/>'), JointRange("link", math.radians(degrees), 3.5))
     assert edited.joint("link").range[0] == built(spec).joint("link").range[0]
 
 
-def test_angles_that_no_degrees_give_are_the_nearest() -> None:
-    """Then the last bit may differ."""
+def test_other_angles_are_exact_to_rounding() -> None:
+    """Limits that are not whole degrees may differ in the last bit."""
     for limit in np.random.default_rng(0).uniform(-3.0, 3.0, 100).tolist():
         model = built(limb('<geom size=".1"/>'), JointRange("link", limit, 3.2))
         assert _range(model, "link")[0] == pytest.approx(limit, rel=3e-16)
 
 
 def test_a_joint_without_limits_becomes_limited() -> None:
-    """A hinge from a full turn; a limit that is not given stays where the turn ends."""
+    """A limit that is not given is that of a full turn."""
     model = built(limb('<geom size=".1"/>'), JointRange("link", lower=-1.0))
     assert model.joint("link").limited
     assert _range(model, "link") == pytest.approx([-1.0, math.pi])
 
 
 def test_a_slide_without_limits_needs_both() -> None:
-    """It has no full turn to begin with; on the way there the limits come from far away."""
+    """Partial edits interpolate from far away."""
     for edit in (JointRange("y", lower=-1.0), JointRange("y", upper=1.0)):
         with pytest.raises(MorphologyError, match="'y' slides without limits: give both of them"):
             built(gantry(), edit)
@@ -64,7 +64,7 @@ def test_a_slide_without_limits_needs_both() -> None:
 
 
 def test_limits_of_many_joints() -> None:
-    """A glob changes every joint that fits."""
+    """A glob changes every joint that it matches."""
     model = built(ant(), JointRange("hip_*", -0.1, 0.1))
     for leg_number in range(1, 5):
         assert _range(model, f"hip_{leg_number}") == pytest.approx([-0.1, 0.1])
@@ -81,20 +81,20 @@ def test_limits_of_many_joints() -> None:
     ],
 )
 def test_empty_ranges_are_refused(lower: float | None, upper: float | None, message: str) -> None:
-    """A joint that cannot move is a lock's business."""
+    """Limits must be finite and ordered."""
     with pytest.raises(MorphologyError, match=message):
         JointRange("hip", lower, upper)
 
 
 def test_ranges_that_the_model_makes_empty_are_refused() -> None:
-    """The other limit is the model's, so only the model shows it."""
+    """A range that is empty with the model's other limit is refused when applied."""
     with pytest.raises(MorphologyError, match=r"The range of 'knee' would be 1 to 0\."):
         built(leg(), JointRange("knee", lower=1.0))
 
 
 @pytest.mark.parametrize("edit", [JointRange("*", -1.0, 1.0), Lock("root")])
 def test_free_joints_have_no_range(edit: Edit) -> None:
-    """And are not locked either."""
+    """Ranges and locks of free joints are refused."""
     with pytest.raises(
         MorphologyError, match="'root' is neither a hinge nor a slide, so it has no range"
     ):
@@ -102,21 +102,21 @@ def test_free_joints_have_no_range(edit: Edit) -> None:
 
 
 @pytest.mark.parametrize("edit", [JointRange("kneee", -1.0, 1.0), Lock("kneee")])
-def test_a_joint_that_is_not_there_is_named(edit: Edit) -> None:
-    """With the nearest that is."""
+def test_an_unknown_joint_is_refused(edit: Edit) -> None:
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"No joint matches 'kneee'\. Did you mean 'knee'\?"):
         built(leg(), edit)
 
 
 @pytest.mark.parametrize("position", [math.nan, math.inf])
-def test_a_joint_is_locked_somewhere(position: float) -> None:
-    """At a number."""
+def test_lock_positions_must_be_finite(position: float) -> None:
+    """Infinite positions and NaN are refused."""
     with pytest.raises(MorphologyError, match="A joint cannot be locked at"):
         Lock("hip", position)
 
 
-def test_a_locked_joint_is_gone() -> None:
-    """With its motor, and the limb stays."""
+def test_a_locked_joint_is_removed() -> None:
+    """The joint and its motor are removed, the limb stays."""
     model = built(leg(), Lock("knee"))
     assert (model.nq, model.nu, model.njnt) == (8, 1, 2)
     assert model.body("shin").dofnum == 0
@@ -124,7 +124,7 @@ def test_a_locked_joint_is_gone() -> None:
 
 
 def test_joints_are_locked_in_the_middle() -> None:
-    """Unless a position is given: the middle of the range, or of the full turn."""
+    """The default position is the middle of the range, or of the full turn."""
     free = built(leg())
     for edit, angle in (
         (Lock("knee"), math.radians(-45.0)),
@@ -138,7 +138,7 @@ def test_joints_are_locked_in_the_middle() -> None:
 
 
 def test_a_slide_without_limits_has_no_middle() -> None:
-    """So it is locked at a position or not at all."""
+    """It needs an explicit position."""
     with pytest.raises(MorphologyError, match="'y' slides without limits, so it has no middle"):
         built(gantry(), Lock("y"))
     assert built(gantry(), Lock("y", 0.3)).njnt == 4
@@ -146,8 +146,8 @@ def test_a_slide_without_limits_has_no_middle() -> None:
     assert _range(half, "y") == pytest.approx([0.3 - 1.0, 0.3 + 1.0])
 
 
-def test_on_the_way_to_a_lock_the_range_narrows() -> None:
-    """Around the position, never to less than a thousandth."""
+def test_a_partial_lock_narrows_the_range() -> None:
+    """The range narrows around the position, to no less than 0.001."""
     for amount in (0.25, 0.5, 1.0 - 1e-9):
         model = built(leg(), Lock("knee", -0.5).partly(amount))
         lower, upper = _range(model, "knee")
@@ -157,7 +157,7 @@ def test_on_the_way_to_a_lock_the_range_narrows() -> None:
 
 
 def test_several_joints_of_a_body_are_locked_together() -> None:
-    """In whatever order they are found; what is left is a body that does not move."""
+    """The order of the locks does not matter."""
     positions = {"x": 0.7, "yaw": -0.3, "y": 0.2, "pitch": 1.1}
     free = posed(built(gantry()), {**positions, "swing": 0.4})
     for order in (list(positions), list(reversed(positions))):
@@ -169,7 +169,7 @@ def test_several_joints_of_a_body_are_locked_together() -> None:
 
 
 def test_a_joint_before_the_locked_one_keeps_its_motion() -> None:
-    """It turns about the same line in the world as it did."""
+    """Its axis and anchor in the world stay."""
     locked = built(gantry(), Lock("pitch", 1.0))
     free = built(gantry())
     for yaw in (-0.5, 0.0, 0.4):

@@ -1,4 +1,4 @@
-"""Cutting, removing, splitting and adding."""
+"""Cutting, removing, splitting, adding and copying."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _MESH_LIMB = """
 
 
 def _bodies(model: mujoco.MjModel) -> list[str]:
-    """The names of the bodies, but for the world."""
+    """Return the names of all bodies except the world."""
     return [model.body(i).name for i in range(1, model.nbody)]
 
 
@@ -46,38 +46,38 @@ def _bodies(model: mujoco.MjModel) -> list[str]:
 
 
 def test_a_cut_keeps_the_near_part() -> None:
-    """A quarter of the shank, held where it was."""
+    """The near part keeps its place and has the given share of the length."""
     model = built(ant(), Cut("shank_4", 0.25))
     assert model.geom("fourth_ankle_geom").size[1] == pytest.approx(0.05 * math.sqrt(2.0))
     np.testing.assert_array_equal(model.body("shank_4").pos, built(ant()).body("shank_4").pos)
 
 
-def test_what_hung_beyond_a_cut_is_lost() -> None:
-    """With its joints and motors; what is held exactly at the cut stays."""
+def test_children_beyond_a_cut_are_removed() -> None:
+    """Joints and motors are removed too; a child exactly at the cut stays."""
     cut = built(leg(), Cut("thigh", 0.99))
     assert (_bodies(cut), cut.nu, cut.nq) == (["trunk", "thigh"], 1, 8)
-    # The knee is at the thigh's end, though the shin's origin is not.
+    # The knee is at the end of the thigh, but the shin's origin is not.
     assert _bodies(built(leg(), Cut("thigh", 1.0))) == ["trunk", "thigh", "shin"]
     for body in ("thigh", "leg"):
         assert built(asset_spec("hopper"), Cut(body, 1.0)).nbody == 5
 
 
-def test_a_cut_that_reaches_a_body_before_itself_skips_it() -> None:
-    """A glob may fit a limb and what hangs on it; the limb is cut, and the rest is gone."""
+def test_a_glob_skips_bodies_that_a_cut_removed() -> None:
+    """Of a limb and its child that match, the limb is cut and the child is gone."""
     model = built(ant(), Cut("*_4", 0.5))
     assert "shank_4" not in _bodies(model)
     assert model.geom("rightback_leg_geom").size[1] == pytest.approx(0.05 * math.sqrt(2.0))
 
 
 @pytest.mark.parametrize("keep", [0.0, -0.5, math.nan, math.inf, 1e-3, 1.001, 1e3])
-def test_a_cut_keeps_a_part(keep: float) -> None:
-    """Not nothing, and not more than there was."""
+def test_invalid_cuts_are_refused(keep: float) -> None:
+    """The kept share must be in the valid range."""
     with pytest.raises(MorphologyError, match="cut"):
         Cut("thigh", keep)
 
 
-def test_on_the_way_to_a_cut_the_rest_shrinks() -> None:
-    """The near part shortens, and what hangs beyond becomes small and weak."""
+def test_a_partial_cut_shrinks_the_rest() -> None:
+    """The near part shortens, and its children become small and weak."""
     before = built(leg())
     half = built(leg(), Cut("thigh", 0.5).partly(0.5))
     assert half.geom("thigh").size[1] == pytest.approx(0.15 * 0.75)
@@ -90,8 +90,8 @@ def test_on_the_way_to_a_cut_the_rest_shrinks() -> None:
 # --- Remove ------------------------------------------------------------------------------------
 
 
-def test_a_limb_is_removed_with_all_that_hangs_on_it() -> None:
-    """Its joints and motors too; the order of the others stays."""
+def test_a_limb_is_removed_with_its_children() -> None:
+    """Joints and motors are removed too; the order of the others stays."""
     model = built(ant(), Remove("aux_1"))
     assert not {"aux_1", "shank_1"} & {*_bodies(model)}
     assert [model.actuator(i).name for i in range(model.nu)] == [
@@ -101,7 +101,7 @@ def test_a_limb_is_removed_with_all_that_hangs_on_it() -> None:
 
 
 def test_a_glob_removes_parents_and_children_once() -> None:
-    """What hung on a limb that is gone is gone."""
+    """Children of a removed limb that match too are no error."""
     assert _bodies(built(leg(), Remove("s*"))) == ["trunk", "thigh"]
     assert _bodies(built(leg(), Remove("[ts]hi*"))) == ["trunk"]
 
@@ -117,7 +117,7 @@ def test_a_glob_removes_parents_and_children_once() -> None:
     ],
 )
 def test_a_trunk_is_not_a_limb(edit: Edit, what: str) -> None:
-    """Without it there would be no robot."""
+    """Trunks cannot be cut, removed, split or copied."""
     with pytest.raises(MorphologyError, match=f"'trunk' is the trunk .* so it cannot be {what}"):
         built(leg(), edit)
 
@@ -129,8 +129,8 @@ def test_a_trunk_is_not_a_limb(edit: Edit, what: str) -> None:
         AddSegment("shim", "toe", (0.0, 0.0, 0.1)),
     ],
 )
-def test_a_limb_that_is_not_there_is_named(edit: Edit) -> None:
-    """With the nearest that is."""
+def test_an_unknown_limb_is_refused(edit: Edit) -> None:
+    """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"No body matches 'shim'\. Did you mean 'shin'\?"):
         built(leg(), edit)
 
@@ -138,8 +138,8 @@ def test_a_limb_that_is_not_there_is_named(edit: Edit) -> None:
 # --- Split -------------------------------------------------------------------------------------
 
 
-def test_a_split_segment_is_two() -> None:
-    """The parts lie where the whole did, and a hinge like its own is between them."""
+def test_a_split_gives_two_segments() -> None:
+    """Both parts cover the original, with a hinge like its own between them."""
     before, after = built(leg()), built(leg(), Split("thigh", "shank", at=1.0 / 3.0, gear=5.0))
     assert _bodies(after) == ["trunk", "thigh", "shank", "shin"]
     np.testing.assert_allclose(after.body("shank").pos, [0.0, 0.0, -0.1])
@@ -155,8 +155,8 @@ def test_a_split_segment_is_two() -> None:
         np.testing.assert_allclose(tip(after, site), tip(before, site), atol=1e-12)
 
 
-def test_what_has_no_length_goes_with_one_part() -> None:
-    """Sites and spheres stay where they are; what refers to them finds them."""
+def test_elements_without_length_go_to_one_part() -> None:
+    """Sites and spheres keep their place and their references."""
     spec = leg()
     spec.add_sensor(
         name="touch",
@@ -184,16 +184,16 @@ def test_what_has_no_length_goes_with_one_part() -> None:
     np.testing.assert_allclose(posed(parts).geom("bone_of_far").xpos, [0.1, 0.0, 0.75])
 
 
-def test_the_farther_part_may_be_passive() -> None:
-    """No motor, another axis, a hinge that is not in the middle of its range."""
+def test_a_split_can_be_passive() -> None:
+    """Without a gear there is no motor; axis and range can be given."""
     model = built(leg(), Split("thigh", "shank", lower=0.1, upper=0.4, axis=(0.0, 1.0, 0.0)))
     assert model.nu == 2
     np.testing.assert_array_equal(model.joint("shank").axis, [0.0, 1.0, 0.0])
     np.testing.assert_allclose(model.joint("shank").range, [0.1, 0.4])
 
 
-def test_rounded_ends_at_a_split_come_with_its_amount() -> None:
-    """At first the halves weigh what the whole did; in the end each is a capsule by itself."""
+def test_rounded_ends_grow_with_the_amount() -> None:
+    """A small amount keeps the mass; at 1 both parts are complete capsules."""
     whole = mass(built(leg()), "thigh")
     first = built(leg(), Split("thigh", "shank").partly(1e-9))
     assert mass(first, "thigh", "shank") == pytest.approx(whole)
@@ -202,8 +202,8 @@ def test_rounded_ends_at_a_split_come_with_its_amount() -> None:
     )
 
 
-def test_a_split_shares_out_a_mass_that_is_written_out() -> None:
-    """As it does a density."""
+def test_a_split_divides_an_explicit_mass() -> None:
+    """An explicit mass is divided like one from a density."""
     for content in ('mass="3"', 'density="3"'):
         geom = f'<geom name="g" type="capsule" size=".1 .5" {content}/>'
         first = built(limb(geom), Split("link", "far", at=0.3).partly(1e-9))
@@ -212,7 +212,7 @@ def test_a_split_shares_out_a_mass_that_is_written_out() -> None:
 
 
 def test_parts_can_be_split_again() -> None:
-    """And each part of each."""
+    """Both parts can be split again."""
     model = built(leg(), Split("thigh", "a"), Split("a", "b"), Split("thigh", "c"))
     assert _bodies(model) == ["trunk", "thigh", "c", "a", "b", "shin"]
     np.testing.assert_allclose(tip(model, "toe"), tip(built(leg()), "toe"), atol=1e-12)
@@ -221,13 +221,13 @@ def test_parts_can_be_split_again() -> None:
 @pytest.mark.parametrize(
     ("model", "body", "child"),
     [
-        ("half_cheetah", "bthigh", "bshin"),  # Its geom is turned by axis and angle.
-        ("humanoid", "right_shin", "right_foot"),  # Its joint is not at its origin.
+        ("half_cheetah", "bthigh", "bshin"),  # Its geom has an axis-angle orientation.
+        ("humanoid", "right_shin", "right_foot"),  # Its joint is away from its origin.
         ("hopper", "leg", "foot"),  # Both its ends follow from a size.
     ],
 )
 def test_splits_of_gymnasiums_limbs(model: str, body: str, child: str) -> None:
-    """However their geoms are written: what hangs on them stays where it is."""
+    """Children stay in place for all ways to write a geom."""
     spec = asset_spec(model)
     before = built(spec, Stretch(body, 1.0))
     after = built(spec, Split(body, "half", at=0.4, axis=(0.0, 1.0, 0.0)))
@@ -244,7 +244,7 @@ def test_splits_of_gymnasiums_limbs(model: str, body: str, child: str) -> None:
 
 
 def _ends(model: mujoco.MjModel, geom: str) -> tuple[np.ndarray, np.ndarray]:
-    """Both ends of a capsule's axis in the world."""
+    """Return both ends of a capsule's axis in the world."""
     data = posed(model).geom(geom)
     half = data.xmat.reshape(3, 3)[:, 2] * model.geom(geom).size[1]
     return data.xpos - half, data.xpos + half
@@ -252,7 +252,7 @@ def _ends(model: mujoco.MjModel, geom: str) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("at", [0.0, 1.0, -0.5, 1.5, math.nan, math.inf])
 def test_a_segment_is_split_between_its_ends(at: float) -> None:
-    """Both parts need a length."""
+    """The position of the split must be between 0 and 1."""
     with pytest.raises(MorphologyError, match="A segment is split between 0 and 1, got"):
         Split("thigh", "toe", at=at)
 
@@ -269,8 +269,8 @@ def test_a_segment_is_split_between_its_ends(at: float) -> None:
         ({"axis": (1.0, 0.0)}, "The axis of a hinge must be a tuple of three finite numbers"),
     ],
 )
-def test_impossible_hinges_are_refused(wrong: dict[str, Any], message: str) -> None:
-    """Whether they come with a split or with a new segment."""
+def test_invalid_hinges_are_refused(wrong: dict[str, Any], message: str) -> None:
+    """Splits and new segments check limits, gear and axis."""
     with pytest.raises(MorphologyError, match=message):
         Split("thigh", "toe", **wrong)
     with pytest.raises(MorphologyError, match=message):
@@ -278,8 +278,8 @@ def test_impossible_hinges_are_refused(wrong: dict[str, Any], message: str) -> N
 
 
 @pytest.mark.parametrize("name", ["shin", "hip", "knee", "", "shin_1"])
-def test_names_that_are_taken_are_refused(name: str) -> None:
-    """By a body, a joint, a motor or a geom; the message says which."""
+def test_used_names_are_refused(name: str) -> None:
+    """New bodies, joints, motors and geoms need unused names."""
     spec = leg()
     spec.geom("sole").name = "thigh_of_shin_1"
     with pytest.raises(MorphologyError, match=r"A new \w+ needs an unused name, got '\w*'"):
@@ -293,7 +293,7 @@ def test_names_that_are_taken_are_refused(name: str) -> None:
 
 
 def test_a_segment_grows_at_the_far_end() -> None:
-    """Like the segment that it grows from: thickness, density, friction; and a hinge like its."""
+    """It has the thickness, density, friction and hinge of its parent."""
     spec = leg()
     spec.geom("shin").friction = [0.7, 0.01, 0.001]
     model = built(spec, AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=4.0))
@@ -307,7 +307,7 @@ def test_a_segment_grows_at_the_far_end() -> None:
 
 
 def test_a_new_segment_can_differ() -> None:
-    """In its radius, its axis, its range, and in having no motor."""
+    """Radius, axis, range and the lack of a motor can be given."""
     edit = AddSegment("shin", "foot", (0.1, 0.0, 0.0), -0.2, 0.7, axis=(0.0, 1.0, 0.0), radius=0.05)
     model = built(leg(), edit)
     assert (model.nu, model.geom("foot_geom").size[0]) == (2, 0.05)
@@ -324,8 +324,8 @@ def test_a_new_segment_can_differ() -> None:
     ],
 )
 @pytest.mark.parametrize("given", ["", 'density="50"', 'mass="2"'])
-def test_a_segment_grows_however_the_other_is_written(geom: str, given: str) -> None:
-    """At the same end, and as dense as it, also where only its mass is written."""
+def test_a_segment_grows_from_any_form_of_geom(geom: str, given: str) -> None:
+    """End and density of the parent are found for all ways to write a geom."""
     spec = limb(f'<geom name="g" {geom} {given}/>')
     before = built(spec)
     model = built(spec, AddSegment("link", "tip", (0.0, 0.0, 0.3)))
@@ -335,15 +335,15 @@ def test_a_segment_grows_however_the_other_is_written(geom: str, given: str) -> 
     assert mass(model, "tip") == pytest.approx(capsule_mass(0.1, 0.3, density))
 
 
-def test_the_first_long_geom_is_the_model() -> None:
-    """A segment may hold spheres and boxes too."""
+def test_the_first_long_geom_is_extended() -> None:
+    """Spheres and boxes of the parent are ignored."""
     content = '<geom size=".3"/><geom type="capsule" size=".1" fromto="0 0 0 0 0 .4"/>'
     model = built(limb(content), AddSegment("link", "tip", (0.0, 0.0, 0.3)))
     assert model.geom("tip_geom").size[0] == 0.1
 
 
 def test_a_body_without_length_has_nothing_to_grow_from() -> None:
-    """Neither end nor thickness."""
+    """A parent without a capsule or cylinder is refused."""
     with pytest.raises(
         MorphologyError, match="'trunk' has no capsule or cylinder, so it has no far"
     ):
@@ -351,7 +351,7 @@ def test_a_body_without_length_has_nothing_to_grow_from() -> None:
 
 
 def test_a_body_without_hinge_needs_an_axis() -> None:
-    """There is none to take over."""
+    """The axis must be given if the parent has no hinge."""
     spec = spec_of(
         """<mujoco><worldbody><body name="b"><freejoint/><geom name="g" type="capsule"
         size=".1 .2"/></body></worldbody></mujoco>"""
@@ -364,20 +364,20 @@ def test_a_body_without_hinge_needs_an_axis() -> None:
 
 @pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (math.nan, 0.0, 1.0), (0.0, 1.0)])
 def test_a_segment_needs_a_length(end: Any) -> None:
-    """In three finite numbers."""
+    """The end must be a nonzero vector of three finite numbers."""
     with pytest.raises(MorphologyError, match="The end of a segment must"):
         AddSegment("shin", "foot", end)
 
 
 @pytest.mark.parametrize("radius", [0.0, -0.1, math.nan, math.inf])
 def test_a_segment_needs_a_thickness(radius: float) -> None:
-    """A finite one, above zero."""
+    """The radius must be positive and finite."""
     with pytest.raises(MorphologyError, match="A radius must be above zero, got"):
         AddSegment("shin", "foot", (0.0, 0.0, 1.0), radius=radius)
 
 
-def test_a_segment_that_appears_is_small_and_weak() -> None:
-    """Length and thickness, gear and armature grow with the amount, from a hundredth."""
+def test_a_partial_segment_is_small_and_weak() -> None:
+    """Size, gear and armature scale with the amount, from 0.01."""
     edit = AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=4.0)
     full = built(leg(), edit)
     for amount, size in ((1e-9, 0.01), (0.25, 0.25)):
@@ -391,8 +391,8 @@ def test_a_segment_that_appears_is_small_and_weak() -> None:
 # --- AddLimb -----------------------------------------------------------------------------------
 
 
-def test_a_copy_has_all_that_the_limb_has() -> None:
-    """Bodies, joints, geoms, sites and motors, each with the suffix, the motors at the end."""
+def test_a_copy_has_all_elements_of_the_limb() -> None:
+    """Bodies, joints, geoms, sites and motors get the suffix; motors come last."""
     model = built(leg(), AddLimb("thigh", "_2", math.pi))
     assert _bodies(model) == ["trunk", "thigh", "shin", "thigh_2", "shin_2"]
     assert [model.actuator(i).name for i in range(model.nu)] == ["hip", "knee", "hip_2", "knee_2"]
@@ -407,7 +407,7 @@ def test_a_copy_has_all_that_the_limb_has() -> None:
 
 
 def test_a_copy_may_be_larger() -> None:
-    """Lengths by the size, masses by its cube, gears by the size."""
+    """Lengths and gears scale with the size, masses with its cube."""
     model = built(leg(), AddLimb("thigh", "_2", math.pi, size=2.0))
     np.testing.assert_allclose(model.geom("shin_2").size, 2.0 * model.geom("shin").size)
     assert mass(model, "thigh_2") == pytest.approx(8.0 * mass(model, "thigh"))
@@ -415,7 +415,7 @@ def test_a_copy_may_be_larger() -> None:
 
 
 def test_copies_of_copies() -> None:
-    """As many limbs as one likes, of meshes too."""
+    """Copies can be copied, meshes included."""
     model = built(ant(), *(AddLimb("aux_1", f"_{n}", n * 0.4) for n in range(2, 8)))
     assert (model.nu, model.nq) == (8 + 12, 15 + 12)
     twice = built(leg(), AddLimb("thigh", "_2", 1.0), AddLimb("thigh_2", "_3", 1.0))
@@ -431,8 +431,8 @@ def test_copies_of_copies() -> None:
     assert mass(model, "claw_3") == mass(model, "claw")
 
 
-def test_a_mesh_cannot_grow_or_fade() -> None:
-    """It is there or not; the message says why."""
+def test_a_mesh_cannot_be_scaled() -> None:
+    """Scaled copies and partial removals of meshes are refused."""
     for edit in (AddLimb("claw", "_2", 1.0, size=2.0), Remove("claw").partly(0.5)):
         with pytest.raises(MorphologyError, match=r"'claw(_2)?' holds 'claw(_2)?', a mesh"):
             built(spec_of(_MESH_LIMB), edit)
@@ -441,21 +441,21 @@ def test_a_mesh_cannot_grow_or_fade() -> None:
 
 @pytest.mark.parametrize(("suffix", "angle"), [("", 1.0), ("_2", math.nan), ("_2", math.inf)])
 def test_a_copy_needs_a_suffix_and_an_angle(suffix: str, angle: float) -> None:
-    """Otherwise it would be the limb itself, or nowhere."""
+    """Empty suffixes and infinite angles are refused."""
     with pytest.raises(MorphologyError, match="A copied limb needs a suffix and a finite angle"):
         AddLimb("thigh", suffix, angle)
 
 
 @pytest.mark.parametrize("size", [0.0, -1.0, math.nan, 1e-3, 1e3])
-def test_a_copy_has_a_size(size: float) -> None:
-    """Between a hundredth and a hundred times."""
+def test_sizes_of_copies_are_limited(size: float) -> None:
+    """Sizes outside 0.01 to 100 are refused."""
     with pytest.raises(MorphologyError, match="The size of a limb must be a ratio"):
         AddLimb("thigh", "_2", 1.0, size)
 
 
 @pytest.mark.parametrize("kind", ["body", "joint", "geom"])
-def test_a_copy_whose_names_are_taken_is_refused(kind: str) -> None:
-    """Also where the name is that of something deep in the limb."""
+def test_a_copy_with_used_names_is_refused(kind: str) -> None:
+    """Names of all elements of the limb are checked."""
     spec = leg()
     trunk = spec.body("trunk")
     if kind == "body":
@@ -468,8 +468,8 @@ def test_a_copy_whose_names_are_taken_is_refused(kind: str) -> None:
         built(spec, AddLimb("thigh", "_2", 1.0))
 
 
-def test_a_limb_that_appears_is_small_and_weak() -> None:
-    """From a hundredth of its size on."""
+def test_a_partial_copy_is_small_and_weak() -> None:
+    """Size and gear scale with the amount, from 0.01."""
     edit = AddLimb("thigh", "_2", math.pi, size=2.0)
     for amount, size in ((1e-9, 0.02), (0.5, 1.0)):
         part = built(leg(), edit.partly(amount))
@@ -477,11 +477,11 @@ def test_a_limb_that_appears_is_small_and_weak() -> None:
         assert part.actuator("hip_2").gear[0] == pytest.approx(20.0 * size)
 
 
-# --- Together ----------------------------------------------------------------------------------
+# --- Combinations ------------------------------------------------------------------------------
 
 
 def test_order_matters_where_it_should() -> None:
-    """Who splits first stretches a half; who cuts first has no child left to stretch."""
+    """A stretch after a split affects one part; after a cut there is no child to stretch."""
     split_first = built(leg(), Split("thigh", "half"), Stretch("thigh", 2.0))
     stretched_first = built(leg(), Stretch("thigh", 2.0), Split("thigh", "half"))
     assert tip(split_first, "toe")[2] == pytest.approx(1.0 - 0.45 - 0.24)
@@ -491,7 +491,7 @@ def test_order_matters_where_it_should() -> None:
         built(leg(), Cut("thigh", 0.5), Stretch("shin", 2.0))
 
 
-def test_new_parts_are_parts_like_any_other() -> None:
+def test_new_segments_can_be_edited() -> None:
     """They can be stretched, weighed, locked, cut and copied."""
     model = built(
         leg(),

@@ -13,7 +13,7 @@ from tests.morphology.models import ant, built, leg, mass, pendulum, tip
 
 
 def test_a_longer_segment_is_as_thick_as_before() -> None:
-    """Twice the length at the same radius and density, and the end moves out by the difference."""
+    """Radius and density stay, and the end moves out."""
     before, after = built(leg()), built(leg(), Stretch("thigh", 2.0))
     np.testing.assert_allclose(after.geom("thigh").size, [0.03, 0.3, 0.0])
     np.testing.assert_allclose(after.geom("thigh").pos, [0.0, 0.0, -0.3])
@@ -24,7 +24,7 @@ def test_a_longer_segment_is_as_thick_as_before() -> None:
 
 
 def test_a_thicker_segment_is_as_long_as_before() -> None:
-    """Twice the radius, and nothing that hangs on it moves."""
+    """Children do not move."""
     before, after = built(leg()), built(leg(), Radius("thigh", 2.0))
     np.testing.assert_allclose(after.geom("thigh").size, [0.06, 0.15, 0.0])
     np.testing.assert_array_equal(after.body_pos, before.body_pos)
@@ -33,8 +33,8 @@ def test_a_thicker_segment_is_as_long_as_before() -> None:
     )
 
 
-def test_a_glob_stretches_every_segment_that_fits() -> None:
-    """Parents first, so that what hangs on them is carried along."""
+def test_a_glob_stretches_every_match() -> None:
+    """Parents are stretched first, so that children move along."""
     model = built(ant(), Stretch("shank_*", 0.5))
     np.testing.assert_allclose(
         [model.geom(f"{leg}_ankle_geom").size[1] for leg in ("left", "right", "third", "fourth")],
@@ -45,7 +45,7 @@ def test_a_glob_stretches_every_segment_that_fits() -> None:
 
 
 def test_a_pole_keeps_its_lean_along_an_axis() -> None:
-    """Along z only, the pole's end stays 1 mm off."""
+    """Stretched along z only, the end of the pole stays 1 mm off."""
     model = built(pendulum(), Stretch("pole", 2.0, axis="z"))
     np.testing.assert_allclose(2.0 * model.geom("cpole").pos, [0.001, 0.0, 1.2])
 
@@ -53,22 +53,22 @@ def test_a_pole_keeps_its_lean_along_an_axis() -> None:
 @pytest.mark.parametrize("kind", [Stretch, Radius])
 @pytest.mark.parametrize("factor", [0.0, -2.0, math.nan, math.inf, 1e-3, 1e3])
 def test_absurd_factors_are_refused(kind: type[Stretch | Radius], factor: float) -> None:
-    """The message says which factors are not."""
+    """Factors outside 0.01 to 100 are refused."""
     with pytest.raises(MorphologyError, match=r"must be a ratio between 0\.01 and 100, got"):
         kind("thigh", factor)
 
 
 @pytest.mark.parametrize("kind", [Stretch, Radius])
-def test_a_body_that_is_not_there_is_named(kind: type[Stretch | Radius]) -> None:
-    """With the nearest that is."""
+def test_an_unknown_body_is_refused(kind: type[Stretch | Radius]) -> None:
+    """The error suggests the nearest name."""
     with pytest.raises(
         UnknownName, match=r"No body matches 'thgih'\. Did you mean 'thigh'\? There"
     ):
         built(leg(), kind("thgih", 2.0))
 
 
-def test_half_a_stretch_is_half_the_difference() -> None:
-    """From once to three times, half of the way is twice."""
+def test_partial_factors_are_linear() -> None:
+    """Half of a factor of 3 is a factor of 2."""
     half, twice = Stretch("thigh", 3.0).partly(0.5), Stretch("thigh", 2.0)
     np.testing.assert_array_equal(built(leg(), half).body_pos, built(leg(), twice).body_pos)
     half, twice = Radius("thigh", 3.0).partly(0.5), Radius("thigh", 2.0)

@@ -38,7 +38,7 @@ _MOTORS = """
 
 @pytest.mark.parametrize("kind", _KINDS)
 def test_a_value_is_scaled_or_set(kind: Any) -> None:
-    """Not both, not neither."""
+    """Exactly one of `scale` and `to` is needed."""
     for wrong in ({}, {"scale": 2.0, "to": 3.0}):
         with pytest.raises(MorphologyError, match=f"{kind.__name__} takes either scale or to, got"):
             kind("*", **wrong)
@@ -47,15 +47,15 @@ def test_a_value_is_scaled_or_set(kind: Any) -> None:
 @pytest.mark.parametrize("kind", _KINDS)
 @pytest.mark.parametrize("scale", [0.0, -1.0, math.nan, math.inf, 1e-3, 1e3])
 def test_absurd_ratios_are_refused(kind: Any, scale: float) -> None:
-    """Whatever is scaled."""
+    """Scales outside 0.01 to 100 are refused."""
     with pytest.raises(MorphologyError, match=f"The scale of {kind.__name__} must be a ratio"):
         kind("*", scale=scale)
 
 
 @pytest.mark.parametrize("kind", _KINDS)
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_values_are_finite(kind: Any, value: float) -> None:
-    """Nothing can be infinite, or no number."""
+def test_values_must_be_finite(kind: Any, value: float) -> None:
+    """NaN and infinite values are refused."""
     with pytest.raises(MorphologyError, match=f"{kind.__name__} cannot be"):
         kind("*", to=value)
 
@@ -67,8 +67,8 @@ def test_values_are_finite(kind: Any, value: float) -> None:
         *((Friction, -0.1), (Gear, 0.0)),
     ],
 )
-def test_values_are_possible(kind: Any, value: float) -> None:
-    """No negative mass, no gear that moves nothing."""
+def test_impossible_values_are_refused(kind: Any, value: float) -> None:
+    """Negative values, and zero masses and gears, are refused."""
     with pytest.raises(MorphologyError, match=f"{kind.__name__} cannot be {value}"):
         kind("*", to=value)
 
@@ -84,14 +84,14 @@ def test_values_are_possible(kind: Any, value: float) -> None:
         (Friction("flor", to=2.0), "geom", "floor"),
     ],
 )
-def test_what_is_not_there_is_named(edit: Edit, kind: str, near: str) -> None:
-    """With the nearest element of the same kind."""
+def test_unknown_elements_are_refused(edit: Edit, kind: str, near: str) -> None:
+    """The error suggests the nearest element of the same kind."""
     with pytest.raises(UnknownName, match=rf"No {kind} matches '\w+'\. Did you mean '{near}'\?"):
         built(leg(), edit)
 
 
-def test_a_heavier_body_is_harder_to_turn() -> None:
-    """The inertia follows the mass, and nothing else changes."""
+def test_inertia_scales_with_mass() -> None:
+    """Nothing else changes."""
     before, after = built(leg()), built(leg(), Mass("shin", scale=3.0))
     assert mass(after, "shin") == pytest.approx(3.0 * mass(before, "shin"))
     np.testing.assert_allclose(after.body("shin").inertia, 3.0 * before.body("shin").inertia)
@@ -106,7 +106,7 @@ def test_a_heavier_body_is_harder_to_turn() -> None:
         '<inertial pos=".1 0 0" mass="2" diaginertia=".1 .2 .25"/><geom size=".1"/>',
     ],
 )
-def test_a_mass_is_set_however_it_was_given(content: str) -> None:
+def test_a_mass_can_be_set_for_any_form(content: str) -> None:
     """Densities, masses and inertias keep their proportions."""
     before, after = built(limb(content)), built(limb(content), Mass("link", to=0.7))
     assert mass(after, "link") == pytest.approx(0.7)
@@ -116,8 +116,8 @@ def test_a_mass_is_set_however_it_was_given(content: str) -> None:
     np.testing.assert_allclose(after.body("link").ipos, before.body("link").ipos, atol=1e-12)
 
 
-def test_a_mass_is_that_of_each_body_by_itself() -> None:
-    """Also of bodies that another edit has just made or moved in the model's order."""
+def test_a_mass_applies_to_each_matching_body() -> None:
+    """Bodies that earlier edits made or moved are included."""
     model = built(ant(), Remove("aux_1"), AddLimb("aux_2", "_5", 1.0), Mass("aux_*", to=0.2))
     for body in ("aux_2", "aux_3", "aux_4", "aux_2_5"):
         assert mass(model, body) == pytest.approx(0.2)
@@ -125,7 +125,7 @@ def test_a_mass_is_that_of_each_body_by_itself() -> None:
 
 
 def test_a_body_without_mass_cannot_be_given_one() -> None:
-    """Nothing says how it would be spread."""
+    """Its distribution would be undefined."""
     spec = limb('<geom size=".1"/><body name="frame" pos="0 0 1"/>')
     with pytest.raises(MorphologyError, match="'frame' has no mass, so none can be set"):
         built(spec, Mass("frame", to=1.0))
@@ -133,7 +133,7 @@ def test_a_body_without_mass_cannot_be_given_one() -> None:
 
 
 def test_a_density_changes_masses_and_inertias() -> None:
-    """Set or scaled, for every geom of the body."""
+    """`to` and `scale` apply to every geom of the body."""
     before = built(leg())
     for edit in (Density("shin", to=1500.0), Density("shin", scale=3.0)):
         after = built(leg(), edit)
@@ -141,8 +141,8 @@ def test_a_density_changes_masses_and_inertias() -> None:
         np.testing.assert_allclose(after.body("shin").inertia, 3.0 * before.body("shin").inertia)
 
 
-def test_a_density_that_counts_for_nothing_is_refused() -> None:
-    """Where mass is written out, of a geom or of the body, the message says what would work."""
+def test_a_density_without_effect_is_refused() -> None:
+    """The error for explicit masses and inertias suggests an alternative."""
     spec = limb('<geom name="g" size=".1" mass="2"/>')
     with pytest.raises(MorphologyError, match="'g' has its mass written out, so its density has"):
         built(spec, Density("link", scale=2.0))
@@ -152,7 +152,7 @@ def test_a_density_that_counts_for_nothing_is_refused() -> None:
 
 
 def test_a_gear_keeps_its_direction() -> None:
-    """`to` is the strongest axis; the others stay in proportion, whatever the sign."""
+    """`to` sets the strongest axis; the others stay in proportion."""
     for edit, gear in (
         (Gear("jet", scale=2.0), [2.0, 0.0, -8.0, 0.0, 4.0, 0.0]),
         (Gear("jet", to=2.0), [-0.5, 0.0, 2.0, 0.0, -1.0, 0.0]),
@@ -164,21 +164,21 @@ def test_a_gear_keeps_its_direction() -> None:
 
 
 def test_gears_of_all_motors() -> None:
-    """A glob changes every actuator that fits, exactly."""
+    """A glob changes every matching actuator exactly."""
     assert set(built(ant(), Gear("*", scale=0.1)).actuator_gear[:, 0]) == {15.0}
     assert set(built(ant(), Gear("hip_*", to=70.0)).actuator_gear[:, 0]) == {70.0, 150.0}
 
 
 def test_damping_and_stiffness_of_joints() -> None:
-    """Scaled or set, per joint, the others untouched."""
+    """Other joints do not change."""
     damped = built(leg(), Damping("hip", scale=2.0), Damping("knee", to=7.0))
     assert [damped.dof_damping[damped.joint(j).dofadr[0]] for j in ("hip", "knee")] == [4.0, 7.0]
     stiff = built(leg(), Stiffness("hip", scale=2.0), Stiffness("knee", to=7.0))
     assert [stiff.joint(j).stiffness[0] for j in ("hip", "knee")] == [6.0, 7.0]
 
 
-def test_higher_coefficients_keep_their_proportion() -> None:
-    """Scaling a joint scales its whole polynomial; setting it sets the linear part."""
+def test_polynomial_coefficients() -> None:
+    """`scale` scales the whole polynomial, `to` sets the linear part."""
     spec = limb('<geom size=".1"/>')
     spec.joint("link").damping = [1.0, 0.5, 0.25]
     spec.joint("link").stiffness = [2.0, 0.5, 0.25]
@@ -193,7 +193,7 @@ def test_higher_coefficients_keep_their_proportion() -> None:
 
 @pytest.mark.parametrize(("component", "place"), [("sliding", 0), ("torsional", 1), ("rolling", 2)])
 def test_friction_has_three_coefficients(component: Any, place: int) -> None:
-    """One of them changes, the other two stay."""
+    """One component changes, the other two stay."""
     before, after = built(leg()), built(leg(), Friction("sole", to=0.3, component=component))
     expected = np.array(before.geom("sole").friction)
     expected[place] = 0.3
@@ -201,28 +201,28 @@ def test_friction_has_three_coefficients(component: Any, place: int) -> None:
     np.testing.assert_array_equal(after.geom("floor").friction, before.geom("floor").friction)
 
 
-def test_a_glob_reaches_the_floor() -> None:
-    """MuJoCo takes the larger of two frictions, so both sides must change."""
+def test_a_glob_includes_the_floor() -> None:
+    """MuJoCo uses the larger of two frictions, so both must change."""
     model = built(leg(), Friction("*", scale=0.5))
     assert set(model.geom_friction[:, 0]) == {0.5}
 
 
 @pytest.mark.parametrize("kind", [Damping, Stiffness, Friction])
 def test_some_values_can_be_zero(kind: Any) -> None:
-    """A joint without damping is a joint."""
+    """Zero damping, stiffness and friction are accepted."""
     built(leg(), kind("*", to=0.0))
 
 
-def test_half_of_the_way() -> None:
-    """A part of a change of value lies between the old and the new one."""
+def test_partial_values_are_interpolated() -> None:
+    """A partial edit lies between the old and the new value."""
     assert built(leg(), Gear("hip", to=40.0).partly(0.25)).actuator("hip").gear[0] == 25.0
     assert mass(built(leg(), Mass("shin", to=3.0).partly(0.5)), "shin") == pytest.approx(
         0.5 * (3.0 + mass(built(leg()), "shin"))
     )
 
 
-def test_a_mass_is_set_on_the_body_it_names_after_others_were_added() -> None:
-    """An edit before it changes the numbers of the bodies, not their names."""
+def test_masses_follow_names_after_additions() -> None:
+    """Earlier edits change indices of bodies, not their names."""
     spec = ant()
     foot = AddSegment("shank_1", "foot_1", (0.3, 0.3, 0.0))
     model = compile_body(spec, (foot, Mass("torso", to=0.5), Mass("foot_1", to=0.1)))
@@ -231,8 +231,8 @@ def test_a_mass_is_set_on_the_body_it_names_after_others_were_added() -> None:
 
 
 @pytest.mark.parametrize("value", [1e300, 2e6])
-def test_values_beyond_all_measure_are_refused(value: float) -> None:
-    """No robot has a mass, gear or damping of more than a million."""
+def test_values_above_a_million_are_refused(value: float) -> None:
+    """Masses, gears and dampings are limited to 1e6."""
     for kind in (Mass, Gear, Damping):
         with pytest.raises(MorphologyError, match="cannot be"):
             kind("*", to=value)

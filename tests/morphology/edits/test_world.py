@@ -1,4 +1,4 @@
-"""Gravity, and the height at which a trunk starts."""
+"""Gravity and the start height of a trunk."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.morphology.models import ant, built, leg
 
 
 def test_gravity_is_set() -> None:
-    """All three components, or a part of the way from what it was."""
+    """All components are set, or interpolated for partial edits."""
     moon = Gravity((0.0, 0.0, -1.62))
     np.testing.assert_array_equal(built(leg(), moon).opt.gravity, [0.0, 0.0, -1.62])
     np.testing.assert_allclose(
@@ -33,27 +33,27 @@ def test_gravity_is_set() -> None:
     ],
 )
 def test_absurd_gravity_is_refused(vector: Any, message: str) -> None:
-    """Ten times Jupiter's is a typing mistake."""
+    """Gravity is limited to 250 m/s²."""
     with pytest.raises(MorphologyError, match=message):
         Gravity(vector)
 
 
 def test_the_trunk_starts_higher() -> None:
-    """Only its height changes."""
+    """Only the height changes."""
     model = built(leg(), StartHeight("trunk", 1.7))
     np.testing.assert_array_equal(model.body("trunk").pos, [0.0, 0.0, 1.7])
     assert model.qpos0[2] == 1.7
     assert built(leg(), StartHeight("trunk", 2.0).partly(0.5)).qpos0[2] == 1.5
 
 
-def test_limbs_start_where_the_trunk_does() -> None:
-    """The message lists the trunks there are."""
+def test_only_trunks_have_a_start_height() -> None:
+    """The error lists the trunks."""
     with pytest.raises(UnknownName, match=r"No trunk matches 'aux_1'\..* There are: torso\."):
         built(ant(), StartHeight("aux_1", 1.0))
 
 
 @pytest.mark.parametrize("height", [math.nan, math.inf, 1e300])
-def test_heights_are_finite(height: float) -> None:
-    """Nothing starts nowhere, or out of sight."""
+def test_heights_are_limited(height: float) -> None:
+    """Heights beyond 100 m are refused."""
     with pytest.raises(MorphologyError, match="A start height is at most 100 m"):
         StartHeight("trunk", height)

@@ -1,4 +1,4 @@
-"""Effective contacts against the contacts of simulated scenes."""
+"""Effective contacts, compared with contacts of simulated scenes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _SCENE = """
 
 
 def _scene(**parts: str) -> mujoco.MjModel:
-    """A ball that has sunk into the floor, with attributes and neighbours to taste."""
+    """Return a ball that penetrates the floor, with optional attributes and neighbours."""
     defaults = {
         "assets": "",
         "option": "",
@@ -51,7 +51,7 @@ def _scene(**parts: str) -> mujoco.MjModel:
 
 
 def _simulated(model: mujoco.MjModel) -> dict[str, list[mujoco.MjContact]]:
-    """The contacts that MuJoCo finds in the starting pose, by the names of the geoms."""
+    """Return MuJoCo's contacts in the start pose, by the names of the geoms."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     found: dict[str, list[mujoco.MjContact]] = {}
@@ -62,7 +62,7 @@ def _simulated(model: mujoco.MjModel) -> dict[str, list[mujoco.MjContact]]:
 
 
 def _contacts(model: mujoco.MjModel) -> dict[str, _Contact]:
-    """The effective contacts of a model."""
+    """Return the effective contacts of a model."""
     return {
         name: {field.removeprefix("contact "): values for field, values in fields.items()}
         for name, fields in effective_model(model)["contacts"].items()
@@ -70,7 +70,7 @@ def _contacts(model: mujoco.MjModel) -> dict[str, _Contact]:
 
 
 def _assert_equal(ours: _Contact, theirs: mujoco.MjContact) -> None:
-    """An effective contact has the parameters of the simulated one."""
+    """Assert that an effective contact has the parameters of the simulated one."""
     assert ours["dimension"] == (theirs.dim,)
     counts = {1: 0, 3: 2, 4: 3, 6: 5}
     np.testing.assert_array_equal(ours.get("friction", ()), theirs.friction[: counts[theirs.dim]])
@@ -83,7 +83,7 @@ def _assert_equal(ours: _Contact, theirs: mujoco.MjContact) -> None:
 
 
 def _random_geom(random: np.random.Generator, name: str) -> str:
-    """A geom of any shape with any contact parameters."""
+    """Return a geom of random shape with random contact parameters."""
     shape = str(random.choice(list(_SHAPES)))
     solref = random.uniform(0.01, 0.05), random.uniform(0.5, 2.0)
     if random.random() < 0.3:
@@ -106,8 +106,8 @@ def _random_geom(random: np.random.Generator, name: str) -> str:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_random_scenes_touch_as_predicted(seed: int) -> None:
-    """Whatever shapes and parameters meet, dimension, friction, softness and margin are as said."""
+def test_random_scenes_have_the_predicted_contacts(seed: int) -> None:
+    """Dimension, friction, softness and margin are as predicted for random geoms."""
     random = np.random.default_rng(seed)
     bodies = "".join(
         f"<body pos='0 0 .05'><freejoint/>{_random_geom(random, f'g{i}')}</body>" for i in range(6)
@@ -123,8 +123,8 @@ def test_random_scenes_touch_as_predicted(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("flag", ["contact='enable'", "filterparent='disable'"])
-def test_pairs_are_those_that_mujoco_collides(seed: int, flag: str) -> None:
-    """In a heap of overlapping balls on any tree, exactly the pairs that pass the filters touch."""
+def test_contact_pairs_are_those_of_mujoco(seed: int, flag: str) -> None:
+    """In random trees of overlapping balls, exactly the pairs that pass the filters collide."""
     random = np.random.default_rng(seed)
     spec = mujoco.MjSpec()
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1])
@@ -154,8 +154,8 @@ def test_pairs_are_those_that_mujoco_collides(seed: int, flag: str) -> None:
     assert set(_contacts(model)) == moving
 
 
-def test_a_slippery_foot_on_a_rough_floor_is_a_rough_foot() -> None:
-    """Lowering the friction of the ant's feet below the floor's does nothing; raising it does."""
+def test_contact_friction_is_the_larger_one() -> None:
+    """Lowering the feet's friction below the floor's has no effect; raising it has."""
     nominal = _contacts(asset("ant"))
     spec = asset_spec("ant")
     for geom in spec.geoms:
@@ -173,7 +173,7 @@ def test_a_slippery_foot_on_a_rough_floor_is_a_rough_foot() -> None:
 
 @pytest.mark.parametrize(("condim", "acting"), [(1, 0), (3, 1), (4, 2), (6, 3)])
 def test_only_the_friction_that_the_dimension_uses_counts(condim: int, acting: int) -> None:
-    """Of slide, spin and roll, one more acts at each dimension."""
+    """Each contact dimension uses one more of sliding, torsional and rolling friction."""
     nominal = _contacts(_scene(ball=f"condim='{condim}'", floor="condim='1'"))
     for i in range(3):
         friction = [1.0, 0.005, 0.0001]
@@ -183,8 +183,8 @@ def test_only_the_friction_that_the_dimension_uses_counts(condim: int, acting: i
         assert (_contacts(changed) != nominal) == (i < acting)
 
 
-def test_margins_and_gaps_add_up_whatever_the_priority() -> None:
-    """MuJoCo 4 sums both; before 4 the larger one counted."""
+def test_margins_and_gaps_add_up() -> None:
+    """MuJoCo 4 sums both for all priorities; earlier versions used the larger one."""
     model = _scene(floor="margin='.02' gap='.1'", ball="margin='.03' gap='.2' priority='1'")
     contact = _contacts(model)["ball + floor"]
     assert contact["margin"] == pytest.approx((0.05,))
@@ -192,8 +192,8 @@ def test_margins_and_gaps_add_up_whatever_the_priority() -> None:
     _assert_equal(contact, _simulated(model)["ball + floor"][0])
 
 
-def test_the_gap_is_where_mujoco_begins_to_find_contacts() -> None:
-    """A contact is found up to margin plus gap away, and not beyond."""
+def test_contacts_are_found_within_margin_and_gap() -> None:
+    """A contact exists up to margin plus gap away."""
     for distance, found in ((0.049, True), (0.051, False)):
         model = _scene(floor="gap='.02'", ball="gap='.01' margin='.02'")
         model.qpos0[2] = 0.1 + distance
@@ -202,8 +202,8 @@ def test_the_gap_is_where_mujoco_begins_to_find_contacts() -> None:
         assert ("ball + floor" in _simulated(model)) == found
 
 
-def test_friction_has_a_floor() -> None:
-    """Zero friction is one in a hundred thousand."""
+def test_friction_has_a_lower_bound() -> None:
+    """Zero friction becomes 1e-5."""
     model = _scene(floor="friction='0 0 0'", ball="friction='0 0 0' condim='6'")
     contact = _contacts(model)["ball + floor"]
     assert contact["friction"] == (1e-5,) * 5
@@ -211,7 +211,7 @@ def test_friction_has_a_floor() -> None:
 
 
 def test_the_override_replaces_all_but_dimension_gap_and_adhesion() -> None:
-    """With the flag set, the model's own contact parameters do not count."""
+    """With the flag set, the geoms' own parameters do not count."""
     option = "o_margin='.1' o_solref='.05 3' o_solimp='.8 .9 .01 .5 2' o_friction='.1 .2 .3 .4 0'"
     model = _scene(
         option=option,
@@ -225,7 +225,7 @@ def test_the_override_replaces_all_but_dimension_gap_and_adhesion() -> None:
 
 
 def test_an_explicit_pair_has_its_own_parameters() -> None:
-    """A pair needs no matching bits, may be of parent and child, and may slip like a skate."""
+    """A pair ignores the collision bits and may be of parent and child."""
     child = "<body name='c'><joint/><geom name='c' size='.1' contype='0' conaffinity='0'/></body>"
     pair = (
         "<pair geom1='floor' geom2='ball' friction='.1 .9 .01 .02 .03' condim='6'"
@@ -241,7 +241,7 @@ def test_an_explicit_pair_has_its_own_parameters() -> None:
 
 
 def test_own_softness_of_friction_counts_only_in_elliptic_cones() -> None:
-    """A pyramidal cone mixes the directions, so there it is no difference."""
+    """Pyramidal cones ignore `solreffriction`."""
     pair = "<pair geom1='floor' geom2='ball' solreffriction='.1 2'/>"
     model = _scene(contact=pair)
     assert _contacts(model)["ball + floor"]["friction solref"] == (0.1, 2.0)
@@ -250,7 +250,7 @@ def test_own_softness_of_friction_counts_only_in_elliptic_cones() -> None:
 
 
 def test_two_pairs_of_the_same_geoms_are_two_contacts() -> None:
-    """MuJoCo makes a contact of each; so do we."""
+    """Each explicit pair gives a contact, as in MuJoCo."""
     pair = "<pair geom1='floor' geom2='ball'/><pair geom1='ball' geom2='floor' condim='1'/>"
     model = _scene(contact=pair)
     predicted = _contacts(model)
@@ -262,13 +262,13 @@ def test_two_pairs_of_the_same_geoms_are_two_contacts() -> None:
 
 
 @pytest.mark.parametrize("flag", ["contact='disable'", "constraint='disable'"])
-def test_switched_off_contacts_are_none(flag: str) -> None:
-    """A model without contacts has no contact parameters."""
+def test_disabled_contacts_are_left_out(flag: str) -> None:
+    """With contacts disabled, there are no contact parameters."""
     assert _contacts(_scene(flag=flag, contact="<pair geom1='floor' geom2='ball'/>")) == {}
 
 
-def test_what_cannot_move_or_cannot_collide_is_no_contact() -> None:
-    """A flying hill passes through the floor, and a ghost moved by hand is not stopped by it."""
+def test_static_and_unsupported_pairs_are_left_out() -> None:
+    """Height fields do not collide with planes, nor mocap bodies with static geoms."""
     asset = "<hfield name='h' nrow='2' ncol='2' size='1 1 1 1' elevation='0 1 0 1'/>"
     bodies = (
         "<body mocap='true'><geom name='ghost' size='.1'/></body>"
@@ -288,10 +288,10 @@ _HARD, _HARDER = "0.012 1", "0.002 1"
 
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast", "discrete"])
 @pytest.mark.parametrize("refsafe", ["enable", "disable"])
-def test_contacts_are_no_harder_than_the_time_step_allows(integrator: str, refsafe: str) -> None:
-    """Below two time steps the time constant does nothing, and we say the same as the simulation.
+def test_contact_stiffness_is_limited_by_the_time_step(integrator: str, refsafe: str) -> None:
+    """Time constants below two time steps are clipped, as in the simulation.
 
-    The integrator `discrete` needs no such safety, and a model may switch it off.
+    The integrator `discrete` does not clip them, nor does a model with `refsafe` disabled.
     """
     effective, moved = [], []
     for solref in (_HARD, _HARDER):

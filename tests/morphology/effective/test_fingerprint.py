@@ -16,7 +16,7 @@ from tests.morphology.scenes import EVERYTHING, asset, asset_spec, everything
 
 
 def test_a_fingerprint_is_sixteen_hex_digits() -> None:
-    """Short enough for a title."""
+    """The fingerprint is a short hexadecimal number."""
     text = fingerprint(asset("ant"))
     assert len(text) == 16
     assert int(text, 16) >= 0
@@ -24,12 +24,12 @@ def test_a_fingerprint_is_sixteen_hex_digits() -> None:
 
 @pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "inverted_pendulum"])
 def test_compiling_twice_gives_one_fingerprint(name: str) -> None:
-    """The same file is the same robot."""
+    """Equal files have equal fingerprints."""
     assert fingerprint(asset(name)) == fingerprint(asset(name))
 
 
 def test_another_process_gives_the_same_fingerprint() -> None:
-    """Nothing depends on the seed of Python's hashes."""
+    """The fingerprint does not depend on the hash seed of Python."""
     script = (
         "import sys, mujoco\n"
         "from shapechanger.morphology.effective import fingerprint\n"
@@ -46,12 +46,12 @@ def test_another_process_gives_the_same_fingerprint() -> None:
 
 
 def test_bodies_have_different_fingerprints() -> None:
-    """No two of Gymnasium's robots are the same."""
+    """Gymnasium's robots have distinct fingerprints."""
     names = ["ant", "hopper", "humanoid", "inverted_pendulum", "reacher", "swimmer", "walker2d_v5"]
     assert len({fingerprint(asset(name)) for name in names}) == len(names)
 
 
-# Array of the model, row, factor and offset of a change that alters the motion.
+# Changes that alter the motion: array of the model, row, factor and offset.
 _PHYSICAL: list[tuple[str, int, float, float]] = [
     ("qpos0", -1, 1.0, 0.1),
     ("qpos_spring", 11, 1.0, 0.1),  # The wrist.
@@ -156,7 +156,7 @@ _PHYSICAL: list[tuple[str, int, float, float]] = [
 def test_every_physical_number_is_in_the_fingerprint(
     array: str, row: int, factor: float, offset: float
 ) -> None:
-    """Writing to one array of a compiled model changes the fingerprint."""
+    """A change of any physical array changes the fingerprint."""
     model = everything()
     nominal = fingerprint(model)
     values = getattr(model, array)
@@ -193,7 +193,7 @@ _OPTIONS = {
 
 @pytest.mark.parametrize("option", _OPTIONS)
 def test_every_physical_option_is_in_the_fingerprint(option: str) -> None:
-    """Time, medium and solver decide the motion too."""
+    """A change of any physical option changes the fingerprint."""
     model = everything()
     nominal = fingerprint(model)
     setattr(model.opt, option, _OPTIONS[option])
@@ -251,22 +251,22 @@ _LOOKS: dict[str, Callable[[mujoco.MjSpec], object]] = {
 
 @pytest.mark.parametrize("edit", _EDITS)
 def test_edits_of_the_ant_change_its_fingerprint(edit: str) -> None:
-    """Each edit of shape, mass, joints, motors or world makes another robot."""
+    """Edits of shape, mass, joints, motors and world change the fingerprint."""
     spec = asset_spec("ant")
     _EDITS[edit](spec)
     assert fingerprint(spec.compile()) != fingerprint(asset("ant"))
 
 
 @pytest.mark.parametrize("look", _LOOKS)
-def test_looks_of_the_ant_do_not(look: str) -> None:
-    """What is only drawn, sensed, or outvoted by the floor leaves the same robot."""
+def test_looks_do_not_change_the_fingerprint(look: str) -> None:
+    """Visuals, sensors and masked parameters do not change the fingerprint."""
     spec = asset_spec("ant")
     _LOOKS[look](spec)
     assert fingerprint(spec.compile()) == fingerprint(asset("ant"))
 
 
-# Writes that a compiled model takes without effect: array, row, offset, and whether `mj_setConst`
-# makes them count.
+# Writes to a compiled model without effect: array, row, offset, and whether `mj_setConst` makes
+# them count.
 _IGNORED: list[tuple[str, int, float, bool]] = [
     ("body_ipos", 8, 0.05, True),  # The wheel's centre of mass was compiled as its body's frame.
     ("geom_pos", 4, 0.05, True),
@@ -276,7 +276,7 @@ _IGNORED: list[tuple[str, int, float, bool]] = [
     ("pair_adhesion", 0, 0.5, True),
     ("actuator_damping", 0, 0.5, True),
     ("actuator_armature", 0, 0.5, True),
-    ("geom_contype", 10, 1.0, False),  # No geom of the wheel was compiled to collide.
+    ("geom_contype", 10, 1.0, False),  # The wheel was compiled without colliding geoms.
     ("jnt_springyield", 2, 0.1, False),
     ("tendon_springyield", 0, 0.1, False),
     ("actuator_delay", 0, 0.1, False),
@@ -284,12 +284,12 @@ _IGNORED: list[tuple[str, int, float, bool]] = [
 
 
 @pytest.mark.parametrize(("array", "row", "offset", "curable"), _IGNORED, ids=lambda x: str(x))
-def test_writes_that_the_simulation_ignores_leave_the_fingerprint(
+def test_ignored_writes_do_not_change_the_fingerprint(
     array: str, row: int, offset: float, curable: bool
 ) -> None:
-    """A compiled model takes some numbers without reading them, and then moves as before.
+    """Numbers that the simulation does not read do not change the fingerprint.
 
-    The same numbers count once `mj_setConst` has noted them, where it can.
+    Some of them count after `mj_setConst`.
     """
     nominal, written = everything(), everything()
     getattr(written, array)[row] += offset
@@ -301,7 +301,7 @@ def test_writes_that_the_simulation_ignores_leave_the_fingerprint(
 
 
 def _motion(model: mujoco.MjModel) -> NDArray[np.float64]:
-    """Where the model is after some steps from a thrown start, shape (nq,)."""
+    """Return the positions after some steps from a random start, shape (nq,)."""
     data = mujoco.MjData(model)
     random = np.random.default_rng(0)
     data.qvel[:] = random.normal(size=model.nv)

@@ -1,4 +1,4 @@
-"""Effective frames against the kinematics of the simulation."""
+"""Effective frames, compared with the kinematics of the simulation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _assert_where(
     xpos: np.ndarray,
     xmat: np.ndarray,
 ) -> None:
-    """The frames, relative to their bodies, are where the simulation puts them."""
+    """Assert that the frames, relative to their bodies, are where the simulation has them."""
     positions, orientations = local
     for i, body in enumerate(bodies):
         turned = data.xmat[body].reshape(3, 3)
@@ -29,8 +29,8 @@ def _assert_where(
 
 @pytest.mark.parametrize("written", [False, True])
 @pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "pusher_v5", "everything"])
-def test_frames_are_where_the_simulation_puts_them(name: str, written: bool) -> None:
-    """As compiled, and after somebody wrote to the arrays that place them."""
+def test_frames_match_the_simulation(name: str, written: bool) -> None:
+    """Frames match as compiled, and after writes to the arrays that place them."""
     model = everything() if name == "everything" else asset(name)
     random = np.random.default_rng(0)
     if written:

@@ -1,4 +1,4 @@
-"""What an effective model holds, and what it leaves out."""
+"""Contents of an effective model."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from shapechanger.morphology.effective.model import effective_model
 from tests.morphology.scenes import asset, everything
 
 
-def test_the_record_reads_like_the_model() -> None:
-    """Numbers are found under the names of section, element and field."""
+def test_values_are_found_by_name() -> None:
+    """Values have the keys section, element and field."""
     effective = effective_model(everything())
     assert effective["bodies"]["hand"]["parent"] == ("arm",)
     assert effective["joints"]["wrist"]["joint range"] == (-1.0, 1.0)
@@ -35,14 +35,14 @@ def test_the_record_reads_like_the_model() -> None:
 
 
 def test_equal_models_are_equal_values() -> None:
-    """Compiling twice gives the same record, also as a key of a dictionary."""
+    """Effective models of equal models are equal and have equal hashes."""
     one, two = effective_model(everything()), effective_model(everything())
     assert one == two
     assert len({one: 1, two: 2}) == 1
 
 
 def test_minus_zero_is_zero() -> None:
-    """Nothing can tell the two apart, so neither do we."""
+    """Signs of zeros are ignored."""
     model = everything()
     nominal = effective_model(model)
     for array in (model.body_pos, model.jnt_pos, model.geom_margin, model.qpos0, model.wrap_prm):
@@ -51,7 +51,7 @@ def test_minus_zero_is_zero() -> None:
 
 
 def test_a_quaternion_and_its_opposite_are_one_rotation() -> None:
-    """The signs of a quaternion mean nothing."""
+    """Signs of quaternions are ignored."""
     model = everything()
     nominal = effective_model(model)
     for array in (model.body_quat, model.body_iquat, model.geom_quat, model.site_quat):
@@ -100,8 +100,8 @@ def _set(model: mujoco.MjModel, flags: str, bit: int) -> None:
 
 
 @pytest.mark.parametrize("what", _UNSEEN)
-def test_what_decides_no_motion_is_left_out(what: str) -> None:
-    """An edit without effect leaves no trace."""
+def test_values_without_effect_are_left_out(what: str) -> None:
+    """Changes without effect on the motion leave the effective model unchanged."""
     model = everything()
     nominal = effective_model(model)
     _UNSEEN[what](model)
@@ -109,8 +109,8 @@ def test_what_decides_no_motion_is_left_out(what: str) -> None:
 
 
 @pytest.mark.parametrize("what", ["size of a plane", "mass of what cannot move"])
-def test_what_is_left_out_does_not_move_anything(what: str) -> None:
-    """The two least obvious of them, checked by stepping."""
+def test_left_out_values_have_no_effect(what: str) -> None:
+    """The two least obvious cases are verified by simulation."""
     positions = []
     for edit in (lambda m: None, _UNSEEN[what]):
         model = everything()
@@ -124,7 +124,7 @@ def test_what_is_left_out_does_not_move_anything(what: str) -> None:
 
 
 def test_wind_counts_only_in_a_medium() -> None:
-    """In a vacuum nothing blows, and no shape is pushed."""
+    """Without density and viscosity, wind and fluid shapes are ignored."""
     model = everything()
     model.opt.density = model.opt.viscosity = 0.0
     still = effective_model(model)
@@ -146,7 +146,7 @@ def test_density_or_viscosity_makes_a_medium(density: float, viscosity: float) -
 
 
 def test_empty_bodies_are_left_out() -> None:
-    """A frame that holds only a camera moves nothing; one that carries a shape stays."""
+    """Bodies that hold only a camera are left out; parents of shapes stay."""
     xml = (
         "<mujoco><worldbody><geom type='plane' size='1 1 1'/>{}<body name='b'><freejoint/>"
         "<geom size='.1'/>{}</body></worldbody></mujoco>"
@@ -160,8 +160,8 @@ def test_empty_bodies_are_left_out() -> None:
     assert list(shelved["bodies"]) == ["b", "shelf", "stone"]
 
 
-def test_sleep_counts_once_it_is_allowed() -> None:
-    """Policies of trees matter only with the flag that lets them sleep."""
+def test_sleep_counts_only_if_enabled() -> None:
+    """Sleep policies are ignored unless sleep is enabled."""
     model = everything()
     awake = effective_model(model)
     assert "sleep policy" not in awake["bodies"]["trunk"]
@@ -171,8 +171,8 @@ def test_sleep_counts_once_it_is_allowed() -> None:
     assert asleep["options"]["simulation"]["with sleep"] == ("yes",)
 
 
-def test_switched_off_actuators_say_so() -> None:
-    """A group that the options disable is told of."""
+def test_disabled_actuators_are_marked() -> None:
+    """Actuators of a disabled group are marked."""
     model = everything()
     model.actuator("motor").group[:] = 3
     model.opt.disableactuator = 1 << 3
@@ -202,8 +202,8 @@ _CLOTH = """
         lambda m: m.geom_pos.fill(0.1),
     ],
 )
-def test_soft_bodies_count(edit: Any) -> None:
-    """Flexes are compared by their own parameters, and so is what they can touch."""
+def test_flexes_are_included(edit: Any) -> None:
+    """Flexes have their own parameters, and the geoms they can touch are included."""
     model = mujoco.MjModel.from_xml_string(_CLOTH)
     nominal = effective_model(model)
     assert nominal["flexes"]["cloth"]["radius"] == (0.01,)
@@ -213,8 +213,8 @@ def test_soft_bodies_count(edit: Any) -> None:
     assert effective_model(model) != nominal
 
 
-def test_plugins_count() -> None:
-    """What an engine plugin was given is part of the model."""
+def test_plugins_are_included() -> None:
+    """The configuration of an engine plugin is part of the model."""
     xml = (
         "<mujoco><extension><plugin plugin='mujoco.pid'><instance name='pid'>"
         "<config key='kp' value='{}'/></instance></plugin></extension>"
@@ -227,8 +227,8 @@ def test_plugins_count() -> None:
 
 
 @pytest.mark.parametrize("name", ["ant", "humanoid", "hopper", "reacher", "swimmer", "pusher"])
-def test_gymnasium_bodies_have_a_record(name: str) -> None:
-    """Every body has as many joints and actuators in its record as in its model."""
+def test_gymnasium_bodies_are_supported(name: str) -> None:
+    """All joints and actuators of Gymnasium's bodies are included."""
     model = asset(name)
     effective = effective_model(model)
     assert len(effective["joints"]) == model.njnt

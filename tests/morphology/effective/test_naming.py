@@ -1,4 +1,4 @@
-"""Names for elements that have none."""
+"""Names of unnamed elements."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tests.morphology.scenes import asset, asset_spec, everything
 
 
 @pytest.mark.parametrize("name", ["ant", "hopper", "humanoid", "inverted_pendulum", "walker2d_v5"])
-def test_a_model_named_by_rule_is_the_same_model(name: str) -> None:
-    """The names given to unnamed elements are those that editing gives them."""
+def test_names_equal_those_of_name_elements(name: str) -> None:
+    """Generated names equal those that editing gives."""
     spec = asset_spec(name)
     name_elements(spec)
     named = spec.compile()
@@ -21,15 +21,15 @@ def test_a_model_named_by_rule_is_the_same_model(name: str) -> None:
     assert fingerprint(named) == fingerprint(asset(name))
 
 
-def test_the_ants_shanks_are_called_after_their_joints() -> None:
-    """The ant's four shanks and eight motors have no names in the file."""
+def test_the_ants_shanks_are_named_after_their_joints() -> None:
+    """The ant's file has no names for shanks and motors."""
     names = names_of(asset("ant"))
     assert names.bodies[4] == "ankle_1"
     assert names.actuators[:2] == ("hip_4", "ankle_4")
 
 
 def test_names_that_repeat_are_numbered() -> None:
-    """No two elements of a kind bear the same name, whatever was given."""
+    """Names of a kind are unique."""
     model = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><body name='a'>"
         "<joint/><joint axis='1 0 0'/><geom size='1'/><geom size='2'/>"
@@ -45,8 +45,8 @@ def test_names_that_repeat_are_numbered() -> None:
     assert names.equalities == ("equality",)
 
 
-def test_every_actuator_names_what_it_drives() -> None:
-    """Joints, tendons, sites and bodies are all driven by something."""
+def test_every_actuator_has_a_target() -> None:
+    """Targets are joints, tendons, sites and bodies."""
     names = names_of(everything())
     assert dict(zip(names.actuators, names.targets, strict=True)) == {
         "motor": "wrist",

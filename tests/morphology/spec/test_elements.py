@@ -1,4 +1,4 @@
-"""Finding elements by name, and naming those that have none."""
+"""Selection and naming of elements."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _NAMELESS = """
 
 
 def test_a_name_is_preferred_to_a_pattern() -> None:
-    """A name finds its element even where it would fit others as a glob."""
+    """A name that is also a glob selects the element of that name."""
     spec = spec_of(
         "<mujoco><worldbody><body name='a*'><geom size='.1'/></body>"
         "<body name='ab'><geom size='.1'/></body></worldbody></mujoco>"
@@ -45,23 +45,23 @@ def test_a_name_is_preferred_to_a_pattern() -> None:
     assert [b.name for b in select("body", "a?", limbs_and_trunks(spec))] == ["a*", "ab"]
 
 
-def test_patterns_find_in_the_order_of_the_model() -> None:
-    """A glob finds all that fit, and letters count as they are written."""
+def test_globs_select_in_model_order() -> None:
+    """Matching is case-sensitive."""
     found = select("body", "shank_[14]", limbs_and_trunks(ant()))
     assert [body.name for body in found] == ["shank_1", "shank_4"]
     with pytest.raises(UnknownName, match=r"No body matches 'Shank_1'\. Did you mean 'shank_1'"):
         select("body", "Shank_1", limbs_and_trunks(ant()))
 
 
-def test_the_world_is_no_body_to_edit() -> None:
-    """It is neither limb nor trunk."""
+def test_the_world_cannot_be_selected() -> None:
+    """The world is neither a limb nor a trunk."""
     assert [body.name for body in limbs_and_trunks(leg())] == ["trunk", "thigh", "shin"]
     with pytest.raises(UnknownName, match="There are: trunk, thigh, shin"):
         select("body", "world", limbs_and_trunks(leg()))
 
 
 def test_trunks_are_no_limbs() -> None:
-    """The message says what could be cut instead."""
+    """The error lists the limbs of the trunk."""
     spec = leg()
     require_limb(spec.body("thigh"), "cut")
     with pytest.raises(MorphologyError, match=r"'trunk' is the trunk .* its limbs can: thigh\."):
@@ -75,24 +75,24 @@ def test_trunks_are_no_limbs() -> None:
     ("kind", "name"),
     [("body", "thigh"), ("joint", "hip"), ("geom", "floor"), ("actuator", "knee"), ("body", "")],
 )
-def test_new_names_must_be_free(kind: str, name: str) -> None:
-    """Two elements of one name could not be told apart, and one of none not be found."""
+def test_new_names_must_be_unused(kind: str, name: str) -> None:
+    """Used and empty names are refused."""
     with pytest.raises(MorphologyError, match=f"A new {kind} needs an unused name, got '{name}'"):
         require_free_name(leg(), kind, name)
 
 
-def test_names_are_free_per_kind() -> None:
-    """A joint may be called as a body is."""
+def test_names_are_unique_per_kind() -> None:
+    """A joint may have the name of a body."""
     require_free_name(leg(), "joint", "thigh")
 
 
 def test_a_subtree_begins_with_its_body() -> None:
-    """Parents come before what hangs on them."""
+    """Parents come before children."""
     assert [body.name for body in subtree(leg().body("trunk"))] == ["trunk", "thigh", "shin"]
 
 
-def test_everything_gets_a_name() -> None:
-    """After what is chosen for the joint, after the joint, after the parent; never one twice."""
+def test_all_elements_get_unique_names() -> None:
+    """Names follow from given names, joints and parents."""
     spec = spec_of(_NAMELESS)
     name_elements(spec, {"knee_3": "shin"})
     assert [body.name for body in spec.bodies] == [
@@ -111,7 +111,7 @@ def test_everything_gets_a_name() -> None:
 
 
 def test_names_change_no_physics() -> None:
-    """A model with names is the model without, and naming twice is naming once."""
+    """Naming does not change the compiled model, and is idempotent."""
     spec = spec_of(_NAMELESS)
     before = spec.copy().compile()
     name_elements(spec)
@@ -122,7 +122,7 @@ def test_names_change_no_physics() -> None:
 
 
 def test_the_ant_has_the_names_that_its_family_gives() -> None:
-    """The release's shanks have no names in Gymnasium's file."""
+    """The family names the shanks, which Gymnasium's file does not."""
     shanks = [body.name for body in ant().bodies if body.name.startswith("shank")]
     assert shanks == ["shank_1", "shank_2", "shank_3", "shank_4"]
     unnamed = asset_spec("ant")

@@ -1,4 +1,4 @@
-"""What a model says indirectly: names, frames and a total mass."""
+"""Resolution of indirect definitions: names, frames and a total mass."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapechanger.morphology.spec.explicit import make_explicit, resolve_frames
 from tests.morphology.models import built, differing, leg, mass, posed, spec_of, tip
 from tests.morphology.scenes import asset_spec
 
-# Everything that can be in a frame, in frames within frames, in degrees.
+# Every element that frames can hold, in nested frames, in degrees.
 _FRAMES = """
 <mujoco>
   <worldbody>
@@ -46,13 +46,13 @@ _FRAMES = """
 """
 
 
-def test_poses_are_written_as_seen_from_the_body() -> None:
-    """The compiled model is the same, and the frames are where their bodies are."""
+def test_frames_are_resolved() -> None:
+    """Poses become relative to the body, and the compiled model does not change."""
     spec = spec_of(_FRAMES)
     before = built(spec)
     resolve_frames(spec)
     after = built(spec)
-    # How a capsule is turned about its own axis decides nothing but its bounding box.
+    # The rotation of a capsule about its axis affects only its bounding box.
     boxes = ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid", "geom_aabb", "geom_quat")
     for field in differing(before, after, ignoring=(*boxes, "site_quat")):
         np.testing.assert_allclose(
@@ -69,8 +69,8 @@ def test_poses_are_written_as_seen_from_the_body() -> None:
     assert differing(once, built(spec)) == []
 
 
-def test_frames_do_not_hide_where_a_segment_grows() -> None:
-    """A limb in a frame that is turned moves along the trunk's axis, not the frame's."""
+def test_stretches_ignore_the_axes_of_frames() -> None:
+    """A limb in a rotated frame moves along the trunk's axis."""
     spec = spec_of(
         """<mujoco><worldbody><body name="trunk"><geom type="box" size=".1 .2 .3"/>
         <frame euler="0 0 90"><body name="limb" pos=".2 0 0"><geom size=".1"/></body></frame>
@@ -81,8 +81,8 @@ def test_frames_do_not_hide_where_a_segment_grows() -> None:
     np.testing.assert_allclose(model.body("limb").pos, [0.0, 0.4, 0.0], atol=1e-12)
 
 
-def test_copied_limbs_are_seen_from_their_body_too() -> None:
-    """A copy on the other side is beyond a cut where the limb is, not where the original was."""
+def test_copied_limbs_have_poses_relative_to_their_body() -> None:
+    """Later cuts and stretches use the position of the copy."""
     spec = leg()
     turned = built(spec, AddLimb("thigh", "_2", math.pi / 2.0), Stretch("trunk", 2.0, axis="x"))
     np.testing.assert_allclose(turned.body("thigh_2").pos, [-0.4, 0.0, 0.0], atol=1e-12)
@@ -98,7 +98,7 @@ def test_copied_limbs_are_seen_from_their_body_too() -> None:
 
 @pytest.mark.parametrize("scaling", ['scale="2"', 'scale="2" massscale="1"'])
 def test_frames_that_scale_are_refused(scaling: str) -> None:
-    """What they hold has other sizes than it says."""
+    """Frames with a scale cannot be edited."""
     text = f"""<mujoco><worldbody><frame name="big" {scaling}><body name="b"><joint/>
     <geom size=".1"/></body></frame></worldbody></mujoco>"""
     with pytest.raises(MorphologyError, match="The frame 'big' scales its elements: write the"):
@@ -106,10 +106,10 @@ def test_frames_that_scale_are_refused(scaling: str) -> None:
 
 
 def test_a_total_mass_does_not_undo_an_edit() -> None:
-    """The half cheetah says that it weighs 14 kg: so it does, until it is made heavier."""
+    """`settotalmass` of the half cheetah is resolved before edits of masses."""
     spec = asset_spec("half_cheetah")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # MuJoCo would rather not have total masses at all.
+        warnings.simplefilter("ignore")  # MuJoCo warns about total masses.
         before = spec.copy().compile()
     make_explicit(spec)
     after = built(spec)
@@ -122,8 +122,8 @@ def test_a_total_mass_does_not_undo_an_edit() -> None:
     assert mass(built(asset_spec("half_cheetah"), Mass("*", to=0.5))) == pytest.approx(3.5)
 
 
-def test_a_total_mass_counts_what_is_written_out() -> None:
-    """Inertias that are the body's own numbers are scaled like those of geoms."""
+def test_a_total_mass_scales_explicit_inertias() -> None:
+    """Explicit masses and inertias are scaled like those of geoms."""
     spec = spec_of(
         """<mujoco><compiler settotalmass="10"/><worldbody>
         <body name="a"><freejoint/><geom type="capsule" size=".1 .2" mass="1"/>
@@ -137,15 +137,15 @@ def test_a_total_mass_counts_what_is_written_out() -> None:
     np.testing.assert_allclose(sorted(model.body("b").inertia), [0.25, 0.5, 0.5])
 
 
-def test_names_are_there_to_be_asked_for() -> None:
-    """Also in a model that was loaded without a family."""
+def test_generated_names_can_be_edited() -> None:
+    """Models that were loaded without a family have generated names."""
     model = built(asset_spec("ant"), Stretch("ankle_1", 2.0))
     assert model.geom("left_ankle_geom").size[1] == pytest.approx(0.4 * math.sqrt(2.0))
     assert "ankle_1" not in [body.name for body in asset_spec("ant").bodies]
 
 
-def test_a_model_without_edits_is_left_alone() -> None:
-    """Nothing is named and nothing resolved where nothing changes."""
+def test_a_model_without_edits_is_unchanged() -> None:
+    """Without edits, or with an amount of 0, frames are not resolved."""
     spec = spec_of(_FRAMES)
     assert any(np.any(frame.pos) for frame in reshape(spec, ()).frames)
     assert any(np.any(f.pos) for f in reshape(spec, [Stretch("limb", 2.0, amount=0.0)]).frames)

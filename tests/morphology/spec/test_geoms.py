@@ -1,4 +1,4 @@
-"""Geoms: volumes as MuJoCo computes them, and growth that keeps the density."""
+"""Geoms: volume, orientation and size."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ _PRIMITIVES = {
 
 
 @pytest.mark.parametrize("shape", _PRIMITIVES.values(), ids=_PRIMITIVES)
-def test_volumes_are_those_of_the_compiler(shape: str) -> None:
-    """At a density of 1 MuJoCo's mass is the volume."""
+def test_volumes_match_the_compiler(shape: str) -> None:
+    """At a density of 1, MuJoCo's mass is the volume."""
     spec = limb(f'<geom {shape} density="1"/>')
     (geom,) = spec.body("link").geoms
     assert volume(spec, geom) == pytest.approx(mass(built(spec), "link"), rel=1e-12)
@@ -41,8 +41,8 @@ def test_volumes_are_those_of_the_compiler(shape: str) -> None:
 
 @pytest.mark.parametrize("shape", _PRIMITIVES.values(), ids=_PRIMITIVES)
 @pytest.mark.parametrize("edit", [Stretch("link", 1.7), Radius("link", 0.6)])
-def test_a_mass_that_is_written_out_follows_the_volume(shape: str, edit: Stretch | Radius) -> None:
-    """A geom of 3 kg grows as one of the same density does."""
+def test_explicit_masses_scale_with_the_volume(shape: str, edit: Stretch | Radius) -> None:
+    """An explicit mass scales as one from a density."""
     by_density = limb(f'<geom {shape} density="70"/>')
     before = mass(built(by_density), "link")
     by_mass = limb(f'<geom {shape} mass="{before!r}"/>')
@@ -53,7 +53,7 @@ def test_a_mass_that_is_written_out_follows_the_volume(shape: str, edit: Stretch
 
 @pytest.mark.parametrize("shape", _PRIMITIVES.values(), ids=_PRIMITIVES)
 def test_resizing_scales_volume_by_the_cube(shape: str) -> None:
-    """Twice as large in every direction is eight times the volume, as seen from a point."""
+    """Size and distance from the fixed point scale by the factor."""
     spec = limb(f'<geom {shape} density="1"/>')
     (geom,) = spec.body("link").geoms
     before, place = volume(spec, geom), place_of(geom)
@@ -63,8 +63,8 @@ def test_resizing_scales_volume_by_the_cube(shape: str) -> None:
 
 
 @pytest.mark.parametrize("shape", _PRIMITIVES.values(), ids=_PRIMITIVES)
-def test_moving_moves_however_the_place_is_written(shape: str) -> None:
-    """Both ends move, or the middle."""
+def test_any_form_of_position_can_be_moved(shape: str) -> None:
+    """Both ends or the centre move."""
     spec = limb(f"<geom {shape}/>")
     (geom,) = spec.body("link").geoms
     before = built(spec).geom_pos[-1]
@@ -81,8 +81,8 @@ def test_moving_moves_however_the_place_is_written(shape: str) -> None:
     ],
 )
 @pytest.mark.parametrize("compiler", ["", 'angle="radian"', 'eulerseq="ZYx"'])
-def test_orientations_are_read_however_they_are_written(written: str, compiler: str) -> None:
-    """Every way to write an orientation gives the compiler's quaternion."""
+def test_any_form_of_orientation_is_read(written: str, compiler: str) -> None:
+    """Every form gives the compiler's quaternion."""
     spec = limb(f'<geom name="g" type="capsule" size=".1 .2" {written}/>', compiler)
     model = built(spec)
     (geom,) = spec.body("link").geoms
@@ -94,7 +94,7 @@ def test_orientations_are_read_however_they_are_written(written: str, compiler: 
 
 
 def test_attached_parts_keep_their_units() -> None:
-    """A part in radians stays one when it is attached to a model in degrees."""
+    """A part in radians keeps its unit within a model in degrees."""
     part = limb('<geom name="g" type="capsule" size=".1 .2" euler="1 0 0"/>', 'angle="radian"')
     whole = spec_of("<mujoco><compiler angle='degree'/><worldbody/></mujoco>")
     whole.worldbody.add_frame().attach_body(part.body("trunk"), "part_", "")
@@ -104,7 +104,7 @@ def test_attached_parts_keep_their_units() -> None:
 
 
 def _sizes(content: str, edit: Stretch | Radius) -> list[float]:
-    """The compiled half-sizes of the link's geom after an edit."""
+    """Return the compiled half-sizes of the link's geom after an edit."""
     return built(limb(content), edit).geom_size[-1].tolist()
 
 
@@ -121,17 +121,15 @@ def _sizes(content: str, edit: Stretch | Radius) -> list[float]:
         ('<geom type="box" size=".1" fromto="0 0 0 .3 .4 0"/>', None, [0.1, 0.1, 0.5]),
     ],
 )
-def test_what_grows_is_what_lies_along_the_axis(
-    content: str, axis: str | None, sizes: list[float]
-) -> None:
-    """A box grows along any axis of its own, a capsule along one only."""
+def test_stretches_apply_along_the_axis(content: str, axis: str | None, sizes: list[float]) -> None:
+    """A box stretches along any of its axes, a capsule along one."""
     edit = Stretch("link", 2.0, axis)  # type: ignore[arg-type]
     np.testing.assert_allclose(_sizes(content, edit), sizes, atol=1e-12)
 
 
 @pytest.mark.parametrize("shape", ["capsule", "box"])
-def test_an_oblique_geom_cannot_grow_along_an_axis(shape: str) -> None:
-    """It would become another shape; the message says what can be done."""
+def test_an_oblique_geom_cannot_be_stretched_along_an_axis(shape: str) -> None:
+    """The error suggests a stretch along all axes."""
     content = f'<geom name="g" type="{shape}" size=".1 .2 .3" euler="0 30 0"/>'
     with pytest.raises(
         MorphologyError, match="'g' lies oblique to the axis 'z': stretch it along all"
@@ -140,7 +138,7 @@ def test_an_oblique_geom_cannot_grow_along_an_axis(shape: str) -> None:
 
 
 def test_oblique_ends_are_stretched_along_an_axis() -> None:
-    """As the pole is, which leans by a millimetre and keeps doing so."""
+    """Geoms with ends can be stretched along any axis."""
     model = built(
         limb('<geom type="capsule" size=".1" fromto="0 0 0 .3 0 .4"/>'), Stretch("link", 2.0, "z")
     )
@@ -158,12 +156,12 @@ def test_oblique_ends_are_stretched_along_an_axis() -> None:
         ('<geom type="ellipsoid" size=".1" fromto="0 0 0 .3 .4 0"/>', [0.3, 0.3, 0.25]),
     ],
 )
-def test_thickness_is_what_length_is_not(content: str, sizes: list[float]) -> None:
-    """The longest of three half-sizes is the length, the other two are the thickness."""
+def test_the_longest_side_is_the_length(content: str, sizes: list[float]) -> None:
+    """`Radius` scales the other two half-sizes."""
     np.testing.assert_allclose(_sizes(content, Radius("link", 3.0)), sizes)
 
 
 def test_only_long_geoms_have_ends() -> None:
-    """A box has no axis to build on."""
+    """Boxes with a size have no axis."""
     spec = limb('<geom type="box" size=".1 .2 .3"/>')
     assert axis_ends(spec, spec.body("link").geoms[0]) is None

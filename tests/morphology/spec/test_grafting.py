@@ -1,4 +1,4 @@
-"""Copying and moving limbs within a model that has one of nearly everything."""
+"""Copying and moving of limbs in models with many kinds of references."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shapechanger.morphology.spec.grafting import copy_geom, graft_copy, move_li
 from tests.morphology.models import built, leg, posed, spec_of
 from tests.morphology.scenes import EVERYTHING
 
-# A limb that others refer to in every way, with assets and defaults of its own.
+# A limb with every kind of reference to it, and with its own assets and defaults.
 _REFERRED_TO = """
 <mujoco>
   <compiler angle="radian"/>
@@ -70,7 +70,7 @@ _REFERRED_TO = """
 
 
 def _referring(model: mujoco.MjModel) -> dict[str, list[object]]:
-    """What the model's elements refer to, by name."""
+    """Return the references of the model's elements, by name."""
     kind, name_of = mujoco.mjtObj, mujoco.mj_id2name
 
     def names(obj: int, ids: np.ndarray) -> list[object]:
@@ -91,8 +91,8 @@ def _referring(model: mujoco.MjModel) -> dict[str, list[object]]:
     }
 
 
-def test_a_moved_limb_keeps_what_refers_to_it() -> None:
-    """Motors, sensors, tendons, couplings, contact pairs: all find it under its name."""
+def test_a_moved_limb_keeps_its_references() -> None:
+    """Motors, sensors, tendons, equalities and contact pairs are kept."""
     spec = spec_of(_REFERRED_TO)
     before = built(spec)
     moved = move_limb(spec, spec.body("shin"), spec.body("wing"))
@@ -108,7 +108,7 @@ def test_a_moved_limb_keeps_what_refers_to_it() -> None:
 
 
 def test_a_copied_limb_shares_the_assets() -> None:
-    """Materials and meshes are there once, however many limbs use them."""
+    """Materials and meshes are not duplicated."""
     spec = spec_of(_REFERRED_TO)
     before = built(spec)
     for suffix, angle in (("_2", 2.0), ("_3", 4.0)):
@@ -124,8 +124,8 @@ def test_a_copied_limb_shares_the_assets() -> None:
     assert after.light("lamp_2").bodyid == after.body("shin_2").id
 
 
-def test_a_copied_limb_has_motors_and_nothing_else_that_refers() -> None:
-    """Sensors, tendons and couplings stay with the original."""
+def test_only_motors_are_copied_with_a_limb() -> None:
+    """Sensors, tendons and equalities stay with the original."""
     spec = spec_of(_REFERRED_TO)
     before = _referring(built(spec))
     graft_copy(spec, spec.body("thigh"), "_2", 2.0)
@@ -135,8 +135,8 @@ def test_a_copied_limb_has_motors_and_nothing_else_that_refers() -> None:
         assert after[kind] == before[kind]
 
 
-def test_limbs_of_a_model_with_one_of_nearly_everything() -> None:
-    """Height fields, skyboxes, mocap bodies, ball joints and muscles are no hindrance."""
+def test_limbs_of_a_complex_model_can_be_copied() -> None:
+    """Height fields, skyboxes, mocap bodies, ball joints and muscles are supported."""
     before = built(spec_of(EVERYTHING))
     model = built(spec_of(EVERYTHING), AddLimb("arm", "_2", 2.0), Split("hand", "finger"))
     assert (model.nbody, model.nmesh, model.nhfield) == (
@@ -146,8 +146,8 @@ def test_limbs_of_a_model_with_one_of_nearly_everything() -> None:
     )
 
 
-def test_a_copied_geom_is_as_the_original() -> None:
-    """In everything that decides physics and looks, but for its name and its body."""
+def test_a_copied_geom_equals_the_original() -> None:
+    """All attributes except name and body are equal."""
     spec = spec_of(
         """<mujoco><asset><material name="red"/></asset><worldbody>
         <body name="a"><freejoint/><geom name="a" type="ellipsoid" size=".1 .2 .3" pos="1 2 3"
@@ -169,7 +169,7 @@ def test_a_copied_geom_is_as_the_original() -> None:
 
 
 def test_a_moved_point_keeps_its_pose_and_its_name() -> None:
-    """A site or a geom, in the frame of its new body."""
+    """Sites and geoms keep their pose relative to the new body."""
     spec = leg()
     spec.site("toe").size = [0.02, 0.03, 0.04]
     before = built(spec)

@@ -1,4 +1,4 @@
-"""What goes with a joint that is taken away."""
+"""Elements that are removed with a joint."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _TIED = """
 """
 
 
-def test_what_refers_to_the_joint_goes_with_it() -> None:
-    """Its motor and the sensors of both, its coupling, and keyframes that list every joint."""
+def test_references_to_the_joint_are_removed() -> None:
+    """Its motor, the sensors of both, its equality, and all keyframes are removed."""
     model = built(gantry(), Lock("yaw"))
     assert (model.nu, model.nkey) == (0, 0)
     assert [model.sensor(i).name for i in range(model.nsensor)] == ["swing_angle", "hook"]
@@ -39,8 +39,8 @@ def test_what_refers_to_the_joint_goes_with_it() -> None:
     }
 
 
-def test_a_tendon_that_does_nothing_goes_too() -> None:
-    """The humanoid's tendons tie hip and knee but neither pull nor are read."""
+def test_a_tendon_without_effect_is_removed() -> None:
+    """The humanoid's tendons have neither force nor sensor."""
     assert built(asset_spec("humanoid")).ntendon == 2
     model = built(asset_spec("humanoid"), Lock("right_knee"))
     assert model.ntendon == 1
@@ -60,15 +60,15 @@ def test_a_tendon_that_does_nothing_goes_too() -> None:
         ("", '<equality><tendon tendon1="tie"/></equality>'),
     ],
 )
-def test_a_tendon_that_ties_joints_holds_them(tendon: str, rest: str) -> None:
-    """Without one of them it would pull otherwise at the other."""
+def test_a_tendon_with_effect_prevents_the_lock(tendon: str, rest: str) -> None:
+    """Removing one of its joints would change its force on the other."""
     spec = spec_of(_TIED.format(tendon=f'name="tie" {tendon}', rest=rest))
     with pytest.raises(MorphologyError, match="'b' is tied to other joints by the tendon 'tie'"):
         built(spec, Lock("b", 0.1))
 
 
 def test_tendons_over_sites_do_not_tie_joints() -> None:
-    """They are where their sites are."""
+    """Spatial tendons do not prevent a lock."""
     rest = '<actuator><motor tendon="rope"/></actuator><sensor><tendonpos tendon="rope"/></sensor>'
     model = built(spec_of(_TIED.format(tendon="", rest=rest)), Lock("b", 0.1))
     assert (model.ntendon, model.nu, model.nsensor) == (1, 1, 1)

@@ -1,4 +1,4 @@
-"""Segments: where they are held, where they end, and what moves with them."""
+"""Segments: anchors, far ends, and children that move along."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ _WRITTEN_OUT = """
 """
 
 
-def test_a_segment_is_held_at_its_first_turning_joint() -> None:
-    """Slides turn about nothing, so the place that is written for them does not count."""
+def test_the_anchor_is_the_first_rotating_joint() -> None:
+    """Positions of slides are ignored."""
     hopper = asset_spec("hopper")
     np.testing.assert_array_equal(anchor(hopper.body("torso")), [0.0, 0.0, 0.0])
     np.testing.assert_array_equal(anchor(hopper.body("leg")), [0.0, 0.0, 0.25])
@@ -50,15 +50,15 @@ def test_a_segment_is_held_at_its_first_turning_joint() -> None:
     np.testing.assert_array_equal(anchor(leg().body("trunk")), [0.0, 0.0, 0.0])
 
 
-def test_the_hopper_grows_where_it_is() -> None:
-    """Its root slides are written at the floor; its torso does not rise when it is stretched."""
+def test_the_hopper_stretches_in_place() -> None:
+    """The torso does not rise, although its root slides are defined at the floor."""
     model = built(asset_spec("hopper"), Stretch("torso", 1.5))
     np.testing.assert_array_equal(model.geom("torso_geom").pos, [0.0, 0.0, 0.0])
     np.testing.assert_allclose(model.body("thigh").pos, [0.0, 0.0, -0.3])
 
 
-def test_where_a_segment_is_held_in_its_parent() -> None:
-    """Through the pose of the body, however that is written."""
+def test_the_anchor_in_the_parents_frame() -> None:
+    """The pose of the body is applied."""
     spec = gantry()
     model = built(spec)
     body, joint = model.body("boom"), model.joint("swing")
@@ -68,18 +68,18 @@ def test_where_a_segment_is_held_in_its_parent() -> None:
 
 
 def test_the_far_end_is_the_end_of_an_axis() -> None:
-    """The farther of both ends as seen from the anchor; a sphere has none."""
+    """It is the end farther from the anchor; spheres have none."""
     spec = leg()
     np.testing.assert_allclose(far_end(spec, spec.body("shin")), [0.0, 0.0, -0.25])
     with pytest.raises(MorphologyError, match="'trunk' has no capsule or cylinder, so it has no"):
         far_end(spec, spec.body("trunk"))
 
 
-def test_what_hangs_on_a_segment_moves_outwards() -> None:
-    """Bodies by where they are held, sites by where they are, further joints too."""
+def test_children_move_along_with_a_stretch() -> None:
+    """Bodies move by their anchors, sites and further joints by their positions."""
     model = built(leg(), Stretch("thigh", 2.0))
     np.testing.assert_allclose(model.site("scar").pos, [0.0, 0.0, -0.12])
-    # The knee, 5 cm below the shin's origin, was at the thigh's end, and is so again.
+    # The knee, 5 cm below the shin's origin, stays at the end of the thigh.
     np.testing.assert_allclose(model.body("shin").pos + model.joint("knee").pos, [0.0, 0.0, -0.6])
     np.testing.assert_array_equal(model.joint("knee").pos, [0.0, 0.0, -0.05])
     rig = built(gantry(), Stretch("rig", 2.0))
@@ -89,7 +89,7 @@ def test_what_hangs_on_a_segment_moves_outwards() -> None:
 
 
 def test_sites_with_ends_are_stretched_too() -> None:
-    """Both ends of the site move outwards."""
+    """Both ends of the site scale."""
     spec = limb(
         '<geom type="capsule" size=".1 .2"/>'
         '<site name="s" type="capsule" size=".01" fromto="0 0 0 0 0 .4"/>'
@@ -100,7 +100,7 @@ def test_sites_with_ends_are_stretched_too() -> None:
 
 
 def test_a_limb_is_resized_as_a_whole() -> None:
-    """Lengths by the factor, masses by its cube, strengths by the factor, held where it was."""
+    """Lengths and strengths scale by the factor, masses by its cube; the anchor stays."""
     spec = leg()
     before = built(spec)
     resize_limb(spec, spec.body("thigh"), 0.5)
@@ -122,7 +122,7 @@ def test_a_limb_is_resized_as_a_whole() -> None:
 
 
 def test_a_box_keeps_its_shape_when_it_is_resized() -> None:
-    """Also where the longest side becomes shorter than another was."""
+    """All sides scale by the same factor, whichever was the longest."""
     spec = limb('<geom type="box" size=".1 .09 .05"/>')
     resize_limb(spec, spec.body("link"), 0.5)
     np.testing.assert_allclose(built(spec).geom_size[-1], [0.05, 0.045, 0.025])
@@ -130,7 +130,7 @@ def test_a_box_keeps_its_shape_when_it_is_resized() -> None:
 
 @pytest.mark.parametrize("edit", [Stretch("link", 2.0), Radius("link", 2.0), Cut("link", 0.5)])
 def test_meshes_cannot_be_reshaped(edit: Stretch | Radius | Cut) -> None:
-    """Their vertices are not ours to move."""
+    """Stretches, radii and cuts of meshes are refused."""
     with pytest.raises(
         MorphologyError, match="'link' holds 'horn', a mesh; only spheres, capsules"
     ):
@@ -138,23 +138,23 @@ def test_meshes_cannot_be_reshaped(edit: Stretch | Radius | Cut) -> None:
 
 
 @pytest.mark.parametrize("edit", [Stretch("link", 2.0), Radius("link", 2.0), Cut("link", 0.5)])
-def test_inertia_that_is_written_out_is_not_left_behind(edit: Stretch | Radius | Cut) -> None:
-    """A new shape with the old inertia would be no body at all."""
+def test_explicit_inertias_prevent_reshaping(edit: Stretch | Radius | Cut) -> None:
+    """An explicit inertia would not follow the new shape."""
     with pytest.raises(
         MorphologyError, match="'link' has its inertia written out, so it would not"
     ):
         built(limb(_WRITTEN_OUT), edit)
 
 
-def test_inertia_from_geoms_makes_up_for_it() -> None:
-    """What is written out counts for nothing where the model says so."""
+def test_inertiafromgeom_allows_reshaping() -> None:
+    """With `inertiafromgeom`, explicit inertias do not count."""
     spec = limb(_WRITTEN_OUT, 'inertiafromgeom="true"')
     require_geometry(spec, spec.body("link"))
     assert mass(built(spec, Radius("link", 2.0)), "link") > 2.0
 
 
-def test_masses_are_scaled_however_they_are_given() -> None:
-    """As a density, as a mass, or written out with the inertia."""
+def test_any_form_of_mass_is_scaled() -> None:
+    """Densities, masses and explicit inertias are scaled."""
     for content in (
         '<geom type="capsule" size=".1 .2"/>',
         '<geom type="capsule" size=".1 .2" mass="3"/>',

@@ -88,16 +88,16 @@ def test_every_control_has_an_accessible_name(car: RunningRobot, visit: Visit) -
     console.await_state(picture="live")
     session = console.page.context.new_cdp_session(console.page)
     nodes = session.send("Accessibility.getFullAXTree")["nodes"]
-    heard = [
+    tree = [
         (node.get("role", {}).get("value"), node.get("name", {}).get("value", ""))
         for node in nodes
         if not node["ignored"]
     ]
     controls = {"button", "slider", "textbox", "checkbox", "application", "log", "image"}
-    named = {(role, name) for role, name in heard if role in controls}
+    named = {(role, name) for role, name in tree if role in controls}
     assert [role for role, name in named if not name.strip()] == []
     assert len([role for role, _ in named if role == "button"]) >= 8
-    roles = {role for role, _ in heard}
+    roles = {role for role, _ in tree}
     assert {"banner", "main", "status", "log", "heading"} <= roles
     first = console.page.evaluate(
         "[...document.querySelectorAll('button, input, [tabindex]')]"

@@ -67,7 +67,7 @@ class Client:
         """Send a message."""
         await self.socket.send_bytes(encode(message))
 
-    async def hear(self) -> RobotMessage | None:
+    async def receive(self) -> RobotMessage | None:
         """Return the next message; None after the robot closed the connection."""
         async with asyncio.timeout(PATIENCE_S):
             message = await self.socket.receive()

@@ -45,7 +45,7 @@ def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
     """Steps, marks and undo are applied in order, and the outcome is stored."""
     reports: list[tuple[str, str]] = []
     answers: list[str] = []
-    thread = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said))
+    thread = EpisodeThread(tmp_path, HEADER, lambda *report: reports.append(report))
     thread.edit(Mark(text="too early"), answers.append)
     thread.edit(Undo(), answers.append)
     assert all(thread.add(*step(number)) for number in range(40))
@@ -68,7 +68,7 @@ def test_a_slow_disk_ends_the_episode_and_keeps_its_steps(tmp_path: Path, bytes_
     """Queued steps and bytes are bounded; the disk is simulated as busy."""
     busy = EpisodeThread(tmp_path, HEADER, lambda *_: None)
     reports: list[tuple[str, str]] = []
-    thread = EpisodeThread(tmp_path, HEADER, lambda *said: reports.append(said), after=busy)
+    thread = EpisodeThread(tmp_path, HEADER, lambda *report: reports.append(report), after=busy)
     taken = 0
     large = b"\xff\xd8" + bytes(bytes_each)
     while thread.add(step(taken)[0], large):
@@ -86,7 +86,7 @@ def test_an_error_of_the_disk_is_reported(tmp_path: Path) -> None:
     """It is reported once, and the episode does not start."""
     (tmp_path / "kept").write_text("in the way")
     reports: list[tuple[str, str]] = []
-    thread = EpisodeThread(tmp_path / "kept", HEADER, lambda *said: reports.append(said))
+    thread = EpisodeThread(tmp_path / "kept", HEADER, lambda *report: reports.append(report))
     assert thread.join(WITHIN_S)
     ((what, trouble),) = reports
     assert (what, thread.progress.episode) == ("ended", "")
@@ -118,19 +118,19 @@ def test_an_episode_of_a_killed_daemon_can_be_repaired(tmp_path: Path) -> None:
             [sys.executable, "-c", _WRITES_FOR_EVER, str(folder)], stdout=subprocess.PIPE, text=True
         )
         assert writing.stdout is not None
-        enough, told = rng.randrange(1, 400), 0
+        enough, reported = rng.randrange(1, 400), 0
         until_s = time.monotonic() + WITHIN_S
-        while told < enough and time.monotonic() < until_s:
-            told = int(writing.stdout.readline())
+        while reported < enough and time.monotonic() < until_s:
+            reported = int(writing.stdout.readline())
         os.kill(writing.pid, signal.SIGKILL)
-        told = max([told, *(int(line) for line in writing.stdout.read().split("\n")[:-1])])
+        reported = max([reported, *(int(line) for line in writing.stdout.read().split("\n")[:-1])])
         writing.wait()
         writing.stdout.close()
         (path,) = episodes_of(folder)
         repair(path)
         episode = read_episode(path)
-        assert told >= enough
-        assert len(episode.steps) >= told
+        assert reported >= enough
+        assert len(episode.steps) >= reported
         assert [s.index for s in episode.steps] == list(range(len(episode.steps)))
         assert all(episode.jpeg(s) == picture(s.index % 5) for s in episode.steps)
 
@@ -229,17 +229,17 @@ def test_a_client_without_control_does_not_complete_applied_outputs(built: Built
 
 
 @given(
-    said=st.lists(
+    events=st.lists(
         st.tuples(st.booleans(), st.sampled_from((ADA, NET)), st.integers(0, 4)), max_size=60
     )
 )
 def test_times_increase_and_no_frame_repeats(
-    said: list[tuple[bool, ClientIdentity, int]],
+    events: list[tuple[bool, ClientIdentity, int]],
 ) -> None:
     """Holds for any order of observations and commands."""
     built = Built()
     newest = {ADA.session: 0, NET.session: 0}
-    for now_ns, (looks, who, back) in enumerate(said):
+    for now_ns, (looks, who, back) in enumerate(events):
         if looks:
             newest[who.session] += 1
             picture = frame(1 + now_ns // 3)  # Each picture is seen a few times.

@@ -337,9 +337,9 @@ def test_an_old_or_foreign_invalid_command_changes_nothing(play: Any) -> None:
         async with robot.client(role="person") as client, robot.client() as other:
             await robot.armed(client)
             seen = await client.drive(5, 0.0, 0.5)
-            for speaker, seq in ((client, 5), (client, 4), (other, 9)):
-                await speaker.send(Command(seq=seq, answers=seen.seq, values=(0.0, nan)))
-                await speaker.expect(Refused)
+            for sender, seq in ((client, 5), (client, 4), (other, 9)):
+                await sender.send(Command(seq=seq, answers=seen.seq, values=(0.0, nan)))
+                await sender.expect(Refused)
             assert robot.guard.kinds() == ["arm", "command"]
 
     play(script)

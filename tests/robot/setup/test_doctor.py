@@ -86,7 +86,7 @@ def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "level", "says"),
+    ("unit", "level", "sentence"),
     [
         ("Restart=always\nExecStopPost=/x/shapechanger robot safe-pins car.toml\n", "good", ""),
         (
@@ -98,13 +98,13 @@ def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path) -> None:
     ],
 )
 def test_the_systemd_unit_must_restart_and_make_safe(
-    tmp_path: Path, unit: str, level: str, says: str
+    tmp_path: Path, unit: str, level: str, sentence: str
 ) -> None:
     """A unit needs Restart=always and an ExecStopPost that makes the pins safe."""
     _write(tmp_path, f"etc/systemd/system/{unit_name('car')}", f"[Service]\n{unit}")
     finding = _found(tmp_path)["systemd"]
     assert finding.level == level
-    assert says in finding.sentence
+    assert sentence in finding.sentence
 
 
 def test_missing_safety_hardware_is_reported(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def root(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("how", "says"),
+    ("how", "expected"),
     [
         ("", "good: The encoder of PIP_flexion detects its magnet."),
         ("gone", "missing: The encoder of PIP_flexion detects no magnet: fit one above the chip."),
@@ -91,12 +91,12 @@ def root(tmp_path: Path) -> Path:
         ("strong", "missing: The magnet of PIP_flexion is too near to its encoder."),
     ],
 )
-def test_the_doctor_checks_each_magnet(root: Path, how: Magnet, says: str) -> None:
+def test_the_doctor_checks_each_magnet(root: Path, how: Magnet, expected: str) -> None:
     """A missing, weak or strong magnet is reported for its joint only."""
     board = _board()
     board.pins.encoder("PIP_flexion").set_magnet(how)
     found = _found(root, _PLAN, board)["encoders"]
-    assert found[2] == says
+    assert found[2] == expected
     assert [one.partition(":")[0] for one in found[:2]] == ["good"] * 2
 
 
@@ -119,7 +119,7 @@ def test_the_doctor_leaves_the_encoders_of_a_served_robot_alone(root: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("config", "says"),
+    ("config", "expected"),
     [
         ("dtparam=i2c_arm_baudrate=1000000", "good"),
         ("dtparam=i2c_arm=on", "missing"),
@@ -127,9 +127,9 @@ def test_the_doctor_leaves_the_encoders_of_a_served_robot_alone(root: Path) -> N
         ("dtparam=i2c_arm_baudrate=100000", "missing"),
     ],
 )
-def test_the_doctor_checks_the_bus_speed(root: Path, config: str, says: str) -> None:
+def test_the_doctor_checks_the_bus_speed(root: Path, config: str, expected: str) -> None:
     """The check applies only to robots with encoders."""
     (root / "boot/config.txt").write_text(config)
-    assert _found(root, _PLAN, _board())["I2C speed"][0].startswith(says)
+    assert _found(root, _PLAN, _board())["I2C speed"][0].startswith(expected)
     car = load_profile(find_profile("car")).guard_plan()
     assert "I2C speed" not in _found(root, car, _board())

@@ -8,7 +8,7 @@ from shapechanger.layout import Feature, Layout
 
 DEGREE = math.pi / 180.0
 
-# Which element is left of which in the mirror y -> -y: leg 1 is at (+, +), 2 at (-, +),
+# Left and right elements in the mirror y -> -y: leg 1 is at (+, +), 2 at (-, +),
 # 3 at (-, -) and 4 at (+, -) in (x, y).
 ANT_SWAP = {"*_1": "*_4", "*_2": "*_3"}
 ANT_FLIP = ["hip_*"]

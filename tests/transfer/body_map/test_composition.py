@@ -18,7 +18,7 @@ from tests.transfer.body_map.bodies import (
 
 
 def grown(**options: object) -> BodyMap:
-    """The map from the ant to the ant with feet."""
+    """Return the map from the ant to the ant with feet."""
     return BodyMap.between(
         ant_observation(),
         ant_observation(feet=True),
@@ -29,7 +29,7 @@ def grown(**options: object) -> BodyMap:
 
 
 def copied() -> BodyMap:
-    """A map in which two target motors copy one source motor."""
+    """Return a map in which two target motors copy one source motor."""
     return BodyMap.between(
         Layout((Feature("z", "m"), Feature("height", "m"))),
         Layout((Feature("z", "m"),)),
@@ -43,13 +43,13 @@ def copied() -> BodyMap:
     )
 
 
-def test_there_and_back_is_nothing() -> None:
+def test_there_and_back_is_the_identity() -> None:
     """Mapping an ant to an ant with feet and back is the identity."""
     there = grown(rules={"foot_*": "learn"})
     assert there.then(there.inverse()) == BodyMap.identity(ant_observation(), ant_action())
 
 
-def test_back_and_there_keeps_what_was_shared() -> None:
+def test_back_and_there_keeps_shared_features() -> None:
     """Features that the middle body lacks are zero in the composition."""
     there = grown(rules={"foot_*": "learn"})
     round_trip = there.inverse("hold").then(there)
@@ -60,7 +60,7 @@ def test_back_and_there_keeps_what_was_shared() -> None:
     assert (action["foot_1/motor"].rule, action["foot_1/motor"].why) == (Learn(), "rule 'foot_*'")
 
 
-def test_rules_multiply_and_reasons_add_up() -> None:
+def test_composition_multiplies_scales_and_joins_reasons() -> None:
     """Scales multiply, and `why` names the rule of each map."""
     motors = pendulum_action()
     first = BodyMap.between(
@@ -88,7 +88,7 @@ def test_rules_multiply_and_reasons_add_up() -> None:
     assert both.observation[1].why == "rule 'pole/*', then rule 'hinge/angle'"
 
 
-def test_actions_run_through_both_maps() -> None:
+def test_a_composition_adapts_actions() -> None:
     """The composition adapts actions as the two maps in a row."""
     first, second = grown(rules={"foot_*/motor": "copy ankle_*/motor"}), grown().inverse()
     second = second.then(grown(rules={"foot_*/motor": "copy hip_*/motor"}))
@@ -106,7 +106,7 @@ def test_actions_run_through_both_maps() -> None:
         (Layout((Feature("z", "m"),)), "one has 2 features and the other 1"),
     ],
 )
-def test_maps_that_do_not_meet_are_refused(middle: Layout, message: str) -> None:
+def test_maps_of_different_middle_bodies_are_refused(middle: Layout, message: str) -> None:
     """Maps with different bodies in the middle are refused, with the first difference."""
     here = Layout((Feature("z", "m"), Feature("y", "m")))
     first = BodyMap.identity(here, pendulum_action())
@@ -116,7 +116,7 @@ def test_maps_that_do_not_meet_are_refused(middle: Layout, message: str) -> None
     assert "target observation of the first" in str(caught.value)
 
 
-def test_motors_of_another_strength_do_not_meet() -> None:
+def test_maps_with_different_gains_are_refused() -> None:
     """Maps whose gains differ in the middle body are refused."""
     first = BodyMap.identity(pendulum_observation(), pendulum_action(100.0))
     second = BodyMap.identity(pendulum_observation(), pendulum_action(200.0))
@@ -124,21 +124,21 @@ def test_motors_of_another_strength_do_not_meet() -> None:
         first.then(second)
 
 
-def test_a_scale_is_undone() -> None:
-    """The inverse divides by the scale."""
+def test_the_inverse_divides_by_the_scale() -> None:
+    """The inverse of a scale of 1/4 is 4."""
     motors = pendulum_action(100.0), pendulum_action(400.0)
     there = BodyMap.between(pendulum_observation(), pendulum_observation(), *motors, units="torque")
     assert there.inverse().action[0].rule == Copy("slide/motor", 4.0)
 
 
-def test_the_namesake_gives_a_copied_feature_back() -> None:
-    """The inverse of several copies reads the copy of the same name."""
+def test_the_inverse_prefers_the_copy_of_the_same_name() -> None:
+    """Other copies are ignored."""
     back = copied().inverse()
     assert [entry.rule for entry in back.action] == [Copy("ankle/motor")]
     assert [entry.rule for entry in back.observation] == [Copy("z")]
 
 
-def test_copies_without_a_namesake_have_no_way_back() -> None:
+def test_ambiguous_copies_have_no_inverse() -> None:
     """Several copies without one of the same name have no unique inverse."""
     there = BodyMap.between(
         pendulum_observation(),
@@ -151,7 +151,7 @@ def test_copies_without_a_namesake_have_no_way_back() -> None:
         there.inverse()
 
 
-def test_what_was_not_taken_gets_the_rule_for_the_rest() -> None:
+def test_the_inverse_uses_otherwise() -> None:
     """The inverse fills features that were not copied by `otherwise`."""
     for otherwise, rule in (("learn", Learn()), ("zero", Zero())):
         rules = {e.feature: e.rule for e in grown().inverse(otherwise).observation}

@@ -66,7 +66,7 @@ def test_an_env_without_layouts_is_refused() -> None:
         body_map(Recorder(), Silent())
 
 
-def test_a_source_policy_acts_in_the_target() -> None:
+def test_a_mapped_env_adapts_observations_and_actions() -> None:
     """Observations are those of the source, and actions move the target's motors."""
     source, target = Recorder(), Recorder(feet=True)
     built = body_map(source, target, rules={"foot_*/motor": "copy ankle_*/motor"})
@@ -83,7 +83,7 @@ def test_a_source_policy_acts_in_the_target() -> None:
     assert target.moved[0].dtype == np.float32
 
 
-def test_the_spaces_are_those_of_the_source() -> None:
+def test_a_mapped_env_has_the_source_spaces() -> None:
     """Spaces are derived from the layouts unless given."""
     source, target = Recorder(), Recorder(feet=True)
     built = body_map(source, target)

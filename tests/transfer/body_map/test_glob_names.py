@@ -13,7 +13,7 @@ def _layout(*names: str) -> Layout:
 MOTOR = _layout("motor")
 
 
-def test_a_rule_under_the_exact_name_of_a_feature_is_no_glob() -> None:
+def test_an_exact_name_is_not_a_glob() -> None:
     """`leg[12]` names one feature; `leg1` and `leg2` get the default rule."""
     source = _layout("leg[12]", "leg1", "leg2", "tail*", "tail_2", "same")
     built = BodyMap.between(
@@ -33,7 +33,7 @@ def test_a_rule_under_the_exact_name_of_a_feature_is_no_glob() -> None:
     ]
 
 
-def test_a_copied_name_with_a_star_is_no_template() -> None:
+def test_an_exact_copied_name_is_not_a_template() -> None:
     """A target feature named `eye*` is copied literally."""
     built = BodyMap.between(
         _layout("left/eye", "same"),

@@ -1,4 +1,4 @@
-"""What a body map computes, prints and refuses."""
+"""Computation, printing and validation of body maps."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.transfer.body_map.bodies import (
 
 
 def small() -> BodyMap:
-    """A map with each kind of rule."""
+    """Return a map with each kind of rule."""
     return BodyMap.between(
         Layout((Feature("z", "m"), Feature("lost", "m"), Feature("rest", "rad"))),
         Layout((Feature("new", "m"), Feature("z", "m"))),
@@ -37,18 +37,18 @@ def small() -> BodyMap:
     )
 
 
-def test_numbers_arrive_where_their_names_are() -> None:
+def test_values_are_reordered_by_name() -> None:
     """Observations are in the order of the source, actions in that of the target."""
     np.testing.assert_array_equal(small().adapt_observation([7.0, 3.0]), [3.0, 0.0, 0.25])
     np.testing.assert_array_equal(small().adapt_action([0.4, 0.3]), [0.3, -0.6, 0.0, 0.2])
 
 
-def test_actions_end_at_the_bounds_of_the_target() -> None:
+def test_actions_are_clipped_to_the_target() -> None:
     """Scaled actions are clipped to the target's bounds."""
     np.testing.assert_array_equal(small().adapt_action([3.0, -0.7]), [-0.7, 1.0, 0.0, 1.0])
 
 
-def test_batches_of_any_shape_pass() -> None:
+def test_batches_of_any_shape_are_accepted() -> None:
     """Leading axes are kept."""
     values = np.random.default_rng(0).normal(size=(4, 5, 2))
     adapted = small().adapt_observation(values)
@@ -61,14 +61,14 @@ def test_batches_of_any_shape_pass() -> None:
     ("given", "result"),
     [(np.float32, np.float32), (np.float64, np.float64), (np.int64, np.float64)],
 )
-def test_the_number_type_is_kept(given: type, result: type) -> None:
+def test_the_dtype_is_kept(given: type, result: type) -> None:
     """float32 in gives float32 out."""
     assert small().adapt_observation(np.ones(2, given)).dtype == result
     assert small().adapt_action(np.ones(2, given)).dtype == result
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_matched_numbers_are_copied_to_the_last_bit(dtype: type) -> None:
+def test_matched_values_are_copied_bitwise(dtype: type) -> None:
     """A map of equal names is a bitwise permutation."""
     built = BodyMap.between(
         ant_observation(), ant_observation(feet=True), ant_action(), ant_action(feet=True)
@@ -81,8 +81,8 @@ def test_matched_numbers_are_copied_to_the_last_bit(dtype: type) -> None:
         assert adapted[place].tobytes() == original.tobytes()
 
 
-def test_a_gap_is_filled_even_from_nonsense() -> None:
-    """Numbers that are not copied do not matter, even if they are NaN."""
+def test_values_that_are_not_copied_may_be_nan() -> None:
+    """They do not affect the result."""
     np.testing.assert_array_equal(small().adapt_observation([np.nan, 3.0]), [3.0, 0.0, 0.25])
 
 
@@ -93,8 +93,8 @@ def test_the_result_is_a_new_array() -> None:
     assert not np.may_share_memory(values, built.adapt_observation(values))
 
 
-def test_blocks_move_as_a_whole() -> None:
-    """A block keeps its order."""
+def test_blocks_keep_their_order() -> None:
+    """A block is copied as a whole."""
     eye = Feature("eye", "1", 0.0, 1.0, shape=(2, 2))
     ear = Feature("ear", "1", 0.0, 1.0, shape=(2,))
     built = BodyMap.between(
@@ -178,7 +178,7 @@ def test_entries_are_equal_if_they_do_the_same() -> None:
     assert not MapEntry("a", Zero(), "default") != MapEntry("a", Zero(), "rule 'a'")  # noqa: SIM202
 
 
-def test_a_map_crosses_to_another_process() -> None:
+def test_a_map_can_be_pickled() -> None:
     """Pickling keeps the map, without its cached arrays."""
     built = small()
     assert built.action_matrix.shape == (4, 2)
@@ -195,7 +195,7 @@ def test_json_round_trip_keeps_the_layouts() -> None:
 
 
 @pytest.mark.parametrize("text", ["{", "{}", small().to_json().replace("0.25", "null")])
-def test_json_that_is_no_map_is_refused(text: str) -> None:
+def test_invalid_json_is_refused(text: str) -> None:
     """Invalid JSON raises a MapError."""
     with pytest.raises(MapError, match="This is not a body map"):
         BodyMap.from_json(text)

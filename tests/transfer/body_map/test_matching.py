@@ -1,4 +1,4 @@
-"""Which rule each feature gets, and what is refused."""
+"""Matching of features to rules."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.transfer.body_map.bodies import (
 
 
 def grown(**options: object) -> BodyMap:
-    """The map from the ant to the ant with feet."""
+    """Return the map from the ant to the ant with feet."""
     return BodyMap.between(
         ant_observation(),
         ant_observation(feet=True),
@@ -31,7 +31,7 @@ def grown(**options: object) -> BodyMap:
 
 
 def shrunk(**options: object) -> BodyMap:
-    """The map from the ant with feet to the ant."""
+    """Return the map from the ant with feet to the ant."""
     return BodyMap.between(
         ant_observation(feet=True),
         ant_observation(),
@@ -66,15 +66,15 @@ def test_features_of_one_name_are_partners() -> None:
         (Copy("ankle_2/motor", 0.5), Copy("ankle_2/motor", 0.5)),
     ],
 )
-def test_a_rule_can_be_said_in_words(like: RuleLike, rule: object) -> None:
+def test_rules_have_a_short_form(like: RuleLike, rule: object) -> None:
     """The short form of a rule equals its object."""
     built = grown(rules={"foot_2/motor": like})
     assert rules_of(built)["foot_2/motor"] == rule
     assert {e.feature: e.why for e in built.action}["foot_2/motor"] == "rule 'foot_2/motor'"
 
 
-def test_holding_keeps_to_the_middle_of_the_range() -> None:
-    """The rule "hold" is the middle of the range."""
+def test_hold_is_the_middle_of_the_range() -> None:
+    """Applies to "hold" without a value."""
     held = rules_of(shrunk(rules={"foot_*/angle": "hold"}))["foot_1/angle"]
     assert isinstance(held, Hold)
     assert held.value == pytest.approx(65 * DEGREE)
@@ -92,7 +92,7 @@ def test_an_exact_name_comes_before_a_glob() -> None:
     assert rules["foot_3/motor"] == Zero()
 
 
-def test_only_an_exact_name_overrules_a_namesake() -> None:
+def test_only_an_exact_name_overrides_an_equal_name() -> None:
     """A glob does not override a partner of the same name."""
     rules = rules_of(grown(rules={"*/motor": "learn", "hip_1/motor": "zero"}))
     assert rules["hip_1/motor"] == Zero()
@@ -100,7 +100,7 @@ def test_only_an_exact_name_overrules_a_namesake() -> None:
     assert rules["foot_2/motor"] == Learn()
 
 
-def test_stars_carry_over() -> None:
+def test_stars_are_substituted() -> None:
     """Each foot copies the ankle of its own leg."""
     rules = rules_of(grown(rules={"foot_*/motor": "copy ankle_*/motor"}))
     assert rules["foot_3/motor"] == Copy("ankle_3/motor")
@@ -125,7 +125,7 @@ def test_rules_can_be_for_one_side_only() -> None:
         BodyMap.between(layout, layout, layout, layout, action_rules={"c": "zero"})
 
 
-def test_what_is_left_over_gets_the_rule_for_the_rest() -> None:
+def test_unmatched_features_get_otherwise() -> None:
     """Features without a partner or rule get `otherwise`."""
     assert rules_of(grown(otherwise="learn"))["foot_2/motor"] == Learn()
     assert rules_of(grown(otherwise=Hold(0.5)))["foot_2/motor"] == Hold(0.5)
@@ -133,7 +133,7 @@ def test_what_is_left_over_gets_the_rule_for_the_rest() -> None:
         grown(otherwise="copy hip_1/motor")
 
 
-def test_what_a_feature_cannot_be_is_not_held() -> None:
+def test_a_constant_outside_the_range_is_refused() -> None:
     """A constant outside the range is refused."""
     with pytest.raises(MapError, match=r"'foot_4/motor' cannot hold 3: it reaches from -1 to 1"):
         grown(rules={"foot_*": Hold(3.0)})
@@ -141,7 +141,7 @@ def test_what_a_feature_cannot_be_is_not_held() -> None:
         grown(otherwise=Hold(3.0))
 
 
-def test_a_pattern_that_fits_nothing_is_unknown() -> None:
+def test_a_pattern_without_matches_is_refused() -> None:
     """A pattern that matches no feature is refused."""
     with pytest.raises(UnknownName, match=r"matches 'fot_1/motor'\. Did you mean 'foot_1/motor'"):
         grown(rules={"fot_1/motor": "learn"})
@@ -153,13 +153,13 @@ def test_a_pattern_that_changes_nothing_is_refused() -> None:
         grown(rules={"hip_*": "learn"})
 
 
-def test_a_word_that_is_no_rule_is_refused() -> None:
+def test_an_unknown_rule_is_refused() -> None:
     """The message suggests the nearest word."""
     with pytest.raises(MapError, match=r"No rule matches 'lern'. Did you mean 'learn'"):
         grown(rules={"foot_*": "lern"})
 
 
-def test_a_partner_that_is_not_there_is_unknown() -> None:
+def test_an_unknown_partner_is_refused() -> None:
     """The message suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"No source action feature .* Did you mean 'ankle_1/mot"):
         grown(rules={"foot_1/motor": "copy ankle_1/moter"})
@@ -183,7 +183,7 @@ def test_units_are_not_mixed() -> None:
     assert sensed[1] == pytest.approx(180 * DEGREE)
 
 
-def test_blocks_of_different_shapes_are_no_partners() -> None:
+def test_blocks_of_different_shapes_do_not_match() -> None:
     """Blocks of different shapes are refused."""
     small = Layout((Feature("eye", "1", 0.0, 1.0, shape=(2, 3)),))
     large = Layout((Feature("eye", "1", 0.0, 1.0, shape=(4, 3)),))
@@ -210,7 +210,7 @@ def test_a_body_without_motors_is_refused_too() -> None:
         )
 
 
-def test_strangers_may_be_mapped_by_hand() -> None:
+def test_unrelated_bodies_can_be_mapped_by_rules() -> None:
     """Bodies without a common name can be mapped by explicit rules."""
     built = BodyMap.between(
         pendulum_observation(),
@@ -235,14 +235,14 @@ def test_equal_torque_is_a_scale() -> None:
     assert built.action[0].rule == Copy("slide/motor", -0.5)
 
 
-def test_a_force_is_no_torque() -> None:
+def test_forces_and_torques_are_not_converted() -> None:
     """Only gains of one unit can be converted."""
     sides = pendulum_observation(), pendulum_observation()
     with pytest.raises(MapError, match="gives 100 N and one of 'slide/motor' 100 N·m"):
         BodyMap.between(*sides, pendulum_action(), pendulum_action(unit="N·m"), units="torque")
 
 
-def test_a_motor_of_unknown_strength_is_taken_as_it_is() -> None:
+def test_unknown_gains_are_not_scaled() -> None:
     """Where both gains are unknown, the scale is 1."""
     silent = Layout((motor("slide", 1.0, ""),))
     sides = pendulum_observation(), pendulum_observation()
@@ -251,7 +251,7 @@ def test_a_motor_of_unknown_strength_is_taken_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("rule", [{"hold": 1.0}, {"take": "ankle_1/motor"}, 0.5, None])
-def test_a_rule_of_another_type_is_refused_in_a_sentence(rule: Any) -> None:
+def test_a_rule_of_another_type_is_refused(rule: Any) -> None:
     """A dictionary is not a rule."""
     with pytest.raises(MapError, match=r"The rule 'foot_1/motor' is .*: give 'zero', 'hold'"):
         BodyMap.between(

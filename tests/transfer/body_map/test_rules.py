@@ -20,13 +20,13 @@ from shapechanger.transfer.body_map.rules import (
 
 
 @pytest.mark.parametrize("scale", [0.0, math.nan, math.inf])
-def test_a_scale_that_cannot_be_undone_is_refused(scale: float) -> None:
+def test_an_invalid_scale_is_refused(scale: float) -> None:
     """Scales of zero, infinity and NaN are refused."""
     with pytest.raises(MapError, match="'hip/angle' must be finite and not zero"):
         Copy("hip/angle", scale)
 
 
-def test_a_value_that_is_no_number_is_refused() -> None:
+def test_a_non_finite_constant_is_refused() -> None:
     """Constants must be finite."""
     with pytest.raises(MapError, match="must be finite, got nan"):
         Hold(math.nan)
@@ -42,7 +42,7 @@ def test_a_value_that_is_no_number_is_refused() -> None:
         (Learn(), "learn"),
     ],
 )
-def test_each_rule_has_words(rule: Rule, words: str) -> None:
+def test_each_rule_has_a_description(rule: Rule, words: str) -> None:
     """`describe_rule` returns a text for each rule."""
     assert describe_rule(rule) == words
 
@@ -56,7 +56,7 @@ def test_each_rule_has_words(rule: Rule, words: str) -> None:
         (Learn(), Learn()),
     ],
 )
-def test_two_rules_in_a_row_are_one(inner: Rule, result: Rule) -> None:
+def test_rules_compose(inner: Rule, result: Rule) -> None:
     """Scales multiply, and constants are scaled."""
     assert compose_rules(Copy("shin", -2.0), inner) == result
 
@@ -72,15 +72,13 @@ def test_two_rules_in_a_row_are_one(inner: Rule, result: Rule) -> None:
         ("*/a_*", "*_*", "b.c_d", "b.c/a_d"),
     ],
 )
-def test_stars_stand_for_what_the_wildcards_fitted(
-    template: str, pattern: str, name: str, result: str
-) -> None:
+def test_stars_take_the_matched_text(template: str, pattern: str, name: str, result: str) -> None:
     """Stars of a template are replaced in order."""
     assert expand_template(template, pattern, name) == result
 
 
 @pytest.mark.parametrize("pattern", ["foot_2/motor", "*_*/motor"])
-def test_as_many_stars_as_wildcards(pattern: str) -> None:
+def test_the_number_of_stars_must_match(pattern: str) -> None:
     """A template with more or fewer stars than wildcards is refused."""
     with pytest.raises(MapError, match="must have a star for each wildcard"):
         expand_template("ankle_*/motor", pattern, "foot_2/motor")

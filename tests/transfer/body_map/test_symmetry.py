@@ -21,7 +21,7 @@ from tests.transfer.body_map.bodies import (
 
 
 def ant_mirror() -> Symmetry:
-    """The left-right mirror of the ant."""
+    """Return the left-right mirror of the ant."""
     return mirror(ant_observation(), ant_action(), swap=ANT_SWAP, flip=ANT_FLIP)
 
 
@@ -70,14 +70,14 @@ def test_a_mirrored_quaternion_is_the_mirrored_rotation() -> None:
     np.testing.assert_allclose(rotation(*mirrored), flip @ rotation(*q) @ flip, atol=1e-12)
 
 
-def test_two_mirrors_are_none() -> None:
-    """The mirror of the mirror is the identity."""
+def test_mirroring_twice_is_the_identity() -> None:
+    """Holds for the ant."""
     once = BodyMap.identity(ant_observation(), ant_action()).with_symmetry(ant_mirror())
     assert once.then(once) == BodyMap.identity(ant_observation(), ant_action())
     assert ant_mirror().inverse() == ant_mirror()
 
 
-def test_a_turned_policy_is_equivariant() -> None:
+def test_a_rotated_policy_is_equivariant() -> None:
     """With g a quarter turn, the map makes of a policy p the policy g⁻¹ p(g o)."""
     names = ("a", "b", "c", "d")
     turn = {name: Copy(names[(i + 1) % 4], -1.0 if i == 0 else 1.0) for i, name in enumerate(names)}
@@ -90,7 +90,7 @@ def test_a_turned_policy_is_equivariant() -> None:
     assert built.then(back) == BodyMap.identity(legs(*names), legs(*names))
 
 
-def test_the_symmetry_of_either_body_will_do() -> None:
+def test_the_symmetry_of_either_body_is_accepted() -> None:
     """The symmetry of the source and that of the target give the same map."""
     there = BodyMap.between(
         ant_observation(),
@@ -123,9 +123,7 @@ def test_the_symmetry_of_a_third_body_is_refused() -> None:
         ({"a": Copy("b", 2.0), "b": Copy("a", 0.5)}, "in a symmetry the scale is 1 or -1"),
     ],
 )
-def test_what_is_no_signed_permutation_is_refused(
-    changes: Mapping[str, Copy], message: str
-) -> None:
+def test_only_signed_permutations_are_accepted(changes: Mapping[str, Copy], message: str) -> None:
     """Scales other than 1 and -1, and two copies of one feature, are refused."""
     with pytest.raises(MapError, match=message):
         Symmetry.of(legs("a", "b"), legs("a"), observation=changes)
@@ -141,7 +139,7 @@ def test_names_and_numbers_of_a_symmetry_are_checked() -> None:
         Symmetry(legs("a"), legs("a"), (Copy("a"),), ())
 
 
-def test_only_like_features_change_places() -> None:
+def test_only_similar_features_can_swap() -> None:
     """Features that differ in unit, shape or gain cannot swap."""
     mixed = Layout((Feature("a", "m"), Feature("b", "rad")))
     swap = {"a": Copy("b"), "b": Copy("a")}
@@ -163,10 +161,8 @@ def test_a_body_whose_ranges_differ_is_not_symmetric() -> None:
         ({"hip_1": "hip_4"}, ["hop_*"], r"No element matches 'hop_\*'"),
     ],
 )
-def test_an_element_that_is_not_there_is_unknown(
-    swap: dict[str, str], flip: list[str], message: str
-) -> None:
-    """Unknown elements are refused."""
+def test_unknown_elements_are_refused(swap: dict[str, str], flip: list[str], message: str) -> None:
+    """Errors suggest the nearest name."""
     with pytest.raises(UnknownName, match=message):
         mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
 
@@ -182,7 +178,7 @@ def test_an_element_that_is_not_there_is_unknown(
         (ANT_SWAP, ["hip_1"], "flip both or neither"),
     ],
 )
-def test_a_mirror_that_is_none_is_refused(
+def test_contradictory_mirrors_are_refused(
     swap: dict[str, str], flip: list[str], message: str
 ) -> None:
     """Contradicting pairs, and pairs of which one element flips, are refused."""
@@ -190,7 +186,7 @@ def test_a_mirror_that_is_none_is_refused(
         mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
 
 
-def test_a_picture_has_no_mirror_by_name() -> None:
+def test_blocks_have_no_mirror() -> None:
     """Blocks cannot be mirrored."""
     seeing = Layout((Feature("eye", "1", shape=(2, 2)),))
     with pytest.raises(MapError, match="'eye' is a block of numbers"):

@@ -44,7 +44,7 @@ def test_a_person_can_write_a_map() -> None:
     assert rules["foot_4/motor"] == Hold(0.1)
 
 
-def test_an_empty_text_is_a_map_by_name() -> None:
+def test_an_empty_text_matches_by_name() -> None:
     """All keys have defaults."""
     assert BodyMap.from_toml("", *GROWN) == BodyMap.between(*GROWN)
 
@@ -67,7 +67,7 @@ def test_units_come_from_the_text() -> None:
         BodyMap.between(*SHRUNK, otherwise="learn"),
     ],
 )
-def test_what_is_written_is_read_again(built: BodyMap) -> None:
+def test_toml_round_trip(built: BodyMap) -> None:
     """TOML round trips bitwise."""
     layouts = (
         built.source_observation,
@@ -93,7 +93,7 @@ def test_the_text_is_short() -> None:
     ]
 
 
-def test_odd_names_survive() -> None:
+def test_special_characters_are_escaped() -> None:
     """Quotes, backslashes, umlauts and control characters are escaped."""
     names = ('a"b', "a\\b", "Größe µ", "tab\t", "del\x7f", "x[0]")
     layout = Layout(tuple(Feature(name, "1") for name in (*names, "z")))
@@ -144,8 +144,8 @@ def test_wrong_text_is_explained(text: str, message: str) -> None:
     assert message in str(caught.value)
 
 
-def test_a_name_that_is_not_there_is_unknown() -> None:
-    """Unknown feature names are refused."""
+def test_unknown_names_are_refused() -> None:
+    """Errors suggest the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'foot_1/motor'"):
         BodyMap.from_toml('[action]\n"fot_1/motor" = "zero"', *GROWN)
     with pytest.raises(UnknownName, match="No target action feature"):

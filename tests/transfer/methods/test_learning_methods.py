@@ -1,4 +1,4 @@
-"""What the shipped methods change in a training."""
+"""Effects of the shipped methods on training."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
     assert set(made.summaries) == set(_LEARNING)
 
 
-def test_they_start_where_the_source_policy_does(study: tuple[Study, Path]) -> None:
+def test_methods_start_with_the_source_policy(study: tuple[Study, Path]) -> None:
     """All methods but kickstart start with the source policy."""
     made, _ = study
     starts = {kind: made.of(kind)[0].curve[0].mean_return for kind in _LEARNING}
@@ -78,7 +78,7 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
         TINY_NORMALISED, learning_rate=1e-2, n_steps=64, eval_every=512
     )
     plan = tiny_plan(settings, arms=("scratch", "kickstart"), steps=512, source_steps=512)
-    monkeypatch.setattr(kickstart, "_UNTIL", 1e9)  # The weight stays.
+    monkeypatch.setattr(kickstart, "_UNTIL", 1e9)  # Weights are kept.
     observations = np.random.default_rng(0).normal(0.0, 0.1, (200, 4))
     away: list[float] = []
     for weight in (0.0, 1.0):
@@ -94,7 +94,7 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
     assert away[1] < 0.8 * away[0], away
 
 
-def test_actions_to_be_learned_are_not_taught() -> None:
+def test_learned_actions_are_not_distilled() -> None:
     """Actions with the rule Learn are not distilled."""
     source, target = ANT.make(), EXTENDED.make()
     layouts = [
@@ -110,7 +110,7 @@ def test_actions_to_be_learned_are_not_taught() -> None:
     assert (shown[:, teacher.taught] == 1.0).all()
 
 
-def test_bodies_between_grow() -> None:
+def test_intermediate_bodies_grow() -> None:
     """Bodies between two pendulums grow in equal steps, without the two ends."""
     lengths = []
     for ref in bodies_between(SMALL, BIG, 2):
@@ -121,7 +121,7 @@ def test_bodies_between_grow() -> None:
     np.testing.assert_allclose(lengths, [0.6, 0.9], rtol=1e-5)
 
 
-def test_bodies_between_may_have_other_spaces() -> None:
+def test_intermediate_bodies_may_have_other_spaces() -> None:
     """Bodies between an ant and an ant with feet have feet."""
     (between,) = bodies_between(ANT, EXTENDED, 1)
     made = between.make()
@@ -147,7 +147,7 @@ def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
     assert [e.steps for e in study.of("evolution")[0].curve] == [0, 32, 64]
 
 
-def test_bodies_of_two_families_have_no_path() -> None:
+def test_bodies_of_two_families_are_refused() -> None:
     """Envs of two families, or of none, are refused."""
     with pytest.raises(StudyError, match="not of one family"):
         bodies_between(ANT, BIG, 1)
@@ -212,7 +212,7 @@ def test_a_shuffled_map_starts_worse(study: tuple[Study, Path], tmp_path: Path) 
     assert start.mean_return != made.of("fine-tune")[0].curve[0].mean_return
 
 
-def test_a_randomised_source_is_one_of_bodies_between(tmp_path: Path) -> None:
+def test_a_randomised_source_draws_intermediate_bodies(tmp_path: Path) -> None:
     """The env is written to the run's folder; bodies of other spaces are refused."""
     plan = tiny_plan(TINY, steps=64, source_steps=64, arms=("scratch", "randomised"))
     study = run_study(plan, tmp_path, executor=Serial())

@@ -116,7 +116,7 @@ def test_methods_of_other_packages(
         load_method("broken")
 
 
-def test_a_method_of_ones_own_is_an_arm(plugin: str, tmp_path: Path) -> None:
+def test_a_custom_method_is_an_arm(plugin: str, tmp_path: Path) -> None:
     """A plug-in method runs in worker processes, with the numbers of scratch."""
     plan = tiny_plan(arms=("scratch", plugin), steps=32)
     study = run_study(plan, tmp_path / "study", executor=Processes(1))
@@ -128,7 +128,7 @@ def test_a_method_of_ones_own_is_an_arm(plugin: str, tmp_path: Path) -> None:
     assert study.summaries[plugin].source_steps == 0
 
 
-def test_a_study_grows_by_arms(tmp_path: Path) -> None:
+def test_a_study_can_gain_arms(tmp_path: Path) -> None:
     """A study can be resumed with more arms, and not with fewer."""
     first = tiny_plan(steps=32)
     run_study(first, tmp_path / "study", executor=Serial())
@@ -146,7 +146,7 @@ def test_seeds_do_not_depend_on_other_arms() -> None:
     assert len({small.seed_of(Run(kind, 0)) for kind in kinds}) == len(kinds)
 
 
-def test_a_method_must_say_what_it_does() -> None:
+def test_a_method_must_implement_learn() -> None:
     """`Method.learn` raises NotImplementedError."""
     run: Any = None
     with pytest.raises(NotImplementedError):

@@ -57,7 +57,7 @@ def test_a_study_with_both(tmp_path: Path) -> None:
         assert study.curves(arm).steps.tolist() == wanted == [0.0, 32.0, 64.0]
 
 
-def test_corrections_are_of_what_differs() -> None:
+def test_corrections_reward_target_like_steps() -> None:
     """Steps of the source alone are penalised, of the target alone rewarded."""
     torch.manual_seed(0)
     classifiers = DomainClassifiers(1, 1, learning_rate=3e-3)

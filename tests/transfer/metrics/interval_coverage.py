@@ -1,4 +1,4 @@
-"""How often three intervals of a ratio hold the truth: measures the table of docs/statistics.md.
+"""Measure the coverage of three intervals of a ratio, for the table of docs/statistics.md.
 
 .venv/bin/python -m tests.transfer.metrics.interval_coverage
 """
@@ -22,11 +22,11 @@ ARM, SCRATCH = 0.8, 0.5
 
 
 class Case(NamedTuple):
-    """One kind of study, imagined many times.
+    """One kind of study, simulated many times.
 
     Attributes:
-        data: How the areas of single seeds are distributed.
-        spread: Their standard deviation over their mean, in percent.
+        data: Distribution of the areas of single seeds.
+        spread: Standard deviation over mean, in percent.
         n_seeds: Seeds in each of the two arms.
     """
 
@@ -36,12 +36,11 @@ class Case(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """What one method did in all studies of a case.
+    """Result of one method over all studies of a case.
 
     Attributes:
-        coverage: Share of the intervals that hold the truth; one that does not exist excludes
-            nothing, so it counts.
-        width: Median width; one that does not exist is infinitely wide.
+        coverage: Share of the intervals that contain the true value; a missing one counts.
+        width: Median width; a missing interval has infinite width.
     """
 
     coverage: float

@@ -15,7 +15,7 @@ from tests.transfer.metrics.interval_coverage import CASES, METHODS, Case, Measu
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "statistics.md"
 TRIALS = 2000
 
-# Arms as they come out of studies: scores with a mean and a spread over seeds of each arm.
+# Means and standard deviations of scores over seeds, typical of studies.
 ARM, SCRATCH = (0.8, 0.1), (0.5, 0.1)
 
 
@@ -34,7 +34,7 @@ def coverage(estimates: list[Estimate], truth: float) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("spread", [0.1, 0.3], ids=["equal spread", "threefold spread"])
-def test_welch_covers_what_it_says_at_five_seeds(spread: float) -> None:
+def test_welch_covers_95_percent_at_five_seeds(spread: float) -> None:
     """A 95 % Welch interval over five seeds covers 95 ± 2 %."""
     arms, scratches = draw(n_seeds=5, seed=0)
     arms = ARM[0] + (arms - ARM[0]) * spread / ARM[1]
@@ -79,7 +79,7 @@ def test_the_table_holds_every_case() -> None:
     assert list(table()) == CASES
 
 
-def test_ratios_cover_what_the_page_says() -> None:
+def test_ratios_cover_what_the_docs_state() -> None:
     """94 to 96.5 % at 5 and 10 seeds except in the last four rows; BCa always less."""
     methods = list(METHODS)
     rows = table()

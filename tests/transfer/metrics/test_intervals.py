@@ -129,13 +129,13 @@ def test_same_generator_same_interval() -> None:
         (ARM[:1], SCRATCH, "at least two seeds"),
         (ARM, SCRATCH[:1], "at least two seeds"),
         (np.full(3, 0.2), np.full(4, 0.1), "all seeds equal"),
-        # Equal up to rounding, which is no spread either.
+        # Equal up to rounding, which counts as no spread.
         (np.array([0.3, 0.1 + 0.2]), np.full(4, 0.1), "all seeds equal"),
-        # So near to nothing that a variance could not tell.
+        # Differences too small for a variance.
         (np.array([0.0, 1e-280]), np.full(4, 0.1), "all seeds equal"),
     ],
 )
-def test_no_interval_is_better_than_a_false_one(
+def test_unreliable_intervals_are_omitted(
     arm: NDArray[np.float64], scratch: NDArray[np.float64], why: str
 ) -> None:
     """One seed, or no spread, gives a value without an interval and a note."""
@@ -163,12 +163,12 @@ def test_ratio_over_too_little_is_undefined() -> None:
         (np.array([0.1, 0.2, 0.7]), np.full(5, 0.5)),
         # Three zeros of five seeds: a ratio of zero without an error in one resample of thirteen.
         (np.array([0.0, 0.0, 0.0, 0.1, 0.2]), SCRATCH),
-        # Nothing but zeros, which is a ratio of exactly zero and no error at all.
+        # Only zeros: a ratio of exactly zero, without an error.
         (np.zeros(5), SCRATCH),
     ],
     ids=["undefined", "overflow", "two seeds", "one arm without spread", "some zeros", "all zeros"],
 )
-def test_resamples_that_say_nothing_are_not_dropped(
+def test_unusable_resamples_are_not_dropped(
     arm: NDArray[np.float64], scratch: NDArray[np.float64]
 ) -> None:
     """If unusable resamples may fill a tail there is no interval, but a note."""

@@ -55,7 +55,7 @@ def test_floor_must_be_finite(floor: float) -> None:
         in_total_steps(RISING, 10, floor)
 
 
-def test_refusals_are_ours_and_pythons() -> None:
+def test_errors_are_also_value_errors() -> None:
     """StudyError is also a ValueError."""
     with pytest.raises(ShapechangerError):
         LearningCurves(np.array([1.0]), np.array([[1.0]]))
@@ -152,9 +152,9 @@ def test_total_steps_jump_without_a_slope() -> None:
         (30, (-30 + 0.35 * 70) / 100, (-30 + 0.65 * 70) / 100),
         # On an evaluation: floor -1 · 50, then the first half of the curve.
         (50, (-50 + 0.25 * 50) / 100, (-50 + 0.75 * 50) / 100),
-        # A sliver of the target is left: it is worth its first evaluation, nearly.
+        # Almost no target steps are left: nearly the value of the first evaluation.
         (99, (-99 + 0.005) / 100, (-99 + 0.995) / 100),
-        # Nothing left, and less than nothing.
+        # No target steps are left.
         (100, -1.0, -1.0),
         (1000, -1.0, -1.0),
     ],

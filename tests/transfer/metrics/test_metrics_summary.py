@@ -85,7 +85,7 @@ def test_thresholds_are_reported_in_order() -> None:
         assert all(t.arm is not None for t in measured.times_to_threshold)
 
 
-def test_summary_says_what_it_rests_on() -> None:
+def test_summary_states_its_settings() -> None:
     """Budget, seeds, k and confidence are in the summary."""
     result = summary()
     assert (result.unit, result.reference) == ("score", REFERENCE)
@@ -121,7 +121,7 @@ def test_arms_that_did_not_learn_leave_values() -> None:
         assert missing.value is None
         assert "no score" in missing.note
     assert len(measured.times_to_threshold) == len(DEFAULT_THRESHOLDS)
-    # In total steps the floor is what takes no skill: (400 · 10 + 200 · 10) / 20 - 100.
+    # In total steps, the floor is the return without skill: (400 · 10 + 200 · 10) / 20 - 100.
     assert result.in_total_steps.total_reward_gain.value == pytest.approx(200.0)
 
 
@@ -156,6 +156,6 @@ def test_other_evaluations_are_refused() -> None:
 
 
 def test_every_exported_name_exists_once_and_in_order() -> None:
-    """`__all__` promises what can be imported."""
+    """`__all__` is sorted, unique and importable."""
     assert len(set(metrics.__all__)) == len(metrics.__all__)
     assert all(hasattr(metrics, name) for name in metrics.__all__)

@@ -28,7 +28,7 @@ def test_the_middle_half_is_averaged() -> None:
     assert found.method == "stratified bootstrap"
 
 
-def test_improvement_is_mann_whitneys() -> None:
+def test_improvement_matches_mann_whitney() -> None:
     """U over the number of pairs, averaged over studies; equal runs count half."""
     rng = np.random.default_rng(1)
     arm, scratch = rng.normal(0.5, 1.0, 7), rng.normal(0.0, 1.0, 5)
@@ -72,7 +72,7 @@ def test_no_runs_are_refused(groups: _Groups) -> None:
         interquartile_mean(groups, rng=_rng())
 
 
-def test_as_many_studies_on_both_sides() -> None:
+def test_the_number_of_studies_must_match() -> None:
     """Different numbers of studies are refused."""
     one = np.ones(2)
     with pytest.raises(StudyError, match="1 studies of the arm and 2 of scratch"):

@@ -23,7 +23,7 @@ def test_scores_run_from_zero_to_one() -> None:
     np.testing.assert_array_equal(scores.steps, STEPS)
 
 
-def test_a_reference_that_ships_wins_over_the_best_arm() -> None:
+def test_a_shipped_reference_overrides_the_best_arm() -> None:
     """A shipped reference is 1 in every study, so a better arm scores above 1."""
     floors, ends = {"random actions": -100.0}, {"scratch": 100.0, "fine-tune": 500.0}
     of_arms = Reference.of(floors, ends)

@@ -58,7 +58,7 @@ def test_no_seed_is_dropped() -> None:
     assert times.steps_saved.method == "Welch's t"
 
 
-def test_median_is_unknown_if_most_never_arrive() -> None:
+def test_median_is_none_if_most_seeds_are_censored() -> None:
     """The median is None if fewer than half the seeds reach the threshold."""
     times = time_to_threshold(ARM, SCRATCH, 0.95)
     assert times.arm is not None
@@ -66,8 +66,8 @@ def test_median_is_unknown_if_most_never_arrive() -> None:
     assert times.scratch == ReachTimes(fraction=0.0, restricted_mean=40.0, restricted_median=None)
 
 
-def test_nobody_arrives() -> None:
-    """If no seed reaches the threshold, 0 steps are saved, without an interval."""
+def test_no_seed_reaches_the_threshold() -> None:
+    """Then 0 steps are saved, without an interval."""
     times = time_to_threshold(ARM, SCRATCH, 2.0)
     assert times.steps_saved.value == 0.0
     assert times.steps_saved.low is None

@@ -16,7 +16,7 @@ def ring(
     gap: float = 0.9,
     current: tuple[float, float] = (0.0, 0.0),
 ) -> Course:
-    """A wavy ring with boxes and posts on alternating sides that leave a gap of at least `gap`."""
+    """Return a wavy ring with boxes and posts on both sides that leave a gap of at least `gap`."""
     rng = np.random.default_rng(seed)
     turns = np.linspace(0.0, 2 * np.pi, 400, endpoint=False)
     phases = rng.uniform(0, 2 * np.pi, 2)

@@ -1,4 +1,4 @@
-"""Vehicles without physics: enough to see whether a driver steers the right way in time."""
+"""Kinematic vehicles, sufficient to test the steering of drivers."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ TRAILER_M = 0.45
 
 
 class Kinematic:
-    """Kinematic vehicle on a course, which stops where it touches something.
+    """A kinematic vehicle on a course, which stops on contact.
 
     Attributes:
-        touches: How often it began to touch something.
+        touches: Number of contacts so far.
     """
 
     def __init__(self, name: str, course: Course, pose: Pose) -> None:
@@ -47,14 +47,14 @@ class Kinematic:
             wheelbase = 0.26 if self.name == "car" else 0.30
             angle = self._steering * math.radians(28.0)
             self.yaw_rate = -self.speed * math.tan(angle) / wheelbase
-            self._slide = self.yaw_rate * wheelbase / 2  # The origin is its middle.
+            self._slide = self.yaw_rate * wheelbase / 2  # The origin is the middle of the vehicle.
         elif self.name == "tank":
             rate = -steering * 2 * TOP["tank"] / 0.32
             self.yaw_rate += (rate - self.yaw_rate) * dt_s / 0.15
         else:
             rate = -1.3 * steering * self.speed
             self.yaw_rate += (rate - self.yaw_rate) * dt_s / 0.5
-            # A hull slides on to the outside of its turn.
+            # A hull slips towards the outside of a turn.
             self._slide += (-self.yaw_rate * self.speed * 0.4 - self._slide) * dt_s / 0.4
             vx, vy = self._current
         heading = self.pose.heading + self.yaw_rate * dt_s / 2
@@ -78,7 +78,7 @@ class Kinematic:
         self._touching = touching
 
     def _hull(self, pose: Pose, trailer: float) -> NDArray[np.float64]:
-        """Points along the outline, m."""
+        """Return points along the outline, m."""
         length, width = SIZES[self.name]
         points = [_outline(pose.x, pose.y, pose.heading, length, width)]
         if self.name == "truck":

@@ -43,7 +43,7 @@ def _drive(
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", _HOMES)
 def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
-    """The expert is fast and touches nothing."""
+    """The expert is fast and has no contact."""
     course = lay_out(_HOMES[name], seed)
     vehicle = Kinematic(name, course, start_pose(course, seed))
     metres = _drive(vehicle, CourseExpert(course, name), course, 30.0)
@@ -52,7 +52,7 @@ def test_each_vehicle_drives_round_its_world(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", _HOMES)
-def test_disturbances_are_put_right(name: str) -> None:
+def test_disturbances_are_corrected(name: str) -> None:
     """The expert corrects wandering and jerks with at most one collision."""
     course = lay_out(_HOMES[name], 6)
     vehicle = Kinematic(name, course, start_pose(course, 6))
@@ -64,7 +64,7 @@ def test_disturbances_are_put_right(name: str) -> None:
     assert vehicle.touches <= 1
 
 
-def test_a_boat_holds_against_the_current() -> None:
+def test_a_boat_compensates_for_the_current() -> None:
     """A current of a fifth of its speed displaces it by less than 0.35 m."""
     course = ring(2, half_width=2.5, radius=10.0, gap=1.8, current=(0.2, -0.1))
     x, y = course.route[0]
@@ -82,7 +82,7 @@ def test_a_boat_holds_against_the_current() -> None:
 
 @pytest.mark.parametrize("name", _HOMES)
 @pytest.mark.parametrize("side", [1, -1])
-def test_it_gets_away_from_a_wall(name: str, side: int) -> None:
+def test_a_vehicle_recovers_from_a_wall(name: str, side: int) -> None:
     """A vehicle that faces a wall backs up, turns and drives on."""
     half_width = 1.2 if name in ("car", "tank") else 2.5
     course = ring(7, half_width=half_width, radius=10.0, obstacles=0)
@@ -95,12 +95,12 @@ def test_it_gets_away_from_a_wall(name: str, side: int) -> None:
 
 
 def pose_on(expert: CourseExpert, i: int) -> Pose:
-    """Pose at a point of the expert's path."""
+    """Return the pose at a point of the expert's path."""
     x, y = expert.path.points[i].tolist()
     return Pose(x, y, float(expert.path.heading[i]))
 
 
-def test_it_backs_up_when_it_stands_still() -> None:
+def test_it_backs_up_when_stuck() -> None:
     """Recovery starts after 0.7 s of throttle without motion and ends by driving forward."""
     course = ring(0)
     expert = CourseExpert(course, "car")
@@ -113,8 +113,8 @@ def test_it_backs_up_when_it_stands_still() -> None:
     assert max(throttles[first_back + 10 :]) > 0.25
 
 
-def test_the_same_seed_does_the_same() -> None:
-    """Equal seeds give equal actions during recovery; other seeds give others."""
+def test_recovery_is_reproducible() -> None:
+    """Equal seeds give equal actions during recovery, and another seed differs."""
     course = ring(1)
 
     def track(seed: int) -> list[float]:
@@ -126,7 +126,7 @@ def test_the_same_seed_does_the_same() -> None:
     assert track(0) != track(1)
 
 
-def test_a_reset_forgets_everything() -> None:
+def test_a_reset_clears_the_state() -> None:
     """After `reset`, the first actions of an episode repeat."""
     course = ring(1)
     expert = CourseExpert(course, "boat")
@@ -139,14 +139,14 @@ def test_a_reset_forgets_everything() -> None:
     np.testing.assert_array_equal(first, [expert.act(pose, 0.5, 0.1) for _ in range(5)])
 
 
-def test_an_unknown_vehicle_is_named() -> None:
+def test_an_unknown_vehicle_is_refused() -> None:
     """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'truck'"):
         CourseExpert(ring(0), "trukc")
 
 
 @pytest.mark.parametrize("name", ["car", "truck"])
-def test_steering_is_that_of_the_body(name: str) -> None:
+def test_steering_matches_the_model(name: str) -> None:
     """The curvature at full lock agrees with the turning radius of the model."""
     model, traits = VEHICLES[name], TRAITS[name]
     assert traits.body is model

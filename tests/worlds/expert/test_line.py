@@ -15,8 +15,8 @@ _SQUARE = ClosedLine(np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]))
 _RING = ClosedLine(ring(0).route)
 
 
-def test_a_square_knows_its_sides() -> None:
-    """The left of a counter-clockwise line is its inside."""
+def test_signed_distances_of_a_square() -> None:
+    """The left of a counter-clockwise line is its inside, with positive distances."""
     assert _SQUARE.length == 16.0
     assert _SQUARE.nearest(1.0, 0.5) == pytest.approx((1.0, 0.5))
     assert _SQUARE.nearest(1.0, -0.5) == pytest.approx((1.0, -0.5))
@@ -24,7 +24,7 @@ def test_a_square_knows_its_sides() -> None:
 
 
 @given(station=st.floats(-200.0, 200.0))
-def test_the_point_at_a_station_is_at_that_station(station: float) -> None:
+def test_at_inverts_nearest(station: float) -> None:
     """Stations wrap around."""
     x, y = _RING.at(station)
     spot = _RING.nearest(x, y)
@@ -33,12 +33,12 @@ def test_the_point_at_a_station_is_at_that_station(station: float) -> None:
 
 
 @given(start=st.floats(0.0, 50.0), moved=st.floats(-20.0, 20.0))
-def test_the_shorter_way_undoes_a_move(start: float, moved: float) -> None:
+def test_ahead_by_takes_the_shorter_way(start: float, moved: float) -> None:
     """`ahead_by` is signed and wraps around."""
     assert _RING.ahead_by(start, start + moved) == pytest.approx(moved, abs=1e-9)
 
 
-def test_a_hint_keeps_to_its_leg() -> None:
+def test_a_hint_selects_the_leg() -> None:
     """With a hint, a nearer parallel leg is ignored."""
     there = [(x, 0.0) for x in np.arange(0.0, 20.0, 0.1)]
     back = [(x, 1.0) for x in np.arange(20.0, 0.0, -0.1)]
@@ -62,7 +62,7 @@ def test_progress_counts_laps_and_counts_down() -> None:
     assert metres == pytest.approx(-1.0, abs=0.2)
 
 
-def test_standing_still_is_no_progress() -> None:
+def test_standing_still_makes_no_progress() -> None:
     """A vehicle at rest makes no progress."""
     course = ring(1)
     progress = CourseProgress(course)

@@ -30,7 +30,7 @@ def _planned(vehicle: str, seed: int) -> tuple[Course, CoursePath, float]:
 
 
 @pytest.mark.parametrize(("vehicle", "seed"), _CASES)
-def test_a_path_keeps_its_laws(vehicle: str, seed: int) -> None:
+def test_properties_of_a_path(vehicle: str, seed: int) -> None:
     """A path is closed, evenly spaced, follows the lane once, and keeps its clearance."""
     course, path, least = _planned(vehicle, seed)
     steps = np.roll(path.points, -1, axis=0) - path.points
@@ -39,7 +39,7 @@ def test_a_path_keeps_its_laws(vehicle: str, seed: int) -> None:
     assert (np.diff(path.stations) > 0).all()
     turns = np.angle(np.exp(1j * (np.arctan2(steps[:, 1], steps[:, 0]) - path.heading)))
     np.testing.assert_allclose(turns, path.curvature * 0.05, atol=0.05)
-    # Between two points a line comes nearer by no more than half of what lies between them.
+    # Between two points, the clearance is lower by at most half of their distance.
     between = (path.points + steps / 2).reshape(-1, 2)
     obstacles = ClearanceField(course)
     assert obstacles.distance(path.points).min() >= least
@@ -49,7 +49,7 @@ def test_a_path_keeps_its_laws(vehicle: str, seed: int) -> None:
     gains = [
         lane.ahead_by(a.station, b.station) for a, b in itertools.pairwise([*places, places[0]])
     ]
-    assert sum(gains) == pytest.approx(lane.length)  # Once round, not twice, and not back.
+    assert sum(gains) == pytest.approx(lane.length)  # Exactly one lap forward.
     assert min(gains) > -0.05
 
 
@@ -68,7 +68,7 @@ def test_planning_twice_gives_the_same_path() -> None:
     np.testing.assert_array_equal(first.points, second.points)
 
 
-def test_where_a_path_begins_does_not_matter() -> None:
+def test_the_start_of_a_path_does_not_matter() -> None:
     """The start of the route leaves no kink in the path."""
     course = ring(4)
     turned = dataclasses.replace(course, route=np.roll(course.route, 137, axis=0))
@@ -86,7 +86,7 @@ def _plug(course: Course, size: float) -> Course:
     return dataclasses.replace(course, obstacles=(*course.obstacles, obstacle))
 
 
-def test_a_blocked_lane_is_refused_in_words() -> None:
+def test_a_blocked_lane_is_refused() -> None:
     """The message names the width, the place and alternatives."""
     with pytest.raises(WorldError, match=r"blocked for anything 0\.40 m wide .* another seed"):
         plan_path(_plug(ring(0, obstacles=0), 2.0), 0.1, 0.1)
@@ -100,7 +100,7 @@ def test_a_gap_is_found_until_it_is_too_narrow() -> None:
         plan_path(course, 0.1, 0.25)
 
 
-def test_ahead_goes_round() -> None:
+def test_stations_wrap_around() -> None:
     """Stations beyond the length wrap around."""
     path = plan_path(ring(5), 0.1, 0.12)
     assert path.at(3.0 + path.length) == pytest.approx(path.at(3.0))
@@ -120,7 +120,7 @@ def test_distances_are_exact() -> None:
     np.testing.assert_allclose(obstacles.distance(points), [0.0, 0.8, 0.9, 0.8])
     assert obstacles.distance(np.array([(30.0, 0.0)])) == FAR_M
     assert obstacles.distance(np.empty((0, 2))).shape == (0,)
-    # A wall is a line with two ends.
+    # Walls are line segments.
     walls = ClearanceField(dataclasses.replace(empty, obstacles=()))
     wall = empty.walls[0]
     middle = (np.array(wall.start) + np.array(wall.end)) / 2

@@ -10,15 +10,15 @@ from shapechanger.worlds.layout.geometry import wall_segments
 
 
 def occupancy(course: Course, cell_m: float) -> tuple[NDArray[np.bool_], tuple[float, float]]:
-    """Grid of free and blocked cells, seen from above.
+    """Return a grid of free and blocked cells, seen from above.
 
     Args:
         course: The course.
         cell_m: Width of a cell, m.
 
     Returns:
-        Grid, (rows, columns), True where the middle of a cell is outside the lane or in an
-        obstacle; rows go along y and columns along x. And x and y of the middle of cell [0, 0], m.
+        Grid, (rows, columns), True where the centre of a cell is outside the lane or in an
+        obstacle; rows go along y and columns along x. And x and y of the centre of cell [0, 0], m.
     """
     feet = wall_segments(course.walls)
     low = np.minimum(feet[:, :2], feet[:, 2:]).min(axis=0) - 1.5 * cell_m
@@ -26,7 +26,7 @@ def occupancy(course: Course, cell_m: float) -> tuple[NDArray[np.bool_], tuple[f
     columns, rows = (int(n) + 1 for n in np.ceil((high - low) / cell_m))
     x0, y0 = float(low[0]), float(low[1])
     y = y0 + cell_m * np.arange(rows)
-    # Along a row, cells are inside after an odd number of walls.
+    # Along a row, cells after an odd number of walls are inside.
     x1, y1, x2, y2 = np.hsplit(feet, 4)
     wall, row = np.nonzero((y1 <= y) != (y2 <= y))
     share = (y[row] - y1[wall, 0]) / (y2[wall, 0] - y1[wall, 0])

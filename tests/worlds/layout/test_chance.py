@@ -8,7 +8,7 @@ import pytest
 from shapechanger.worlds.layout.furniture import weighted_choice
 
 
-def test_each_is_picked_as_often_as_its_share() -> None:
+def test_frequencies_follow_the_weights() -> None:
     """Frequencies are proportional to the weights; weight 0 is never drawn."""
     rng = np.random.default_rng(0)
     counts = np.bincount([weighted_choice(rng, [3.0, 0.0, 1.0]) for _ in range(4000)], minlength=3)

@@ -55,10 +55,10 @@ def _same(one: Course, other: Course) -> bool:
 
 
 @each_world
-def test_a_seed_is_a_course(world: str) -> None:
+def test_the_seed_determines_the_course(world: str) -> None:
     """Equal seeds give equal courses, different seeds different ones."""
     for seed in _SEEDS[:5] + _SEEDS[-5:]:
-        np.random.seed(seed % 7)  # noqa: NPY002 - What others do with chance must not matter.
+        np.random.seed(seed % 7)  # noqa: NPY002 - The global state must not matter.
         assert _same(lay_out(world, seed), _laid(world, seed))
     courses = _courses(world)
     assert not any(_same(a, b) for i, a in enumerate(courses) for b in courses[:i])
@@ -74,7 +74,7 @@ def test_a_flooded_corridor_has_the_courses_of_the_corridor(seed: int) -> None:
 
 
 @each_world
-def test_the_route_is_closed_even_and_of_the_promised_length(world: str) -> None:
+def test_the_route_is_closed_and_evenly_spaced(world: str) -> None:
     """Points are evenly spaced around the closed route, and its length is in range."""
     for course in _courses(world):
         steps = np.diff(course.route, axis=0, append=course.route[:1])
@@ -98,16 +98,16 @@ def test_courses_turn_both_ways(world: str) -> None:
 
 
 @each_world
-def test_no_bend_is_tighter_than_promised(world: str) -> None:
+def test_curvature_is_limited(world: str) -> None:
     """The curvature of the route stays within the limit of its world."""
     for course in _courses(world):
-        # Over half a metre: the route is drawn by points, so single angles are rough.
+        # Averaged over half a metre, since angles between single points are coarse.
         turned = np.abs(ndimage.uniform_filter1d(_bends(course), 5, mode="wrap"))
         assert course.spacing / turned.max() >= 0.97 * _RADII[world]
 
 
 @each_world
-def test_the_walls_are_closed_lines(world: str) -> None:
+def test_walls_form_closed_lines(world: str) -> None:
     """Each wall ends where exactly one other begins."""
     for course in _courses(world):
         starts = [wall.start for wall in course.walls]
@@ -120,7 +120,7 @@ def test_the_walls_are_closed_lines(world: str) -> None:
 
 
 @each_world
-def test_no_view_escapes_and_walls_face_it(world: str) -> None:
+def test_walls_face_the_route(world: str) -> None:
     """From the route, every ray hits the front of a wall."""
     angles = np.linspace(0.0, 2 * math.pi, 90, endpoint=False) + 0.0123
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -135,7 +135,7 @@ def test_no_view_escapes_and_walls_face_it(world: str) -> None:
             hit = (far > 0.0) & (share >= 0.0) & (share <= 1.0)
             assert hit.any(axis=1).all()
             nearest = np.where(hit, far, np.inf).argmin(axis=1)
-            # The look comes from the left of the wall: it crosses towards its right.
+            # Rays come from the left of the wall and cross to its right.
             assert (across[np.arange(len(ways)), nearest] > 0.0).all()
 
 
@@ -152,7 +152,7 @@ def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
 
 
 @each_world
-def test_things_touch_at_most(world: str) -> None:
+def test_obstacles_do_not_overlap(world: str) -> None:
     """Obstacles overlap neither walls nor each other."""
     for course in _courses(world):
         feet = wall_segments(course.walls)
@@ -177,7 +177,7 @@ def test_the_start_is_free(world: str) -> None:
 
 
 @each_world
-def test_there_is_a_way_round_as_wide_as_promised(world: str) -> None:
+def test_the_whole_lane_has_the_promised_gap(world: str) -> None:
     """A disc of diameter `gap_m` fits around the course on an occupancy grid."""
     cell = 0.04
     for course in _courses(world)[::2]:
@@ -185,7 +185,7 @@ def test_there_is_a_way_round_as_wide_as_promised(world: str) -> None:
         blocked, (x0, y0) = occupancy(course, cell)
         room = ndimage.distance_transform_edt(~blocked) * cell
         free = room >= course.gap_m / 2.0 - 1.5 * cell
-        # A cut across the lane at the start: its two sides must be joined the other way round.
+        # Cut the lane at the start: both sides must be connected around the course.
         ahead = course.route[1] - course.route[-1]
         ahead /= np.hypot(*ahead)
         rows, columns = np.indices(blocked.shape)
@@ -200,7 +200,7 @@ def test_there_is_a_way_round_as_wide_as_promised(world: str) -> None:
 
 
 @each_world
-def test_lamps_hang_over_the_lane(world: str) -> None:
+def test_lamps_are_over_the_lane(world: str) -> None:
     """Lamps are in the lane, and only corridors have a ceiling."""
     for course in _courses(world):
         assert course.lamps
@@ -224,7 +224,7 @@ def test_corridors_have_corners_and_doors() -> None:
     assert kinds == {"box", "bin", "bench", "plant", "cabinet", "crate"}
 
 
-def test_yards_and_harbours_have_all_that_belongs_there() -> None:
+def test_yards_and_harbours_have_every_kind() -> None:
     """Over all seeds every surface and obstacle occurs, and quays have their height."""
     yards, harbours = _courses("yard"), _courses("harbour")
     assert {w.surface for c in yards for w in c.walls} == {"hedge", "fence", "brick", "shed"}
@@ -235,7 +235,7 @@ def test_yards_and_harbours_have_all_that_belongs_there() -> None:
     assert quays == {0.6}
 
 
-def test_only_water_flows() -> None:
+def test_only_harbours_have_currents() -> None:
     """Harbours have varying currents of up to 0.15 m/s; land has none."""
     speeds = [math.hypot(*course.current_mps) for course in _courses("harbour")]
     assert 0.1 < max(speeds) <= 0.15
@@ -251,7 +251,7 @@ def test_unknown_worlds_and_seeds_are_refused() -> None:
         lay_out("yard", -1)
 
 
-def test_a_world_that_never_fits_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_layout_that_never_fits_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     """The search for a layout gives up with an error."""
     from shapechanger.worlds.layout import courses
 

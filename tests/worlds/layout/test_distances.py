@@ -55,7 +55,7 @@ def test_distances_are_those_of_the_nearest_points(seed: int) -> None:
     assert max(far, 0.0) == pytest.approx(_nearest(_samples(one), line), abs=0.1)
 
 
-def test_a_thing_inside_another_is_no_distance_away() -> None:
+def test_a_contained_obstacle_overlaps() -> None:
     """A box inside another overlaps it, although no sides cross."""
     large = Obstacle("box", 0.0, 0.0, 0.3, 2.0, 2.0, 1.0)
     small = Obstacle("box", 0.1, 0.0, 1.0, 0.2, 0.3, 1.0)
@@ -64,8 +64,8 @@ def test_a_thing_inside_another_is_no_distance_away() -> None:
     assert distances_from_obstacle(large, box_sides(small)) == pytest.approx(0.0)
 
 
-def test_pieces_cross_only_in_their_middles() -> None:
-    """Shared ends do not count as a crossing."""
+def test_shared_ends_are_not_crossings() -> None:
+    """Segments that share an end do not cross."""
     chain = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     tie = chain[[0, 2, 1, 3]]
     assert not any_crossing(np.hstack([chain, np.roll(chain, -1, 0)]))

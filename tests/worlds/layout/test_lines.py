@@ -20,7 +20,7 @@ def _ellipse(a: float, b: float, n: int) -> np.ndarray:
     return np.stack([a * np.cos(angles), b * np.sin(angles)], axis=1)
 
 
-def test_resampled_points_are_evenly_apart() -> None:
+def test_resampled_points_are_evenly_spaced() -> None:
     """Points are evenly spaced in sharp bends and from uneven input."""
     line = resample(_ellipse(6.0, 2.0, 2000), 0.1)
     chords = np.hypot(*np.diff(line, axis=0, append=line[:1]).T)
@@ -29,7 +29,7 @@ def test_resampled_points_are_evenly_apart() -> None:
     assert length(line) == pytest.approx(length(_ellipse(6.0, 2.0, 2000)), rel=1e-3)
 
 
-def test_normals_point_left_and_turns_sum_to_once_round() -> None:
+def test_normals_point_left() -> None:
     """Normals of a counter-clockwise circle point inwards, and its turns sum to 2 pi."""
     circle = _ellipse(3.0, 3.0, 100)
     assert normals(circle) == pytest.approx(-circle / 3.0)
@@ -37,7 +37,7 @@ def test_normals_point_left_and_turns_sum_to_once_round() -> None:
     assert turn_angles(circle[::-1]).sum() == pytest.approx(-2 * np.pi)
 
 
-def test_tangent_radii_know_bends_and_necks() -> None:
+def test_tangent_radii_of_bends_and_necks() -> None:
     """They equal a circle's radius, and half the distance between two long sides."""
     assert tangent_radii(_ellipse(3.0, 3.0, 64)) == pytest.approx(3.0)
     x = np.linspace(-10.0, 10.0, 201)

@@ -8,7 +8,7 @@ import pytest
 from shapechanger.worlds.layout.geometry import grow_cells, scale_grid, trace_outline
 
 
-def test_outlines_go_round_counter_clockwise() -> None:
+def test_outlines_are_counter_clockwise() -> None:
     """The outline of an L of three cells has eight sides."""
     loop = trace_outline(frozenset({(0, 0), (1, 0), (0, 1)}))
     assert loop is not None
@@ -25,13 +25,13 @@ def test_outlines_go_round_counter_clockwise() -> None:
     ],
     ids=["a corner touches", "a hole", "two pieces"],
 )
-def test_outlines_that_meet_themselves_are_refused(cells: frozenset[tuple[int, int]]) -> None:
+def test_self_touching_outlines_are_refused(cells: frozenset[tuple[int, int]]) -> None:
     """Outlines in several parts, or that touch themselves, return None."""
     assert trace_outline(cells) is None
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_grown_squares_hang_together(seed: int) -> None:
+def test_grown_cells_are_connected(seed: int) -> None:
     """Accepted outlines have unit steps and no repeated point."""
     rng = np.random.default_rng(seed)
     cells = grow_cells(rng, 6)

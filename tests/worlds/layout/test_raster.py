@@ -47,7 +47,7 @@ def test_the_lane_is_free_and_the_rest_blocked() -> None:
         (Obstacle("bin", -2.0, 0.3, 0.0, 0.6, 0.6, 0.5), np.pi * 0.09),
     ],
 )
-def test_things_are_blocked(obstacle: Obstacle, area: float) -> None:
+def test_obstacles_are_blocked(obstacle: Obstacle, area: float) -> None:
     """The blocked cells cover the obstacle."""
     empty, (x0, y0) = occupancy(_ring(), 0.02)
     full, _ = occupancy(_ring(obstacle), 0.02)
@@ -68,7 +68,7 @@ def test_the_route_is_free_of_walls(world: str) -> None:
     near = distances_to_segments(
         middles[::50], np.hstack([course.route, np.roll(course.route, -1, 0)])
     )
-    # The farthest free place is the outer corner of a corridor, or a nook between rocks.
+    # The farthest free cell is in an outer corner of a corridor or between rocks.
     assert near.min(axis=1).max() <= 1.5 * course.half_width.max()
     walls = wall_segments(course.walls)
     middle_of_walls = (walls[:, :2] + walls[:, 2:]) / 2.0
@@ -79,4 +79,4 @@ def test_the_route_is_free_of_walls(world: str) -> None:
     r = np.rint((behind[:, 1] - y0) / 0.05).astype(int)
     c = np.rint((behind[:, 0] - x0) / 0.05).astype(int)
     inside = (r >= 0) & (c >= 0) & (r < blocked.shape[0]) & (c < blocked.shape[1])
-    assert blocked[r[inside], c[inside]].mean() > 0.97  # The jambs of doors have the lane behind.
+    assert blocked[r[inside], c[inside]].mean() > 0.97  # Door jambs have the lane behind them.

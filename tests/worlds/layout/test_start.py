@@ -41,13 +41,13 @@ def test_starts_are_on_the_route_and_free(world: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("world", WORLDS)
-def test_starts_follow_from_the_seed(world: str) -> None:
+def test_starts_are_reproducible(world: str) -> None:
     """Equal seeds give equal starts."""
     course = lay_out(world, 1)
     assert [start_pose(course, k) for k in range(5)] == [start_pose(course, k) for k in range(5)]
 
 
-def test_a_lane_that_is_full_begins_at_its_first_point() -> None:
+def test_a_full_lane_starts_at_its_first_point() -> None:
     """Without any free place, the start is the first point of the route."""
     course = lay_out("corridor", 0)
     full = replace(

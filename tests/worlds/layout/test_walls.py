@@ -16,7 +16,7 @@ _CORNERS = np.array([(0.0, 0.0), (20.0, 0.0), (20.0, 15.0), (0.0, 15.0)])
 
 
 def length(wall: Wall) -> float:
-    """Length of a wall, m."""
+    """Return the length of a wall, m."""
     return float(np.hypot(*np.subtract(wall.end, wall.start)))
 
 
@@ -44,10 +44,10 @@ def test_long_walls_of_a_corridor_are_split_by_panels(seed: int) -> None:
         if wall.surface in panels:
             low, high = panels[wall.surface]
             assert low - 1e-9 <= length(wall) <= high + 1e-9
-            if length(before) != pytest.approx(RECESS_M):  # Doors may stand back.
+            if length(before) != pytest.approx(RECESS_M):  # Doors may be recessed.
                 assert before.surface == "plaster"
                 assert 0.4 - 1e-9 <= length(before) <= 2.4 + 1e-9
-    # What is left of a leg ends in plaster that was too short for another panel.
+    # A leg ends in plaster that is too short for another panel.
     assert max(length(wall) for wall in walls) < 2.4 + 2.4 + 0.3
 
 

@@ -12,8 +12,8 @@ _TILED = ("floor", "asphalt", "water", "grass", "hedge", "ceiling", "brick", "fe
 
 
 @pytest.mark.parametrize("name", PAINTERS)
-def test_a_texture_is_a_picture_with_something_on_it(name: str) -> None:
-    """Textures are small and not uniform."""
+def test_a_texture_is_small_and_not_uniform(name: str) -> None:
+    """The dtype is uint8, with three channels and at most 512 pixels a side."""
     picture = texture(name, 0)
     assert picture.dtype == np.uint8
     assert picture.shape[2] == 3
@@ -22,7 +22,7 @@ def test_a_texture_is_a_picture_with_something_on_it(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PAINTERS)
-def test_it_follows_from_its_seed(name: str) -> None:
+def test_textures_are_reproducible(name: str) -> None:
     """Equal seeds give equal textures in every process."""
     first = texture(name, 1).copy()
     texture.cache_clear()
@@ -31,7 +31,7 @@ def test_it_follows_from_its_seed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", _TILED)
-def test_what_goes_on_and_on_has_no_seam(name: str) -> None:
+def test_repeating_textures_have_no_seam(name: str) -> None:
     """Repeating textures are continuous across their edges."""
     picture = texture(name, 3).astype(float)
     inside = np.abs(np.diff(picture, axis=1)).mean(axis=(0, 2))
@@ -39,20 +39,20 @@ def test_what_goes_on_and_on_has_no_seam(name: str) -> None:
     assert seam <= inside.max() * 1.5
 
 
-def test_a_kept_texture_cannot_be_spoilt() -> None:
-    """Cached textures are read-only."""
+def test_cached_textures_are_read_only() -> None:
+    """Writing to a cached texture raises an error."""
     with pytest.raises(ValueError, match="read-only"):
         texture("door", 0)[0, 0, 0] = 1
 
 
-def test_an_unknown_texture_names_the_nearest() -> None:
+def test_an_unknown_texture_is_refused() -> None:
     """The error suggests the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'plaster'"):
         texture("plastre", 0)
 
 
 def test_clouds_have_mean_0_and_deviation_1() -> None:
-    """Clouds have mean 0 and standard deviation 1."""
+    """The mean is 0 and the standard deviation 1."""
     field = clouds(np.random.default_rng(0), 64, 96, 4, 6)
     assert field.shape == (64, 96)
     assert field.mean() == pytest.approx(0.0, abs=1e-5)

@@ -11,7 +11,7 @@ from shapechanger.worlds.scene import add_course
 from tests.worlds.scene.courses import square
 
 _WORLDS = ("corridor", "yard", "harbour")
-# What a vehicle's hull and wheels are to have.
+# Collision bits of a vehicle's hull and wheels.
 _HULL = {"contype": 2, "conaffinity": 1}
 _WHEEL = {"contype": 10, "conaffinity": 5}
 
@@ -35,7 +35,7 @@ def _touched(model: mujoco.MjModel, *place: float) -> set[str]:
 
 
 @pytest.mark.parametrize("world", _WORLDS)
-def test_every_name_says_that_it_is_of_the_world(world: str) -> None:
+def test_every_name_has_the_prefix_of_the_world(world: str) -> None:
     """All elements of a course are named "world/..."."""
     model = _compiled(world)
     names = [
@@ -49,7 +49,7 @@ def test_every_name_says_that_it_is_of_the_world(world: str) -> None:
 
 
 @pytest.mark.parametrize("world", _WORLDS)
-def test_what_is_touched_is_not_drawn_and_what_is_drawn_not_touched(world: str) -> None:
+def test_collision_and_visual_geoms_are_separate(world: str) -> None:
     """Collision geoms are hidden, and visual meshes do not collide."""
     model = _compiled(world)
     touchable = (model.geom_contype | model.geom_conaffinity) > 0
@@ -58,7 +58,7 @@ def test_what_is_touched_is_not_drawn_and_what_is_drawn_not_touched(world: str) 
     assert (model.geom_type[~touchable] == mujoco.mjtGeom.mjGEOM_MESH).all()
 
 
-def test_walls_and_things_are_named_by_their_number() -> None:
+def test_walls_and_obstacles_are_numbered() -> None:
     """Collision geoms are numbered like the walls and obstacles of the course."""
     model = _compiled("corridor")
     course = square("corridor")
@@ -70,29 +70,29 @@ def test_walls_and_things_are_named_by_their_number() -> None:
 
 
 @pytest.mark.parametrize(("bits", "ground"), [(_HULL, False), (_WHEEL, True)])
-def test_a_wheel_touches_the_ground_and_a_hull_does_not(bits: dict[str, int], ground: bool) -> None:
+def test_only_wheels_collide_with_the_ground(bits: dict[str, int], ground: bool) -> None:
     """Wheels collide with the ground, hulls do not."""
     touched = _touched(_compiled("corridor", **bits), 0.0, 3.0, 0.05)
     assert touched == ({"world/ground"} if ground else set())
 
 
 @pytest.mark.parametrize("bits", [_HULL, _WHEEL])
-def test_both_touch_walls_and_things(bits: dict[str, int]) -> None:
+def test_hulls_and_wheels_touch_walls_and_obstacles(bits: dict[str, int]) -> None:
     """Hulls and wheels collide with walls and obstacles."""
     model = _compiled("corridor", **bits)
     assert _touched(model, 3.5, -0.95, 0.3) == {"world/wall/0"}
     assert _touched(model, 6.6, 2.8, 0.3) == {"world/thing/1"}
 
 
-def test_the_seen_side_of_a_wall_is_where_it_starts_to_push() -> None:
-    """The visible side of a wall is the surface of its collision geom."""
+def test_the_visible_side_of_a_wall_is_its_collision_surface() -> None:
+    """Contact begins at the visible side."""
     model = _compiled("corridor", **_HULL)
     assert _touched(model, 3.5, -0.89, 0.3) == set()
     assert _touched(model, 3.5, -0.91, 0.3) == {"world/wall/0"}
 
 
-def test_the_world_weighs_nothing_and_can_stand_with_a_vehicle() -> None:
-    """A course adds no joints and no mass."""
+def test_a_course_adds_no_mass_and_no_joints() -> None:
+    """A vehicle can be added to the same model."""
     model = _compiled("yard", **_HULL)
     assert model.body_mass[0] == 0.0
     assert model.nv == 6

@@ -1,4 +1,4 @@
-"""Rendered pictures of courses."""
+"""Rendered images of courses."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
     """Textures are upright and not mirrored on walls of any direction."""
     ahead = np.array([np.cos(angle), np.sin(angle)])
     right = np.array([ahead[1], -ahead[0]])
-    # A wall 1.8 m wide 1 m ahead; its free side is at the left of who looks along it.
+    # A wall 1.8 m wide, 1 m ahead; its visible side is on the left of its direction.
     start, end = ahead + 0.9 * right, ahead - 0.9 * right
     wall = Wall((start[0], start[1]), (end[0], end[1]), 1.0, "window")
     picture = _draw(with_walls(square("corridor"), wall), _WHITE, (0.0, 0.0), angle)
@@ -78,8 +78,8 @@ def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
     assert picture[bottom, left].argmax() == picture[bottom, right_hand].argmax() == 2
 
 
-def test_nobody_sees_a_wall_from_behind() -> None:
-    """Backs of walls are not rendered."""
+def test_backs_of_walls_are_not_rendered() -> None:
+    """A wall seen from behind leaves the image unchanged."""
     front = Wall((1.0, -1.0), (1.0, 1.0), 1.0, "brick")
     back = replace(front, start=front.end, end=front.start)
     course = with_walls(square("harbour"))
@@ -92,14 +92,14 @@ def test_nobody_sees_a_wall_from_behind() -> None:
 
 
 @pytest.mark.parametrize("world", ["corridor", "yard", "harbour"])
-def test_every_world_can_be_seen(world: str) -> None:
+def test_every_world_renders(world: str) -> None:
     """Pictures of every world are neither uniform nor saturated."""
     picture = _draw(square(world), Look.of(world), (0.5, 0.0), 0.0)
     assert 20 < picture.mean() < 200
     assert picture.std() > 10
 
 
-def test_light_makes_it_bright_and_warmth_takes_the_blue() -> None:
+def test_light_and_warmth_change_the_image() -> None:
     """More light is brighter, and warmth removes blue."""
     course, usual = square("corridor"), Look(light=0.6, warmth=0.2)
 
@@ -112,20 +112,20 @@ def test_light_makes_it_bright_and_warmth_takes_the_blue() -> None:
     assert warm[0] > 0.95 * cold[0]
 
 
-def test_a_glossy_floor_shows_the_lamp_above_it() -> None:
-    """A glossy floor reflects lamps."""
+def test_a_glossy_floor_reflects_lamps() -> None:
+    """With gloss, the floor below a lamp is brighter."""
     course = square("corridor")
     dull, glossy = (
         _draw(course, replace(Look.of("corridor"), gloss=gloss), (-0.5, 0.0), 0.0)
         for gloss in (0.0, 0.6)
     )
-    # Only the lamp is white in this yellow light.
+    # In this yellow light, only the lamp is white.
     below = slice(_HEIGHT // 2, None)
     assert glossy[below, :, 2].max() > 1.5 * dull[below, :, 2].max()
 
 
-def test_the_same_course_looks_the_same_twice() -> None:
-    """Rendering is deterministic."""
+def test_rendering_is_deterministic() -> None:
+    """Two renderings are equal."""
     one, other = (_draw(square("harbour"), Look.of("harbour"), (0.5, 0.0), 0.2) for _ in "ab")
     np.testing.assert_array_equal(one, other)
 

@@ -14,7 +14,7 @@ from tests.worlds.scene.courses import square, with_walls
 
 
 def pieces(course: Course, surface: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners (n, 4, 3), texture coordinates (n, 4, 2) and lights (n, 4) of a surface."""
+    """Return corners (n, 4, 3), texture coordinates (n, 4, 2) and lights (n, 4) of a surface."""
     patches = Surfaces(course, Look.of(course.world)).walls()[surface]
     points, places, lights, _ = patches.arrays(mirrored=False)
     return points.reshape(-1, 4, 3), places.reshape(-1, 4, 2), lights.reshape(-1, 4)
@@ -39,7 +39,7 @@ def test_long_walls_are_split(length: float, columns: int) -> None:
     np.testing.assert_allclose(corners[..., 1], 2.0)
 
 
-def test_the_texture_runs_on_from_piece_to_piece() -> None:
+def test_texture_coordinates_are_continuous() -> None:
     """Texture coordinates are continuous across the patches of a wall."""
     wall = Wall((0.0, 0.0), (6.0, 0.0), 0.9, "brick")
     corners, places, _ = pieces(with_walls(square("corridor"), wall), "brick")
