@@ -44,7 +44,7 @@ def tensor_bytes(tensors: Mapping[str, NDArray[Any]], card: bytes, kind: str = "
     """
     # Safetensors keeps the bytes of an array as they lie in memory.
     arrays = {name: np.asarray(value, order="C") for name, value in tensors.items()}
-    metadata = {_CARD: card.decode(), _HASH: _digest(arrays)}
+    metadata = {_CARD: card.decode(), _HASH: _digest(kind, card, arrays)}
     if kind:
         metadata[_KIND] = kind
     content = safetensors.save(arrays, metadata=metadata)
@@ -78,9 +78,10 @@ def read_tensors(path: Path, kind: str = "") -> tuple[bytes, dict[str, NDArray[A
     if metadata.get(_KIND, "") != kind:
         raise ValueError(f"it is a {metadata.get(_KIND, 'policy of a study')}")
     tensors = safetensors.load(content)
-    if _digest(tensors) != metadata[_HASH]:
-        raise ValueError("its numbers do not have the hash of its card")
-    return metadata[_CARD].encode(), tensors
+    card = metadata[_CARD].encode()
+    if _digest(kind, card, tensors) != metadata[_HASH]:
+        raise ValueError("its card or its numbers do not have its hash")
+    return card, tensors
 
 
 def kind_of(path: Path) -> str | None:
@@ -101,9 +102,9 @@ def _metadata(header: bytes) -> dict[str, str]:
     return msgspec.convert(found, dict[str, str])
 
 
-def _digest(tensors: Mapping[str, NDArray[Any]]) -> str:
-    """SHA-256 over names, types, shapes and numbers."""
-    digest = hashlib.sha256()
+def _digest(kind: str, card: bytes, tensors: Mapping[str, NDArray[Any]]) -> str:
+    """SHA-256 over kind, card, names, types, shapes and numbers."""
+    digest = hashlib.sha256(f"{kind} {len(card)} ".encode() + card)
     for name in sorted(tensors):
         array = tensors[name]
         digest.update(f"{name} {array.dtype} {array.shape} ".encode())

@@ -191,6 +191,23 @@ def test_folders_of_two_machines_are_merged(
     assert all(one == alone[one["name"]] for one in found)
 
 
+def test_merging_keeps_the_looks_of_the_parts(
+    complete_suite: tuple[Path, _Counting, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seeds that were added on one machine while results could be seen are on the joint page."""
+    monkeypatch.setattr(suite_command, "write_study_report", lambda study, folder: folder)
+    name = _PAIRS[0]
+    shutil.copytree(complete_suite[0] / name, tmp_path / "a" / name)
+    study = tmp_path / "a" / name / "study.json"
+    study.write_text(json.dumps({**json.loads(study.read_text()), "looks": [4, 2]}))
+    merge = ["suite", "merge", "vehicles", str(tmp_path / "a")]
+    code, _, complained = _run(tmp_path / "whole", _Counting(), arguments=merge)
+    assert code == 0, complained
+    assert json.loads((tmp_path / "whole" / name / "study.json").read_text())["looks"] == [4, 2]
+    page = (tmp_path / "whole" / "index.html").read_text()
+    assert "Results were also computed on the way, with 4 seeds" in page
+
+
 def test_conflicting_folders_are_refused(
     complete_suite: tuple[Path, _Counting, str], tmp_path: Path
 ) -> None:

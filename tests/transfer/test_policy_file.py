@@ -18,6 +18,7 @@ import shapechanger
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.errors import CorruptStudy
+from shapechanger.tensor_file import tensor_bytes
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
@@ -124,6 +125,14 @@ def test_a_changed_file_is_refused(at: int, tmp_path: Path) -> None:
         load_policy(tmp_path / "bad.safetensors")
 
 
+def test_a_changed_card_is_refused(tmp_path: Path) -> None:
+    """A name in a layout cannot be changed: the hash covers the card too."""
+    content = POLICIES["reach"].read_bytes()
+    (tmp_path / "bad.safetensors").write_bytes(content.replace(b"MCP_flexion", b"PIP_flexion", 1))
+    with pytest.raises(CorruptStudy, match="its card or its numbers do not have its hash"):
+        load_policy(tmp_path / "bad.safetensors")
+
+
 def test_a_truncated_file_is_refused(tmp_path: Path) -> None:
     """Any truncation raises a PolicyError."""
     content = POLICIES["reach"].read_bytes()
@@ -134,13 +143,13 @@ def test_a_truncated_file_is_refused(tmp_path: Path) -> None:
 
 
 def _changed(tmp_path: Path, card: dict[str, Any]) -> Path:
-    """Write a policy of the finger with another card and the hash of its numbers."""
+    """Write a policy of the finger with another card and the hash of both."""
     content = POLICIES["reach"].read_bytes()
     length = int.from_bytes(content[:8], "little")
     metadata = json.loads(content[8 : 8 + length])["__metadata__"]
-    metadata["card"] = json.dumps({**json.loads(metadata["card"]), **card})
+    changed = json.dumps({**json.loads(metadata["card"]), **card}).encode()
     path = tmp_path / "other.safetensors"
-    path.write_bytes(safetensors.save(safetensors.load(content), metadata=metadata))
+    path.write_bytes(tensor_bytes(safetensors.load(content), changed))
     return path
 
 

@@ -355,7 +355,13 @@ class MergeSuites:
 
     def run(self) -> None:
         """Copy what has ended, and report the studies that are complete."""
-        from shapechanger.transfer.study import PLAN_FILE, run_study, unfinished_runs
+        from shapechanger.transfer.study import (
+            PLAN_FILE,
+            STUDY_FILE,
+            looks_in,
+            run_study,
+            unfinished_runs,
+        )
         from shapechanger.transfer.suite import merge_study
 
         suite = load_suite(self.name)
@@ -376,7 +382,14 @@ class MergeSuites:
             if missing := unfinished_runs(plan, out / name):
                 say(f"{name} lacks {', '.join(run.name for run in missing)}.")
                 continue
-            page.add(name, run_study(plan, out / name, executor=Serial(), command=command_line()))
+            study = run_study(
+                plan,
+                out / name,
+                executor=Serial(),
+                command=command_line(),
+                looked=[look for part in parts for look in looks_in(part / STUDY_FILE)],
+            )
+            page.add(name, study)
         _print_outcomes(page.outcomes())
 
 

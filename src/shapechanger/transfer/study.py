@@ -262,6 +262,7 @@ def run_study(
     on_progress: OnProgress = lambda name, steps, ended: None,
     command: str = "",
     traits: TaskTraits | None = None,
+    looked: Sequence[int] = (),
 ) -> Study:
     """Perform the runs of a plan that are missing in `out`, and return the result.
 
@@ -276,6 +277,7 @@ def run_study(
         on_progress: Called with the name of a run, its steps so far and whether it has ended.
         command: The command that repeats the study.
         traits: What `inspect_task` returned for the task; None to inspect it now.
+        looked: Numbers of seeds at which parts of this study were evaluated elsewhere.
 
     Raises:
         EmptyShift: If nothing changes between source and target.
@@ -308,17 +310,30 @@ def run_study(
         runs=results,
         source_return=tuple(r.curve[-1].mean_return for r in results if r.run.kind == SOURCE),
         summaries={},
-        looks=_looks(plan, out / STUDY_FILE),
+        looks=_looks(plan, out / STUDY_FILE, looked),
     )
     study = msgspec.structs.replace(study, summaries=_summaries(study))
     write_json(out / STUDY_FILE, study)
     return study
 
 
-def _looks(plan: Plan, before: Path) -> tuple[int, ...]:
+def _looks(plan: Plan, before: Path, elsewhere: Sequence[int]) -> tuple[int, ...]:
     """Numbers of seeds at which this study has been evaluated, with the present one."""
-    looked = read_json(before, Study, f"delete {before}").looks if before.exists() else ()
+    looked = looks_in(before)
+    looked += tuple(sorted(set(elsewhere) - {*looked, plan.seeds}))
     return looked if looked[-1:] == (plan.seeds,) else (*looked, plan.seeds)
+
+
+def looks_in(path: Path) -> tuple[int, ...]:
+    """Return the numbers of seeds at which the study in a file was evaluated; none without a file.
+
+    Args:
+        path: A `study.json`.
+
+    Raises:
+        CorruptStudy: If it cannot be read.
+    """
+    return read_json(path, Study, f"delete {path}").looks if path.exists() else ()
 
 
 def unfinished_runs(plan: Plan, out: Path) -> tuple[Run, ...]:

@@ -118,7 +118,7 @@ def test_changed_weights_are_detected(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[-100] ^= 1
     path.write_bytes(content)
-    with pytest.raises(PolicyError, match="do not have the hash"):
+    with pytest.raises(PolicyError, match="do not have its hash"):
         CameraPolicy.load(path)
 
 

@@ -286,7 +286,7 @@ def test_an_edit_before_the_first_step_can_be_undone() -> None:
         env.step(np.zeros(8))
         env.model.opt.timestep = timestep
     for _ in range(3):
-        same(ours.step(np.full(8, 0.2)), theirs.step(np.full(8, 0.2)))
+        assert same(ours.step(np.full(8, 0.2)), theirs.step(np.full(8, 0.2)))
     assert ours._bound.has_fast_model
 
 
