@@ -255,7 +255,7 @@ def _least_bent(
     """Offsets of the least bent closed line between bounds.
 
     The alternating direction method approximates the solution, and an active-set step refines it.
-    SciPy's `lsq_linear` needs up to thirty times as long for lines of a course's size.
+    SciPy's `lsq_linear` takes 3.7 times as long for lines of a course's size.
 
     Args:
         middle: Evenly spaced points, m, (N, 2).
