@@ -23,7 +23,7 @@ from shapechanger.errors import (
 )
 from shapechanger.tasks.measure import RETURN, Measure
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvTraits, certify_shift, env_traits
+from shapechanger.transfer.env_ref import EnvTraits, certify_shift, env_traits, is_reward_term
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
 from shapechanger.transfer.learners.settings import Settings, require_budget
@@ -248,7 +248,7 @@ def _measure(target: EnvTraits, name: str) -> Measure:
         return target.measures[0]
     if name in known:
         return known[name]
-    if name.startswith("reward_"):
+    if is_reward_term(name):
         return Measure(name, RETURN.unit)
     raise UnknownName("measure", name, known)
 
