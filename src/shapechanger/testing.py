@@ -20,7 +20,7 @@ from gymnasium.utils.env_checker import check_env
 
 from shapechanger.errors import LayoutError, ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.transfer.env_ref import layouts_of
+from shapechanger.transfer.env_ref import is_reward_term, layouts_of
 
 MakeEnv = Callable[[], gym.Env[Any, Any]]
 """Makes a new env."""
@@ -120,7 +120,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
         terms = [
             float(value)
             for name, value in info.items()
-            if (name.startswith("reward_") or name.endswith("_penalty"))
+            if is_reward_term(name)
             and not isinstance(value, Mapping)  # Such as all terms together, or their sources.
         ]
         _require(bool(terms), "info reports no reward terms.")

@@ -128,7 +128,10 @@ def test_a_fallen_runner_stands_still_for_the_rest() -> None:
         result.value("forward sped")
 
 
-@pytest.mark.parametrize("name", ["Ant", "HalfCheetah", "Hopper", "InvertedPendulum", "Finger"])
+@pytest.mark.parametrize(
+    "name",
+    ["Ant", "HalfCheetah", "Hopper", "InvertedDoublePendulum", "InvertedPendulum", "Finger"],
+)
 def test_reward_terms_of_an_evaluation_add_up_to_its_return(name: str) -> None:
     """Every reward term is counted, whatever its type."""
     env = gym.make(f"shapechanger/{name}-v1")

@@ -223,6 +223,13 @@ def test_unknown_arms_and_scratch_left_out_are_refused() -> None:
         tiny_plan(arms=("zero-shot", "fine-tune"))
 
 
+def test_a_measure_is_one_of_the_target() -> None:
+    """A misspelt reward term is refused before anything is trained."""
+    assert tiny_plan(measure="reward_survive").measure == "reward_survive"
+    with pytest.raises(UnknownName, match="Did you mean 'reward_survive'"):
+        tiny_plan(measure="reward_survived")
+
+
 def test_unknown_envs_are_refused() -> None:
     """The message lists the known envs."""
     with pytest.raises(UnknownName, match="shapechanger/BigAnt-v1"):

@@ -227,6 +227,15 @@ def measures_of(env: gym.Env[Any, Any]) -> tuple[Measure, ...]:
     return declared if RETURN in declared else (*declared, RETURN)
 
 
+def is_reward_term(name: str) -> bool:
+    """Return whether a number of a step's `info` is a term of the reward.
+
+    Args:
+        name: Its name: `reward_...`, or `..._penalty` as of negative costs in Gymnasium.
+    """
+    return name.startswith("reward_") or name.endswith("_penalty")
+
+
 def layouts_of(env: gym.Env[Any, Any]) -> tuple[Layout, Layout]:
     """Return the observation and the action layout of an env, or of its outermost wrapper with one.
 

@@ -23,7 +23,13 @@ from shapechanger.errors import (
 )
 from shapechanger.tasks.measure import RETURN, Measure
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvTraits, certify_shift, env_traits
+from shapechanger.transfer.env_ref import (
+    EnvRef,
+    EnvTraits,
+    certify_shift,
+    env_traits,
+    is_reward_term,
+)
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
 from shapechanger.transfer.learners.settings import Settings, require_budget
@@ -185,7 +191,7 @@ def make_plan(
     learns.require(task.target, traits.target)
     for arm in arms:
         load_method(arm).require(traits.source, traits.target, settings)
-    measured = _measure(traits.target, measure)
+    measured = _measure(task.target, traits.target, measure)
     wanted = settings.steps if steps is None else steps
     require_budget(wanted, settings, "target")
     budget = settings.whole_updates(wanted)
@@ -237,8 +243,8 @@ def make_plan(
     )
 
 
-def _measure(target: EnvTraits, name: str) -> Measure:
-    """Return a measure of the target; a reward term is taken as given.
+def _measure(env: EnvRef, target: EnvTraits, name: str) -> Measure:
+    """Return a measure of the target, or one of its reward terms; those of a robot are not checked.
 
     Raises:
         UnknownName: If there is none of this name.
@@ -248,9 +254,18 @@ def _measure(target: EnvTraits, name: str) -> Measure:
         return target.measures[0]
     if name in known:
         return known[name]
-    if name.startswith("reward_"):
+    terms = () if target.exclusive else _reward_terms(env)
+    if name in terms or (target.exclusive and is_reward_term(name)):
         return Measure(name, RETURN.unit)
-    raise UnknownName("measure", name, known)
+    raise UnknownName("measure", name, (*known, *terms))
+
+
+def _reward_terms(env: EnvRef) -> tuple[str, ...]:
+    """Names of the reward terms that an env reports in its first step."""
+    with closing(env.make()) as made:
+        made.reset(seed=0)
+        info = made.step(made.action_space.sample())[4]
+    return tuple(name for name in info if is_reward_term(name))
 
 
 def run_study(

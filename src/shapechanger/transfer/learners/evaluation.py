@@ -16,6 +16,7 @@ from shapechanger.tasks.measure import RETURN, Measure
 from shapechanger.transfer.env_ref import (
     EnvRef,
     HasHeldOutStarts,
+    is_reward_term,
     is_single_instance,
     measures_of,
 )
@@ -133,7 +134,7 @@ class _Episode:
         self.length += 1
         for name, value in info.items():
             # NumPy's float32 is not a Python float; ants report their control cost as one.
-            if name.startswith("reward_") and isinstance(value, int | float | np.floating):
+            if is_reward_term(name) and isinstance(value, int | float | np.floating):
                 self.terms[name] = self.terms.get(name, 0.0) + float(cast("float", value))
         if "is_success" in info:
             self.success = bool(info["is_success"])
