@@ -88,7 +88,7 @@ def test_a_path_that_leaves_the_workspace_is_refused(
 ) -> None:
     """The error states where, when and by how much."""
     path = circle(0.012, place, hz=1.5)
-    with pytest.raises(PathError, match="The path leaving the finger's reach: at ") as caught:
+    with pytest.raises(PathError, match="The path leaves the finger's reach: at ") as caught:
         FingerTrackEnv(path=path)
     words = str(caught.value).split()
     beyond_mm = float(words[words.index("beyond.") - 2])
@@ -176,7 +176,7 @@ def test_another_path_can_be_given_at_a_reset() -> None:
     env = FingerTrackEnv()
     env.reset(seed=0)
     first = env.path
-    with pytest.raises(PathError, match="leaving the finger's reach"):
+    with pytest.raises(PathError, match="leaves the finger's reach"):
         env.reset(options={"path": circle(0.012, (0.09, 0.0, 0.0))})
     with pytest.raises(UnknownName, match=r"'circel'. Did you mean 'circle'"):
         env.reset(options={"path": "circel"})
