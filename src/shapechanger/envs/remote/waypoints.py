@@ -28,7 +28,7 @@ _SENSORS: Final = ("speed", "yaw_rate")
 
 
 class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
-    """A policy that learned to point out the free way in one vehicle drives another, real one.
+    """Drive a vehicle on the network by waypoints, with a policy from any other vehicle.
 
     The camera's frames are warped to the virtual camera of `WaypointEnv`, by the pitch and the
     field of view that the robot's profile states (`shapechanger robot camera` measures them). The
@@ -53,8 +53,8 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
         response: How the vehicle turns; None before the first reset.
 
     Raises:
-        RobotRefused: If the robot is no vehicle with a camera whose geometry is known, or measures
-            neither its speed nor its rate of turn.
+        RobotRefused: If the robot is not a vehicle, the geometry of its camera is unknown, or it
+            does not measure its speed or, without a given response, its rate of turn.
         StudyError: If the vehicle does not turn as it steers.
     """
 
@@ -73,7 +73,7 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
         except BaseException:
             self._env.close()
             raise
-        # Tracks turn a vehicle that stands; where the body is not known, the response tells.
+        # Only tracks turn a vehicle on the spot.
         self._on_the_spot = welcome.body == "tank"
         self._speed = 0.0
         self.render_mode = self._env.render_mode
@@ -145,7 +145,7 @@ def _camera_of(welcome: Welcome) -> tuple[tuple[int, int], CameraGeometry]:
     """
     size, pitch, fovy = welcome.image_size, welcome.camera_pitch_deg, welcome.camera_fovy_deg
     if size is None:
-        raise RobotRefused(f"{welcome.robot} has no camera, and waypoints are seen.")
+        raise RobotRefused(f"{welcome.robot} has no camera, which a policy with waypoints needs.")
     if pitch is None or fovy is None or not (math.isfinite(pitch) and 0.0 < fovy < 180.0):
         raise RobotRefused(
             f"{welcome.robot} does not state pitch_deg and fovy_deg of its camera: measure them "
