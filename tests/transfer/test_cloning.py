@@ -18,6 +18,8 @@ from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners import DemonstrationFile, cloning
 from shapechanger.transfer.learners.cloning import (
     CloneLearner,
+    Demonstrations,
+    load_or_record,
     record_demonstrations,
 )
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluation_envs
@@ -143,7 +145,27 @@ def test_rehearsal_starts_from_the_source_and_learns_from_both(
     for tuned, rehearsed in zip(study.of("fine-tune"), study.of("rehearsal"), strict=True):
         assert [e.steps for e in rehearsed.curve] == [0, 30, 60, 120]
         assert rehearsed.curve[0] == tuned.curve[0]
-        assert rehearsed.curve[1:] != tuned.curve[1:]
+    shown = folder / "demonstrations"
+    source = load_or_record(
+        DemonstrationFile(shown / "source-0.npz", 0), LANE, 60, TINY_CLONING.episode_steps, _FRAMING
+    )
+    first = study.of("rehearsal")[0]
+
+    def curve(rehearsal: Demonstrations | None) -> list[Evaluation]:
+        found: list[Evaluation] = []
+        _LEARNER.train(
+            SLIPPERY,
+            120,
+            first.seed,
+            demonstrations=DemonstrationFile(shown / "scratch-0.npz", 0),
+            start=CameraPolicy.load(folder / "runs" / "source-0" / "policy.safetensors"),
+            rehearsal=rehearsal,
+            on_evaluation=found.append,
+        )
+        return found
+
+    assert curve(source) == list(first.curve)
+    assert curve(None) != list(first.curve)
     names = sorted(path.name for path in (folder / "demonstrations").iterdir())
     assert names == ["scratch-0.npz", "scratch-1.npz", "source-0.npz", "source-1.npz"]
 

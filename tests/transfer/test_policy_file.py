@@ -127,7 +127,7 @@ def test_a_changed_file_is_refused(at: int, tmp_path: Path) -> None:
 
 def test_a_changed_card_is_refused(tmp_path: Path) -> None:
     """A name in a layout cannot be changed: the hash covers the card too."""
-    content = POLICIES["reach"].read_bytes()
+    content = _changed(tmp_path, {}).read_bytes()
     (tmp_path / "bad.safetensors").write_bytes(content.replace(b"MCP_flexion", b"PIP_flexion", 1))
     with pytest.raises(CorruptStudy, match="its card or its numbers do not have its hash"):
         load_policy(tmp_path / "bad.safetensors")
