@@ -113,18 +113,18 @@ def _seeds() -> int:
 
 
 def _row(crossing: StudyOutcome) -> Row:
-    tuned = crossing.fine_tune_steps
+    steps = crossing.arm_steps
     gains = ", ".join(
         f"{name.replace('_', ' ')} {estimate_text(gain, signed=True)}"
         for name, gain in crossing.gains.items()
     )
     zero_shot = "not asked" if crossing.zero_shot is None else f"{crossing.zero_shot:.1f}"
-    reached = "never" if tuned is None else f"after {tuned / STEPS_A_MINUTE:.1f} min"
+    reached = "never" if steps is None else f"after {steps / STEPS_A_MINUTE:.1f} min"
     return Row(
         f"{crossing.name}: fine-tuning reaches what scratch ends with",
         f"{reached}, scratch after {crossing.scratch_steps / STEPS_A_MINUTE:.1f} min",
         f"{_seeds()} seeds; returns: scratch {crossing.final:.1f}, zero-shot {zero_shot}, "
-        f"fine-tuned {crossing.fine_tuned:.1f}; gains in {crossing.unit}s: {gains}",
+        f"fine-tuned {crossing.arm_final:.1f}; gains in {crossing.unit}s: {gains}",
         "none for a single pair",
         True,
     )

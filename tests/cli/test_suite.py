@@ -108,7 +108,7 @@ def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> 
         assert (out / name / "report.html").stat().st_size > 10_000
         command = json.loads((out / name / "study.json").read_text())["command"]
         assert command == f"shapechanger suite run vehicles --seeds 2 --out {out}"
-    assert "of 6 fine-tuning came to what scratch ends with in less than half of" in output
+    assert "of 6 pairs fine-tune reached what scratch ends with in less than half of" in output
 
 
 def test_suite_json_matches_the_table(complete_suite: tuple[Path, _Counting, str]) -> None:
@@ -127,10 +127,10 @@ def test_suite_json_matches_the_table(complete_suite: tuple[Path, _Counting, str
         assert 0.0 <= crossing["scratch_steps"] <= 40.0
         (row,) = (line for line in output.splitlines() if f" {crossing['name']} " in line)
         assert row.split()[1:3] == ["return", f"{crossing['final']:.4g}"]
-        assert ("never" in row) == (crossing["fine_tune_steps"] is None)
-    tuned = [(c["fine_tune_steps"], c["scratch_steps"]) for c in found]
+        assert ("never" in row) == (crossing["arm_steps"] is None)
+    tuned = [(c["arm_steps"], c["scratch_steps"]) for c in found]
     halves = sum(steps is not None and steps < scratch / 2 for steps, scratch in tuned)
-    assert f"On {halves} of 6 fine-tuning" in output
+    assert f"On {halves} of 6 pairs fine-tune" in output
 
 
 def test_each_training_is_done_once(complete_suite: tuple[Path, _Counting, str]) -> None:

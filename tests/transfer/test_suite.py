@@ -251,9 +251,9 @@ def test_a_crossing_is_found_along_a_line() -> None:
         "Ant-to-BigAnt",
         final=pytest.approx(1000.0),
         zero_shot=pytest.approx(400.0),
-        fine_tuned=pytest.approx(900.0),
+        arm_final=pytest.approx(900.0),
         scratch_steps=pytest.approx(10_240.0),
-        fine_tune_steps=pytest.approx(1536.0),
+        arm_steps=pytest.approx(1536.0),
     )
     assert found.halves
 
@@ -263,28 +263,28 @@ def test_scratch_may_come_to_its_end_before_it() -> None:
     early = np.array([0.0, 2000.0, *[1000.0] * 9])
     found = _crossing(_STEADY, early)
     assert found.scratch_steps == pytest.approx(512.0)
-    assert found.fine_tune_steps == pytest.approx(10_240.0)
+    assert found.arm_steps == pytest.approx(10_240.0)
     assert not found.halves
 
 
 def test_a_policy_that_is_as_good_at_once_needs_no_step() -> None:
     """A policy that starts above the level needs 0 steps."""
     found = _crossing(np.full(11, 1200.0))
-    assert found.fine_tune_steps == 0.0
+    assert found.arm_steps == 0.0
     assert found.halves
 
 
 def test_never_reaching_the_level_does_not_count() -> None:
     """Fine-tuning that never reaches the level has no steps."""
     found = _crossing(np.full(11, 400.0))
-    assert found.fine_tune_steps is None
+    assert found.arm_steps is None
     assert not found.halves
 
 
 def test_exactly_half_does_not_count() -> None:
     """Less than half of scratch's steps are needed."""
     at_half = np.array([*[0.0] * 5, *[1000.0] * 6])
-    assert _crossing(at_half).fine_tune_steps == pytest.approx(5120.0)
+    assert _crossing(at_half).arm_steps == pytest.approx(5120.0)
     assert not StudyOutcome("a", 1.0, None, 1.0, 5120.0, 2560.0).halves
     assert StudyOutcome("a", 1.0, None, 1.0, 5120.0, 2559.9).halves
 
@@ -293,3 +293,11 @@ def test_zero_shot_may_be_left_out() -> None:
     """Without that arm its value is None."""
     assert study_outcome("first", make_study(arms=("scratch", "fine-tune"))).zero_shot is None
     assert study_outcome("second", make_study()).zero_shot is not None
+
+
+def test_fine_tune_may_be_left_out() -> None:
+    """The first other arm is then compared with scratch."""
+    found = study_outcome("Ant-to-BigAnt", make_study(arms=("scratch", "zero-shot")))
+    assert found.arm == "zero-shot"
+    assert found.arm_final == found.zero_shot == pytest.approx(400.0)
+    assert list(found.gains) == ["jumpstart", "total_reward_gain", "asymptotic_gain"]

@@ -227,7 +227,7 @@ class RunSuite:
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
     """A TOML file, or the name of a suite that comes with Shapechanger: ants, lenses, methods,
-    pendulums, shank or vehicles."""
+    pendulums, shank, vehicles or waypoints."""
     seeds: int | None = None
     """Runs of each arm; the suite's own number if not given."""
     steps: int | None = None
@@ -450,10 +450,11 @@ def _progress_table(out: Path) -> tuple[Table, bool]:
 def _print_outcomes(found: list[StudyOutcome]) -> None:
     print_table(_table(found), _FILE_WIDTH)
     halves = sum(outcome.halves for outcome in found)
+    arms = " or ".join(dict.fromkeys(outcome.arm for outcome in found))
     say(
-        "Gains are of fine-tuning over scratch, in scores (0: what takes no skill, 1: the "
+        f"Gains are of {arms} over scratch, in scores (0: what takes no skill, 1: the "
         "target's reference, or the end of the best arm), with 95 % intervals over seeds.\n"
-        f"On {halves} of {len(found)} fine-tuning came to what scratch ends with in less than "
+        f"On {halves} of {len(found)} pairs {arms} reached what scratch ends with in less than "
         "half of scratch's steps."
     )
 
@@ -530,20 +531,21 @@ class _Page:
 def _table(found: list[StudyOutcome]) -> Table:
     """Format the results: values and steps, then gains with intervals."""
     table = Table(
-        *("study", "measure", "scratch", "zero-shot", "fine-tuned", "scratch, steps"),
-        *("fine-tune, steps", "jumpstart", "total reward gain", "gain at the end"),
+        *("study", "measure", "scratch", "zero-shot", "arm", "at its end", "scratch, steps"),
+        *("arm, steps", "jumpstart", "total reward gain", "gain at the end"),
         box=None,
     )
     for outcome in found:
-        tuned = outcome.fine_tune_steps
+        steps = outcome.arm_steps
         table.add_row(
             outcome.name,
             outcome.measure,
             f"{outcome.final:.4g}",
             "" if outcome.zero_shot is None else f"{outcome.zero_shot:.4g}",
-            f"{outcome.fine_tuned:.4g}",
+            outcome.arm,
+            f"{outcome.arm_final:.4g}",
             f"{outcome.scratch_steps:,.0f}",
-            "never" if tuned is None else f"{tuned:,.0f}",
+            "never" if steps is None else f"{steps:,.0f}",
             *(estimate_text(gain, signed=True) for gain in outcome.gains.values()),
         )
     return table

@@ -21,7 +21,6 @@ from shapechanger.reports.verdict import (
     MeasureRow,
     arm_rows,
     caveats,
-    headline_arm,
     measure_rows,
     verdict,
 )
@@ -65,7 +64,7 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
         title=f"{_short_name(plan.task.source)} → {_short_name(plan.task.target)}",
         plan=plan,
         verdict=verdict(study),
-        headline_arm=headline_arm(study),
+        headline_arm=study.headline_arm,
         cards=_cards(study, measures),
         bodies=_bodies(study, pictures) if pictures is not None else [],
         picture_note=picture_note,
@@ -118,7 +117,7 @@ def _truncate(words: str) -> str:
 
 def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str]]:
     """The numbers that the verdict rests on, in target steps and in total steps."""
-    rows = [row for row in measures if row.arm == headline_arm(study)]
+    rows = [row for row in measures if row.arm == study.headline_arm]
     wanted = [row for name in _HEADLINE for row in rows if row.measure == name]
     wanted += [row for row in rows if row.measure.startswith(TIME_TO_THRESHOLD)][-1:]
     cards: list[dict[str, str]] = []

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shapechanger.reports.numbers import count, estimate_text, number
 from shapechanger.reports.page import jpeg_uri, render, svg_uri
-from shapechanger.reports.verdict import direction, finals, headline_arm, is_flat, verdict
+from shapechanger.reports.verdict import direction, finals, is_flat, verdict
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.metrics import (
     Estimate,
@@ -80,7 +80,7 @@ def suite_html(
     from shapechanger.reports.charts import learning_curves, sweep_chart
 
     first = next(iter(studies.values()))
-    arm, plan = headline_arm(first), first.plan
+    arm, plan = first.headline_arm, first.plan
     swept = None
     if sweep is not None:
         by_value = {sweep.values[one]: study for one, study in studies.items()}
@@ -116,7 +116,7 @@ def _verdict(studies: Mapping[str, Study]) -> str:
     """Count the pairs on which transfer helped."""
     found = [direction(gain_over_scratch(study)) for study in studies.values()]
     flat = sum(is_flat(study) for study in studies.values())
-    arm = headline_arm(next(iter(studies.values())))
+    arm = next(iter(studies.values())).headline_arm
     words = (
         f"Over {len(found)} studies, {arm} is ahead of scratch in {found.count('up')}, behind in "
         f"{found.count('down')}, and without a clear difference in {found.count('unclear')}"
@@ -132,7 +132,7 @@ def gain_over_scratch(study: Study) -> Estimate:
     Args:
         study: The study.
     """
-    arm = study.curves(headline_arm(study))
+    arm = study.curves(study.headline_arm)
     if arm.n_evals > 1:
         return total_reward_gain(arm, study.curves("scratch"))
     return jumpstart(arm, study.curves("scratch"))

@@ -329,7 +329,7 @@ def verdict(study: Study) -> str:
     study without fine-tune by the jumpstart of its first other arm. Where scratch starts within a
     tenth of its end, the sentence says that the study shows nothing.
     """
-    arm, plan = headline_arm(study), study.plan
+    arm, plan = study.headline_arm, study.plan
     scratch = study.curves("scratch")
 
     def text(values: NDArray[np.float64]) -> str:
@@ -364,11 +364,6 @@ def is_flat(study: Study) -> bool:
     end = float(finals(study, "scratch").mean())
     best = max(float(finals(study, arm).mean()) for arm in study.plan.arms)
     return max(end, best) - start <= _FLAT * max(abs(end), abs(best))
-
-
-def headline_arm(study: Study) -> str:
-    """The arm that the verdict is about."""
-    return "fine-tune" if "fine-tune" in study.summaries else next(iter(study.summaries))
 
 
 def source_takes_all(summary: Summary) -> bool:

@@ -73,6 +73,11 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     summaries: dict[str, Summary]
     looks: tuple[int, ...] = ()
 
+    @property
+    def headline_arm(self) -> str:
+        """The arm that is compared with scratch first: fine-tune, else the first other one."""
+        return "fine-tune" if "fine-tune" in self.summaries else next(iter(self.summaries))
+
     def of(self, kind: str) -> list[RunResult]:
         """Return the runs of one kind, by index."""
         return [result for result in self.runs if result.run.kind == kind]

@@ -35,29 +35,31 @@ class StudyOutcome(msgspec.Struct, frozen=True):
         name: SOURCE-to-TARGET.
         final: Measure of scratch at its end, mean over seeds.
         zero_shot: Measure of the source policy without training; None if that arm is missing.
-        fine_tuned: Measure of fine-tuning at its end, mean over seeds.
+        arm_final: Measure of `arm` at its end, mean over seeds.
         scratch_steps: Steps at which scratch first reaches `final`.
-        fine_tune_steps: Steps at which fine-tuning first reaches `final`; None if it never does.
+        arm_steps: Steps at which `arm` first reaches `final`; None if it never does.
         unit: Unit of the gains, see `Summary`.
-        gains: Gains of fine-tuning over scratch, in target steps and with intervals: `jumpstart`,
+        gains: Gains of `arm` over scratch, in target steps and with intervals: `jumpstart`,
             `total_reward_gain` and `asymptotic_gain`.
         measure: Name of the measure.
+        arm: The arm that is compared with scratch, see `Study.headline_arm`.
     """
 
     name: str
     final: float
     zero_shot: float | None
-    fine_tuned: float
+    arm_final: float
     scratch_steps: float
-    fine_tune_steps: float | None
+    arm_steps: float | None
     unit: str = "score"
     gains: dict[str, Estimate] = {}
     measure: str = RETURN.name
+    arm: str = "fine-tune"
 
     @property
     def halves(self) -> bool:
-        """Return whether fine-tuning needs less than half as many steps as scratch."""
-        return self.fine_tune_steps is not None and self.fine_tune_steps < self.scratch_steps / 2
+        """Return whether the arm needs less than half as many steps as scratch."""
+        return self.arm_steps is not None and self.arm_steps < self.scratch_steps / 2
 
 
 def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
@@ -173,22 +175,24 @@ def study_outcome(name: str, study: Study) -> StudyOutcome:
 
     Args:
         name: Its name.
-        study: The study, with the arms scratch and fine-tune.
+        study: The study.
     """
-    scratch, tuned = study.curves("scratch"), study.curves("fine-tune")
+    arm = study.headline_arm
+    scratch, trained = study.curves("scratch"), study.curves(arm)
     final = float(scratch.returns[:, -1].mean())
-    summary = study.summaries["fine-tune"]
+    summary = study.summaries[arm]
     first = _first_at(scratch, final)
     return StudyOutcome(
         name,
         final,
         float(study.curves("zero-shot").returns.mean()) if study.of("zero-shot") else None,
-        float(tuned.returns[:, -1].mean()),
+        float(trained.returns[:, -1].mean()),
         study.plan.steps if first is None else first,
-        _first_at(tuned, final),
+        _first_at(trained, final),
         summary.unit,
         {gain: getattr(summary.in_target_steps, gain) for gain in _GAINS},
         study.plan.measure,
+        arm,
     )
 
 
