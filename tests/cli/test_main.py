@@ -98,6 +98,16 @@ def test_a_missing_pygame_gives_one_sentence(tmp_path: os.PathLike[str]) -> None
     assert done.stderr.count("\n") == 1
 
 
+def test_an_option_that_is_given_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """Only the last one would count."""
+    with pytest.raises(SystemExit) as stop:
+        main(["train", "Ant", "--set", "gamma=0.9", "--set", "n_epochs=5"])
+    assert stop.value.code == 2
+    assert capsys.readouterr().err == (
+        "error: --set is given twice: give it once, with all its values after it.\n"
+    )
+
+
 @pytest.mark.parametrize(
     ("arguments", "hint"),
     [

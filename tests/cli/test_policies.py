@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from stable_baselines3 import PPO
+import torch
+from sb3_contrib import TQC
+from stable_baselines3 import A2C, PPO, SAC, TD3
+from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 from shapechanger.cli import main
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.transfer.learners.settings import OffPolicySettings
 
 
 def _zip(path: Path, env: str = "shapechanger/InvertedPendulum-v1", **arguments: object) -> PPO:
@@ -59,6 +64,63 @@ def test_a_zip_of_stable_baselines3_is_converted(
     capsys.readouterr()
     main(["policies", "show", str(out)])
     assert "command      shapechanger policies convert mine.zip\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", [SAC, TQC])
+def test_zips_of_off_policy_learners_are_converted(kind: type[SAC], tmp_path: Path) -> None:
+    """The actions and the critics stay the same."""
+    env = gym.make("shapechanger/InvertedPendulum-v1")
+    networks = {"net_arch": {"pi": [8, 8], "qf": [8, 8]}}
+    model = kind("MlpPolicy", env, seed=3, train_freq=4, buffer_size=100, policy_kwargs=networks)
+    model.save(tmp_path / "mine.zip")
+    out = tmp_path / "mine.safetensors"
+    convert = ["policies", "convert", str(tmp_path / "mine.zip"), "InvertedPendulum"]
+    main([*convert, "--out", str(out), "--trust"])
+    policy = load_policy(out)
+    seen = np.random.default_rng(0).normal(size=(20, 4))
+    np.testing.assert_array_equal(policy.act(seen), model.predict(seen, deterministic=True)[0])
+    assert policy.card.settings == OffPolicySettings(
+        algorithm=kind.__name__,
+        net_arch=(8, 8),
+        buffer_size=100,
+        learning_starts=100,
+        train_freq=4,
+        gradient_steps=1,
+        steps=4,
+        eval_every=4,
+    )
+    for name, weight in model.policy.state_dict().items():
+        assert torch.equal(policy.model.policy.state_dict()[name], weight)
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "words"),
+    [
+        (SAC, {"train_freq": (1, "episode")}, "only updates after steps fit"),
+        (SAC, {"policy_kwargs": {"n_critics": 3}}, "These policy_kwargs change the networks"),
+        (SAC, {"policy_kwargs": {"activation_fn": nn.Tanh}}, "both must be the same, with ReLU"),
+        (A2C, {}, "is of another algorithm or policy class"),
+        (TD3, {}, "is of another algorithm or policy class"),
+    ],
+)
+def test_other_zips_are_refused(
+    kind: type[BaseAlgorithm],
+    arguments: dict[str, object],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """With one sentence, before a file is written."""
+    make: Any = kind
+    make("MlpPolicy", gym.make("InvertedPendulum-v5"), **arguments).save(tmp_path / "mine.zip")
+    out = tmp_path / "mine.safetensors"
+    convert = ["policies", "convert", str(tmp_path / "mine.zip"), "InvertedPendulum"]
+    with pytest.raises(SystemExit):
+        main([*convert, "--out", str(out), "--trust"])
+    message = capsys.readouterr().err
+    assert words in message
+    assert message.count("\n") == 1
+    assert not out.exists()
 
 
 @pytest.mark.parametrize(
@@ -121,6 +183,39 @@ def test_a_folder_is_listed(trained: Path, capsys: pytest.CaptureFixture[str]) -
     with pytest.raises(SystemExit):
         main(["policies", "list", str(trained.parent / "empty")])
     assert "There is no policy in" in capsys.readouterr().err
+
+
+@pytest.mark.gl
+def test_a_policy_is_played_from_its_file(
+    trained: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the env of its training, and in another through the body map; also exported."""
+    exported = trained.with_suffix(".onnx")
+    main(["policies", "export", str(trained), "--out", str(exported)])
+    film = tmp_path / "film.mp4"
+    for env in ([], ["--env", "BigInvertedPendulum"], ["--body", "BigInvertedPendulum"]):
+        returns: list[str] = []
+        for file in (trained, exported):
+            capsys.readouterr()
+            main(["policies", "play", str(file), "--max-steps", "5", "--out", str(film), *env])
+            returns.append(capsys.readouterr().out)
+            assert film.stat().st_size > 0
+        assert returns[0] == returns[1]
+        assert returns[0].startswith("episode 0: return ")
+
+
+@pytest.mark.gl
+def test_clones_are_evaluated_and_played(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the vehicle that they learned in, and in another; not in a body with other actions."""
+    film = tmp_path / "film.mp4"
+    for env in ([], ["--env", "Tank"]):
+        main(["policies", "play", str(CLONES["car"]), "--max-steps", "3", "--out", str(film), *env])
+        assert "in 3 steps" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["policies", "evaluate", str(CLONES["car"]), "--env", "Ant"])
+    assert "The actions of the policy are steering, throttle" in capsys.readouterr().err
 
 
 def test_an_exported_policy_evaluates_the_same(

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from typing import Annotated, Any, Final, NoReturn, get_args, get_type_hints
 
-from shapechanger.errors import MissingExtra, ShapechangerError, UnknownName
+from shapechanger.errors import MissingExtra, ShapechangerError, StudyError, UnknownName
 
 # Exit codes of shells for Ctrl-C (128 plus SIGINT) and for wrong usage.
 _INTERRUPTED: Final = 130
@@ -65,7 +65,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
-        _require_commands(sys.argv[1:] if arguments is None else arguments)
+        given = sys.argv[1:] if arguments is None else arguments
+        _require_commands(given)
+        _require_single(given)
         command = tyro.cli(
             _Command,
             prog="shapechanger",
@@ -108,6 +110,14 @@ def _require_commands(arguments: Sequence[str]) -> None:
         if name not in kinds:
             raise UnknownName(f"command of `{said}`", word, kinds)
         said, kinds = f"{said} {name}", _commands(kinds[name])
+
+
+def _require_single(arguments: Sequence[str]) -> None:
+    """Raise StudyError for an option that is given twice: the first one would be dropped."""
+    options = [word.partition("=")[0] for word in arguments if word.startswith("--")]
+    for name in options:
+        if name != "--" and options.count(name) > 1:
+            raise StudyError(f"{name} is given twice: give it once, with all its values after it.")
 
 
 def _commands(kind: Any) -> dict[str, Any]:

@@ -1,10 +1,10 @@
-"""`shapechanger policies`: list, show, evaluate, export and convert policies."""
+"""`shapechanger policies`: list, show, play, evaluate, export and convert policies."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import gymnasium as gym
 import msgspec
@@ -12,16 +12,21 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import command_line, print_table, say
-from shapechanger.cli.env_arguments import EnvId, env_ref, opened
+from shapechanger.cli.env_arguments import Body, EnvId, driven, env_ref, opened
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
-from shapechanger.transfer.env_ref import layouts_of, measures_of
-from shapechanger.transfer.learners.settings import PpoSettings
+from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
+from shapechanger.transfer.learners.settings import (
+    OffPolicySettings,
+    PpoSettings,
+    Sb3Settings,
+)
 from shapechanger.transfer.references import load_references
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
+    from shapechanger.transfer.learners.evaluation import Act
     from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
     from shapechanger.transfer.onnx_policy import OnnxCard, OnnxPolicy
 
@@ -155,14 +160,87 @@ class EvaluatePolicy:
 
         if self.episodes < 1:
             raise StudyError("An evaluation takes at least one episode.")
-        policy = load_any_policy(self.file)
-        with opened(env_ref(self.env, self.body) if self.env else policy.card.env) as env:
-            acting = fitting(env, policy.card)
-            found = evaluate(policy.act, [acting], EVALUATION_SEED, episodes=self.episodes)
+        with opened(_env_of(self.file, self.env, self.body)) as env:
+            acting, act = acting_in(env, self.file)
+            if isinstance(env.unwrapped, HasHeldOutStarts):
+                env.unwrapped.hold_out()
+            found = evaluate(act, [acting], EVALUATION_SEED, episodes=self.episodes)
             for measure in measures_of(env):
                 unit = "" if measure.unit == "1" else f" {measure.unit}"
                 say(f"{measure.name:14} {found.value(measure.name):.4g}{unit}")
             say(f"{'length':14} {found.mean_length:.4g} steps")
+
+
+@dataclass(frozen=True)
+class PlayPolicy:
+    """Watch a policy in the env of its training, in a window or as a video."""
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A policy, or one that was exported as ONNX."""
+    env: str = ""
+    """Id of another env, where it acts through the body map of same names; that of its training by
+    default."""
+    body: Body = ""
+    out: Path | None = None
+    """A film to write in place of a window, such as ant.mp4; play.mp4 where there is no screen."""
+    episodes: int = 1
+    """Number of episodes."""
+    seed: int = 0
+    """Seed of the starts."""
+    max_steps: int = 1000
+    """Longest episode to show."""
+
+    def run(self) -> None:
+        """Play and print the returns."""
+        from shapechanger.cli.play import play
+
+        ref = _env_of(self.file, self.env, self.body)
+        play(ref, self.file, self.out, self.episodes, self.seed, self.max_steps)
+
+
+def _env_of(file: Path, env: str, body: str) -> EnvRef:
+    """Return the env that is named, else the one in which a policy was trained."""
+    if env or body:
+        return driven(env_ref(env or _trained_in(file).id, body))
+    return driven(_trained_in(file))
+
+
+def _trained_in(file: Path) -> EnvRef:
+    """Return the env of a policy's card."""
+    from shapechanger.demos.cloning.policy import CameraPolicy
+    from shapechanger.transfer.learners.cloning import is_clone
+
+    if file.suffix == ".onnx" or not is_clone(file):
+        return load_any_policy(file).card.env
+    env = CameraPolicy.load(file).card.data.get("env")
+    if env is None:
+        raise StudyError(f"{file} learned from recordings of no env: name one with --env.")
+    return env_ref(str(env))
+
+
+def acting_in(env: gym.Env[Any, Any], file: Path) -> tuple[gym.Env[Any, Any], Act]:
+    """Return an env as a policy senses it, and the policy.
+
+    Args:
+        env: The env.
+        file: A policy, a clone, or a policy that was exported as ONNX.
+
+    Raises:
+        CorruptStudy: If the file cannot be read.
+        MapError: If there is no body map of same names between the layouts.
+        PolicyError: If the clone's layouts are not those of the env.
+    """
+    if file.suffix != ".onnx":  # ONNX needs no PyTorch.
+        from shapechanger.demos.cloning.policy import CameraPolicy
+        from shapechanger.transfer.learners.cloning import is_clone
+
+        if is_clone(file):
+            clone = CameraPolicy.load(file)
+            if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
+                clone.card.require_layouts(layout, clone.card.state_layout)
+            return env, clone.predict_many
+    policy = load_any_policy(file)
+    return fitting(env, policy.card), policy.act
 
 
 def load_any_policy(file: Path) -> TrainedPolicy | OnnxPolicy:
@@ -221,10 +299,10 @@ class ExportPolicy:
 
 @dataclass(frozen=True)
 class Convert:
-    """Convert a zip of Stable-Baselines3's PPO; loading it can run code from it."""
+    """Convert a zip of PPO, SAC or TQC from Stable-Baselines3; loading it can run code from it."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A zip that PPO.save wrote."""
+    """A zip that the model's `save` wrote."""
     env: EnvId
     """Id of the env that it was trained in; its layouts must fit the policy's spaces."""
     out: Path
@@ -272,50 +350,86 @@ class Convert:
 
 
 def _load_zip(path: Path) -> Any:
-    """Load a model with Stable-Baselines3."""
-    from stable_baselines3 import PPO
+    """Load a model with the class of Stable-Baselines3 or sb3-contrib that wrote it."""
+    from sb3_contrib import TQC
+    from stable_baselines3 import PPO, SAC
+    from stable_baselines3.common.save_util import load_from_zip_file
 
     try:
-        return cast("Any", PPO).load(path, device="cpu")
+        data: Any = load_from_zip_file(path, device="cpu")[0]
+        # A2C has PPO's policy, and no clipping.
+        kinds: tuple[Any, ...] = (PPO,) if "clip_range" in data else (SAC, TQC)
+        for kind in kinds:
+            if data["policy_class"] is kind.policy_aliases["MlpPolicy"]:
+                return kind.load(path, device="cpu")
     except FileNotFoundError:
         raise CorruptStudy(f"There is no policy file {path}.") from None
     except Exception as error:  # A damaged pickle can raise anything.
-        raise CorruptStudy(f"{path} is not a zip of Stable-Baselines3's PPO ({error}).") from error
+        raise CorruptStudy(
+            f"{path} is not a zip of Stable-Baselines3's PPO, SAC or TQC ({error})."
+        ) from error
+    raise StudyError(
+        f"{path} is of another algorithm or policy class: the MlpPolicy of PPO, SAC and TQC can be "
+        "converted."
+    )
 
 
-def _settings(model: Any) -> PpoSettings:
-    """Return the settings of a model, whose two networks must be alike, with tanh."""
+def _settings(model: Any) -> Sb3Settings:
+    """Return the settings of a model, whose networks must be those that the settings describe."""
+    from stable_baselines3.common.vec_env import DummyVecEnv
     from torch import nn
 
+    from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model
+
+    on_policy = hasattr(model, "clip_range")
+    activation = nn.Tanh if on_policy else nn.ReLU
     widths = model.policy.net_arch
-    of_each: Any = widths if "pi" in widths else {"pi": widths, "vf": widths}
-    actor: list[int] = list(of_each["pi"])
-    critic: list[int] = list(of_each["vf"])
-    if actor != critic or model.policy.activation_fn is not nn.Tanh:
+    of_each: Any = widths if "pi" in widths else {"pi": widths, "critic": widths}
+    actor, critic = (list(layers) for layers in of_each.values())
+    if actor != critic or model.policy.activation_fn is not activation:
         raise StudyError(
             f"The actor has layers {actor} and the critic {critic}, with "
-            f"{model.policy.activation_fn.__name__}: both must be the same, with Tanh."
+            f"{model.policy.activation_fn.__name__}: both must be the same, with "
+            f"{activation.__name__}."
         )
-    update = model.n_envs * model.n_steps
-    same = ("n_envs", "n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "ent_coef")
-    return PpoSettings(
+    kind: type[PpoSettings | OffPolicySettings]
+    if on_policy:
+        kind, update = PpoSettings, model.n_envs * model.n_steps
+        same = ("n_envs", "n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "ent_coef")
+        own: dict[str, Any] = {"clip_range": float(model.clip_range(1.0))}
+    else:
+        frequency, unit = model.train_freq
+        if unit.value != "step":
+            raise StudyError("This model updates after episodes: only updates after steps fit.")
+        kind, update = OffPolicySettings, model.n_envs * frequency
+        same = ("n_envs", "batch_size", "buffer_size", "learning_starts", "gradient_steps", "gamma")
+        same = (*same, "tau", "ent_coef")
+        own = {"algorithm": type(model).__name__, "train_freq": frequency}
+    settings = kind(
         **{name: getattr(model, name) for name in same},
+        **own,
         learning_rate=float(model.lr_schedule(1.0)),
-        clip_range=float(model.clip_range(1.0)),
         net_arch=tuple(actor),
         steps=max(int(model.num_timesteps), update),
         eval_every=update,
         eval_episodes=5,
     )
+    spaces = SpacesOnly(model.observation_space, model.action_space)
+    built = build_model(settings, DummyVecEnv([lambda: spaces] * model.n_envs), 0).policy
+    shapes = {name: weight.shape for name, weight in model.policy.state_dict().items()}
+    if shapes != {name: weight.shape for name, weight in built.state_dict().items()}:
+        raise StudyError(f"These policy_kwargs change the networks: {model.policy_kwargs}.")
+    return settings
 
 
 @dataclass(frozen=True)
 class Policies:
-    """List, inspect, evaluate, export and convert policies."""
+    """List, inspect, watch, evaluate, export and convert policies."""
 
     command: (
         Annotated[ListPolicies, tyro.conf.subcommand("list")]
         | Annotated[Show, tyro.conf.subcommand("show")]
+        | Annotated[PlayPolicy, tyro.conf.subcommand("play")]
         | Annotated[EvaluatePolicy, tyro.conf.subcommand("evaluate")]
         | Annotated[ExportPolicy, tyro.conf.subcommand("export")]
         | Annotated[Convert, tyro.conf.subcommand("convert")]
