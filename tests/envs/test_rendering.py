@@ -373,3 +373,14 @@ def test_gymnasium_records_videos(tmp_path: Path) -> None:
     env.close()
     (video,) = (tmp_path / "videos").glob("*.mp4")
     assert video.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("env_id", ["InvertedPendulum", "BigInvertedPendulum"])
+def test_a_pendulum_is_seen_whole_on_a_light_background(env_id: str) -> None:
+    """Its model has neither lights nor a sky; a longer pole is seen from farther away."""
+    env = gym.make(f"shapechanger/{env_id}-v1", render_mode="rgb_array")
+    env.reset(seed=0)
+    frame: Any = env.render()
+    env.close()
+    assert frame[0].min() > 200
+    assert (frame.min(axis=2) < 60).any()

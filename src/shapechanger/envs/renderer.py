@@ -218,6 +218,28 @@ def _geoms(
     return middle, places, model.geom_rbound[of_body]
 
 
+def light_up(spec: mujoco.MjSpec) -> None:
+    """Give a model without lights a brighter headlight, and a sky unless it has one.
+
+    The pendulums' models have neither: their frames would be dark shapes on black.
+    """
+    if spec.lights:
+        return
+    spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [_HEADLIGHT] * 3
+    if any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
+        return
+    grey = [_BACKGROUND / 255.0] * 3
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        rgb1=grey,
+        rgb2=grey,
+        width=8,
+        height=8,
+    )
+
+
 def halve_textures(spec: mujoco.MjSpec) -> None:
     """Halve the width and height of all procedural textures of bodies and skies.
 

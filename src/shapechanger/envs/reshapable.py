@@ -24,7 +24,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 from shapechanger.bodies.families import BodyLike, Family
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
-from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures
+from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures, light_up
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
 from shapechanger.morphology.certificate import Certificate, Wrapped, certify
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 # Distance of the camera from a body that it follows, in multiples of its reach; 3.5 m for the ant.
 _VIEW_DISTANCE_PER_REACH: Final = 3.0
+# Of a fixed camera: 2.04 m for the inverted pendulum, as Gymnasium's.
+_FIXED_DISTANCE_PER_REACH: Final = 4.1
 BAD_STATE: Final = slice(
     int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1
 )
@@ -173,7 +175,9 @@ class Reshapable(MujocoEnv):
     def _load_family(self) -> mujoco.MjSpec:
         """Return the family's model, with smaller textures if the env never renders."""
         spec = self.family.load(self.fullpath)
-        if not self._draws:
+        if self._draws:
+            light_up(spec)
+        else:
             halve_textures(spec)
         return spec
 
@@ -305,6 +309,11 @@ class Reshapable(MujocoEnv):
         camera = self._given_camera or cast("dict[str, Any]", renderer.default_cam_config or {})
         if trunk is not None and self._given_camera is None:
             camera = {"distance": _VIEW_DISTANCE_PER_REACH * self.reach, "elevation": -20.0}
+        elif self._given_camera is None:
+            # Gymnasium's distance is that of its own pole: a longer one would be cut.
+            least = _FIXED_DISTANCE_PER_REACH * self.reach
+            middle = self.model.body(1).pos.tolist()
+            camera = {"distance": max(camera.get("distance", 0.0), least), "lookat": middle}
         self.mujoco_renderer = Renderer(
             self.model,
             self.data,
