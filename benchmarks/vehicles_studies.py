@@ -5,6 +5,7 @@ The studies take hours and resume from `results/`; `SEEDS` sets the number of ru
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Final, Literal
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.row import Row
 from shapechanger.cli.suite import RunSuite
+from shapechanger.envs.vehicle.ranges import COLLISION_REWARD
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.metrics.intervals import estimate_difference
@@ -24,6 +26,8 @@ SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0
 # Target time at which fine-tuning is compared with scratch.
 _SECONDS: Final = (15, 30)
+# Collisions per 100 m.
+FEW: Final = 3.0
 # Out of twelve.
 GOOD: Final = 8
 
@@ -56,9 +60,13 @@ def waypoints() -> list[Row]:
 
 
 def waypoint_rows(folder: Path) -> list[Row]:
-    """Return what the studies of a suite have found so far, at 15 and at 30 s of driving."""
-    rows: list[Row] = []
+    """Return what the studies of a suite have found so far, at 15 and at 30 s of driving.
+
+    Args:
+        folder: Folder of the suite.
+    """
     pairs = [path.parent for path in sorted(folder.glob("*-to-*/study.json"))]
+    rows = [_seconds_row(pair) for pair in pairs]
     for arm in ("fine-tune", "rehearsal"):
         better = dict.fromkeys(_SECONDS, 0)
         with_arm = [pair for pair in pairs if (pair / "runs" / f"{arm}-0").exists()]
@@ -92,14 +100,51 @@ def waypoint_rows(folder: Path) -> list[Row]:
     return rows
 
 
+def _seconds_row(pair: Path) -> Row:
+    """Return how much of the target's driving each arm needs to collide rarely."""
+    needed: list[str] = []
+    rates: list[str] = []
+    for arm in ("scratch", "fine-tune", "rehearsal"):
+        found = {
+            steps: _per_100_m(each) for steps, each in _evaluations(pair / "runs", arm).items()
+        }
+        if found:
+            enough = [steps for steps, rate in sorted(found.items()) if rate <= FEW]
+            needed.append(
+                f"{arm} {60 * enough[0] / STEPS_A_MINUTE:g} s" if enough else f"{arm} never"
+            )
+            each = ", ".join(f"{rate:.1f}" for _, rate in sorted(found.items()))
+            rates.append(f"{arm} {each}")
+    return Row(
+        f"{pair.name}: seconds of the target's driving until at most {FEW:g} collisions per 100 m",
+        "; ".join(needed),
+        f"collisions per 100 m after 0, 5, 15, 30 and 60 s: {'; '.join(rates)}",
+        "none for a single pair",
+        True,
+    )
+
+
+def _per_100_m(evaluations: list[Evaluation]) -> float:
+    """Return the collisions per 100 m driven forward, over all seeds."""
+    collisions = sum(each.terms["reward_collision"] for each in evaluations) / COLLISION_REWARD
+    metres = sum(each.terms["reward_velocity"] for each in evaluations)  # One for each metre.
+    return 100.0 * collisions / metres if metres > 0.0 else math.inf
+
+
 def _by_steps(runs: Path, kind: str) -> dict[int, NDArray[np.float64]]:
     """Return the returns of all runs of a kind, by number of target steps."""
-    found: dict[int, list[float]] = {}
+    found = _evaluations(runs, kind)
+    return {steps: np.array([one.mean_return for one in each]) for steps, each in found.items()}
+
+
+def _evaluations(runs: Path, kind: str) -> dict[int, list[Evaluation]]:
+    """Return the evaluations of all runs of a kind, by number of target steps."""
+    found: dict[int, list[Evaluation]] = {}
     for curve in sorted(runs.glob(f"{kind}-*/curve.jsonl")):
         for line in curve.read_bytes().splitlines():
             evaluation = msgspec.json.decode(line, type=Evaluation)
-            found.setdefault(evaluation.steps, []).append(evaluation.mean_return)
-    return {steps: np.array(each) for steps, each in found.items()}
+            found.setdefault(evaluation.steps, []).append(evaluation)
+    return found
 
 
 def _suite(name: Literal["vehicles", "lenses", "waypoints"]) -> list[StudyOutcome]:

@@ -20,6 +20,9 @@ from shapechanger.robot.guard.rules import aimed, slewed
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.worlds.simulation import MujocoWorld
 
+COLLISION_REWARD: Final = -3.0
+"""Reward of a collision: it costs three metres."""
+
 # Slower than this it stands. Without a price for it, two of four teachers learned to stop in front
 # of a wall and stay there.
 _STANDING_MPS: Final = 0.1
@@ -166,7 +169,9 @@ class RangesEnv(DrivingEnv):
         self._ticks = round(1.0 / (profile.control_hz * self._shaper.tick_s))
         self._period_s = 1.0 / profile.control_hz
         ends = {"collision_ends_episode": 0.0} if put_back else {}
-        self._reward = DriveReward.from_weights({"collision": -3.0, **(reward or {}), **ends})
+        self._reward = DriveReward.from_weights(
+            {"collision": COLLISION_REWARD, **(reward or {}), **ends}
+        )
         self._puts_back = put_back
         self.action_layout = profile.action_layout()
         self.observation_layout = Layout(
