@@ -105,16 +105,13 @@ def _seconds_row(pair: Path) -> Row:
     needed: list[str] = []
     rates: list[str] = []
     for arm in ("scratch", "fine-tune", "rehearsal"):
-        found = {
-            steps: _per_100_m(each) for steps, each in _evaluations(pair / "runs", arm).items()
-        }
+        runs = _evaluations(pair / "runs", arm)
+        found = {steps: _per_100_m(runs[steps]) for steps in sorted(runs)}
         if found:
-            enough = [steps for steps, rate in sorted(found.items()) if rate <= FEW]
-            needed.append(
-                f"{arm} {60 * enough[0] / STEPS_A_MINUTE:g} s" if enough else f"{arm} never"
-            )
-            each = ", ".join(f"{rate:.1f}" for _, rate in sorted(found.items()))
-            rates.append(f"{arm} {each}")
+            enough = next((steps for steps, rate in found.items() if rate <= FEW), None)
+            seconds = "never" if enough is None else f"{60 * enough / STEPS_A_MINUTE:g} s"
+            needed.append(f"{arm} {seconds}")
+            rates.append(f"{arm} {', '.join(f'{rate:.1f}' for rate in found.values())}")
     return Row(
         f"{pair.name}: seconds of the target's driving until at most {FEW:g} collisions per 100 m",
         "; ".join(needed),

@@ -168,10 +168,10 @@ class RangesEnv(DrivingEnv):
         self._shaper = OutputShaper(profile.guard_plan())
         self._ticks = round(1.0 / (profile.control_hz * self._shaper.tick_s))
         self._period_s = 1.0 / profile.control_hz
-        ends = {"collision_ends_episode": 0.0} if put_back else {}
-        self._reward = DriveReward.from_weights(
-            {"collision": COLLISION_REWARD, **(reward or {}), **ends}
-        )
+        weights = {"collision": COLLISION_REWARD, **(reward or {})}
+        if put_back:
+            weights["collision_ends_episode"] = 0.0
+        self._reward = DriveReward.from_weights(weights)
         self._puts_back = put_back
         self.action_layout = profile.action_layout()
         self.observation_layout = Layout(
