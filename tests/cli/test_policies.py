@@ -233,6 +233,10 @@ def test_an_exported_policy_evaluates_the_same(
         assert output[0] == output[1]
         assert output[0].startswith("return ")
         assert "steps" in output[0]
+    main(["policies", "evaluate", str(trained), "--env", "InvertedDoublePendulum"])
+    assert capsys.readouterr().out.startswith(
+        "Without a counterpart in the other body, and so constant: hinge/angle."
+    )
     with pytest.raises(SystemExit):
         main(["policies", "evaluate", str(exported), "--episodes", "0"])
     assert "at least one episode" in capsys.readouterr().err

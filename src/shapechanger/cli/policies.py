@@ -14,7 +14,7 @@ from rich.table import Table
 from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, driven, env_ref, opened
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
-from shapechanger.transfer.body_map import BodyMap, MappedEnv
+from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
 from shapechanger.transfer.learners.settings import (
@@ -240,7 +240,7 @@ def acting_in(env: gym.Env[Any, Any], file: Path) -> tuple[gym.Env[Any, Any], Ac
                 clone.card.require_layouts(layout, clone.card.state_layout)
             return env, clone.predict_many
     policy = load_any_policy(file)
-    return fitting(env, policy.card), policy.act
+    return _fitting(env, policy.card), policy.act
 
 
 def load_any_policy(file: Path) -> TrainedPolicy | OnnxPolicy:
@@ -261,20 +261,17 @@ def load_any_policy(file: Path) -> TrainedPolicy | OnnxPolicy:
     return load_policy(file)
 
 
-def fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any, Any]:
-    """Return an env with a policy's layouts, through the body map of same names if needed.
-
-    Args:
-        env: The env.
-        card: The policy's card.
-
-    Raises:
-        MapError: If there is no such body map.
-    """
+def _fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any, Any]:
+    """Return an env with a policy's layouts, through the body map of same names if needed."""
     observation, action = layouts_of(env)
     if (observation, action) == (card.observation, card.action):
         return env
-    return MappedEnv(env, BodyMap.between(card.observation, observation, card.action, action))
+    body_map = BodyMap.between(card.observation, observation, card.action, action)
+    entries = (*body_map.observation, *body_map.action)
+    filled = [entry.feature for entry in entries if not isinstance(entry.rule, Copy)]
+    if filled:
+        say(f"Without a counterpart in the other body, and so constant: {', '.join(filled)}.")
+    return MappedEnv(env, body_map)
 
 
 @dataclass(frozen=True)
