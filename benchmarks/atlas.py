@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import os
+import shutil
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +19,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from playwright.sync_api import sync_playwright
 
 from benchmarks.row import Row
 from shapechanger.cli.films import film_study
@@ -166,6 +168,29 @@ def claims() -> list[Row]:
             float(shares[:, _DAMAGED].mean()) < 0.25,
         ),
     ]
+
+
+def pages() -> list[Row]:
+    """Measure the size and the loading time of the pages of all suites in `results`."""
+    rows: list[Row] = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"))
+        for path in sorted(Path("results").glob("*/index.html")):
+            page = browser.new_page()
+            page.goto(path.resolve().as_uri(), wait_until="load")
+            loaded_s = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
+            rows.append(
+                Row(
+                    f"page of the suite {path.parent.name}: size and time until it is loaded",
+                    f"{path.stat().st_size / 1e6:.1f} MB, {loaded_s / 1e3:.2f} s",
+                    f"{page.locator('.gain').count()} pairs, film strips included; Chromium",
+                    "under 10 MB and 2 s",
+                    path.stat().st_size < 10e6 and loaded_s < 2e3,
+                )
+            )
+            page.close()
+        browser.close()
+    return rows
 
 
 def _first_reaching(run: RunResult, level: float) -> float | None:

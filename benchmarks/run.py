@@ -145,6 +145,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "atlas-shank": atlas.shank,
     "atlas-controls": atlas.controls,
     "atlas-claims": atlas.claims,
+    "atlas-pages": atlas.pages,
     "bodies": bodies,
     "cloning-real": cloning_real.real,
     "console": console.console,
