@@ -415,19 +415,24 @@ LEARNERS: Final[dict[str, Settings]] = {
 
 
 TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
-    "ppo-balance": ("InvertedPendulum", "BigInvertedPendulum"),
-    "ppo-run": ("Ant", "HalfCheetah"),
+    "ppo-balance": ("InvertedPendulum", "BigInvertedPendulum", "SmallInvertedPendulum"),
+    "ppo-run": ("Ant", "AmputatedAnt", "BigAnt", "ExtendedAnt", "HalfCheetah"),
     "ppo-swim": ("Swimmer",),
     "ppo-planar": ("Hopper", "Walker2d", "InvertedDoublePendulum"),
     "ppo-finger": ("Finger",),
     "ppo-rig": ("Finger",),
     "ppo-drive": ("CarRanges",),
-    "cloning": ("Car",),
-    "waypoint": ("CarWaypoint", "TankWaypoint"),
+    "cloning": ("Car", "Tank", "Truck", "Boat"),
+    "waypoint": ("CarWaypoint", "TankWaypoint", "TruckWaypoint"),
     "sac": (),
     "tqc": (),
 }
-"""The envs that the settings of each learner were tuned on."""
+"""The envs that the settings of each learner were tuned on.
+
+Settings count as tuned on another body of the same family if a policy that ships, or a benchmark,
+reached its target there with them as they are: `shapechanger policies list --references`, and the
+rows `vehicles-clone` and `vehicles-waypoints`.
+"""
 
 
 def tuning_text(learner: str, env: str) -> str:
@@ -440,7 +445,8 @@ def tuning_text(learner: str, env: str) -> str:
     if not TUNED_ON.get(learner):
         return "It is not stated what these settings were tuned on."
     name = env.rpartition("/")[2].removesuffix("-v1")
-    tuned = " and ".join(TUNED_ON[learner])
+    *first, last = TUNED_ON[learner]
+    tuned = f"{', '.join(first)} and {last}" if first else last
     if name in TUNED_ON[learner]:
         return f"The settings were tuned on {tuned}."
     return f"The settings were tuned on {tuned}, not on {name}."
