@@ -66,8 +66,18 @@ def pendulums() -> list[Row]:
 
 def methods() -> list[Row]:
     """Measure each method on one pair of ants: forward speed during and after training."""
+    return _by_method("methods")
+
+
+def replay() -> list[Row]:
+    """Measure the methods for learners with a replay buffer on one pair of poles."""
+    return _by_method("replay")
+
+
+def _by_method(suite: str) -> list[Row]:
+    """Run a suite and compare each arm with scratch."""
     rows: list[Row] = []
-    for name, study in _suite("methods").items():
+    for name, study in _suite(suite).items():
         plan = study.plan
         scratch = study.curves("scratch")
         for arm in plan.arms:

@@ -142,6 +142,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "atlas-ants": atlas.ants,
     "atlas-methods": atlas.methods,
     "atlas-pendulums": atlas.pendulums,
+    "atlas-replay": atlas.replay,
     "atlas-shank": atlas.shank,
     "atlas-controls": atlas.controls,
     "atlas-claims": atlas.claims,

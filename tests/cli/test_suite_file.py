@@ -36,6 +36,7 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
         "lenses": 4,
         "methods": 1,
         "pendulums": 6,
+        "replay": 1,
         "shank": 9,
         "vehicles": 12,
         "waypoints": 12,

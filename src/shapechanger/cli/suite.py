@@ -227,7 +227,7 @@ class RunSuite:
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SUITE")]
     """A TOML file, or the name of a suite that comes with Shapechanger: ants, lenses, methods,
-    pendulums, shank, vehicles or waypoints."""
+    pendulums, replay, shank, vehicles or waypoints."""
     seeds: int | None = None
     """Runs of each arm; the suite's own number if not given."""
     steps: int | None = None

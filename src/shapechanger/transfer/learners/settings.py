@@ -408,6 +408,18 @@ LEARNERS: Final[dict[str, Settings]] = {
         # A share of 0.5 or 0.8 of the source's demonstrations drives alike: docs/vehicles.md.
         clone=CloneSettings(held_out=0.0, passes=50.0, most_steps=3000, rehearsal=0.5),
     ),
+    # Small networks and few random steps: a pole of 0.6 m is balanced after 12,000 steps.
+    "sac-balance": OffPolicySettings(
+        algorithm="SAC",
+        net_arch=(64, 64),
+        learning_rate=1e-3,
+        batch_size=128,
+        buffer_size=100_000,
+        learning_starts=1000,
+        steps=16_000,
+        source_steps=16_000,
+        eval_every=2000,
+    ),
     # The settings that the papers of SAC and TQC share, and Stable-Baselines3's defaults.
     "sac": OffPolicySettings(algorithm="SAC", steps=200_000, eval_every=20_000),
     "tqc": OffPolicySettings(algorithm="TQC", steps=200_000, eval_every=20_000),
@@ -424,6 +436,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "ppo-drive": ("CarRanges",),
     "cloning": ("Car", "Tank", "Truck", "Boat"),
     "waypoint": ("CarWaypoint", "TankWaypoint", "TruckWaypoint"),
+    "sac-balance": ("InvertedPendulum",),
     "sac": (),
     "tqc": (),
 }
