@@ -80,6 +80,7 @@ def _by_method(suite: str) -> list[Row]:
     for name, study in _suite(suite).items():
         plan = study.plan
         scratch = study.curves("scratch")
+        unit = "" if plan.unit == "1" else f" {plan.unit}"
         for arm in plan.arms:
             if arm == "scratch":
                 continue
@@ -90,10 +91,10 @@ def _by_method(suite: str) -> list[Row]:
                 Row(
                     f"{name}: {plan.measure} of {arm} over that of scratch, "
                     + ("mean over the budget" if trained else "at the start"),
-                    f"{estimate_text(gain, signed=True)} {plan.unit}",
+                    f"{estimate_text(gain, signed=True)}{unit}",
                     f"{plan.seeds} seeds; from {curves.returns[:, 0].mean():.2f} to "
-                    f"{finals(study, arm).mean():.2f} {plan.unit}; scratch to "
-                    f"{finals(study, 'scratch').mean():.2f}",
+                    f"{finals(study, arm).mean():.2f}{unit}; scratch to "
+                    f"{finals(study, 'scratch').mean():.2f}{unit}",
                     "none: whatever comes out",
                     True,
                 )
