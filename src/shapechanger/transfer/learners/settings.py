@@ -360,6 +360,20 @@ LEARNERS: Final[dict[str, Settings]] = {
         steps=1_048_576,
         eval_every=65_536,
     ),
+    # A humanoid takes actions up to 0.4, so it explores with less noise, in smaller batches.
+    "ppo-humanoid": PpoSettings(
+        n_envs=16,
+        n_steps=256,
+        batch_size=256,
+        n_epochs=5,
+        learning_rate=1e-4,
+        gae_lambda=0.9,
+        log_std_init=-2.0,
+        net_arch=(256, 256),
+        normalise=True,
+        steps=524_288,
+        eval_every=65_536,
+    ),
     # A swimming stroke takes longer than a stride, so the discount is closer to 1.
     "ppo-swim": PpoSettings(
         n_envs=16,
@@ -431,6 +445,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "ppo-run": ("Ant", "AmputatedAnt", "BigAnt", "ExtendedAnt", "HalfCheetah"),
     "ppo-swim": ("Swimmer",),
     "ppo-planar": ("Hopper", "Walker2d", "InvertedDoublePendulum"),
+    "ppo-humanoid": ("Humanoid",),
     "ppo-finger": ("Finger",),
     "ppo-rig": ("Finger",),
     "ppo-drive": ("CarRanges",),
