@@ -113,6 +113,7 @@ def make_study(
         ),
     }
     drawn["zero-action"] = drawn["random"][:1]
+    drawn["frozen-trunk"] = drawn["fine-tune"]
     wanted: list[str] = [*([] if given else ["source"]), "random", "zero-action", *arms]
     plan = Plan(
         task=TransferTask(

@@ -296,8 +296,10 @@ def test_zero_shot_may_be_left_out() -> None:
 
 
 def test_fine_tune_may_be_left_out() -> None:
-    """The first other arm is then compared with scratch."""
+    """The first arm that learns is then compared with scratch, and zero-shot without one."""
     found = study_outcome("Ant-to-BigAnt", make_study(arms=("scratch", "zero-shot")))
     assert found.arm == "zero-shot"
     assert found.arm_final == found.zero_shot == pytest.approx(400.0)
+    arms = ("scratch", "zero-shot", "frozen-trunk")
+    assert study_outcome("Ant-to-BigAnt", make_study(arms=arms)).arm == "frozen-trunk"
     assert list(found.gains) == ["jumpstart", "total_reward_gain", "asymptotic_gain"]

@@ -118,7 +118,7 @@ def _verdict(studies: Mapping[str, Study]) -> str:
     flat = sum(is_flat(study) for study in studies.values())
     arm = next(iter(studies.values())).headline_arm
     words = (
-        f"Over {len(found)} studies, {arm} is ahead of scratch in {found.count('up')}, behind in "
+        f"Over {len(found)} {'study' if len(found) == 1 else 'studies'}, {arm} is ahead of scratch in {found.count('up')}, behind in "
         f"{found.count('down')}, and without a clear difference in {found.count('unclear')}"
     )
     return f"{words}; {flat} show nothing." if flat else f"{words}."

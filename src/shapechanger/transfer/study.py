@@ -75,8 +75,11 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def headline_arm(self) -> str:
-        """The arm that is compared with scratch first: fine-tune, else the first other one."""
-        return "fine-tune" if "fine-tune" in self.summaries else next(iter(self.summaries))
+        """The arm that is compared with scratch first: fine-tune, else the first that learns."""
+        if "fine-tune" in self.summaries:
+            return "fine-tune"
+        learning = (arm for arm in self.summaries if self.curves(arm).n_evals > 1)
+        return next(learning, next(iter(self.summaries)))
 
     def of(self, kind: str) -> list[RunResult]:
         """Return the runs of one kind, by index."""
