@@ -117,8 +117,9 @@ def _verdict(studies: Mapping[str, Study]) -> str:
     found = [direction(gain_over_scratch(study)) for study in studies.values()]
     flat = sum(is_flat(study) for study in studies.values())
     arm = next(iter(studies.values())).headline_arm
+    over = "one study" if len(found) == 1 else f"{len(found)} studies"
     words = (
-        f"Over {len(found)} {'study' if len(found) == 1 else 'studies'}, {arm} is ahead of scratch in {found.count('up')}, behind in "
+        f"Over {over}, {arm} is ahead of scratch in {found.count('up')}, behind in "
         f"{found.count('down')}, and without a clear difference in {found.count('unclear')}"
     )
     return f"{words}; {flat} show nothing." if flat else f"{words}."
