@@ -121,7 +121,7 @@ _FAMILIES: Final = {
     "Hopper": ("runners:HopperEnv", "ppo-planar", 3800.0),
     "Walker2d": ("runners:Walker2dEnv", "ppo-planar", None),
     "Swimmer": ("runners:SwimmerEnv", "ppo-swim", 360.0),
-    "Humanoid": ("runners:HumanoidEnv", "ppo-run", None),
+    "Humanoid": ("runners:HumanoidEnv", "ppo-humanoid", None),
     "InvertedDoublePendulum": ("pendulum:InvertedDoublePendulumEnv", "ppo-planar", 9100.0),
 }
 # Name, family and summary of each body.
