@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, cast
@@ -14,7 +15,7 @@ from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits, is_single_instance, layouts_of
-from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
+from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin, ignore
 from shapechanger.transfer.learners.algorithms import build_model
 from shapechanger.transfer.learners.cloning import is_clone
 from shapechanger.transfer.learners.evaluation import (
@@ -143,7 +144,8 @@ class Sb3Learner:
                 self._name, settings, eval_envs, single, on_evaluation, on_steps
             )
             # Before `learn`: it starts with a reset, which already changes the running statistics.
-            on_evaluation(evaluations.evaluate(model, envs))
+            if on_evaluation is not ignore:
+                on_evaluation(evaluations.evaluate(model, envs))
             callbacks: list[BaseCallback] = [] if callback is None else [callback]
             if start is not None and isinstance(settings, OffPolicySettings):
                 callbacks.append(_ActFirst(settings.learning_starts))
@@ -317,7 +319,8 @@ class _PeriodicEvaluation(BaseCallback):
         self._single = single
         self._on_evaluation = on_evaluation
         self._on_steps = on_steps
-        self._next = settings.eval_every
+        # A third of the time of a finger's training is evaluation.
+        self._next = math.inf if on_evaluation is ignore else settings.eval_every
 
     def _on_step(self) -> bool:
         self._on_steps(self.num_timesteps)
