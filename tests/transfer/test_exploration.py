@@ -1,4 +1,4 @@
-"""Law of fine-tuning: it explores, however little its source does."""
+"""Training from a policy explores, however little that policy does."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.sb3 import START_LOG_STD, Sb3Learner
 from shapechanger.transfer.learners.settings import Sb3Settings
@@ -78,3 +79,15 @@ def test_it_never_explores_more_than_a_new_policy() -> None:
 def test_a_new_policy_has_no_such_start() -> None:
     """Nothing was reset."""
     assert _source(-4.0).card.start_log_std is None
+
+
+def test_evaluations_that_nobody_reads_are_left_out() -> None:
+    """The policy is the same without them."""
+    learner = Sb3Learner("tiny", TINY)
+    steps: list[int] = []
+    seen = learner.train(SMALL, 96, 0, on_evaluation=lambda e: steps.append(e.steps))
+    unseen = learner.train(SMALL, 96, 0, on_evaluation=ignore)
+    assert steps == [0, 32, 64, 96]
+    weights: list[Any] = [policy.model.policy.state_dict() for policy in (seen, unseen)]
+    for name, tensor in weights[0].items():
+        assert torch.equal(tensor, weights[1][name]), name
