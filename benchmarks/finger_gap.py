@@ -28,7 +28,7 @@ from shapechanger.transfer.study import Study, make_plan, run_study
 SEEDS: Final = 3
 # Ten minutes on a bench.
 STEPS: Final = 30_720
-RIGS: Final = 2
+RIGS: Final = 3
 RIG_STEPS: Final = 6144
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 # Zero-shot success below this counts as a gap.
@@ -53,7 +53,7 @@ def gap() -> list[Row]:
 def rig() -> list[Row]:
     """Measure the same through link, daemon, guard and servo bus, with two minutes per rig."""
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
-    arms: tuple[str, ...] = ("scratch", "zero-shot", "randomised", "identified")
+    arms: tuple[str, ...] = ("scratch", "zero-shot", "identified")
     study = _study(target, "ppo-rig", arms, RIGS, RIG_STEPS, Path("results", "finger-rig"))
     return rows_of(study, "twins of a rig, real-like")
 

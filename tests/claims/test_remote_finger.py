@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from shapechanger.bodies.finger import NOMINAL, FingerParameters
-from shapechanger.envs.finger.gap import resolve_gap
+from shapechanger.envs.finger.gap import GAPS, resolve_gap
 from shapechanger.errors import BadAction, UnknownName
+from shapechanger.identify.result import PATH_DELAY_ERROR_S
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.twin.robots import until
@@ -290,7 +291,8 @@ def test_each_seed_of_a_study_gets_another_rig() -> None:
     with gym.make("shapechanger/RemoteFinger-v1", twin="real-like") as many:
         own: Any = many.unwrapped
         assert own.individual == "finger_seed"
-        assert own.randomised_source() == {"gap": "geared"}
+        assert own.randomised_source() == {"gap": "geared", "reward": {"change": 5.0}}
+        assert own.motors.path == GAPS["geared"].around.path
         assert not own.side_by_side
 
 
@@ -300,7 +302,11 @@ def test_ten_seconds_identify_the_finger() -> None:
         truth: FingerParameters = simulated.get_wrapper_attr("parameters")
     with gym.make("shapechanger/RemoteFinger-v1", twin="real-like", finger_seed=0) as rig:
         own: Any = rig.unwrapped
-        found = resolve_gap(own.identified_source(0)["gap"]).around
+        gap = resolve_gap(own.identified_source(0)["gap"])
+    found = gap.around
+    # A command waits for the next tick of the guard, 10 ms.
+    assert found.command_delay == pytest.approx(0.010, abs=PATH_DELAY_ERROR_S)
+    assert gap.command_delay[0] < 0.010 < gap.command_delay[1]
     large = np.abs(truth.arms) > 2e-3
     np.testing.assert_allclose(found.arms[large], truth.arms[large], rtol=0.05)
     assert np.abs(NOMINAL.arms / np.where(large, truth.arms, 1.0) - 1.0)[large].max() > 0.15

@@ -65,7 +65,8 @@ def scaled(strength: float) -> FingerParameters:
 
 def test_synthetic_logs_give_the_motors() -> None:
     """Lag, delay, noise and the strength relative to known motors are found."""
-    found = fit_motors(followed(0.045, 0.037, 0.8, 0.1), scaled(0.7))
+    log = changed(followed(0.045, 0.037, 0.8, 0.1), motors=scaled(0.7))
+    found = fit_motors(log)
     assert found.lag == pytest.approx(0.045, abs=0.001)
     assert found.delay == pytest.approx(0.037, abs=0.001)
     assert found.saturates

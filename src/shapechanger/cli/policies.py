@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
@@ -74,7 +75,14 @@ def _card_lines(card: PolicyCard) -> dict[str, str]:
         "learner": card.learner,
         "steps": f"{card.steps:,}",
         "seed": str(card.seed),
+        **({} if card.start_log_std is None else {"explored": _deviations(card.start_log_std)}),
     }
+
+
+def _deviations(log_std: tuple[float, ...]) -> str:
+    """Return the standard deviations of the actions at the start of a fine-tuning."""
+    low, high = math.exp(min(log_std)), math.exp(max(log_std))
+    return f"standard deviations of {low:.2f} to {high:.2f} at the start"
 
 
 def _clone_lines(card: CloneCard) -> dict[str, str]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
-from shapechanger.bodies.finger import DRIVES, JOINTS, TENDONS
+from shapechanger.bodies.finger import DRIVES, JOINTS, TENDONS, FingerParameters
 from shapechanger.errors import FingerError, OutputError, UnknownName
 
 SIGNALS: Final = {
@@ -54,6 +54,8 @@ class FingerLog:
         actions: Meaning of a command; see `shapechanger.bodies.finger.DRIVES`.
         control_dt: Control period, s.
         source: Recorded env or robot, such as an env id.
+        motors: A finger with the motors, the range of tensions and the command path of the rig;
+            None if nothing is known about them. A log says little about geared motors.
 
     Raises:
         FingerError: If the arrays differ in length, hold a number that is not finite, run backwards
@@ -69,6 +71,7 @@ class FingerLog:
     actions: str
     control_dt: float
     source: str = ""
+    motors: FingerParameters | None = None
 
     def __post_init__(self) -> None:
         if self.actions not in DRIVES:
@@ -148,6 +151,7 @@ class _Header(msgspec.Struct, frozen=True, kw_only=True):
     joints: tuple[str, ...]
     tendons: tuple[str, ...]
     source: str = ""
+    motors: FingerParameters | None = None
 
 
 def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
@@ -168,6 +172,7 @@ def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
         joints=JOINTS,
         tendons=TENDONS,
         source=log.source,
+        motors=log.motors,
     )
     arrays = {name: getattr(log, name) for name in SIGNALS}
     encoded = np.frombuffer(msgspec.json.encode(header), np.uint8)
@@ -212,6 +217,7 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
         actions=header.actions,
         control_dt=header.control_dt,
         source=header.source,
+        motors=header.motors,
     )
 
 

@@ -176,7 +176,6 @@ def fit_dynamics(
     last: int | None = None,
     *,
     with_arms: bool = False,
-    known: FingerParameters | None = None,
 ) -> Dynamics:
     """Fit joint and friction parameters to a log.
 
@@ -188,13 +187,12 @@ def fit_dynamics(
             the log.
         with_arms: Whether to fit the arms again, with those of the kinematics and their covariance
             as the prior.
-        known: Finger with known motors; None if nothing is known about them.
 
     Raises:
         MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
     """
     sysid = _load_sysid()
-    fit = _MotionFit(sysid, log, kinematics, motors, last, with_arms=with_arms, known=known)
+    fit = _MotionFit(sysid, log, kinematics, motors, last, with_arms=with_arms)
     found, result = sysid.optimize(
         fit.parameters(),
         fit.residual,
@@ -240,7 +238,6 @@ class _MotionFit:
         last: int | None,
         *,
         with_arms: bool,
-        known: FingerParameters | None,
     ) -> None:
         self._sysid = sysid
         self._arms = kinematics.arms
@@ -248,7 +245,7 @@ class _MotionFit:
         self._arm_axes = np.linalg.cholesky(kinematics.arms_covariance + rounding)
         self._n_arms = int(ARMS.sum()) if with_arms else 0
         self._prior_sd = np.concatenate([np.full(len(FACTORS), _PRIOR_SD), np.ones(self._n_arms)])
-        spec = build_finger(with_motors(motors, known), drive_of(log.actions, NOMINAL))
+        spec = build_finger(with_motors(motors, log.motors), drive_of(log.actions, NOMINAL))
         for name in JOINTS:
             spec.add_sensor(
                 name=name,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from shapechanger.bodies.finger import NOMINAL, FingerParameters, drive_of
+from shapechanger.bodies.finger import NOMINAL, drive_of
 from shapechanger.identify.kinematics import robust_covariance
 from shapechanger.identify.log import FingerLog
 
@@ -108,13 +108,9 @@ class Motors:
     tension_noise: float
 
 
-def fit_motors(log: FingerLog, known: FingerParameters = NOMINAL) -> Motors:
-    """Fit lag, delay and strength of the motors to a log.
-
-    Args:
-        log: The log.
-        known: Finger with the assumed range of tensions.
-    """
+def fit_motors(log: FingerLog) -> Motors:
+    """Fit lag, delay and strength of the motors to a log, over those of its motors, if known."""
+    known = log.motors or NOMINAL
     most = np.array(known.most_tension)
     drive = drive_of(log.actions, NOMINAL)
     commands = CommandSignal(log)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from shapechanger.bodies.finger import (
     build_finger,
     drive_of,
 )
+from shapechanger.bodies.finger.path import HeldTensions, hold_controls
 from shapechanger.identify.kinematics import ARMS, Kinematics, fit_kinematics, interval_quantile
 from shapechanger.identify.log import FingerLog, require_informative
 from shapechanger.identify.motion import (
@@ -46,6 +48,11 @@ _MODEL_ERROR: Final = {"joint_stiffness": 0.15, "joint_damping": 0.20, "tendon_f
 # model, s. In simulation, tensions are one or two steps old.
 _DELAY_ERROR_S: Final = 0.002
 _LAG_ERROR_S: Final = 0.0005
+# Delays that the motion is replayed with, s apart.
+_DELAY_STEP_S: Final = 0.0025
+PATH_DELAY_ERROR_S: Final = 0.005
+"""Half the interval of a delay found from motion, s: on five twins, with 10 ms, 7 to 13 ms were
+found (`python -m benchmarks.run finger-path`)."""
 # Largest stiffness, N/m, that can be told from infinity: at it all tension there is stretches a
 # tendon by less than 0.1 mm.
 _STIFFEST: Final = 2.5e5
@@ -148,20 +155,18 @@ class IdentifiedFinger:
 def identify(
     log: FingerLog,
     progress: Callable[[str], None] = lambda _: None,
-    known: FingerParameters | None = None,
 ) -> IdentifiedFinger:
     """Estimate the parameters of a finger from a log.
 
     Arms and stretch follow from the lengths, angles and tensions of the whole log, and the motors
     from its commands and tensions; joint and friction parameters follow from the motion in its
-    first four fifths, by `mujoco.sysid`. The last fifth is simulated for validation.
+    first four fifths, by `mujoco.sysid`. The last fifth is simulated for validation. On the path of
+    a rig, tensions hide a delay shorter than a period; it follows from the motion.
 
     Args:
         log: A log in which each joint moves through much of its range, under tensions that change;
             ten seconds work well.
         progress: Called with the name of each step before it starts.
-        known: Finger with the same motors, if known: a log says little about the mass, damping and
-            strength of motors with gears.
 
     Raises:
         FingerError: If the log is too short, or a joint hardly moves or only along with others.
@@ -171,11 +176,16 @@ def identify(
     progress("arms and stretch, from lengths")
     kinematics = fit_kinematics(log)
     progress("motors, from tensions")
-    motors = fit_motors(log, known or NOMINAL)
+    motors = fit_motors(log)
     progress("joints and friction, from motion")
     last = round(_FITTED * len(log))
-    dynamics = fit_dynamics(log, kinematics, motors, last, known=known)
-    parameters = _parameters(kinematics, motors, dynamics, known)
+    dynamics = fit_dynamics(log, kinematics, motors, last)
+    parameters = _parameters(kinematics, motors, dynamics, log.motors)
+    if parameters.path is not None:
+        progress("delay, from motion")
+        late = _delay(log, parameters, cut_windows(log, kinematics, motors, last))
+        motors = dataclasses.replace(motors, lag=parameters.motor_lag, delay=late)
+        parameters = parameters.replace(command_delay=late)
     progress("the last fifth, simulated")
     rows = len(log) - 1 - last
     dt = log.control_dt
@@ -183,7 +193,7 @@ def identify(
     return IdentifiedFinger(
         parameters=parameters,
         estimates=_estimates(kinematics, motors, dynamics, log),
-        undetermined=_undetermined(motors, known),
+        undetermined=_undetermined(motors, log.motors),
         held_out=HeldOut(
             t=log.t[last:] - log.t[0],
             measured=log.angles[last:],
@@ -206,33 +216,57 @@ def replay(log: FingerLog, parameters: FingerParameters, window: Window) -> NDAr
     Returns:
         Angles, rad, (m + 1, 4); the first row is that of the window.
     """
-    on_time = parameters.replace(command_delay=0.0)  # The commands below are delayed already.
-    model = build_finger(on_time, drive_of(log.actions, NOMINAL)).compile()
+    drive, delay = drive_of(log.actions, NOMINAL), parameters.command_delay
+    if parameters.path is None:  # The commands below are delayed already.
+        parameters = parameters.replace(command_delay=0.0)
+    model = build_finger(parameters, drive).compile()
     skip = steps_per_period(log.control_dt, model.opt.timestep)
     step = model.opt.timestep = log.control_dt / skip
     data = mujoco.MjData(model)
     n, arms = len(JOINTS), parameters.arms
     data.qpos[:n], data.qvel[:n] = window.angles[0], window.velocities
+    row = int(np.searchsorted(log.t, window.start - 0.5 * log.control_dt))
     if parameters.tendon_stiffness is not None:
-        row = int(np.searchsorted(log.t, window.start - 0.5 * log.control_dt))
         stretch = parameters.backlash + log.tensions[row] / parameters.tendon_stiffness
         data.qpos[n:] = arms @ window.angles[0] + stretch
         data.qvel[n:] = arms @ window.velocities
-    commands, delay = CommandSignal(log), parameters.command_delay
+    periods = len(window.angles) - 1
+    angles = [window.angles[0]]
+    if parameters.path is not None:
+        held = HeldTensions(parameters.path, parameters, drive, log.control_dt, step)
+        hold_controls(model, data, held.start(log.tensions[row]))
+        for command in log.commands[row + 1 : row + 1 + periods]:
+            held.advance(model, data, command)
+            angles.append(data.qpos[:n].copy())
+        return np.array(angles)
+    commands = CommandSignal(log)
     before = math.ceil((window.start - float(log.t[0])) / step)
     activations = commands.activations(
         window.start - before * step, step, before, delay, parameters.motor_lag
     )
     data.act[:] = np.clip(activations[-1], -1.0, 1.0)
-    periods = len(window.angles) - 1
     late = commands.delayed(window.start, step, skip * periods, delay)
-    angles = [window.angles[0]]
     for period in range(periods):
         for command in late[period * skip : (period + 1) * skip]:
             data.ctrl[:] = command
             mujoco.mj_step(model, data)
         angles.append(data.qpos[:n].copy())
     return np.array(angles)
+
+
+def _delay(log: FingerLog, parameters: FingerParameters, windows: list[Window]) -> float:
+    """Return the delay of the commands, s, with which the replayed angles are the nearest."""
+    delays = np.arange(0.0, 1.5 * log.control_dt, _DELAY_STEP_S)
+    errors: list[float] = []
+    for delay in delays.tolist():
+        late = parameters.replace(command_delay=delay)
+        errors.append(sum(float(np.sum((replay(log, late, w) - w.angles) ** 2)) for w in windows))
+    at = min(max(int(np.argmin(errors)), 1), len(delays) - 2)
+    # The lowest point of the parabola through the three lowest.
+    before, lowest, after = errors[at - 1 : at + 2]
+    bend = before - 2.0 * lowest + after
+    shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return float(delays[at] + _DELAY_STEP_S * min(max(shift, -1.0), 1.0))
 
 
 def _estimates(
@@ -255,6 +289,9 @@ def _estimates(
         by = math.exp(_NORMAL * math.hypot(dynamics.sd[name], _MODEL_ERROR[kind]))
         unit = _UNITS[kind]
         found.append(ParameterEstimate(name, unit, value, value / by, value * by, nominal[name]))
+    if log.motors is not None and log.motors.path is not None:
+        late = _around("command_delay", "s", motors.delay, PATH_DELAY_ERROR_S, 0.0, least=0.0)
+        return (*found, late)
     lag = reach * math.hypot(motors.sd[0], _LAG_ERROR_S)
     delay = reach * math.hypot(motors.sd[1], _DELAY_ERROR_S)
     found += [
@@ -273,7 +310,10 @@ def _parameters(
     noise = float(np.sqrt(np.mean(kinematics.joint_noise**2)))
     values = dynamics.values
     arms: list[list[float]] = kinematics.arms.tolist()
-    return with_motors(motors, known).replace(
+    plain = with_motors(motors, known)
+    if known is not None and known.path is not None:
+        plain = plain.replace(path=known.path, motor_lag=known.motor_lag)
+    return plain.replace(
         moment_arms=tuple(tuple(row) for row in arms),
         joint_stiffness=tuple(values[f"joint_stiffness/{joint}"] for joint in JOINTS),
         joint_damping=tuple(values[f"joint_damping/{joint}"] for joint in JOINTS),
@@ -295,6 +335,9 @@ def _undetermined(motors: Motors, known: FingerParameters | None) -> tuple[tuple
         ("motor_kg", f"Masked by stretch and damping; assumed {1e3 * kg:g} g."),
         ("backlash", "Acts like an offset of a motor's zero; assumed none."),
     ]
+    if known is not None and known.path is not None:
+        lag = f"Hidden by the control period; assumed {1e3 * known.motor_lag:g} ms."
+        undetermined.append(("motor_lag", lag))
     if known is None and not motors.saturates:
         undetermined.append(
             ("most_tension", "No tendon reached its largest tension; assumed nominal.")

@@ -302,6 +302,9 @@ class Welcome(_Message, frozen=True):
             profile does not state it.
         camera_fovy_deg: Vertical field of view of the camera, degrees; None likewise.
         control_hz: Commands per second that the robot expects.
+        tick_hz: Rate of the guard, Hz.
+        slew_per_s: Fastest change of each action away from rest, 1/s; 0 for no limit.
+        slew_down_per_s: Fastest change of each action towards rest, 1/s; 0 for no limit.
         deadline_ms: Longest time that a command acts, ms.
         max_observation_age_ms: Oldest observation that a command may answer, ms.
         reward: Weights of the task, from the robot's profile, by name.
@@ -327,6 +330,9 @@ class Welcome(_Message, frozen=True):
     clock: Literal["real", "twin"]
     session: int
     can_record: bool = False
+    tick_hz: float = 100.0
+    slew_per_s: tuple[float, ...] = ()
+    slew_down_per_s: tuple[float, ...] = ()
     camera_pitch_deg: float | None = None
     camera_fovy_deg: float | None = None
 

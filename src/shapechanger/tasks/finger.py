@@ -94,10 +94,12 @@ class FingertipReward:
     Attributes:
         nearness: Reward per second at the target, 1/s.
         effort: Cost per second at full tension of all tendons, 1/s.
+        change: Cost per second of commands that change by 1 in each step, 1/s.
     """
 
     nearness: float = 50.0
     effort: float = 1.0
+    change: float = 0.0
 
     @classmethod
     def from_weights(cls, weights: Mapping[str, float]) -> FingertipReward:
@@ -115,22 +117,24 @@ class FingertipReward:
                 raise UnknownName("weight of the reward", name, names)
         return cls(**{name: float(value) for name, value in weights.items()})
 
-    def terms(self, distance: float, effort: float, dt_s: float) -> dict[str, float]:
+    def terms(self, distance: float, effort: float, change: float, dt_s: float) -> dict[str, float]:
         """Return the terms of one step; the reward is their sum.
 
         Args:
             distance: Distance of the fingertip from its target, m, at least 0.
             effort: Mean square of the tensions relative to their maxima, 0 to 1.
+            change: Mean square of the changes of the commands, 0 to 4.
             dt_s: Duration of the step, s.
 
         Returns:
-            `reward_nearness`, above 0 and at most `nearness * dt_s`, and `reward_effort`, at most
-            0.
+            `reward_nearness`, above 0 and at most `nearness * dt_s`; `reward_effort` and
+            `reward_change`, at most 0.
         """
         near = 0.5 / (1.0 + distance / _FAR_M) + 0.5 / (1.0 + distance / _NEAR_M)
         return {
             "reward_nearness": self.nearness * dt_s * near,
             "reward_effort": -self.effort * dt_s * effort,
+            "reward_change": -self.change * dt_s * change,
         }
 
 

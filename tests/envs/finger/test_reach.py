@@ -98,7 +98,7 @@ def test_the_reward_is_the_sum_of_its_terms() -> None:
     env = FingerReachEnv(reward={"nearness": 10.0})
     env.reset(seed=0)
     _, reward, _, _, info = env.step(_NOTHING)
-    assert reward == info["reward_nearness"] + info["reward_effort"]
+    assert reward == sum(info[f"reward_{term}"] for term in ("nearness", "effort", "change"))
     share = env.plant.data.actuator_force / np.array(NOMINAL.most_tension)
     assert info["reward_effort"] == pytest.approx(-0.02 * np.mean(share**2))
     assert 0.0 < info["reward_nearness"] <= 0.2

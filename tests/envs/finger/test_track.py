@@ -66,7 +66,7 @@ def test_the_rms_error_starts_after_half_a_second() -> None:
     for step in range(1, 41):
         _, reward, terminated, _, info = env.step(_NOTHING)
         assert not terminated
-        assert reward == info["reward_nearness"] + info["reward_effort"]
+        assert reward == sum(info[f"reward_{term}"] for term in ("nearness", "effort", "change"))
         true = math.dist(env.plant.fingertip, info["target"])
         assert info["distance"] == pytest.approx(true)
         distances.append(info["distance"])

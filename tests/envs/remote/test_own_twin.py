@@ -10,6 +10,7 @@ import shapechanger  # noqa: F401 - Registers the ids.
 from shapechanger.bodies.finger import NOMINAL
 from shapechanger.envs.finger.gap import GAPS, with_gears
 from shapechanger.errors import FingerError, UnknownName
+from shapechanger.robot.profile.load import find_profile, load_profile
 
 RIG = "shapechanger/RemoteFinger-v1"
 
@@ -37,3 +38,18 @@ def test_a_geared_finger_is_within_its_gap() -> None:
         assert low < getattr(geared, name) < high
     drawn = gap.draw(np.random.default_rng(0))
     assert 0.5 < drawn.motor_kg / geared.motor_kg < 2.0
+
+
+def test_geared_fingers_have_the_path_of_the_shipped_rig() -> None:
+    """Rates and slew are those of its profile, so its tensions fall as fast as they rise."""
+    profile = load_profile(find_profile("finger"))
+    path = GAPS["geared"].around.path
+    assert path is not None
+    assert path.control_hz == profile.control_hz
+    assert path.tick_hz == profile.guard_plan().tick_hz
+    for action in profile.actions:
+        assert (action.slew_per_s, action.slew_down_per_s) == (
+            path.slew_per_s,
+            path.slew_down_per_s,
+        )
+        assert action.slew_per_s == action.slew_down_per_s

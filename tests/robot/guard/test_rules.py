@@ -1,6 +1,7 @@
 """Each rule of the guard, to the nanosecond, with explicit times."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -231,6 +232,22 @@ def test_slew_limits_moves_away_from_rest_only() -> None:
     assert at(40, -0.4) == 0.0
     assert at(50, -0.4) == pytest.approx(-0.02)
     assert at(60, 0.4) == 0.0
+
+
+def test_a_tension_falls_no_faster_than_it_rises() -> None:
+    """With a limit towards rest, a chattering command has its own mean; a stop ramps as ever."""
+    tension = ActionPlan("FDP", 0.0, slew_per_s=20.0, slew_down_per_s=20.0, one_sided=True)
+    rules = _armed(replace(car(stop=StopPlan(hold_ms=0, ramp_ms=40)), actions=(tension,)))
+    seen: list[float] = []
+    for k in range(40):
+        now = _T0 + (k + 1) * 20 * MS
+        rules.offer(command(k, now, (0.3 + 0.4 * (k % 2),)), now)
+        seen += [rules.tick(now + ms * MS).actions[0] for ms in (0, 10)]
+    steps = [abs(after - before) for before, after in pairwise(seen)]
+    assert max(steps) <= 0.2 + 1e-9
+    assert sum(seen[20:]) / len(seen[20:]) == pytest.approx(0.5, abs=0.01)
+    rules.tick(now + 300 * MS)  # Out of date.
+    assert rules.tick(now + 340 * MS).actions == (0.0,)
 
 
 def test_slew_is_limited_after_a_pause() -> None:

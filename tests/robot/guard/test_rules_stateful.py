@@ -36,10 +36,11 @@ class _World(RuleBasedStateMachine):
     @initialize(
         levels=_levels,
         slew=_slews,
+        slew_down=_slews,
         stop=st.sampled_from(["hold", "release"]),
         stale_ms=st.sampled_from([0, 60, 150]),
     )
-    def start(self, levels: str, slew: float, stop: str, stale_ms: int) -> None:
+    def start(self, levels: str, slew: float, slew_down: float, stop: str, stale_ms: int) -> None:
         """Set up a car with or without a camera whose limit differs from the deadline."""
         self.stale_ns = stale_ms * MS
         limits = LimitPlan(
@@ -49,7 +50,7 @@ class _World(RuleBasedStateMachine):
             low_battery_v=6.0,
         )
         actions = (
-            ActionPlan("steering", -0.8, 0.5, 0.1, slew_per_s=slew),
+            ActionPlan("steering", -0.8, 0.5, 0.1, slew_per_s=slew, slew_down_per_s=slew_down),
             ActionPlan("throttle", -0.4, 0.6, slew_per_s=slew, levels=levels, propels=True),
         )
         plan = replace(car(limits, StopPlan(hold_ms=30, ramp_ms=40, then=stop)), actions=actions)
@@ -248,6 +249,8 @@ class _World(RuleBasedStateMachine):
                 assert new in (action.low, action.rest, action.high)
             elif abs(is_now) > abs(was) and action.slew_per_s < float("inf"):
                 assert abs(is_now) - abs(was) <= action.slew_per_s * elapsed_s + 1e-9
+            elif decision.seq is not None and action.slew_down_per_s < float("inf"):
+                assert abs(was) - abs(is_now) <= action.slew_down_per_s * elapsed_s + 1e-9
 
 
 TestRules = _World.TestCase

@@ -378,6 +378,12 @@ MISTAKES = [
     ),
     (
         "slew_per_s = 2",
+        "slew_down_per_s = 2",
+        "slew_down_per_s = 2",
+        "[action.throttle] cannot have slew_down_per_s, because it propels: a stop is immediate",
+    ),
+    (
+        "slew_per_s = 2",
         "slew_per_s = 0",
         "slew_per_s = 0",
         "must be a number above 0 (per second), not 0",

@@ -57,7 +57,7 @@ def test_layouts_are_in_newtons_and_metres() -> None:
         ),
         (
             _TEXT.replace("pretension_n = 1.0", "pretension_n = 30.0", 1),
-            "line 50: .*pretension must be",
+            "line 57: .*pretension must be",
         ),
         (changed("watchdog_ms = 100", "watchdog_ms = 90", _TEXT), "steps of 20, not 90"),
         (_TEXT.replace("XL330-M077", "XL330-M078", 1), "did you mean 'XL330-M077'"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shapechanger.bodies.finger.anatomy import JOINTS, TENDONS
 from shapechanger.bodies.finger.model import build_finger
-from shapechanger.bodies.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.bodies.finger.parameters import NOMINAL, CommandPath, FingerParameters
 from shapechanger.bodies.finger.tensions import DRIVES, TendonDrive, drive_of
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "JOINTS",
     "NOMINAL",
     "TENDONS",
+    "CommandPath",
     "FingerParameters",
     "TendonDrive",
     "build_finger",

@@ -34,6 +34,10 @@ SIM_DT: Final = 0.002
 _SIM_DT_STRETCHED: Final = 0.0005
 """Simulation step with tendons that stretch, s: a light spool on a stiff spring oscillates at 100
 Hz and more."""
+_SIM_DT_GEARED: Final = 0.001
+_GEARED_KG: Final = 0.5
+"""Simulation step with heavier motors than this, s: with gears they oscillate at some 20 Hz, and
+half the step changes the motion by less than 0.05 degrees RMS."""
 
 FINGERTIP: Final = "fingertip"
 """Name of the site at the end of the distal phalanx."""
@@ -64,9 +68,10 @@ def build_finger(
 ) -> mujoco.MjSpec:
     """Build the MuJoCo model of a finger.
 
-    Controls are the commands of the drive, -1 to 1, in the order of `TENDONS`. Tendons have the
-    names of `TENDONS`, and lengths relative to the straight finger, m. A tendon that stretches has
-    a motor: a slide joint such as `FDP/motor`, whose travel winds it up.
+    Controls are the commands of the drive, -1 to 1, in the order of `TENDONS`; with a path, they
+    are the tensions from the least, -1, to the most, 1, see `HeldTensions`. Tendons have the names
+    of `TENDONS`, and lengths relative to the straight finger, m. A tendon that stretches has a
+    motor: a slide joint such as `FDP/motor`, whose travel winds it up.
 
     Args:
         parameters: Parameters of the finger.
@@ -75,7 +80,9 @@ def build_finger(
     """
     spec = mujoco.MjSpec()
     spec.modelname = "finger"
-    spec.option.timestep = _SIM_DT_STRETCHED if parameters.gives else SIM_DT
+    geared = parameters.motor_kg > _GEARED_KG
+    stretched = _SIM_DT_GEARED if geared else _SIM_DT_STRETCHED
+    spec.option.timestep = stretched if parameters.gives else SIM_DT
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     spec.visual.headlight.ambient[:] = (0.4, 0.4, 0.4)
@@ -83,6 +90,9 @@ def build_finger(
     spec.stat.center[:] = (0.02, 0.0, -0.02)
     spec.stat.extent = 0.15
     _add_bones(spec, parameters)
+    if parameters.path is not None:
+        half = 0.5 * (np.array(parameters.most_tension) - parameters.least_tension)
+        drive = TendonDrive(parameters.least_tension + half, half, 0.0, 0.0)
     for i in range(len(TENDONS)):
         _add_tendon(spec, i, parameters, drive)
     mark = spec.worldbody.add_body(name=TARGET, mocap=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 import msgspec
@@ -18,7 +20,7 @@ from shapechanger.bodies.finger.anatomy import (
     MOST_TENSION_N,
     TENDONS,
 )
-from shapechanger.errors import FingerError
+from shapechanger.errors import FingerError, UnknownName
 
 # Time constant between a command and its force. Chosen.
 _MOTOR_LAG_S: Final = 0.020
@@ -27,6 +29,8 @@ _MOTOR_LAG_S: Final = 0.020
 _MOTOR_KG: Final = 0.010
 # N·s/m. Chosen.
 _TENDON_DAMPING: Final = 2.0
+# Tolerance of a ratio that must be whole.
+_WHOLE: Final = 1e-6
 
 Arms = tuple[tuple[float, float, float, float], ...]
 
@@ -36,6 +40,66 @@ def _plain(numbers: NDArray[np.float64]) -> tuple[Any, ...]:
     if numbers.ndim > 1:
         return tuple(_plain(row) for row in numbers)
     return tuple(float(number) for number in numbers)
+
+
+class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the commands of a rig become tensions; names and units are those of its profile.
+
+    Without a path, the tensions follow commands, lengths and speeds in each simulation step. Lag
+    and delay are `motor_lag` and `command_delay` of `FingerParameters`, with a path or without.
+
+    Attributes:
+        control_hz: Rate at which tensions are computed from commands, lengths and speeds, and then
+            held, 1/s.
+        tick_hz: Rate at which the guard sends tensions to the servos, 1/s; a multiple of
+            `control_hz`.
+        slew_per_s: Fastest rise of a tension, in ranges from the least to the most tension per
+            second; None for no limit.
+        slew_down_per_s: Fastest fall of a tension, likewise.
+        tension_step: Resolution of the tensions, N, which are rounded down; 0 for none.
+
+    Raises:
+        FingerError: If a rate or a slew is not above zero and finite, the step is negative, or
+            `tick_hz` is not a multiple of `control_hz`.
+    """
+
+    control_hz: float = 50.0
+    tick_hz: float = 100.0
+    slew_per_s: float | None = None
+    slew_down_per_s: float | None = None
+    tension_step: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("control_hz", "tick_hz", "slew_per_s", "slew_down_per_s"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
+                raise FingerError(f"{name} of a path must be above zero and finite, got {value}.")
+        if not 0.0 <= self.tension_step < math.inf:
+            raise FingerError(
+                f"tension_step of a path must be zero or above and finite, got {self.tension_step}."
+            )
+        ticks = self.tick_hz / self.control_hz
+        if abs(ticks - round(ticks)) > _WHOLE * ticks:
+            raise FingerError(
+                f"tick_hz of a path must be a multiple of control_hz, got {self.tick_hz:g} and "
+                f"{self.control_hz:g}."
+            )
+
+    @classmethod
+    def from_mapping(cls, given: Mapping[str, Any]) -> CommandPath:
+        """Create a path from values by name.
+
+        Raises:
+            UnknownName: If there is no such name.
+            FingerError: If a value is malformed.
+        """
+        for name in given:
+            if name not in cls.__struct_fields__:
+                raise UnknownName("parameter of a command path", str(name), cls.__struct_fields__)
+        try:
+            return msgspec.convert(given, cls)
+        except msgspec.ValidationError as error:
+            raise FingerError(f"A command path is malformed: {str(error).rstrip('.')}.") from error
 
 
 class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -57,10 +121,13 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         command_delay: Delay of the commands, s.
         joint_noise: Standard deviation of a measured angle, rad.
         tension_noise: Standard deviation of a measured tension, N.
+        path: Path of the commands on a rig, or its values by name; None if the motors follow
+            commands, lengths and speeds without one.
 
     Raises:
         FingerError: If a number is not finite or has the wrong sign, an array has the wrong shape,
             or a backlash is given without a stiffness.
+        UnknownName: If the path has no such value.
     """
 
     moment_arms: Arms = tuple(map(tuple, MOMENT_ARMS.tolist()))  # pyright: ignore[reportAssignmentType]
@@ -78,9 +145,12 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     command_delay: float = 0.0
     joint_noise: float = 0.0
     tension_noise: float = 0.0
+    path: CommandPath | None = None
 
     def __post_init__(self) -> None:
         numbers = msgspec.structs.asdict(self)
+        if isinstance(path := numbers.pop("path"), Mapping):
+            msgspec.structs.force_setattr(self, "path", CommandPath.from_mapping(path))
         if self.tendon_stiffness is None:
             if self.backlash:
                 raise FingerError("backlash needs a tendon_stiffness: a stiff tendon has none.")

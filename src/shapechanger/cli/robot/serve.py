@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import shutil
 import socket
@@ -189,6 +190,8 @@ class Serve:
             state_layout=profile.state_layout().to_json(),
             camera=profile.camera,
             control_hz=profile.control_hz,
+            slew_per_s=tuple(_limit(a.slew_per_s) for a in profile.actions),
+            slew_down_per_s=tuple(_limit(a.slew_down_per_s) for a in profile.actions),
             deadline_ms=profile.limits.deadline_ms,
             max_observation_age_ms=profile.max_observation_age_ms,
             reward=profile.reward,
@@ -211,6 +214,11 @@ class Serve:
         daemon = msgspec.structs.replace(daemon, camera=camera, clock=self.clock)
         patience_ms = _TWIN_PATIENCE_MS if self.clock == "twin" else 0
         return ServePlan(guard, daemon.to_dict(), board.hardware, patience_ms=patience_ms)
+
+
+def _limit(slew_per_s: float) -> float:
+    """Return a slew as JSON has it: 0 for no limit."""
+    return slew_per_s if math.isfinite(slew_per_s) else 0.0
 
 
 def _require_free(host: str, port: int) -> None:

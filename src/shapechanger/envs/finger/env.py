@@ -22,7 +22,7 @@ from shapechanger.bodies.finger import (
 from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TENSION_N
 from shapechanger.bodies.finger.model import FingerFigure
 from shapechanger.envs.actions import check_action
-from shapechanger.envs.finger.gap import Gap, resolve_gap
+from shapechanger.envs.finger.gap import Gap, resolve_gap, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.renderer import Renderer, body_reach, draw
@@ -30,6 +30,7 @@ from shapechanger.errors import FingerError, UnknownName
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.rendering import choose_gl, require_screen
 from shapechanger.tasks.finger import FingerSenses, FingertipReward, features_of_senses
+from shapechanger.tasks.measure import Measure
 
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
@@ -43,6 +44,9 @@ _CAMERA: Final[Mapping[str, Any]] = {
     "elevation": -15.0,
 }
 _PICTURE: Final = 480
+
+SMOOTHNESS: Final = Measure("smoothness", "1", "smoothness", "episode")
+"""1 minus the mean change of a tendon's command per step, over its range of 2."""
 
 
 class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
@@ -115,6 +119,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         else:
             self._use(self._gap.draw(np.random.default_rng(finger_seed or 0)))
         self._senses: FingerSenses | None = None
+        self._change = np.zeros(len(TENDONS))  # Of the command, in the newest step.
         self.action_layout = Layout(
             tuple(
                 Feature(f"{name}/command", "1", -1.0, 1.0, Element("tendon", name))
@@ -151,21 +156,30 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         if self._senses is None:
             raise gym.error.ResetNeeded("Call reset() before the first step.")
         checked = check_action(self, action)
-        self._senses = self.plant.act(np.asarray(checked, np.float64), self.np_random)
+        before = self._senses.commands
+        self._senses = self._move(np.clip(np.asarray(checked, np.float64), -1.0, 1.0))
+        self._change = self._senses.commands - before
         return self._senses
+
+    def _move(self, command: NDArray[np.float64]) -> FingerSenses:
+        """Apply a command, -1 to 1, (7,), for one control period."""
+        return self.plant.act(command, self.np_random)
 
     def _terms(self, place: NDArray[np.float64]) -> tuple[float, dict[str, float]]:
         """Return the distance of the fingertip from its target, m, and the terms of the reward."""
         distance = float(np.linalg.norm(self.plant.fingertip - place))
         tension = np.abs(self.plant.data.actuator_force) / self._most
-        return distance, self._reward.terms(distance, float(np.mean(tension**2)), CONTROL_DT)
+        effort, change = float(np.mean(tension**2)), float(np.mean(self._change**2))
+        return distance, self._reward.terms(distance, effort, change, CONTROL_DT)
 
     def _stepped(
         self, observation: Any, info: dict[str, Any], terms: dict[str, float]
     ) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Return the result of a step, whose reward is the sum of `terms`."""
-        diverged = {"diverged": True} if self.plant.diverged else {}
-        return observation, sum(terms.values()), False, False, {**info, **terms, **diverged}
+        more: dict[str, Any] = {SMOOTHNESS.key: 1.0 - 0.5 * float(np.abs(self._change).mean())}
+        if self.plant.diverged:
+            more["diverged"] = True
+        return observation, sum(terms.values()), False, False, {**info, **terms, **more}
 
     def render(self) -> Any:
         """Return a frame of `render_mode`; None without one.
@@ -211,6 +225,15 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         for name in ("parameters", "gap"):
             if isinstance(kwargs.get(name), msgspec.Struct):
                 kwargs[name] = msgspec.to_builtins(kwargs[name])
+
+    @property
+    def motors(self) -> FingerParameters | None:
+        """What a rig's profile tells about its motors and path; None where there is no path."""
+        own = self.parameters
+        if own.path is None:
+            return None
+        known = {"most_tension": own.most_tension, "least_tension": own.least_tension}
+        return with_gears(NOMINAL.replace(**known, path=own.path))
 
     # Interface of transfer studies; see `shapechanger.transfer`.
 

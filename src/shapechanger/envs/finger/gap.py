@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.finger import NOMINAL, FingerParameters
+from shapechanger.bodies.finger import NOMINAL, CommandPath, FingerParameters
 from shapechanger.bodies.finger.tensions import spans_all_torques
 from shapechanger.errors import FingerError, UnknownName
 
@@ -25,6 +25,8 @@ _LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"}
 # Relative errors of identified arms and stretch, and of joints: `benchmarks.finger_identify`.
 _FOUND: Final = 0.03
 _JOINTS_FOUND: Final = 0.2
+# Error of an identified delay on the path of a rig, s: `benchmarks.finger_path`.
+_DELAY_FOUND_S: Final = 0.005
 
 Range = tuple[float, float]
 
@@ -47,7 +49,7 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         tension_noise: Standard deviation of measured tensions, N.
         tendon_damping: N·s/m.
         least_tension: N.
-        around: The finger that errors and factors refer to.
+        around: The finger that errors and factors refer to, whose path of commands all have.
 
     Raises:
         FingerError: If a range is empty, not finite or negative, begins at 0 where logarithms are
@@ -108,6 +110,7 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             tension_noise=rng.uniform(*self.tension_noise),
             tendon_damping=rng.uniform(*self.tendon_damping),
             least_tension=rng.uniform(*self.least_tension),
+            path=self.around.path,
         )
 
     def _arms(self, rng: np.random.Generator) -> NDArray[np.float64]:
@@ -164,10 +167,10 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
         ),
         # The same for geared servos with spools of 1 cm, as in the profile "finger": the rotors
         # have 1.4 kg, 4 N·s/m of damping and 0.5 N of friction at the tendon (the motor's numbers,
-        # `shapechanger.twin.servos.motor`, divided by the spool's radius). The motor's force takes
-        # 1 ms, but a rig needs 50 ms to change it over its whole range, and measurements are late:
-        # a lag represents both, as policies did there as they do here with 40 to 60 ms. Tensions
-        # are 1 to 15 of 25 N. The width of the ranges around these numbers is chosen.
+        # `shapechanger.twin.servos.motor`, divided by the spool's radius). Rates and slew are those
+        # of the profile. A command waits up to 10 ms for the guard's tick, exactly so long on a
+        # twin; the current takes 1 ms. Tensions are 1 to 15 of 25 N. The width of the ranges around
+        # these numbers is chosen.
         "geared": Gap(
             arm_error=0.25,
             joint_factor=(0.6, 1.6),
@@ -176,12 +179,17 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
             tendon_stiffness=(5e3, 30e3),
             backlash=(0.0, 0.5e-3),
             motor_kg=(1.0, 2.0),
-            motor_lag=(0.005, 0.030),
-            command_delay=(0.020, 0.060),
+            motor_lag=(0.001, 0.005),
+            command_delay=(0.005, 0.015),
             joint_noise=(0.0, 1.5 * _DEGREE),
             tension_noise=(0.0, 0.6),
             tendon_damping=(3.0, 10.0),
             least_tension=(0.5, 1.5),
+            around=NOMINAL.replace(
+                path=CommandPath(
+                    control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0
+                )
+            ),
         ),
     }
 )
@@ -205,12 +213,13 @@ def with_gears(parameters: FingerParameters) -> FingerParameters:
 def geared_around(found: FingerParameters) -> Gap:
     """Return the gap of a finger on geared servos after identification.
 
-    Arms, joints and stretch are close to the identified ones; parameters of the motors, which a log
-    hardly reveals, keep their ranges in "geared".
+    Path, arms, joints, stretch and delay are those identified, within their errors; parameters of
+    the motors, which a log hardly reveals, keep their ranges in "geared".
 
     Args:
         found: The identified parameters.
     """
+    late = found.command_delay + _DELAY_FOUND_S
     stiffness = found.tendon_stiffness or GAPS["geared"].tendon_stiffness[1]
     return msgspec.structs.replace(
         GAPS["geared"],
@@ -218,6 +227,7 @@ def geared_around(found: FingerParameters) -> Gap:
         arm_error=_FOUND,
         joint_factor=(1.0 - _JOINTS_FOUND, 1.0 + _JOINTS_FOUND),
         strength=(1.0, 1.0),
+        command_delay=(max(0.0, found.command_delay - _DELAY_FOUND_S), late),
         tendon_stiffness=((1.0 - _FOUND) * stiffness, (1.0 + _FOUND) * stiffness),
         joint_noise=(found.joint_noise, found.joint_noise),
         tension_noise=(found.tension_noise, found.tension_noise),

@@ -169,6 +169,7 @@ def record_babble(
         actions=actions,
         control_dt=control_dt,
         source=name,
+        motors=getattr(env.unwrapped, "motors", None),
     )
 
 
@@ -180,19 +181,16 @@ def _places(layout: Layout, names: tuple[str, ...], kind: str) -> list[int]:
     return [slices[f"{name}/{kind}"].start for name in names]
 
 
-def identify_env(
-    env: gym.Env[Any, Any], actions: str, seed: int, known: FingerParameters | None = None
-) -> FingerParameters:
+def identify_env(env: gym.Env[Any, Any], actions: str, seed: int) -> FingerParameters:
     """Move a finger for ten seconds, and identify its parameters.
 
     Args:
         env: Env of the finger, without a time limit.
         actions: What its actions command.
         seed: Seed of the motions.
-        known: A finger with the same motors; None if nothing is known about them.
 
     Raises:
         FingerError: If the motions do not suffice, or observations are not a vector.
         MissingExtra: If `mujoco.sysid` is not installed.
     """
-    return identify(record_babble(env, _SECONDS, seed, actions), known=known).parameters
+    return identify(record_babble(env, _SECONDS, seed, actions)).parameters

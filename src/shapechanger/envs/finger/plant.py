@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from shapechanger.bodies.finger import JOINTS, TENDONS, FingerParameters, TendonDrive, build_finger
 from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
 from shapechanger.bodies.finger.model import FINGERTIP, TARGET
+from shapechanger.bodies.finger.path import HeldTensions, hold_controls
 from shapechanger.tasks.finger import FingerSenses, fingertip
 
 # Time constant of the smoothing of velocities, s: two control periods.
@@ -73,7 +74,11 @@ class FingerPlant:
         # A view, because reading the warnings one by one takes longer than a step.
         self._warnings: NDArray[np.int32] = cast("Any", self.data.warning).number
         self._drive = drive
-        self._frame_skip = round(control_dt / self.model.opt.timestep)
+        timestep = self.model.opt.timestep
+        self._frame_skip = round(control_dt / timestep)
+        self._held: HeldTensions | None = None
+        if parameters.path is not None:
+            self._held = HeldTensions(parameters.path, parameters, drive, control_dt, timestep)
         self._arms = parameters.arms
         self._tip = self.data.site_xpos[self.model.site(FINGERTIP).id]
         self._command = np.zeros(_N_TENDONS)
@@ -117,13 +122,10 @@ class FingerPlant:
         length = -self._arms @ angles
         command = self._drive.command(np.full(_N_TENDONS, least), length, np.zeros(_N_TENDONS))
         self._command = np.clip(command, -1.0, 1.0)
-        data.ctrl[:] = self._command
-        data.act[:] = self._command
-        if self.parameters.command_delay > 0.0:
-            # A new history holds zeros; this command acts until the first one arrives.
-            for i, held in enumerate(self._command):
-                samples = np.full((model.actuator_history[i, 0], 1), held)
-                mujoco.mj_initCtrlHistory(model, data, i, None, samples)
+        controls = self._command
+        if self._held is not None:
+            controls = self._held.start(np.full(_N_TENDONS, least))
+        hold_controls(model, data, controls)
         mujoco.mj_forward(model, data)
         self._angles = self._measured(rng)
         self._differences.forget()
@@ -138,8 +140,11 @@ class FingerPlant:
             rng: Source of measurement noise.
         """
         self._command = np.clip(np.asarray(command, np.float64), -1.0, 1.0)
-        self.data.ctrl[:] = self._command
-        mujoco.mj_step(self.model, self.data, self._frame_skip)
+        if self._held is None:
+            self.data.ctrl[:] = self._command
+            mujoco.mj_step(self.model, self.data, self._frame_skip)
+        else:
+            self._held.advance(self.model, self.data, self._command)
         mujoco.mj_kinematics(self.model, self.data)  # Move the fingertip to the new angles.
         self._angles = self._measured(rng)
         if self.parameters.joint_noise > 0.0:

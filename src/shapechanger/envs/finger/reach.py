@@ -10,7 +10,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
-from shapechanger.envs.finger.env import FingerEnv, as_numbers
+from shapechanger.envs.finger.env import SMOOTHNESS, FingerEnv, as_numbers
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_posture
 from shapechanger.errors import FingerError
@@ -40,7 +40,8 @@ class FingerReachEnv(FingerEnv):
     `achieved_goal` (3) and `desired_goal` (3), for learners with hindsight.
 
     ## Reward
-    `FingertipReward`: nearness to the target minus effort. With `goal=True` it is -1 where the
+    `FingertipReward`: nearness to the target minus effort, and minus the change of the commands
+    where `reward={"change": 5.0}` or so gives it a weight. With `goal=True` it is -1 where the
     measured fingertip is farther than 5 mm from the target and 0 elsewhere, as in
     `compute_reward`.
 
@@ -53,7 +54,8 @@ class FingerReachEnv(FingerEnv):
 
     ## Info
     `is_success`, whether the fingertip has been within 5 mm for the last 0.2 s; `distance`, m, of
-    the true fingertip; `target`, m; `reward_nearness` and `reward_effort` (with `goal=True`
+    the true fingertip; `target`, m; `smoothness`, 1 minus the mean change of the commands over
+    their range; `reward_nearness`, `reward_effort` and `reward_change` (with `goal=True`
     `reward_goal`); `diverged` where the simulation diverged.
 
     Args:
@@ -61,7 +63,7 @@ class FingerReachEnv(FingerEnv):
         **arguments: Arguments of `FingerEnv`.
     """
 
-    measures = (SUCCESS, RETURN)
+    measures = (SUCCESS, RETURN, SMOOTHNESS)
     _options = ("posture", "target")
 
     def __init__(self, *, goal: bool = False, **arguments: Any) -> None:

@@ -175,7 +175,8 @@ class FingerTrackEnv(FingerEnv):
     ## Info
     `distance`, m, of the true fingertip from the point; `rms`, m, its root mean square since 0.5 s
     after the start; `is_success`, whether that is below 3 mm; `target`, m;
-    `reward_nearness` and `reward_effort`; `diverged` where the simulation diverged.
+    `smoothness`, `reward_nearness`, `reward_effort` and `reward_change`; `diverged` where the
+    simulation diverged.
 
     Args:
         path: A path of `shapechanger.tasks.paths`; its name, "circle", "figure-eight", "line" or

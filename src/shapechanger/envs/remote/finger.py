@@ -5,18 +5,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, cast
 
-import gymnasium as gym
 import msgspec
 import mujoco
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, CommandPath, FingerParameters
 from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
-from shapechanger.envs.actions import check_action
 from shapechanger.envs.finger.env import check_posture
 from shapechanger.envs.finger.gap import GAPS, geared_around, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT
@@ -42,6 +40,8 @@ _START_OFF_RAD: Final = 0.03
 _START_S: Final = 1.0
 # Time for the pretension to wind in slack, s.
 _SLACK_S: Final = 0.6
+# Weight of the reward in a source for a rig: what changes fast costs, because a rig cannot follow.
+_CALM: Final = {"change": 5.0}
 # Prefixes of infos that concern driving only.
 _DRIVING: Final = ("reward", "frame", "captured_ns")
 
@@ -245,7 +245,7 @@ class RemoteFingerEnv(FingerReachEnv):
 
     def randomised_source(self) -> dict[str, Any]:
         """Return arguments of `Finger-v1` for random fingers with geared servos."""
-        return {"gap": "geared"}
+        return {"gap": "geared", "reward": _CALM}
 
     def identified_source(self, seed: int) -> dict[str, Any]:
         """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
@@ -260,17 +260,33 @@ class RemoteFingerEnv(FingerReachEnv):
             FingerError: If the motions do not suffice, or observations are not a vector.
             MissingExtra: If `mujoco.sysid` is not installed.
         """
-        rig = self._rig_senses
-        pulls = {
-            "most_tension": tuple(rig.most.tolist()),
-            "least_tension": float(rig.least.max()),
-        }
-        known = with_gears(NOMINAL.replace(**pulls))
         # An optimiser, which an env that only steps does not need.
         from shapechanger.envs.finger.identification import identify_env
 
-        found = identify_env(self, self._actions, seed, known)
-        return {"gap": msgspec.to_builtins(geared_around(found))}
+        found = identify_env(self, self._actions, seed)
+        return {"gap": msgspec.to_builtins(geared_around(found)), "reward": _CALM}
+
+    @property
+    def motors(self) -> FingerParameters:
+        """The nominal finger with the rig's range of tensions and path, on geared servos."""
+        rig, welcome = self._rig_senses, self._rig.welcome
+        # The slowest of its servos stands for all.
+        slews = [
+            min((slew for slew in given if slew > 0.0), default=None)
+            for given in (welcome.slew_per_s, welcome.slew_down_per_s)
+        ]
+        return with_gears(
+            NOMINAL.replace(
+                most_tension=tuple(rig.most.tolist()),
+                least_tension=float(rig.least.max()),
+                path=CommandPath(
+                    control_hz=welcome.control_hz,
+                    tick_hz=welcome.tick_hz,
+                    slew_per_s=slews[0],
+                    slew_down_per_s=slews[1],
+                ),
+            )
+        )
 
     def _place(self, options: dict[str, Any] | None) -> FingerSenses:
         """Arm the rig, and bring the finger to its start."""
@@ -300,14 +316,11 @@ class RemoteFingerEnv(FingerReachEnv):
         self._senses = dataclasses.replace(senses, commands=self._command)
         return self._senses
 
-    def _act(self, action: Any) -> FingerSenses:
-        if self._senses is None:
-            raise gym.error.ResetNeeded("Call reset() before the first step.")
-        checked = np.asarray(check_action(self, action), np.float64)
-        self._command = np.clip(checked, -1.0, 1.0)
-        asked = self.drive.tension(self._command, self._senses.lengths, self._rig_senses.speeds)
-        self._senses = self._pull(asked)
-        return self._senses
+    def _move(self, command: NDArray[np.float64]) -> FingerSenses:
+        """Convert a command to tensions, and pull for one control period."""
+        self._command = command
+        lengths = cast("FingerSenses", self._senses).lengths
+        return self._pull(self.drive.tension(command, lengths, self._rig_senses.speeds))
 
     def _pull(self, tensions: NDArray[np.float64]) -> FingerSenses:
         """Command tensions, N, (7,), for one control period."""

@@ -25,6 +25,8 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         camera: Settings of the camera; None without one.
         control_hz: Commands per second that the robot expects.
         tick_hz: Rate of the guard, Hz.
+        slew_per_s: Fastest change of each action away from rest, 1/s; 0 for no limit.
+        slew_down_per_s: Fastest change of each action towards rest, 1/s; 0 for no limit.
         deadline_ms: Longest time that a command acts, ms; the guard enforces it.
         max_observation_age_ms: Oldest observation that a command may answer, ms.
         reward: Weights of the task, by name.
@@ -49,6 +51,8 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     camera: CameraPlan | None = None
     control_hz: Annotated[float, Meta(gt=0.0, le=100_000.0)] = 20.0
     tick_hz: Annotated[float, Meta(gt=0.0)] = 100.0
+    slew_per_s: tuple[float, ...] = ()
+    slew_down_per_s: tuple[float, ...] = ()
     deadline_ms: Annotated[int, Meta(ge=1)] = 250
     max_observation_age_ms: Annotated[int, Meta(ge=1)] = 400
     reward: dict[str, float] = {}

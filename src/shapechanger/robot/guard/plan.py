@@ -23,7 +23,8 @@ class ActionPlan:
         low: Lower cap; smaller values are clipped.
         high: Upper cap. The full range of an action is -1 to 1, or 0 to 1 if `one_sided`.
         rest: Value at rest, the end of every stop.
-        slew_per_s: Fastest change away from rest, 1/s. Changes towards rest are immediate.
+        slew_per_s: Fastest change away from rest, 1/s.
+        slew_down_per_s: Fastest change towards rest, 1/s. An action that propels has no limit.
         levels: "any", or "three" for a motor with only full left, off and full right.
         threshold: Magnitude from which a value counts as full if `levels` is "three".
         propels: Whether it propels the robot; such an action rests at once in a stop.
@@ -37,6 +38,7 @@ class ActionPlan:
     high: float = 1.0
     rest: float = 0.0
     slew_per_s: float = math.inf
+    slew_down_per_s: float = math.inf
     levels: Literal["any", "three"] = "any"
     threshold: float = 0.33
     propels: bool = False

@@ -208,8 +208,8 @@ def clipped(action: ActionPlan, value: float) -> bool:
 def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> float:
     """Return the next value on the way to the target.
 
-    It jumps towards rest, is limited by the slew away from rest, and pauses at rest for one step
-    when it changes sides. A three-level motor has no slew.
+    The slew limits it away from rest and towards rest, and it pauses at rest for one step when it
+    changes sides. A three-level motor has no slew.
 
     Args:
         action: The action.
@@ -219,12 +219,12 @@ def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> floa
     """
     is_away, will_be_away = now - action.rest, aim - action.rest
     if is_away < 0.0 < will_be_away or will_be_away < 0.0 < is_away:
-        return action.rest
-    if abs(will_be_away) <= abs(is_away):
+        aim = action.rest
+    falls = abs(aim - action.rest) <= abs(is_away)
+    slew_per_s = action.slew_down_per_s if falls else action.slew_per_s
+    if action.levels == "three" or math.isinf(slew_per_s):
         return aim
-    if action.levels == "three" or math.isinf(action.slew_per_s):
-        return aim
-    step = action.slew_per_s * elapsed_s
+    step = slew_per_s * elapsed_s
     return aim if abs(aim - now) <= step else now + math.copysign(step, aim - now)
 
 

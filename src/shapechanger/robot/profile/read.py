@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -164,6 +165,9 @@ def _read_action(name: str, section: Section) -> ActionPlan:
         raise section.mistake(words, "rest")
     if action.propels and action.rest != 0.0:
         raise section.mistake(f"rest of {section} must be 0, because it propels", "rest")
+    if action.propels and action.slew_down_per_s < math.inf:
+        words = f"{section} cannot have slew_down_per_s, because it propels: a stop is immediate"
+        raise section.mistake(words, "slew_down_per_s")
     if action.gain != 1.0 and action.unit == "1":
         raise section.mistake(f"gain of {section} needs a unit, such as unit = 'deg'", "gain")
     return action

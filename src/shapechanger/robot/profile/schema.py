@@ -274,6 +274,7 @@ ACTION_KEYS: Final = (
     ProfileKey("high", "number", 1.0, low=-1.0, high=1.0),
     ProfileKey("rest", "number", 0.0, low=-1.0, high=1.0),
     ProfileKey("slew_per_s", "number", math.inf, low=0.0, above=True),
+    ProfileKey("slew_down_per_s", "number", math.inf, low=0.0, above=True),
     ProfileKey("levels", "choice", "any", names=("any", "three")),
     ProfileKey("threshold", "number", 0.33, low=0.0, high=1.0, above=True),
     ProfileKey("propels", "truth", False),

@@ -12,7 +12,12 @@ if TYPE_CHECKING:
     from shapechanger.transfer.body_map import BodyMap
     from shapechanger.transfer.learners.evaluation import Evaluation
 
-__all__ = ["DemonstrationFile", "Learner", "PolicyOrigin"]
+__all__ = ["DemonstrationFile", "Learner", "PolicyOrigin", "ignore"]
+
+
+def ignore(evaluation: Evaluation) -> None:
+    """Discard an evaluation: given as `on_evaluation`, none is needed along the way."""
+    del evaluation
 
 
 class DemonstrationFile(NamedTuple):
@@ -82,7 +87,7 @@ class Learner(Protocol):
             only_last: Whether only the final evaluation is needed.
             callback: A callback of Stable-Baselines3 for the training; None for none.
             rehearsal: Demonstrations that `start` was cloned from, to mix in; None for none.
-            on_evaluation: Called with each evaluation.
+            on_evaluation: Called with each evaluation; `ignore` where none is needed.
             on_steps: Called with the number of steps done.
 
         Raises:

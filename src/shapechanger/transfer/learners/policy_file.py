@@ -58,6 +58,8 @@ class PolicyCard(msgspec.Struct, frozen=True):
         seed: Seed of the training.
         version: Version of Shapechanger.
         command: The command that wrote it; empty in a study, where `study.json` holds it.
+        start_log_std: Logarithm of the standard deviation of each action where its training started
+            from another policy; None if it did not, or if the deviation is no parameter.
     """
 
     env: EnvRef
@@ -69,6 +71,7 @@ class PolicyCard(msgspec.Struct, frozen=True):
     seed: int
     version: str
     command: str = ""
+    start_log_std: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import msgspec
 
 from shapechanger.errors import StudyError, UnknownName
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners import DemonstrationFile
+from shapechanger.transfer.learners import DemonstrationFile, ignore
 
 if TYPE_CHECKING:
     from shapechanger.transfer.body_map import BodyMap
@@ -117,7 +117,7 @@ class MethodRun:
         body_map: BodyMap | None = None,
         callback: Any = None,
         rehearsal: Any = None,
-        on_evaluation: Callable[[Evaluation], None] = lambda evaluation: None,
+        on_evaluation: Callable[[Evaluation], None] = ignore,
     ) -> Any:
         """Train a policy with the study's learner.
 
