@@ -1,12 +1,13 @@
 """Surroundings of a harbour's lane: quays, their fittings, moored boats and a far shore.
 
-All of it is behind the visible side of the walls, where no vehicle comes, and is only drawn.
+It is drawn only. But for dinghies, which are obstacles, and for tyres and ladders, which stand out
+of their wall by 2 cm at most, all of it is behind the walls, where no vehicle comes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -109,9 +110,9 @@ def fittings(course: Course) -> Patches:
             add_solid(patches, moved(tyre, foot, yaw), "rubber")
         elif draws[1] < _TYRE + _LADDER:
             add_solid(patches, moved(_ladder(length - place, wall.height), foot, yaw), "rust")
-    for x, y, yaw, length, kind in moored(course):
-        for faces, stuff in _boat(length, kind):
-            add_solid(patches, moved(faces, (x, y, 0.0), yaw), stuff)
+    for boat in moored(course):
+        for faces, stuff in _boat(boat.length, boat.kind):
+            add_solid(patches, moved(faces, (boat.x, boat.y, 0.0), boat.yaw), stuff)
     for faces, stuff in _village(course, rng):
         add_solid(patches, faces, stuff, reflected=False)
     return patches
@@ -149,8 +150,26 @@ def _ladder(x: float, height: float) -> Faces:
     )
 
 
-def moored(course: Course) -> list[tuple[float, float, float, float, str]]:
-    """Boats behind the quays: x and y, m, yaw, rad, length, m, and kind.
+class MooredBoat(NamedTuple):
+    """A boat behind a quay.
+
+    Attributes:
+        x: Position of its middle, m.
+        y: Position of its middle, m.
+        yaw: Direction of its bow, rad.
+        length: Length, m.
+        kind: "sail", "motor" or "fishing".
+    """
+
+    x: float
+    y: float
+    yaw: float
+    length: float
+    kind: str
+
+
+def moored(course: Course) -> list[MooredBoat]:
+    """Boats along the rear sides of quays, where there is room.
 
     Args:
         course: The course.
@@ -158,30 +177,32 @@ def moored(course: Course) -> list[tuple[float, float, float, float, str]]:
     rng = np.random.default_rng([course.seed, 80])
     starts = np.array([wall.start for wall in course.walls])
     ways = np.array([wall.end for wall in course.walls]) - starts
-    placed: list[tuple[float, float, float, float, str]] = []
-    for i in rng.permutation(len(course.walls)):
+    placed: list[MooredBoat] = []
+    for i in map(int, rng.permutation(len(course.walls))):
         wall, length = course.walls[i], float(rng.uniform(1.5, 2.8))
-        kind = ("sail", "motor", "fishing")[rng.integers(3)]
-        turned = float(rng.integers(2)) * np.pi
+        kind = _KINDS[int(rng.integers(len(_KINDS)))]
+        yaw = float(np.arctan2(ways[i, 1], ways[i, 0]) + rng.integers(2) * np.pi)
         if wall.surface != "quay" or len(placed) == _MOST_BOATS:
             continue
         half = 0.5 * _BEAM * length
-        middle = 0.5 * (np.asarray(wall.start) + wall.end)
-        x, y = middle + (BANK_M + _SPACE_M + half) * _behind(wall)
-        yaw = float(np.arctan2(ways[i, 1], ways[i, 0])) + turned
-        axis = np.linspace(-0.5, 0.5, 5)[:, None] * length * (np.cos(yaw), np.sin(yaw)) + (x, y)
+        place: Array = starts[i] + 0.5 * ways[i] + (BANK_M + _SPACE_M + half) * _behind(wall)
+        axis = np.linspace(-0.5, 0.5, 5)[:, None] * length * (np.cos(yaw), np.sin(yaw)) + place
         # Distance of each point of its axis from each wall.
         away = axis[:, None, :] - starts
         share = np.clip((away * ways).sum(axis=2) / (ways * ways).sum(axis=1), 0.0, 1.0)
         near = np.linalg.norm(away - share[..., None] * ways, axis=2).min()
         if near < half + BANK_M:
             continue
-        if any(np.hypot(x - a, y - b) < 0.55 * (length + c) for a, b, _, c, _ in placed):
-            continue
-        placed.append((float(x), float(y), yaw, length, kind))
+        boat = MooredBoat(float(place[0]), float(place[1]), yaw, length, kind)
+        if all(
+            np.hypot(boat.x - other.x, boat.y - other.y) > 0.55 * (length + other.length)
+            for other in placed
+        ):
+            placed.append(boat)
     return placed
 
 
+_KINDS: Final = ("sail", "motor", "fishing")
 _BEAM: Final = 0.34  # Width of a boat over its length.
 
 
@@ -246,7 +267,8 @@ def dinghy(obstacle: Obstacle) -> list[tuple[Faces, str]]:
         ends = (rear * long, -half * wide, low * high), (front * long, half * wide, top * high)
         made.append((block(*ends), stuff))
 
-    if round(1000.0 * long) % 2:  # Half of them.
+    has_cabin = round(1000.0 * long) % 2 == 1  # Half of them.
+    if has_cabin:
         add(-0.05, 0.30, 0.34, 0.55, 0.92, "hull")
         add(-0.08, 0.33, 0.38, 0.92, 1.0, "wood")
         add(0.29, 0.305, 0.28, 0.66, 0.88, "black")
@@ -256,7 +278,7 @@ def dinghy(obstacle: Obstacle) -> list[tuple[Faces, str]]:
         add(-0.44, 0.40, 0.40, 0.55, 0.635, "dark wood")
         for x in (-0.3, 0.0, 0.26):
             add(x - 0.04, x + 0.04, 0.46, 0.55, 0.70, "wood")
-    add(-0.5, -0.44, 0.10, 0.2, 1.0 if not round(1000.0 * long) % 2 else 0.8, "metal")
+    add(-0.5, -0.44, 0.10, 0.2, 0.8 if has_cabin else 1.0, "metal")  # Outboard motor.
     place = obstacle.x, obstacle.y, 0.0
     return [(moved(faces, place, obstacle.yaw), stuff) for faces, stuff in made]
 
@@ -272,9 +294,9 @@ def far_shore(course: Course) -> Patches:
     rng = np.random.default_rng([course.seed, 81])
     middle, radius = extent(course)
     angle = np.linspace(0.0, 2.0 * np.pi, _SHORE_SIDES + 1)[::-1]
-    waves = sum(
-        np.sin(k * angle + rng.uniform(0.0, 2.0 * np.pi)) / k**0.7 for k in (2, 3, 5, 8, 13, 21)
-    )
+    orders = np.array([2.0, 3.0, 5.0, 8.0, 13.0, 21.0])[:, None]
+    swing = np.sin(orders * angle + rng.uniform(0.0, 2.0 * np.pi, orders.shape))
+    waves: Array = (swing / orders**0.7).sum(axis=0)
     share = (waves - waves.min()) / np.ptp(waves)
     points = np.empty((2, _SHORE_SIDES + 1, 3))
     points[..., 0] = middle[0] + radius * np.cos(angle)

@@ -164,7 +164,8 @@ def add_solid(
     """
     low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
     faces = faces[normals(faces)[:, 2] > -0.9]  # Nothing looks up from the ground.
-    across, down, up = np.moveaxis((faces - low) / np.maximum(high - low, 1e-9), 2, 0)
+    share: Array = (faces - low) / np.maximum(high - low, 1e-9)
+    across, down, up = share[..., 0], share[..., 1], share[..., 2]
     edges = np.abs(np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1]))
     facing = edges.argmax(axis=1)[:, None]  # Axis along which the face mostly looks.
     places = np.stack(

@@ -22,11 +22,11 @@ def loft(rings: ArrayLike, *, closed: bool = True) -> Faces:
     sides = np.stack([points[:-1], after[:-1], after[1:], points[1:]], axis=2).reshape(-1, 4, 3)
     if not closed:
         return sides
-    return np.concatenate([sides, _fan(points[-1]), _fan(points[0, ::-1])])
+    return np.concatenate([sides, fan(points[-1]), fan(points[0, ::-1])])
 
 
-def _fan(ring: NDArray[np.float64]) -> Faces:
-    """Triangles that fill a convex ring, (k, 3)."""
+def fan(ring: NDArray[np.float64]) -> Faces:
+    """Triangles that fill a convex ring, (k, 3), counter-clockwise seen from outside, m."""
     first = np.broadcast_to(ring[0], (len(ring) - 2, 3))
     return np.stack([first, ring[1:-1], ring[2:], ring[2:]], axis=1)
 
@@ -70,7 +70,9 @@ def section(x: float, outline: ArrayLike) -> NDArray[np.float64]:
     return np.concatenate([np.full((len(around), 1), x), around], axis=1)
 
 
-def hull(length: float, width: float, depth: float, *, sheer: float = 0.25) -> Faces:
+def hull(
+    length: float, width: float, depth: float, *, sheer: float = 0.25, low: float = 0.0
+) -> Faces:
     """Boat's hull with a pointed bow and a transom, its middle at the origin of the waterline.
 
     Args:
@@ -78,6 +80,7 @@ def hull(length: float, width: float, depth: float, *, sheer: float = 0.25) -> F
         width: Width, m.
         depth: Height of the deck above the water amidships, m.
         sheer: Rise of the deck at the bow over the depth.
+        low: Share of the depth below which it is left out.
     """
     # Position from the middle over the length, and half width of the deck and of the waterline
     # over the width: a fair line, which is full aft.
@@ -92,12 +95,23 @@ def hull(length: float, width: float, depth: float, *, sheer: float = 0.25) -> F
     rings: list[NDArray[np.float64]] = []
     for x, deck, water in stations:
         top = depth * (1.0 + sheer * max(0.0, x + 0.1) / 0.6)
-        # The stem leans forward.
-        ahead = np.array([[x * length - 0.06 * length * max(0.0, x)] * 2, [x * length] * 2])
-        ring = section(0.0, [(water * width, 0.0), (deck * width, top)])
-        ring[:, 0] = ahead.ravel()[[0, 2, 2, 0]]
+        start = water + low * (deck - water)
+        ring = section(x * length, [(start * width, low * top), (deck * width, top)])
+        ring[[0, -1], 0] -= 0.06 * length * max(0.0, x) * (1.0 - low)  # The stem leans forward.
         rings.append(ring)
     return loft(rings)
+
+
+def extrude(outline: ArrayLike, right: float, left: float) -> Faces:
+    """Solid with an outline in the x-z plane.
+
+    Args:
+        outline: x and z, m, (k, 2), convex and counter-clockwise seen from the right.
+        right: y of its right side, m.
+        left: y of its left side, m.
+    """
+    x, z = np.asarray(outline, float).T
+    return loft([np.stack([x, np.full(len(x), y), z], axis=1) for y in (left, right)])
 
 
 def moved(faces: Faces, by: ArrayLike, yaw: float = 0.0) -> Faces:
