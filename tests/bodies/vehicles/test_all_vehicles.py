@@ -137,6 +137,19 @@ def test_a_wall_stops_a_vehicle(name: str, heading: float) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
+def test_a_vehicle_comes_off_a_wall_slowly(name: str) -> None:
+    """With open motors it rebounds at 5 to 20 % of its speed before the collision."""
+    here = ground(name, wall_x=3.0)
+    while here.vehicle.motion().x < 3.0 - here.kind.nose_m - 0.03:
+        here.drive(SIM_DT, AHEAD[name])
+    before, least = here.vehicle.motion().speed, math.inf
+    for _ in range(100):
+        here.drive(SIM_DT, dict.fromkeys(AHEAD[name]))
+        least = min(least, here.vehicle.motion().speed)
+    assert 0.05 < -least / before < 0.2
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_random_outputs_are_stable(name: str) -> None:
     """Random outputs and voltages keep the vehicle upright and its state finite."""
     rng = np.random.default_rng(7)
