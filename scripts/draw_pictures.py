@@ -1,7 +1,14 @@
-"""Draw the pictures of the README: `python scripts/draw_pictures.py`."""
+"""Draw the pictures of the README: `python scripts/draw_pictures.py`.
+
+`--only vehicles` draws one of them. `--sheets results/sheets` draws contact sheets instead, one of
+each world: a row for each vehicle and course, with the camera's picture, the same through each
+lens, and two views from outside. The last course of each vehicle is held out and has a random look.
+"""
 
 from __future__ import annotations
 
+import argparse
+import math
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -12,6 +19,10 @@ from PIL import Image
 
 from shapechanger.envs.finger.oracle import FingerOracle
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.worlds.course import FLOODED, HELD_OUT, HOME
+from shapechanger.worlds.lens import LENSES
+from shapechanger.worlds.look import LOOKS, Look
+from shapechanger.worlds.simulation import MujocoWorld
 
 PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
 ANTS: Final = ("Ant", "AmputatedAnt", "BigAnt", "ExtendedAnt")
@@ -24,11 +35,56 @@ _DRIVEN_S: Final = 3.0
 
 def main() -> None:
     """Draw four ants, four vehicles with what their cameras see, and a finger on its way."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--only", choices=("ants", "vehicles", "finger"))
+    parser.add_argument("--sheets", type=Path, help="folder for contact sheets of the worlds")
+    asked = parser.parse_args()
+    if asked.sheets is not None:
+        asked.sheets.mkdir(parents=True, exist_ok=True)
+        for world in LOOKS:
+            iio.imwrite(asked.sheets / f"{world}.png", _sheet(world))
+        return
     PICTURES.mkdir(parents=True, exist_ok=True)
-    iio.imwrite(PICTURES / "ants.jpg", _row(ANTS), quality=85)
-    seen = np.concatenate([_seen(name) for name in VEHICLES], axis=1)
-    iio.imwrite(PICTURES / "vehicles.jpg", np.concatenate([_row(VEHICLES), seen]), quality=85)
-    iio.imwrite(PICTURES / "finger.jpg", _finger(), quality=85)
+    for name, draw in (("ants", _ants), ("vehicles", _vehicles), ("finger", _finger)):
+        if asked.only in (None, name):
+            iio.imwrite(PICTURES / f"{name}.jpg", draw(), quality=85)
+
+
+def _ants() -> NDArray[np.uint8]:
+    return _row(ANTS)
+
+
+def _vehicles() -> NDArray[np.uint8]:
+    """Four vehicles from outside, and below each what its camera sees."""
+    pairs = [_seen(name) for name in VEHICLES]
+    rows = [np.concatenate(row, axis=1) for row in zip(*pairs, strict=True)]
+    return np.concatenate(rows)
+
+
+_SEEDS: Final = (0, 1, 2, HELD_OUT[0])
+
+
+def _sheet(world: str) -> NDArray[np.uint8]:
+    """Vehicles of a world on four courses; see the docstring of this script."""
+    vehicles = ["boat"] if world == FLOODED else [name for name in HOME if HOME[name] == world]
+    rows: list[NDArray[np.uint8]] = []
+    for name in vehicles:
+        for seed in _SEEDS:
+            drawn = Look.random(world, np.random.default_rng(seed))
+            look = drawn if seed == _SEEDS[-1] else None
+            here = MujocoWorld(name, world, seed, size=_SIZE, look=look)
+            seen = here.picture()
+            through = [lens(seen, seed) for lens in LENSES.values()]
+            outside = [
+                here.outside(*_SIZE),
+                here.outside(*_SIZE, 2.0 * here.reach, azimuth_rad=_BEHIND),
+            ]
+            here.close()
+            rows.append(np.concatenate([seen, *through, *outside], axis=1))
+    return np.concatenate(rows)
+
+
+_BEHIND: Final = math.radians(15.0)
 
 
 def _finger() -> NDArray[np.uint8]:
@@ -57,16 +113,18 @@ def _row(names: tuple[str, ...]) -> NDArray[np.uint8]:
     return row
 
 
-def _seen(name: str) -> NDArray[np.uint8]:
-    """What the camera of a vehicle sees after some seconds of its expert's driving."""
+def _seen(name: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """A vehicle after some seconds of its expert's driving, from outside and through its camera."""
     env = cast("Any", EnvRef(f"shapechanger/{name}-v1").make())
     picture, _ = env.reset(seed=3)
     expert = env.unwrapped.demonstrator(seed=0)
     expert.begin()
     for _ in range(round(_DRIVEN_S * env.metadata["render_fps"])):
         picture, *_ = env.step(expert.act()[1])
+    outside = env.unwrapped.picture(*_SIZE)
     env.close()
-    return np.asarray(Image.fromarray(picture).resize(_SIZE, Image.Resampling.NEAREST))
+    seen = Image.fromarray(picture).resize(_SIZE, Image.Resampling.NEAREST)
+    return outside, np.asarray(seen)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""On-board camera: offscreen rendering without shadows, reflections and antialiasing."""
+"""Cameras on board and outside: offscreen rendering without MuJoCo's shadows and reflections."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.bodies.vehicles.looks import OUTSIDE_VIEW, OWN_VIEW
 from shapechanger.errors import RenderError, WorldError
 from shapechanger.rendering import choose_gl, open_context
 
@@ -23,43 +24,35 @@ _MOST_GEOMS: Final = 2000
 _drawing: set[int] = set()
 
 
-class OnboardCamera:
-    """Renders the view of a camera in a model.
+class _Renderer:
+    """Renders views of a model.
 
     The OpenGL context is opened for the first picture, so that a process that has only built a
     camera, such as the parent of an `AsyncVectorEnv`, can be forked.
 
     Args:
         size: Width and height of the pictures in pixels.
+        hidden: Group of geoms that are not drawn.
 
     Raises:
         RenderError: If the width or the height is below 1.
     """
 
-    def __init__(self, size: tuple[int, int]) -> None:
+    def __init__(self, size: tuple[int, int], hidden: int) -> None:
         self._width, self._height = size
         if min(size) < 1:
             raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
         self._gl: Any = None
-        self._wanted: tuple[mujoco.MjModel, str] | None = None
+        self._wanted: mujoco.MjModel | None = None
         self._rect = mujoco.MjrRect(0, 0, *size)
         self._picture = np.empty((self._height, self._width, 3), np.uint8)
         self._context: mujoco.MjrContext | None = None
         self._scene: mujoco.MjvScene | None = None
         self._camera = mujoco.MjvCamera()
-        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
         self._option = mujoco.MjvOption()
+        self._option.geomgroup[hidden] = 0
 
-    def look_through(self, model: mujoco.MjModel, camera: str) -> None:
-        """Select the model and the camera.
-
-        Args:
-            model: Compiled model; its offscreen buffer is resized.
-            camera: Name of the camera.
-        """
-        self._wanted = model, camera
-
-    def _open(self, model: mujoco.MjModel, camera: str) -> None:
+    def _open(self, model: mujoco.MjModel) -> None:
         """Create the rendering context of a model."""
         if self._gl is None:
             if _drawing - {os.getpid()}:
@@ -82,6 +75,70 @@ class OnboardCamera:
         self._scene = mujoco.MjvScene(model, _MOST_GEOMS)
         for flag in _COSTLY:
             self._scene.flags[flag] = 0
+
+    def _render(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
+        """Return the picture of a state, (height, width, 3), upside down; it is overwritten.
+
+        Raises:
+            RenderError: If no model was selected, or no OpenGL context can be opened.
+        """
+        if self._wanted is not None:
+            self._open(self._wanted)
+            self._wanted = None
+        if self._scene is None or self._context is None:
+            raise RenderError("The camera has no model: call `look_through` first.")
+        self._gl.make_current()
+        mujoco.mjv_updateScene(
+            model,
+            data,
+            self._option,
+            None,
+            self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value,
+            self._scene,
+        )
+        self._arrange(self._scene)
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        mujoco.mjr_readPixels(self._picture, None, self._rect, self._context)
+        return self._picture
+
+    def _arrange(self, scene: mujoco.MjvScene) -> None:
+        """Change the geoms of a scene before it is rendered."""
+
+    def close(self) -> None:
+        """Free the OpenGL context and forget the model."""
+        self._wanted = None
+        if self._context is not None:
+            self._gl.make_current()
+            self._context.free()
+            self._context = self._scene = None
+        if self._gl is not None:
+            self._finalizer()
+            self._gl = None
+
+
+class OnboardCamera(_Renderer):
+    """Renders the view of a camera in a model, without what is only seen from outside.
+
+    Args:
+        size: Width and height of the pictures in pixels.
+
+    Raises:
+        RenderError: If the width or the height is below 1.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        super().__init__(size, OUTSIDE_VIEW)
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
+
+    def look_through(self, model: mujoco.MjModel, camera: str) -> None:
+        """Select the model and the camera.
+
+        Args:
+            model: Compiled model; its offscreen buffer is resized.
+            camera: Name of the camera.
+        """
+        self._wanted = model
         self._camera.fixedcamid = model.camera(camera).id
 
     def picture(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
@@ -97,35 +154,84 @@ class OnboardCamera:
         Raises:
             RenderError: If no model was selected, or no OpenGL context can be opened.
         """
-        if self._wanted is not None:
-            self._open(*self._wanted)
-            self._wanted = None
-        if self._scene is None or self._context is None:
-            raise RenderError("The camera has no model: call `look_through` first.")
-        self._gl.make_current()
-        mujoco.mjv_updateScene(
-            model,
-            data,
-            self._option,
-            None,
-            self._camera,
-            mujoco.mjtCatBit.mjCAT_ALL.value,
-            self._scene,
-        )
-        mujoco.mjr_render(self._rect, self._scene, self._context)
-        mujoco.mjr_readPixels(self._picture, None, self._rect, self._context)
-        return self._picture[::-1].copy()
+        return self._render(model, data)[::-1].copy()
 
-    def close(self) -> None:
-        """Free the OpenGL context and forget the model."""
-        self._wanted = None
-        if self._context is not None:
-            self._gl.make_current()
-            self._context.free()
-            self._context = self._scene = None
-        if self._gl is not None:
-            self._finalizer()
-            self._gl = None
+
+# Pixels of an outside view are the means of squares this wide, so that edges are smooth.
+_SUPERSAMPLED: Final = 2
+_BEHIND_ALL_M: Final = 1000.0
+_LARGEST: Final = 4096  # Width and height; software renderers draw no larger images.
+
+
+class OutsideCamera(_Renderer):
+    """Renders a model from outside, with smooth edges.
+
+    Args:
+        size: Width and height of the pictures in pixels.
+
+    Raises:
+        RenderError: If the width or the height is out of range.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        if max(size) > _LARGEST:
+            raise RenderError(
+                f"A view from outside has at most {_LARGEST} pixels a side, got "
+                f"{size[0]} x {size[1]}."
+            )
+        super().__init__((_SUPERSAMPLED * size[0], _SUPERSAMPLED * size[1]), OWN_VIEW)
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE.value
+        self.size = size
+
+    def look_at(self, model: mujoco.MjModel) -> None:
+        """Select the model.
+
+        Args:
+            model: Compiled model; its offscreen buffer is resized.
+        """
+        self._wanted = model
+
+    def picture(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        middle: tuple[float, float, float],
+        distance_m: float,
+        azimuth_rad: float,
+        elevation_rad: float,
+    ) -> NDArray[np.uint8]:
+        """Render a state.
+
+        Args:
+            model: The selected model.
+            data: Its state.
+            middle: Point in the middle of the picture, m.
+            distance_m: Distance from it.
+            azimuth_rad: Direction of view seen from above, from the x axis, counter-clockwise.
+            elevation_rad: Angle of view above the horizon; negative looks down.
+
+        Returns:
+            RGB picture, shape (height, width, 3), in a new array.
+
+        Raises:
+            RenderError: If no model was selected, or no OpenGL context can be opened.
+        """
+        self._camera.lookat[:] = middle
+        self._camera.distance = distance_m
+        self._camera.azimuth = math.degrees(azimuth_rad)
+        self._camera.elevation = math.degrees(elevation_rad)
+        fine = self._render(model, data)[::-1]
+        squares = fine.reshape(self.size[1], _SUPERSAMPLED, self.size[0], _SUPERSAMPLED, 3)
+        return (squares.mean(axis=(1, 3)) + 0.5).astype(np.uint8)
+
+    def _arrange(self, scene: mujoco.MjvScene) -> None:
+        """Draw the ground before the shadows on it.
+
+        MuJoCo draws translucent geoms from far to near, and takes a large one for near.
+        """
+        for geom in scene.geoms[: scene.ngeom]:
+            if geom.rgba[3] < 1.0 and geom.modelrbound > 1.0:
+                geom.modelrbound = -_BEHIND_ALL_M
 
 
 def _free(gl: Any) -> None:

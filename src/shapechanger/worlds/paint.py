@@ -306,6 +306,55 @@ def water(rng: np.random.Generator) -> Field:
     return blend(image, (0.75, 0.82, 0.84), np.clip(ripples - 1.6, 0.0, 1.0) * 0.5)
 
 
+def sea(rng: np.random.Generator) -> Field:
+    """Deep green water, 3 m wide: wavelets before the wind, whose crests mirror the sky."""
+    y, x = np.mgrid[:_GROUND, :_GROUND].astype(np.float32) * np.float32(2.0 * np.pi / _GROUND)
+    height = np.zeros((_GROUND, _GROUND), np.float32)
+    wind = rng.uniform(-np.pi, np.pi)
+    for _ in range(40):
+        # Whole numbers of waves, so that the texture repeats without a seam.
+        angle, waves = wind + rng.normal(0.0, 0.55), float(np.exp(rng.uniform(1.2, 3.9)))
+        across, down = round(waves * float(np.cos(angle))), round(waves * float(np.sin(angle)))
+        swing = np.sin(across * x + down * y + np.float32(rng.uniform(0.0, 2.0 * np.pi)))
+        height += swing * np.float32(waves**-0.35)
+    height += 0.25 * clouds(rng, _GROUND, _GROUND, 32, 32, 2) * height.std()
+    height = (height - height.mean()) / height.std()
+    image = np.asarray((0.16, 0.29, 0.31), np.float32) * (1.0 + 0.20 * height[..., None])
+    image *= 1.0 + 0.08 * clouds(rng, _GROUND, _GROUND, 3, 3, 2)[..., None]
+    image = blend(image, (0.46, 0.60, 0.66), np.clip(height - 0.7, 0.0, 1.0) * 0.55)
+    return blend(image, (0.90, 0.95, 0.97), np.clip(height - 2.0, 0.0, 1.0) * 0.9)
+
+
+def paving(rng: np.random.Generator) -> Field:
+    """Slabs of concrete on a quay, 2.4 m wide, with a pale edge of stone along the water."""
+    columns = 4
+    x = np.arange(_SIZE)[None, :] * columns / _SIZE
+    shade = rng.uniform(0.86, 1.1, columns).astype(np.float32)[x.astype(int)]
+    image = np.asarray((0.50, 0.48, 0.44), np.float32) * shade[..., None]
+    image = image * (1.0 + 0.08 * clouds(rng, _SIZE, _SIZE, 8, 24, 3)[..., None])
+    image *= 1.0 + 0.05 * grain(rng, _SIZE, _SIZE)[..., None]
+    image[:, (x[0] % 1.0) < 0.03] *= 0.55
+    edge = int(0.72 * _SIZE)
+    image[edge:] *= np.asarray((1.26, 1.25, 1.22), np.float32)
+    image[edge : edge + 6] *= 0.55
+    return image
+
+
+def shore(rng: np.random.Generator) -> Field:
+    """Far shore in haze, half a circle wide: sand, fields, woods and blue hills."""
+    height, width = 64, _GROUND
+    up = np.linspace(1.0, 0.0, height, dtype=np.float32)[:, None]
+    line = 0.18 * clouds(rng, 1, width, 1, 14, 3)
+    image = _plain((0.42, 0.52, 0.60), height, width)
+    image *= 1.0 + 0.04 * clouds(rng, height, width, 3, 40, 2)[..., None]
+    for level, colour in ((0.62, (0.34, 0.44, 0.42)), (0.42, (0.30, 0.42, 0.24))):
+        image = blend(image, colour, np.clip((level + line - up) * 14.0, 0.0, 1.0))
+        line = np.roll(line, width // 3, axis=1)
+    woods = np.clip(clouds(rng, height, width, 6, 90, 2) - 0.2, 0.0, 1.0)
+    image = blend(image, (0.16, 0.26, 0.15), woods * np.clip((0.5 - up) * 6.0, 0.0, 1.0))
+    return blend(image, (0.66, 0.60, 0.46), np.clip((0.06 - up) * 40.0, 0.0, 1.0))
+
+
 _SKY_SIZE: Final = 64
 _ZENITH: Final = np.array([0.36, 0.55, 0.82], np.float32)
 _HORIZON: Final = np.array([0.80, 0.86, 0.90], np.float32)
@@ -367,14 +416,48 @@ _COLOURS: Final[Mapping[str, tuple[float, float, float]]] = MappingProxyType(
     }
 )
 
-CELLS: Final[Mapping[str, int]] = MappingProxyType({name: i for i, name in enumerate(_COLOURS)})
-"""Index of each cell in the obstacles' texture, row by row from the top left."""
+# The same for what stands or floats behind quays, beyond the vehicle's reach.
+_HARBOUR_COLOURS: Final[Mapping[str, tuple[float, float, float]]] = MappingProxyType(
+    {
+        "white hull": (0.88, 0.89, 0.90),
+        "blue hull": (0.10, 0.22, 0.44),
+        "green hull": (0.08, 0.30, 0.22),
+        "red hull": (0.58, 0.12, 0.08),
+        "deck": (0.66, 0.52, 0.34),
+        "cabin": (0.90, 0.89, 0.85),
+        "panes": (0.10, 0.15, 0.19),
+        "spar": (0.72, 0.72, 0.70),
+        "canvas": (0.16, 0.30, 0.55),
+        "iron": (0.13, 0.12, 0.12),
+        "rubber": (0.06, 0.06, 0.06),
+        "rust": (0.42, 0.22, 0.12),
+        "house": (0.82, 0.78, 0.68),
+        "gable": (0.62, 0.28, 0.18),
+        "roof": (0.46, 0.20, 0.14),
+        "tower": (0.90, 0.88, 0.84),
+    }
+)
+
+CELLS: Final[Mapping[str, int]] = MappingProxyType(
+    {name: i for sheet in (_COLOURS, _HARBOUR_COLOURS) for i, name in enumerate(sheet)}
+)
+"""Index of each cell in its texture, "things" or "harbour", row by row from the top left."""
 
 
 def things(rng: np.random.Generator) -> Field:
     """Texture of all obstacles, with one cell for each material, (256, 256, 3)."""
+    return _sheet(_COLOURS, rng)
+
+
+def harbour(rng: np.random.Generator) -> Field:
+    """Texture of boats, quay fittings and houses, with one cell for each material."""
+    return _sheet(_HARBOUR_COLOURS, rng)
+
+
+def _sheet(colours: Mapping[str, tuple[float, float, float]], rng: np.random.Generator) -> Field:
+    """Cells of these colours, (256, 256, 3)."""
     image = np.zeros((ROWS * _CELL, ROWS * _CELL, 3), np.float32)
-    for name, colour in _COLOURS.items():
+    for name, colour in colours.items():
         row, column = divmod(CELLS[name], ROWS)
         cell = image[row * _CELL : (row + 1) * _CELL, column * _CELL : (column + 1) * _CELL]
         cell[:] = _cell(name, colour, rng)
@@ -415,6 +498,17 @@ def _cell(name: str, colour: ArrayLike, rng: np.random.Generator) -> Field:
         cell[26:40] = (0.90, 0.90, 0.86)
     elif name == "bin":
         cell[6:10] *= 2.2
+    elif name.endswith(" hull"):
+        cell[6:12] = 0.85 if name != "white hull" else (0.14, 0.20, 0.40)
+        cell[50:] = (0.30, 0.10, 0.08)  # Antifouling at the waterline.
+    elif name == "cabin":
+        cell[14:34, 8:56] = (0.10, 0.15, 0.19)
+        cell[14:34, 22:25] = cell[14:34, 39:42] = colour
+    elif name == "house":
+        for column in (8, 26, 44):
+            cell[12:26, column : column + 10] = cell[38:52, column : column + 10] = 0.22
+    elif name == "tower":
+        cell[8:20] = cell[32:44] = cell[56:] = (0.70, 0.10, 0.08)
     return cell
 
 
@@ -439,8 +533,12 @@ PAINTERS: Final[Mapping[str, Callable[[np.random.Generator], Field]]] = MappingP
             asphalt,
             grass,
             water,
+            sea,
+            paving,
+            shore,
             sky,
             things,
+            harbour,
         )
     }
 )

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.worlds.course import FLOODED, Course
+from shapechanger.worlds.harbour import far_shore, fittings
 from shapechanger.worlds.look import Colour, Look
 from shapechanger.worlds.paint import texture
-from shapechanger.worlds.surfaces import Patches, Surfaces
+from shapechanger.worlds.patches import Patches
+from shapechanger.worlds.surfaces import Surfaces
 
 # Two geoms collide if the contype of one shares a bit with the conaffinity of the other.
 _SOLID_TYPE: Final = 1
@@ -94,7 +96,7 @@ def _add_solid(
 
 
 # Texture of the ground in each world.
-_GROUND: Final = {"corridor": "floor", "yard": "asphalt", "harbour": "water", FLOODED: "water"}
+_GROUND: Final = {"corridor": "floor", "yard": "asphalt", "harbour": "sea", FLOODED: "water"}
 _DEFAULT_GROUND: Final = "asphalt"
 # Clipping planes, m. The nearest object that a camera sees is the vehicle's own bonnet.
 _NEAR: Final = 0.02
@@ -136,6 +138,9 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
         _add_texture(spec, "world/sky", sky, mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     if course.world == "yard":
         show("grass", surfaces.verges(), plain)
+    if course.world == "harbour":
+        show("shore", far_shore(course), plain)
+        show("harbour", fittings(course), plain)
     show("things", surfaces.obstacles(), plain)
     if course.lamps and course.ceiling_m > 0.0:
         # They stay bright in dim light, as they do for a camera.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shapechanger.bodies.vehicles import SIM_DT, Motion, add_vehicle, vehicle_model
 from shapechanger.errors import WorldError
-from shapechanger.worlds.camera import CameraJitter, OnboardCamera, move_camera
+from shapechanger.worlds.camera import CameraJitter, OnboardCamera, OutsideCamera, move_camera
 from shapechanger.worlds.course import HOME, Course, require_element
 from shapechanger.worlds.expert.line import CourseProgress
 from shapechanger.worlds.expert.path import CoursePath, plan_path
@@ -40,6 +40,12 @@ _SOLID_GROUP: Final = 3  # Group of the collision geoms; see `shapechanger.world
 _ROUNDING_S: Final = 1e-9
 # Laying out a course takes 70 ms and planning a path 60, so both are kept; a model takes 5 MB.
 _KEPT_COURSES: Final = 64
+# View from outside: from the right and ahead, a little above, at a height on the vehicle, m. At
+# MuJoCo's field of view of 45 degrees a sphere of radius 1 fills the height at a distance of 2.6.
+_PORTRAIT_RAD: Final = math.radians(125.0)
+_ABOVE_RAD: Final = math.radians(-20.0)
+_LOOKED_AT_M: Final = 0.06
+_DISTANCE_PER_REACH: Final = 3.0
 # Farthest distance between two updates of the progress, m: well below `line.WINDOW_M`.
 _PROGRESS_M: Final = 0.5
 
@@ -83,6 +89,7 @@ class MujocoWorld:
         self._world = HOME[vehicle] if world is None else world
         self.look: Look = Look.of(self._world) if look is None else look
         self._camera = None if size is None else OnboardCamera(size)
+        self._outside: OutsideCamera | None = None
         self.lenses = tuple(lenses)
         self._distortions = [find_lens(name) for name in lenses]
         self.resting_v = RESTING_V
@@ -152,6 +159,8 @@ class MujocoWorld:
         self._solid[_SOLID_GROUP] = 1
         if self._camera is not None:
             self._camera.look_through(self.model, _CAMERA)
+        if self._outside is not None:
+            self._outside.look_at(self.model)
         self.place(seed)
 
     def place(self, seed: int) -> None:
@@ -299,11 +308,55 @@ class MujocoWorld:
             picture = distort(picture, self.course.seed)
         return picture
 
+    @property
+    def reach(self) -> float:
+        """Distance from the middle of the vehicle, trailer included, to its farthest point, m."""
+        return 0.5 * math.hypot(self.vehicle.length_m, self.vehicle.width_m)
+
+    def outside(
+        self,
+        width: int = 480,
+        height: int = 360,
+        reach: float | None = None,
+        *,
+        azimuth_rad: float = _PORTRAIT_RAD,
+        elevation_rad: float = _ABOVE_RAD,
+    ) -> NDArray[np.uint8]:
+        """Picture of the vehicle in its world from outside, (height, width, 3).
+
+        Args:
+            width: Width in pixels.
+            height: Height in pixels.
+            reach: Radius in view around the middle of the vehicle, m; None for its own reach.
+            azimuth_rad: Direction of view from its heading, counter-clockwise; 0 is from behind.
+            elevation_rad: Angle of view above the horizon; negative looks down.
+
+        Raises:
+            RenderError: If the size is out of range, or nothing can be drawn here.
+        """
+        if self._outside is None or self._outside.size != (width, height):
+            camera = OutsideCamera((width, height))
+            if self._outside is not None:
+                self._outside.close()
+            self._outside = camera
+            camera.look_at(self.model)
+        x, y, heading = self._motion[:3]
+        middle = self.vehicle.nose_m - 0.5 * self.vehicle.length_m
+        return self._outside.picture(
+            self.model,
+            self.data,
+            (x + middle * math.cos(heading), y + middle * math.sin(heading), _LOOKED_AT_M),
+            _DISTANCE_PER_REACH * (reach or self.reach),
+            heading + azimuth_rad,
+            elevation_rad,
+        )
+
     def close(self) -> None:
-        """Free the camera's OpenGL context."""
-        if self._camera is not None:
-            self._camera.close()
-            self._camera = None
+        """Free the cameras' OpenGL contexts."""
+        for camera in (self._camera, self._outside):
+            if camera is not None:
+                camera.close()
+        self._camera = self._outside = None
 
     def _rest_at(self, pose: Pose) -> None:
         mujoco.mj_resetData(self.model, self.data)
@@ -336,7 +389,7 @@ def _compiled(vehicle: str, world: str, seed: int, look: Look) -> tuple[Course, 
     course = lay_out(world, seed)
     spec = mujoco.MjSpec()
     add_course(spec, course, look)
-    add_vehicle(spec, vehicle)
+    add_vehicle(spec, vehicle, look.tone())
     return course, spec.compile()
 
 

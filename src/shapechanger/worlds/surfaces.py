@@ -4,159 +4,16 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course, Obstacle, Wall
+from shapechanger.worlds.harbour import add_banks, dinghy, extent
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.paint import CELLS, ROWS
-
-Array = NDArray[np.float64]
-
-# The corners of a patch are counter-clockwise seen from its front.
-_TRIANGLES: Final = np.array([[0, 1, 2], [0, 2, 3]])
-# A mirrored patch has the opposite order.
-_MIRRORED: Final = np.array([[0, 2, 1], [0, 3, 2]])
-_DOWN: Final = np.array([1.0, 1.0, -1.0])
-
-
-@dataclass(slots=True)
-class Patches:
-    """Patches with texture coordinates and light.
-
-    Each has four corners, counter-clockwise seen from its front; its back is invisible. Texture
-    coordinates are u to the right and v down, from 0 to 1.
-    """
-
-    _corners: list[Array] = field(default_factory=list[Array])
-    _places: list[Array] = field(default_factory=list[Array])
-    _lights: list[Array] = field(default_factory=list[Array])
-
-    def add(self, corners: Array, places: Array, lights: Array | float = 1.0) -> None:
-        """Add n patches.
-
-        Args:
-            corners: Corners, m, (n, 4, 3).
-            places: Texture coordinates of the corners, (n, 4, 2).
-            lights: Brightness of each corner, 0 to 1, (n, 4); or of all of them.
-        """
-        self._corners.append(corners)
-        self._places.append(places)
-        self._lights.append(np.broadcast_to(np.asarray(lights, float), corners.shape[:2]))
-
-    def add_grid(self, points: Array, places: Array, lights: Array) -> None:
-        """Add the cells of a grid whose rows go up and whose columns go right, seen from its front.
-
-        Args:
-            points: Grid points, m, (rows, columns, 3).
-            places: Their texture coordinates, (rows, columns, 2).
-            lights: Their brightness, 0 to 1, (rows, columns).
-        """
-        self.add(_grid_cells(points), _grid_cells(places), _grid_cells(lights))
-
-    def __bool__(self) -> bool:
-        return bool(self._corners)
-
-    def arrays(self, mirrored: bool) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-        """Points, m, (m, 3), texture coordinates, (m, 2), lights, (m,), and triangles, (k, 3).
-
-        Args:
-            mirrored: Whether to add a copy mirrored below the ground, for a glossy ground.
-        """
-        points = np.concatenate(self._corners).reshape(-1, 3)
-        places = np.concatenate(self._places).reshape(-1, 2)
-        lights = np.concatenate(self._lights).reshape(-1)
-        first = np.arange(0, len(points), 4)[:, None, None]
-        triangles = (first + _TRIANGLES).reshape(-1, 3)
-        if mirrored:
-            below = (first + len(points) + _MIRRORED).reshape(-1, 3)
-            triangles = np.concatenate([triangles, below])
-            points = np.concatenate([points, points * _DOWN])
-            places, lights = np.tile(places, (2, 1)), np.tile(lights, 2)
-        return points, places, lights, triangles
-
-
-# Margin of a texture cell, so that its neighbours do not bleed into it at a distance.
-_INSET: Final = 0.08
-_SIDES: Final = 10
-# Corners of a cube from -1 to 1: four sides and the top, counter-clockwise from the lower left.
-_BOX: Final = np.array(
-    [
-        [(1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1)],
-        [(1, 1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, 1)],
-        [(-1, 1, -1), (-1, -1, -1), (-1, -1, 1), (-1, 1, 1)],
-        [(-1, -1, -1), (1, -1, -1), (1, -1, 1), (-1, -1, 1)],
-        [(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)],
-    ],
-    float,
-)
-_BOX_LIGHT: Final = np.array([0.9, 0.75, 0.7, 0.85, 1.0])
-_FOOT: Final = 0.75
-
-
-def _add_box(
-    patches: Patches, middle: Array, half: Array, yaw: float, stuff: str, light: float
-) -> None:
-    """Add an upright box.
-
-    Args:
-        patches: Patches to extend.
-        middle: Its centre, m, (3,).
-        half: Half sizes, m, (3,).
-        yaw: Rotation about the vertical axis, rad.
-        stuff: Cell of the texture.
-        light: Brightness, 0 to 1.
-    """
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    corners = _BOX * half @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + middle
-    lights = np.repeat(_BOX_LIGHT[:, None], 4, axis=1) * light
-    lights[:4, :2] *= _FOOT
-    square = np.array([(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
-    patches.add(corners, np.tile(_cell(stuff, square), (5, 1, 1)), lights)
-
-
-def _add_turned(
-    patches: Patches, x: float, y: float, profile: Array, stuff: str, light: float
-) -> None:
-    """Add a solid of revolution.
-
-    Args:
-        patches: Patches to extend.
-        x: Position of its axis, m.
-        y: Position of its axis, m.
-        profile: Radius and height from below, m, (n, 2).
-        stuff: Cell of the texture.
-        light: Brightness, 0 to 1.
-    """
-    angle = np.linspace(0.0, 2.0 * np.pi, _SIDES + 1)
-    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    points = np.empty((len(profile), _SIDES + 1, 3))
-    points[..., :2] = profile[:, None, :1] * ring + (x, y)
-    points[..., 2] = profile[:, None, 1]
-    rise = profile[:, 1] - profile[0, 1]
-    places = np.empty((len(profile), _SIDES + 1, 2))
-    places[..., 0] = np.abs(2.0 * angle / (2.0 * np.pi) - 1.0)
-    places[..., 1] = 1.0 - (rise / max(float(rise[-1]), 1e-6))[:, None]
-    lights = np.tile(light * (0.82 + 0.18 * np.cos(angle - 0.7)), (len(profile), 1))
-    lights[0] *= _FOOT
-    patches.add_grid(points, _cell(stuff, places), lights)
-
-
-def _cell(stuff: str, places: Array) -> Array:
-    """Texture coordinates within a cell, as coordinates within the whole texture."""
-    row, column = divmod(CELLS[stuff], ROWS)
-    return (np.array([column, row]) + _INSET + (1.0 - 2.0 * _INSET) * places) / ROWS
-
-
-def _grid_cells(grid: Array) -> Array:
-    """Values at the corners of each cell of a grid (rows, columns, ...): (n, 4, ...)."""
-    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
-    return np.stack(corners, axis=2).reshape(-1, 4, *grid.shape[2:])
-
+from shapechanger.worlds.patches import Array, Patches, add_box, add_solid, add_turned
 
 # Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
 _REACH: Final = 1.6
@@ -223,12 +80,6 @@ _BOXES: Final[Mapping[str, tuple[_Part, ...]]] = MappingProxyType(
             (_LEG, (0.4, 0.38, 0.4), "black"),
             ((0.5, 0.5, 0.15), (0.0, 0.0, 0.85), "dark wood"),
         ),
-        "dinghy": (
-            ((0.34, 0.5, 0.5), (-0.16, 0.0, 0.5), "hull"),
-            ((0.10, 0.38, 0.5), (0.28, 0.0, 0.5), "hull"),
-            ((0.06, 0.22, 0.5), (0.44, 0.0, 0.5), "hull"),
-            ((0.04, 0.42, 0.06), (-0.05, 0.0, 1.05), "wood"),
-        ),
     }
 )
 # Solids of revolution: radius over the diameter, and height over the height.
@@ -246,7 +97,13 @@ _ROUND: Final[Mapping[str, tuple[_Turned, ...]]] = MappingProxyType(
             (((0.5, 0.0), (0.38, 0.1), (0.34, 0.5), (0.0, 0.5)), "bark"),
             (((0.3, 0.4), (1.6, 0.55), (1.8, 0.72), (1.0, 0.92), (0.0, 1.0)), "leaves"),
         ),
-        "buoy": ((((0.4, 0.0), (0.5, 0.25), (0.42, 0.5), (0.12, 0.8), (0.0, 1.0)), "buoy"),),
+        # As wide as its collision geom where a boat meets it.
+        "buoy": (
+            (((0.5, 0.0), (0.5, 0.06)), "black"),
+            (((0.48, 0.06), (0.48, 0.3), (0.36, 0.4), (0.15, 0.72), (0.0, 0.74)), "buoy"),
+            (((0.03, 0.72), (0.03, 0.82)), "black"),
+            (((0.0, 0.80), (0.17, 0.82), (0.0, 1.0)), "buoy"),
+        ),
     }
 )
 
@@ -270,6 +127,8 @@ class Surfaces:
     def ground(self) -> Patches:
         """Ground of the lane and a margin, seen from above."""
         corners = self._tiles()
+        if self._course.world == "harbour":
+            corners = np.concatenate([corners, self._open_water(corners)])
         return _level(corners, 0.0, _GROUND_PERIOD, self._light_at(corners))
 
     def ceiling(self) -> Patches:
@@ -322,6 +181,8 @@ class Surfaces:
             else:
                 name = "panel" if clad and wall.surface == "plaster" else wall.surface
                 self._add_wall(result[name], wall, 0.0, wall.height, offset)
+        if self._course.world == "harbour":
+            add_banks(self._course, result, self._light_at)
         return dict(result)
 
     def obstacles(self) -> Patches:
@@ -329,10 +190,13 @@ class Surfaces:
         patches = Patches()
         for obstacle in self._course.obstacles:
             bright = float(self._light_at(np.array([obstacle.x, obstacle.y])))
-            if obstacle.is_round:
+            if obstacle.kind == "dinghy":
+                for faces, stuff in dinghy(obstacle):
+                    add_solid(patches, faces, stuff, bright)
+            elif obstacle.is_round:
                 for outline, stuff in _ROUND[obstacle.kind]:
                     profile = np.array(outline) * (obstacle.length, obstacle.height)
-                    _add_turned(patches, obstacle.x, obstacle.y, profile, stuff, bright)
+                    add_turned(patches, obstacle.x, obstacle.y, profile, stuff, bright)
             else:
                 _add_boxes(patches, obstacle, bright)
         return patches
@@ -356,9 +220,10 @@ class Surfaces:
         """Corners of the tiles that cover the lane, counter-clockwise from above, m, (n, 4, 2)."""
         indoors = self._course.ceiling_m > 0.0
         size = _FINE if indoors else _COARSE
-        reach = float(self._course.half_width.max()) + (
-            _INDOORS_BEHIND if indoors else _OUTDOORS_BEHIND
-        )
+        behind = _INDOORS_BEHIND if indoors else _OUTDOORS_BEHIND
+        if self._course.world == "harbour":
+            behind = _COARSE
+        reach = float(self._course.half_width.max()) + behind
         low, high = self._course.route.min(axis=0) - reach, self._course.route.max(axis=0) + reach
         count = np.ceil((high - low) / size).astype(int)
         origin = low + size * np.argwhere(np.ones(count, bool))
@@ -369,6 +234,17 @@ class Surfaces:
             near = (gaps * gaps).sum(axis=2).min(axis=1) < (reach + size) ** 2
             origin = origin[near]
         return origin[:, None, :] + size * np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+
+    def _open_water(self, tiles: Array) -> Array:
+        """Corners of four large tiles around the others, up to the far shore, m, (4, 4, 2)."""
+        (x0, y0), (x1, y1) = tiles.min(axis=(0, 1)), tiles.max(axis=(0, 1))
+        middle, radius = extent(self._course)
+        (left, bottom), (right, top) = middle - radius, middle + radius
+        around = (
+            (left, bottom, right, y0), (left, y1, right, top), (left, y0, x0, y1),
+            (x1, y0, right, y1),
+        )  # fmt: skip
+        return np.array([[(a, b), (c, b), (c, d), (a, d)] for a, b, c, d in around])
 
     def _add_wall(
         self, patches: Patches, wall: Wall, low: float, high: float, offset: float
@@ -426,4 +302,4 @@ def _add_boxes(patches: Patches, obstacle: Obstacle, bright: float) -> None:
     for half, place, stuff in _BOXES[obstacle.kind]:
         dx, dy, dz = np.array(place) * size
         middle = np.array([obstacle.x + cos * dx - sin * dy, obstacle.y + sin * dx + cos * dy, dz])
-        _add_box(patches, middle, np.array(half) * size, obstacle.yaw, stuff, bright)
+        add_box(patches, middle, np.array(half) * size, obstacle.yaw, stuff, bright)

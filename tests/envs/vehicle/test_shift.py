@@ -78,14 +78,3 @@ def test_other_envs_are_refused(order: int, blind: dict[str, bool]) -> None:
         source, target = (car, pole)[::order]
         with pytest.raises(MorphologyError, match=r"is not a vehicle|has no model"):
             source.unwrapped.certify_shift(source, target)  # pyright: ignore[reportAttributeAccessIssue]
-
-
-@pytest.mark.gl
-@pytest.mark.parametrize("vehicle", ["car", "tank", "truck", "boat"])
-def test_picture_shows_the_vehicle(vehicle: str) -> None:
-    """The vehicle is smaller with a larger reach."""
-    with closing(VehicleEnv(vehicle, image=False)) as env:
-        near, far = env.picture(160, 120), env.picture(160, 120, reach=3.0 * env.reach)
-    assert near.shape == (120, 160, 3)
-    gaudy = [int((np.ptp(picture.astype(int), axis=2) > 40).sum()) for picture in (near, far)]
-    assert gaudy[0] > 3 * gaudy[1] > 0

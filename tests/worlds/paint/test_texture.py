@@ -8,7 +8,18 @@ import pytest
 from shapechanger.errors import UnknownName
 from shapechanger.worlds.paint import PAINTERS, clouds, texture
 
-_TILED = ("floor", "asphalt", "water", "grass", "hedge", "ceiling", "brick", "fence")
+_TILED = (
+    "floor",
+    "asphalt",
+    "water",
+    "sea",
+    "paving",
+    "grass",
+    "hedge",
+    "ceiling",
+    "brick",
+    "fence",
+)
 
 
 @pytest.mark.parametrize("name", PAINTERS)

@@ -82,13 +82,23 @@ def test_backs_of_walls_are_not_rendered() -> None:
     """A wall seen from behind leaves the image unchanged."""
     front = Wall((1.0, -1.0), (1.0, 1.0), 1.0, "brick")
     back = replace(front, start=front.end, end=front.start)
-    course = with_walls(square("harbour"))
+    course = with_walls(square("corridor"))
     nothing, seen, unseen = (
         _draw(replace(course, walls=walls), _WHITE, (0.0, 0.0), 0.0)
         for walls in ((), (front,), (back,))
     )
     assert not np.array_equal(nothing, seen)
     np.testing.assert_array_equal(nothing, unseen)
+
+
+def test_quays_have_a_rear_side() -> None:
+    """A quay seen from behind and above has a top and a rear side."""
+    quay = Wall((1.0, 1.0), (1.0, -1.0), 0.3, "quay")
+    course = with_walls(square("harbour"))
+    nothing, seen = (
+        _draw(replace(course, walls=walls), _WHITE, (0.0, 0.0), 0.0) for walls in ((), (quay,))
+    )
+    assert (nothing != seen).any(axis=2).mean() > 0.02
 
 
 @pytest.mark.parametrize("world", ["corridor", "yard", "harbour"])

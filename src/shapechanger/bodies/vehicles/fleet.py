@@ -10,6 +10,7 @@ import mujoco
 
 from shapechanger.bodies.vehicles.boat import BOAT
 from shapechanger.bodies.vehicles.car import CAR
+from shapechanger.bodies.vehicles.looks import Paint
 from shapechanger.bodies.vehicles.model import VehicleModel
 from shapechanger.bodies.vehicles.tank import TANK
 from shapechanger.bodies.vehicles.truck import TRUCK
@@ -35,12 +36,15 @@ def vehicle_model(name: str) -> VehicleModel:
     return VEHICLES[name]
 
 
-def add_vehicle(spec: mujoco.MjSpec, name: str) -> VehicleModel:
+def add_vehicle(
+    spec: mujoco.MjSpec, name: str, light: tuple[float, float, float] = (1.0, 1.0, 1.0)
+) -> VehicleModel:
     """Add a vehicle at the origin of a model, and set the step and solver options that it needs.
 
     Args:
         spec: Model to extend.
         name: Name of the vehicle.
+        light: Red, green and blue of the light on it, each 0 to 1, for views from outside.
 
     Raises:
         UnknownName: If no vehicle has this name.
@@ -53,7 +57,7 @@ def add_vehicle(spec: mujoco.MjSpec, name: str) -> VehicleModel:
     # vehicle at rest from creeping.
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
-    model.build(spec)
+    model.build(spec, Paint(spec, light))
     return model
 
 

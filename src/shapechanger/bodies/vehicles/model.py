@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import mujoco
 
+from shapechanger.bodies.vehicles.looks import Paint
 from shapechanger.bodies.vehicles.parts import CameraMount, DcMotor
 
 Outputs = Mapping[str, float | None]
@@ -185,7 +186,7 @@ class VehicleModel:
         camera: Mount of its camera.
         top_speed_mps: Speed at full throttle and `BATTERY_V`, on level ground or in still water.
         turning_radius_m: Radius of the origin's path at full lock; 0 if it turns on the spot.
-        build: Adds its body, joints and motors to a model.
+        build: Adds its body, joints, motors and looks to a model.
         bind: Finds them in the compiled model.
     """
 
@@ -199,7 +200,7 @@ class VehicleModel:
     camera: CameraMount
     top_speed_mps: float
     turning_radius_m: float
-    build: Callable[[mujoco.MjSpec], None]
+    build: Callable[[mujoco.MjSpec, Paint], None]
     bind: Callable[[mujoco.MjModel, mujoco.MjData], BoundVehicle]
 
     @property

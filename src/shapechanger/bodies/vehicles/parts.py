@@ -10,6 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shapechanger.bodies.vehicles.looks import OWN_VIEW, Paint, dress_wheel
+
 # Collision bits. MuJoCo lets two geoms collide if the contype of one shares a bit with the
 # conaffinity of the other. Walls have the type 1 and the affinity 2, the ground 4 and 8.
 _HULL_TYPE, _HULL_MEETS = 2, 1  # Collides with walls and obstacles, not with the ground.
@@ -25,45 +27,6 @@ _WHEEL_DAMPING: Final = 1e-4  # N·m·s/rad in the bearing; small, an estimate.
 
 PI_CAMERA_FOVY_DEG: Final = 48.8
 """Raspberry Pi camera module 2: https://www.raspberrypi.com/documentation/accessories/camera.html"""
-
-
-_COLOURS: Final = {
-    "blue": (0.08, 0.20, 0.45),
-    "brass": (0.55, 0.42, 0.15),
-    "dark": (0.07, 0.07, 0.08),
-    "glass": (0.16, 0.20, 0.24),
-    "green": (0.20, 0.27, 0.13),
-    "olive": (0.27, 0.33, 0.17),
-    "orange": (0.70, 0.28, 0.05),
-    "red": (0.62, 0.06, 0.05),
-    "rim": (0.55, 0.55, 0.58),
-    "track": (0.09, 0.09, 0.09),
-    "tyre": (0.05, 0.05, 0.05),
-    "white": (0.62, 0.62, 0.58),
-}
-
-
-class Paint:
-    """Makes materials, partly emissive because courses have no lights for vehicles.
-
-    Args:
-        spec: Model that the materials are added to.
-    """
-
-    def __init__(self, spec: mujoco.MjSpec) -> None:
-        self._spec = spec
-        self._made: set[str] = set()
-
-    def __call__(self, colour: str) -> str:
-        """Name of the material of a colour, which is added on the first call."""
-        material = f"vehicle/{colour}"
-        if material not in self._made:
-            rgba = [*_COLOURS[colour], 1.0]
-            self._spec.add_material(
-                name=material, rgba=rgba, emission=0.6, specular=0.2, shininess=0.3
-            )
-            self._made.add(material)
-        return material
 
 
 def add_chassis(spec: mujoco.MjSpec) -> mujoco.MjsBody:
@@ -86,7 +49,7 @@ def add_look(
     *,
     euler_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> None:
-    """Add a visual geom: without mass and collisions.
+    """Add a simple visual geom for the own camera: without mass and collisions.
 
     Args:
         body: Body to extend.
@@ -100,7 +63,7 @@ def add_look(
     mujoco.mju_euler2Quat(quat, np.radians(euler_deg), "xyz")
     body.add_geom(
         type=kind, pos=pos, size=_three(size), quat=quat, material=material, mass=0.0,
-        contype=0, conaffinity=0, group=0,
+        contype=0, conaffinity=0, group=OWN_VIEW,
     )  # fmt: skip
 
 
@@ -157,7 +120,7 @@ def add_wheel(
         paint: Source of its materials.
         armature: Share of the motor's rotor inertia, kg·m2.
         friction: Friction on any ground; None for that of the ground.
-        tyre: Colour of the tyre.
+        tyre: Colour of the tyre, or "track" for a road wheel within a track.
     """
     wheel = body.add_body(name=name, pos=pos)
     wheel.add_joint(
@@ -170,13 +133,10 @@ def add_wheel(
         priority=0 if friction is None else 1, condim=3, group=_HIDDEN_GROUP,
         contype=_WHEEL_TYPE, conaffinity=_WHEEL_MEETS,
     )  # fmt: skip
-    cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
-    black, grey = paint(tyre), paint("rim")
     aside = (90.0, 0.0, 0.0)
-    add_look(wheel, cylinder, (0.0, 0.0, 0.0), (radius, width / 2), black, euler_deg=aside)
-    add_look(wheel, cylinder, (0.0, 0.0, 0.0), (0.55 * radius, 0.52 * width), grey, euler_deg=aside)
-    box = mujoco.mjtGeom.mjGEOM_BOX  # A spoke, so that its rotation is visible.
-    add_look(wheel, box, (0.0, 0.0, 0.0), (0.5 * radius, 0.54 * width, 0.12 * radius), black)
+    size, black = (radius, width / 2), paint(tyre)
+    add_look(wheel, mujoco.mjtGeom.mjGEOM_CYLINDER, (0.0, 0.0, 0.0), size, black, euler_deg=aside)
+    dress_wheel(wheel, radius, width, paint, tyre)
     return wheel
 
 

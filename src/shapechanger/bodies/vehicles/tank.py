@@ -7,18 +7,20 @@ from functools import partial
 from typing import Final
 
 import mujoco
+import numpy as np
 
+from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress
 from shapechanger.bodies.vehicles.model import VehicleModel
 from shapechanger.bodies.vehicles.parts import (
     HOBBY_MOTOR,
     CameraMount,
-    Paint,
     add_camera,
     add_chassis,
     add_hull,
     add_look,
     add_wheel,
 )
+from shapechanger.bodies.vehicles.shapes import Faces, block, extrude, loft, rod
 from shapechanger.bodies.vehicles.wheels import Rolling
 
 # Sizes of a toy tank at the scale 1:16 to 1:24; the mass is an estimate.
@@ -42,26 +44,75 @@ _CAMERA: Final = CameraMount(x=0.12, y=0.0, z=0.115, pitch_rad=math.radians(3.0)
 _SIDES: Final = (("left", 1), ("right", -1))
 
 
-def _build(spec: mujoco.MjSpec) -> None:
-    box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
-    paint = Paint(spec)
+def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
+    box = mujoco.mjtGeom.mjGEOM_BOX
     chassis = add_chassis(spec)
     size = (_LENGTH / 2, _WIDTH / 2, 0.025)
     add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.050), size, _BODY_KG)
-    green, olive, dark = paint("green"), paint("olive"), paint("dark")
-    add_look(chassis, box, (0.0, 0.0, 0.058), (0.150, 0.072, 0.022), green)
-    add_look(chassis, box, (-0.02, 0.0, 0.086), (0.115, 0.118, 0.006), olive)
-    add_look(chassis, cylinder, (-0.04, 0.0, 0.104), (0.055, 0.014), green)
-    add_look(chassis, box, (0.105, 0.0, 0.092), (0.010, 0.012, 0.016), dark)
+    # What its own camera sees, in wide pictures.
+    add_look(chassis, box, (0.0, 0.0, 0.058), (0.150, 0.072, 0.022), paint("green"))
+    dress(chassis, _bodywork(), paint)
+    add_shadow(chassis, (-_LENGTH / 2, -_WIDTH / 2), (_LENGTH / 2, _WIDTH / 2), paint)
     for side, sign in _SIDES:
-        y = sign * _GAUGE / 2
-        # The track between its wheels.
-        add_look(chassis, box, (0.0, y, 0.012), (0.095, _TRACK_WIDTH / 2, 0.0105), dark)
-        add_look(
-            chassis, box, (0.0, y, 2 * _RADIUS - 0.006), (0.095, _TRACK_WIDTH / 2, 0.006), dark
-        )
-        _add_track(spec, chassis, side, y, paint)
+        _add_track(spec, chassis, side, sign * _GAUGE / 2, paint)
     add_camera(chassis, _CAMERA)
+
+
+def _bodywork() -> list[tuple[str, Faces]]:
+    """Hull, tracks and a turret whose gun is the camera: colours and faces."""
+    hull = extrude(
+        [(-0.145, 0.03), (0.10, 0.026), (0.155, 0.050), (0.12, 0.078), (-0.15, 0.078)],
+        -0.074, 0.074,
+    )  # fmt: skip
+    # Octagons: position ahead, radius and height.
+    corners = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False) + np.pi / 8.0
+    turret = [
+        np.stack([x + 1.15 * r * np.cos(corners), r * np.sin(corners), np.full(8, z)], axis=1)
+        for x, r, z in ((-0.035, 0.066, 0.078), (-0.035, 0.070, 0.092), (-0.042, 0.050, 0.126))
+    ]
+    z = _CAMERA.z
+    parts = [
+        ("green", hull),
+        ("green", loft(turret)),
+        ("olive", block((-0.02, -0.028, z - 0.012), (0.028, 0.028, z + 0.010))),  # Mantlet.
+        ("dark", rod((0.02, 0.0, z), (0.10, 0.0, z), 0.009, 12)),
+        ("dark", block((0.085, -0.014, z - 0.013), (0.117, 0.014, z + 0.013))),
+        ("steel", rod((0.116, 0.0, z), (0.119, 0.0, z), 0.008)),
+        ("olive", rod((-0.06, 0.022, 0.122), (-0.06, 0.022, 0.131), 0.017, 12)),  # Hatch.
+        ("dark", rod((-0.09, -0.03, 0.12), (-0.10, -0.03, 0.215), 0.0015, 6)),  # Aerial.
+    ]
+    slots = [-0.140 + 0.010 * i for i in range(5)]
+    parts += [("dark", block((x, -0.045, 0.077), (x + 0.004, 0.045, 0.0792))) for x in slots]
+    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)
+    bend = np.stack([np.cos(angle), np.sin(angle)], axis=1) * (_RADIUS + 0.001)
+    end = np.array([_WHEEL_XS["front"], 0.0])
+    straight = np.linspace(-0.095, 0.095, 11)[1:-1]
+    way = [
+        *((x, -_RADIUS) for x in straight), *(end + bend),
+        *((x, _RADIUS + 0.001) for x in straight[::-1]), *(-end - bend),
+    ]  # fmt: skip
+    loop = np.add(way, (0.0, _RADIUS + 0.001))
+    for _, sign in _SIDES:
+        y, half = sign * _GAUGE / 2, _TRACK_WIDTH / 2
+        track = extrude(loop, y - half, y + half)
+        links = len(loop)
+        parts += [
+            ("grey", track[0:links:2]),
+            ("track", track[1:links:2]),
+            ("track", track[links:]),
+        ]
+        fender = extrude(
+            [(-0.150, 0.074), (0.125, 0.074), (0.158, 0.052), (0.160, 0.055), (0.128, 0.080),
+             (-0.150, 0.080)],
+            y - half - 0.004, y + half + 0.004,
+        )  # fmt: skip
+        parts += [
+            ("olive", fender),
+            ("olive", block((-0.10, y - 0.014, 0.080), (-0.03, y + 0.014, 0.092))),  # Stowage.
+            ("lamp", rod((0.118, 0.75 * y, 0.073), (0.137, 0.75 * y, 0.073), 0.007)),
+            ("red", block((-0.1512, 0.9 * y - 0.006, 0.062), (-0.149, 0.9 * y + 0.006, 0.068))),
+        ]
+    return parts
 
 
 def _add_track(

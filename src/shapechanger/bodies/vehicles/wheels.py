@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import mujoco
 
+from shapechanger.bodies.vehicles.looks import Paint
 from shapechanger.bodies.vehicles.model import BoundVehicle, Motion, Outputs
-from shapechanger.bodies.vehicles.parts import HOBBY_SERVO, DcMotor, Paint, add_wheel
+from shapechanger.bodies.vehicles.parts import HOBBY_SERVO, DcMotor, add_wheel
 
 
 class Rolling(BoundVehicle):

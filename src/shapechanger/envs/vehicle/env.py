@@ -9,13 +9,10 @@ from importlib.util import find_spec
 from typing import Any, Final
 
 import gymnasium as gym
-import mujoco
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.bodies.vehicles import add_vehicle
-from shapechanger.envs.renderer import body_reach, draw
 from shapechanger.envs.vehicle.base import (
     Courses,
     CourseSampler,
@@ -35,10 +32,6 @@ from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
 
-# The ground in images of the vehicle: half of its side, m, and its colour on land and on water.
-_GROUND_M: Final = 2.0
-_LAND: Final = (0.62, 0.60, 0.56, 1.0)
-_WATER: Final = (0.24, 0.40, 0.46, 1.0)
 _MODES: Final = ("rgb_array",)
 
 
@@ -248,13 +241,12 @@ class VehicleEnv(DrivingEnv):
     @property
     def reach(self) -> float:
         """Distance from the middle of the vehicle to its farthest point, m."""
-        model = without_world(self._world.vehicle.name)
-        return body_reach(model, model.qpos0)
+        return self._world.reach
 
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
-        """Return an image of the vehicle on flat ground, shape (height, width, 3).
+        """Return a picture of the vehicle in its world from outside, shape (height, width, 3).
 
         Args:
             width: Width in pixels.
@@ -262,10 +254,9 @@ class VehicleEnv(DrivingEnv):
             reach: Radius in view around the middle of the vehicle, m; None for its own reach.
 
         Raises:
-            RenderError: If nothing can be drawn here.
+            RenderError: If the size is out of range, or nothing can be drawn here.
         """
-        model = without_world(self._world.vehicle.name)
-        return draw(model, model.qpos0, width, height, reach or body_reach(model, model.qpos0))
+        return self._world.outside(width, height, reach)
 
     def close(self) -> None:
         """Release the pins and the renderer."""
@@ -291,13 +282,3 @@ class VehicleEnv(DrivingEnv):
             "captured_ns": seen.captured_ns,
             "decided_ns": seen.command_ns,
         }
-
-
-def without_world(vehicle: str) -> mujoco.MjModel:
-    """Return a model of the vehicle on flat ground."""
-    spec = mujoco.MjSpec()
-    model = add_vehicle(spec, vehicle)
-    ground = spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE)
-    ground.size = (_GROUND_M, _GROUND_M, 1.0)
-    ground.rgba = _WATER if model.floats else _LAND
-    return spec.compile()

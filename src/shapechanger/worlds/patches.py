@@ -1,0 +1,187 @@
+"""Patches with texture coordinates and light, and the solids that are made of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.bodies.vehicles.shapes import Faces, normals, shading
+from shapechanger.worlds.paint import CELLS, ROWS
+
+Array = NDArray[np.float64]
+
+# The corners of a patch are counter-clockwise seen from its front.
+_TRIANGLES: Final = np.array([[0, 1, 2], [0, 2, 3]])
+# A mirrored patch has the opposite order.
+_MIRRORED: Final = np.array([[0, 2, 1], [0, 3, 2]])
+_DOWN: Final = np.array([1.0, 1.0, -1.0])
+
+
+@dataclass(slots=True)
+class Patches:
+    """Patches with texture coordinates and light.
+
+    Each has four corners, counter-clockwise seen from its front; its back is invisible. Texture
+    coordinates are u to the right and v down, from 0 to 1.
+    """
+
+    _corners: list[Array] = field(default_factory=list[Array])
+    _places: list[Array] = field(default_factory=list[Array])
+    _lights: list[Array] = field(default_factory=list[Array])
+    _reflected: list[bool] = field(default_factory=list[bool])
+
+    def add(
+        self, corners: Array, places: Array, lights: Array | float = 1.0, *, reflected: bool = True
+    ) -> None:
+        """Add n patches.
+
+        Args:
+            corners: Corners, m, (n, 4, 3).
+            places: Texture coordinates of the corners, (n, 4, 2).
+            lights: Brightness of each corner, 0 to 1, (n, 4); or of all of them.
+            reflected: Whether a glossy ground shows them; False for what is hidden there.
+        """
+        self._reflected.append(reflected)
+        self._corners.append(corners)
+        self._places.append(places)
+        self._lights.append(np.broadcast_to(np.asarray(lights, float), corners.shape[:2]))
+
+    def add_grid(self, points: Array, places: Array, lights: Array) -> None:
+        """Add the cells of a grid whose rows go up and whose columns go right, seen from its front.
+
+        Args:
+            points: Grid points, m, (rows, columns, 3).
+            places: Their texture coordinates, (rows, columns, 2).
+            lights: Their brightness, 0 to 1, (rows, columns).
+        """
+        self.add(_grid_cells(points), _grid_cells(places), _grid_cells(lights))
+
+    def __bool__(self) -> bool:
+        return bool(self._corners)
+
+    def arrays(self, mirrored: bool) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        """Points, m, (m, 3), texture coordinates, (m, 2), lights, (m,), and triangles, (k, 3).
+
+        Args:
+            mirrored: Whether to add a copy mirrored below the ground, for a glossy ground.
+        """
+        points = np.concatenate(self._corners).reshape(-1, 3)
+        places = np.concatenate(self._places).reshape(-1, 2)
+        lights = np.concatenate(self._lights).reshape(-1)
+        first = np.arange(0, len(points), 4)[:, None, None]
+        triangles = (first + _TRIANGLES).reshape(-1, 3)
+        if mirrored:
+            counts = [len(corners) for corners in self._corners]
+            shown = np.repeat(np.repeat(self._reflected, counts), 4)
+            first = np.arange(len(points), len(points) + int(shown.sum()), 4)[:, None, None]
+            triangles = np.concatenate([triangles, (first + _MIRRORED).reshape(-1, 3)])
+            points = np.concatenate([points, points[shown] * _DOWN])
+            places = np.concatenate([places, places[shown]])
+            lights = np.concatenate([lights, lights[shown]])
+        return points, places, lights, triangles
+
+
+# Margin of a texture cell, so that its neighbours do not bleed into it at a distance.
+_INSET: Final = 0.08
+_SIDES: Final = 10
+# Corners of a cube from -1 to 1: four sides and the top, counter-clockwise from the lower left.
+_BOX: Final = np.array(
+    [
+        [(1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1)],
+        [(1, 1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, 1)],
+        [(-1, 1, -1), (-1, -1, -1), (-1, -1, 1), (-1, 1, 1)],
+        [(-1, -1, -1), (1, -1, -1), (1, -1, 1), (-1, -1, 1)],
+        [(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)],
+    ],
+    float,
+)
+_BOX_LIGHT: Final = np.array([0.9, 0.75, 0.7, 0.85, 1.0])
+_FOOT: Final = 0.75
+
+
+def add_box(
+    patches: Patches, middle: Array, half: Array, yaw: float, stuff: str, light: float
+) -> None:
+    """Add an upright box.
+
+    Args:
+        patches: Patches to extend.
+        middle: Its centre, m, (3,).
+        half: Half sizes, m, (3,).
+        yaw: Rotation about the vertical axis, rad.
+        stuff: Cell of the texture.
+        light: Brightness, 0 to 1.
+    """
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    corners = _BOX * half @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + middle
+    lights = np.repeat(_BOX_LIGHT[:, None], 4, axis=1) * light
+    lights[:4, :2] *= _FOOT
+    square = np.array([(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
+    patches.add(corners, np.tile(cell(stuff, square), (5, 1, 1)), lights)
+
+
+def add_turned(
+    patches: Patches, x: float, y: float, profile: Array, stuff: str, light: float
+) -> None:
+    """Add a solid of revolution.
+
+    Args:
+        patches: Patches to extend.
+        x: Position of its axis, m.
+        y: Position of its axis, m.
+        profile: Radius and height from below, m, (n, 2).
+        stuff: Cell of the texture.
+        light: Brightness, 0 to 1.
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, _SIDES + 1)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    points = np.empty((len(profile), _SIDES + 1, 3))
+    points[..., :2] = profile[:, None, :1] * ring + (x, y)
+    points[..., 2] = profile[:, None, 1]
+    rise = profile[:, 1] - profile[0, 1]
+    places = np.empty((len(profile), _SIDES + 1, 2))
+    places[..., 0] = np.abs(2.0 * angle / (2.0 * np.pi) - 1.0)
+    places[..., 1] = 1.0 - (rise / max(float(rise[-1]), 1e-6))[:, None]
+    lights = np.tile(light * (0.82 + 0.18 * np.cos(angle - 0.7)), (len(profile), 1))
+    lights[0] *= _FOOT
+    patches.add_grid(points, cell(stuff, places), lights)
+
+
+def add_solid(
+    patches: Patches, faces: Faces, stuff: str, light: float = 1.0, *, reflected: bool = True
+) -> None:
+    """Add a solid, on which the cell is upright and stretched over its whole side or top.
+
+    Args:
+        patches: Patches to extend.
+        faces: Its faces, m, (n, 4, 3).
+        stuff: Cell of the texture.
+        light: Brightness, 0 to 1.
+        reflected: See `Patches.add`.
+    """
+    low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
+    faces = faces[normals(faces)[:, 2] > -0.9]  # Nothing looks up from the ground.
+    share: Array = (faces - low) / np.maximum(high - low, 1e-9)
+    across, down, up = share[..., 0], share[..., 1], share[..., 2]
+    edges = np.abs(np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1]))
+    facing = edges.argmax(axis=1)[:, None]  # Axis along which the face mostly looks.
+    places = np.stack(
+        [np.where(facing == 0, down, across), np.where(facing == 2, down, 1.0 - up)], axis=2
+    )
+    lights = light * shading(faces)[:, None]
+    patches.add(faces, cell(stuff, places), lights, reflected=reflected)
+
+
+def cell(stuff: str, places: Array) -> Array:
+    """Texture coordinates within a cell, as coordinates within the whole texture."""
+    row, column = divmod(CELLS[stuff], ROWS)
+    return (np.array([column, row]) + _INSET + (1.0 - 2.0 * _INSET) * places) / ROWS
+
+
+def _grid_cells(grid: Array) -> Array:
+    """Values at the corners of each cell of a grid (rows, columns, ...): (n, 4, ...)."""
+    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
+    return np.stack(corners, axis=2).reshape(-1, 4, *grid.shape[2:])
