@@ -88,7 +88,7 @@ def test_a_drive_becomes_a_policy_of_waypoints(
 ) -> None:
     """The command says what it did, and the policy's card says what its actions mean."""
     out = tmp_path / "policy.safetensors"
-    TrainClone(_record(tmp_path / "drive"), out, waypoints=True).run()
+    TrainClone(_record(tmp_path / "drive"), out, waypoints=True, ppo=tmp_path / "ppo.zip").run()
     card = CameraPolicy.load(out).card
     assert card.action_layout == ACTION_LAYOUT
     assert card.data["response"] == pytest.approx([_PER_METRE, 0.0], abs=0.01)
