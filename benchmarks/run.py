@@ -177,6 +177,8 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "vehicles-pairs": vehicles_studies.pairs,
     "vehicles-lenses": vehicles_studies.lenses,
     "vehicles-waypoints": waypoints.pairs,
+    "vehicles-waypoints-labels": waypoints.labels,
+    "vehicles-waypoints-worlds": waypoints.worlds,
     "vehicles-waypoints-remote": waypoints.remote,
     "vehicles-waypoint-studies": vehicles_studies.waypoints,
 }

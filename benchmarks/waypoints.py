@@ -1,4 +1,4 @@
-"""Zero-shot transfer of a waypoint policy to other vehicles.
+"""Zero-shot transfer of a waypoint policy to other vehicles and to other worlds.
 
 The sources are trained once per seed and kept in `results/waypoints`; `SEEDS` sets the number of
 seeds. All drives are on held-out courses.
@@ -8,35 +8,85 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import permutations
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Final, cast
+from typing import Any, Final, Literal, NamedTuple, cast
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted
-from shapechanger.demos.cloning.learn import clone
+from shapechanger.cli.demos.train import Shrinking
+from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
+from shapechanger.demos.cloning.learn import clone, learn
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.dataset import Dataset, load_dataset
+from shapechanger.demos.drivers import DriverDecision, ExpertPilot, record_steps
+from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.envs.remote.waypoints import RemoteWaypointEnv
 from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
-from shapechanger.envs.vehicle.drivers import CLONES
+from shapechanger.envs.vehicle.drivers import CLONES, VehicleDemonstrator
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
+from shapechanger.envs.vehicle.waypoints import WaypointDemonstrator
+from shapechanger.errors import UnknownName
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
 from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings
 from shapechanger.twin.robot import run_robot
-from shapechanger.worlds.course import HELD_OUT
+from shapechanger.worlds.course import FLOODED, HELD_OUT
+from shapechanger.worlds.simulation import MujocoWorld
 
 VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3
 COURSES: Final = HELD_OUT[:17]  # Of 30 m: 510 m for each drive.
 OUT: Final = Path("results", "waypoints")
+
+
+class Source(NamedTuple):
+    """What a source is taught in.
+
+    Attributes:
+        vehicle: Its vehicle.
+        worlds: Its worlds; each gives an equal share of the six minutes.
+        randomise: Whether light, textures and the camera's pose are drawn for each episode.
+        labels: "path" for points on the path of the expert that drives by waypoints. Where it
+            drives by steering and throttle: "steering" for what these lead to, or "path beside it".
+    """
+
+    vehicle: str
+    worlds: tuple[str, ...] = ("corridor",)
+    randomise: bool = False
+    labels: Literal["path", "steering", "path beside it"] = "path"
+
+
+SOURCES: Final = {
+    **{vehicle: Source(vehicle) for vehicle in VEHICLES},
+    "boat": Source("boat", (FLOODED,)),
+    "yard-truck": Source("truck", ("yard",)),
+    "yard-random-truck": Source("truck", ("yard",), randomise=True),
+    "mixed-truck": Source("truck", ("yard", "corridor")),
+    "harbour-boat": Source("boat", ("harbour",)),
+    "harbour-random-boat": Source("boat", ("harbour",), randomise=True),
+    "mixed-boat": Source("boat", ("harbour", FLOODED)),
+}
+# Those that see other worlds than their targets.
+ACROSS: Final = tuple(list(SOURCES)[4:])
+# Two clones of the same pictures, whose labels differ.
+BY_STEERING: Final = {
+    "car-by-its-steering": Source("car", labels="steering"),
+    "car-by-the-path": Source("car", labels="path beside it"),
+}
 # Both clones were trained in the corridor.
 STEERED: Final = (("car", "tank"), ("tank", "car"))
 STEERED_COURSES: Final = COURSES[:6]
@@ -47,36 +97,22 @@ GOOD: Final = 4
 
 def pairs() -> list[Row]:
     """Measure the six ordered pairs of land vehicles, all in the corridor."""
-    OUT.mkdir(parents=True, exist_ok=True)
-    seeds = range(int(os.environ.get("SEEDS", SEEDS)))
-    jobs = [(vehicle, seed) for seed in seeds for vehicle in VEHICLES]
+    found = _measure([*permutations(VEHICLES, 2), *((one, one) for one in VEHICLES)])
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
-        found = dict(zip(jobs, pool.map(_driven, jobs), strict=True))
         by_steering = dict(zip(STEERED, pool.map(_steered, STEERED), strict=True))
-    rows: list[Row] = []
-    good = 0
-    own = [(vehicle, vehicle) for vehicle in VEHICLES]
-    for source, target in (*permutations(VEHICLES, 2), *own):
-        each = [DriveScore.of(found[source, seed][target]) for seed in seeds]
-        score = DriveScore.of([one for seed in seeds for one in found[source, seed][target]])
-        good += source != target and score.per_100_m <= FEW
-        by_seed = ", ".join(f"{one.per_100_m:.1f}" for one in each)
-        rows.append(
-            Row(
-                f"waypoints, {source} to {target}: collisions per 100 m, zero-shot",
-                f"{score.per_100_m:.1f}",
-                f"{counted(score)}; {score.speed:.2f} m/s; by seed {by_seed}",
-                "none for a single pair",
-                True,
-            )
-        )
+    few = [
+        _score(drives).per_100_m <= FEW
+        for (source, target), drives in found.items()
+        if source != target
+    ]
+    rows = [_row(pair, drives) for pair, drives in found.items()]
     rows.append(
         Row(
             f"waypoints: pairs with at most {FEW:g} collisions per 100 m, zero-shot",
-            f"{good} of 6",
-            f"{len(seeds)} seeds, six minutes of a source's driving each",
+            f"{sum(few)} of {len(few)}",
+            f"{len(_seeds())} seeds, six minutes of a source's driving each",
             f">= {GOOD}",
-            good >= GOOD,
+            sum(few) >= GOOD,
         )
     )
     for (source, target), drives in by_steering.items():
@@ -91,6 +127,77 @@ def pairs() -> list[Row]:
             )
         )
     return rows
+
+
+def worlds() -> list[Row]:
+    """Measure pairs with the boat, and sources that were taught in other worlds.
+
+    All targets are judged in the corridor, the boat in the flooded one. `ONLY` names pairs, such as
+    `yard-truck-to-car`.
+    """
+    land = [(source, target) for source in ACROSS for target in VEHICLES]
+    boats = [
+        ("boat", "boat"),
+        *(pair for land in VEHICLES for pair in (("boat", land), (land, "boat"))),
+    ]
+    named = {f"{source}-to-{target}": (source, target) for source, target in (*boats, *land)}
+    asked = os.environ.get("ONLY", "").split() or list(named)
+    for name in asked:
+        if name not in named:
+            raise UnknownName("pair", name, named)
+    return [_row(pair, drives) for pair, drives in _measure([named[one] for one in asked]).items()]
+
+
+def labels() -> list[Row]:
+    """Compare clones of a driver's own steering with clones of the path, on equal pictures.
+
+    The driver is the expert at the whole robot of a car, by steering and throttle.
+    """
+    OUT.mkdir(parents=True, exist_ok=True)
+    use_one_thread()
+    for seed in _seeds():
+        _record(seed)
+    found = _measure([(source, target) for target in ("car", "tank") for source in BY_STEERING])
+    return [_row(pair, drives) for pair, drives in found.items()]
+
+
+def _seeds() -> range:
+    return range(int(os.environ.get("SEEDS", SEEDS)))
+
+
+def _measure(asked: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[list[DriveResult]]]:
+    """Train the sources of pairs, and drive them in their targets; cache both.
+
+    Returns:
+        For each pair, the drives of each seed.
+    """
+    OUT.mkdir(parents=True, exist_ok=True)
+    seeds = _seeds()
+    trained = [(source, seed) for source in dict(asked) for seed in seeds]
+    jobs = [(source, target, seed) for source, target in asked for seed in seeds]
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        for _ in pool.map(_train, trained):
+            pass
+        drives = list(pool.map(_driven, jobs))
+    n = len(seeds)
+    return {pair: drives[n * i : n * (i + 1)] for i, pair in enumerate(asked)}
+
+
+def _score(by_seed: list[list[DriveResult]]) -> DriveScore:
+    return DriveScore.of([one for each in by_seed for one in each])
+
+
+def _row(pair: tuple[str, str], drives: list[list[DriveResult]]) -> Row:
+    source, target = pair
+    score = _score(drives)
+    by_seed = ", ".join(f"{DriveScore.of(each).per_100_m:.1f}" for each in drives)
+    return Row(
+        f"waypoints, {source} to {target}: collisions per 100 m, zero-shot",
+        f"{score.per_100_m:.1f}",
+        f"{counted(score)}; {score.speed:.2f} m/s; by seed {by_seed}",
+        "none for a single pair",
+        True,
+    )
 
 
 def remote() -> list[Row]:
@@ -143,36 +250,108 @@ def _steered(pair: tuple[str, str]) -> list[DriveResult]:
     return drives
 
 
-def _driven(job: tuple[str, int]) -> dict[str, list[DriveResult]]:
-    """Train a source and drive it in all vehicles; cache both."""
-    vehicle, seed = job
+def _train(job: tuple[str, int]) -> None:
     use_one_thread()
-    kept = OUT / f"{vehicle}-{seed}.json"
+    _source(*job)
+
+
+def _driven(job: tuple[str, str, int]) -> list[DriveResult]:
+    """Drive a source in a target; cache it."""
+    source, target, seed = job
+    use_one_thread()
+    kept = OUT / f"{source}-to-{target}-{seed}.json"
     if kept.exists():
-        drives = json.loads(kept.read_bytes())
-        return {name: [DriveResult(**one) for one in each] for name, each in drives.items()}
-    policy = _source(vehicle, seed)
-    results: dict[str, list[DriveResult]] = {}
-    for target in VEHICLES:
-        with closing(WaypointEnv(target, courses="held-out", put_back=True)) as env:
-            results[target] = [drive(env, policy.predict, course=course) for course in COURSES]
-    plain = {name: [asdict(one) for one in each] for name, each in results.items()}
-    kept.write_text(json.dumps(plain), encoding="utf-8")
-    return results
+        return [DriveResult(**one) for one in json.loads(kept.read_bytes())]
+    policy = _source(source, seed)
+    with closing(WaypointEnv(target, courses="held-out", put_back=True)) as env:
+        drives = [drive(env, policy.predict, course=course) for course in COURSES]
+    kept.write_text(json.dumps([asdict(one) for one in drives]), encoding="utf-8")
+    return drives
 
 
-def _source(vehicle: str, seed: int) -> CameraPolicy:
-    path = OUT / f"{vehicle}-{seed}.safetensors"
+def _source(name: str, seed: int) -> CameraPolicy:
+    """Clone the demonstrations of a source, of which each of its worlds gives an equal share."""
+    path = OUT / f"{name}-{seed}.safetensors"
     if path.exists():
         return CameraPolicy.load(path)
+    source = SOURCES.get(name) or BY_STEERING[name]
     settings = cast("CloningSettings", LEARNERS["waypoint"])
-    env = EnvRef(f"shapechanger/{vehicle.capitalize()}Waypoint-v1", {"put_back": True})
-    shown = record_demonstrations(
-        env, settings.steps, settings.episode_steps, seed, settings.clone.framing
-    )
+    if source.labels != "path":
+        data = _labelled(seed, source.labels)
+        policy, _ = learn(data, settings=settings.clone, head="regression", seed=seed)
+        policy.save(path)
+        return policy
+    env_id = f"shapechanger/{source.vehicle.capitalize()}Waypoint-v1"
+    envs = [
+        EnvRef(env_id, {"put_back": True, "world": world, "randomise": source.randomise})
+        for world in source.worlds
+    ]
+    steps = settings.steps // len(envs)
+    shown = [
+        record_demonstrations(env, steps, settings.episode_steps, seed, settings.clone.framing)
+        for env in envs
+    ]
     policy, _ = clone(
-        shown.pictures, shown.actions, settings=settings.clone, seed=seed, episodes=shown.episodes
+        np.concatenate([one.pictures for one in shown]),
+        np.concatenate([one.actions for one in shown]),
+        settings=settings.clone,
+        seed=seed,
+        episodes=[length for one in shown for length in one.episodes],
     )
-    policy = state_actions(policy, env)
+    policy = state_actions(policy, envs[0])
     policy.save(path)
     return policy
+
+
+class _Watched(ExpertPilot):
+    """Expert that drives by steering, and the waypoints on the path beside it.
+
+    Args:
+        world: The world of the vehicle.
+        seed: Seed of the mistakes.
+
+    Attributes:
+        waypoints: One for each step.
+    """
+
+    def __init__(self, world: MujocoWorld, seed: int) -> None:
+        super().__init__(VehicleDemonstrator(world, seed))
+        self._path = WaypointDemonstrator(world, seed)
+        self.waypoints: list[NDArray[np.float32]] = []
+
+    def begin(self) -> None:
+        super().begin()
+        self._path.begin()
+
+    def decide(self, observation: Any) -> DriverDecision:
+        self.waypoints.append(self._path.act()[0])
+        return super().decide(observation)
+
+
+def _record(seed: int) -> Path:
+    """Record six minutes of a car by steering and throttle, with the path's waypoints beside."""
+    folder = OUT / f"car-by-steering-{seed}"
+    waypoints = folder.with_suffix(".npy")
+    if waypoints.exists():
+        return folder
+    shutil.rmtree(folder, ignore_errors=True)
+    settings = cast("CloningSettings", LEARNERS["waypoint"])
+    env = gym.make(
+        "shapechanger/Car-v1", state=True, put_back=True, max_episode_steps=settings.episode_steps
+    )
+    with closing(env):
+        pilot = _Watched(cast("VehicleEnv", env.unwrapped).world, seed)
+        # Each episode takes the next seed.
+        record_steps(RecordEpisodes(env, folder), pilot, settings.steps, 1000 * seed)
+    np.save(waypoints, np.stack(pilot.waypoints))
+    return folder
+
+
+def _labelled(seed: int, labels: str) -> Dataset:
+    """Return the recording of a seed with labels of one kind."""
+    folder = _record(seed)
+    framing = cast("CloningSettings", LEARNERS["waypoint"]).clone.framing
+    shown = as_waypoints(load_dataset(folder, shrink=Shrinking(framing, CanonicalView())))
+    if labels == "steering":
+        return shown.data
+    return replace(shown.data, actions=np.load(folder.with_suffix(".npy"))[shown.kept])

@@ -70,7 +70,7 @@ def test_the_drivers_are_chosen_by_name(tmp_path: Path) -> None:
 
 def test_images_can_be_shrunk_while_loading(tmp_path: Path) -> None:
     """`shrink` limits the memory that is needed."""
-    data = load_dataset(_recorded(tmp_path), shrink=lambda picture: picture[::2, ::2])
+    data = load_dataset(_recorded(tmp_path), shrink=lambda picture, _: picture[::2, ::2])
     assert data.pictures is not None
     assert data.pictures.shape == (5, 12, 16, 3)
 

@@ -26,8 +26,8 @@ _NS_PER_S: Final = 1e9
 # Two recorders at 20 Hz may write 20 and 20.000001.
 _RATE_TOLERANCE: Final = 0.01
 
-Shrink = Callable[[NDArray[np.uint8]], NDArray[np.uint8]]
-"""Function that reduces a picture, shape (H, W, 3), to save memory."""
+Shrink = Callable[[NDArray[np.uint8], EpisodeHeader], NDArray[np.uint8]]
+"""Function that reduces a picture of an episode, shape (H, W, 3), to save memory."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _pixels(part: _Part, jpeg: bytes, where: str, shrink: Shrink | None) -> NDAr
         raise DemosError(
             f"{where} has {size[0]} x {size[1]} pixels, but the other pictures {wide} x {high}."
         )
-    return pixels if shrink is None else shrink(pixels)
+    return pixels if shrink is None else shrink(pixels, part.header)
 
 
 def _require_same(parts: list[_Part]) -> None:

@@ -354,10 +354,12 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         if self._start["options"]:
             notes["reset_options"] = _plain(self._start["options"])
         kwargs = spec.kwargs if spec else {}
-        robot = getattr(inner, "welcome", None)  # Of a robot on the network.
+        robot = getattr(inner, "welcome", None)  # Of a robot on the network, or an emulated one.
         fields: dict[str, Any] = {
             "robot": getattr(robot, "robot", ""),
             "body": getattr(robot, "body", ""),
+            "camera_pitch_deg": getattr(robot, "camera_pitch_deg", None),
+            "camera_fovy_deg": getattr(robot, "camera_fovy_deg", None),
             "action_layout": self._encoder.action_layout.to_json(),
             "state_layout": layout.to_json() if layout else "",
             "image_size": picture_size(seen.jpeg, "from the env") if seen.jpeg else None,

@@ -1,10 +1,10 @@
-"""What the envs with waypoints share: the action, and how a body turns it into steering."""
+"""What the envs with waypoints share: the action, and how it becomes steering and back."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -23,6 +23,15 @@ WIDEST_RAD: Final = 1.0
 
 _SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
 _LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
+_STANDING_MPS: Final = 0.1
+_STANDING_RADPS: Final = 0.1
+_AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
+# Of a fit to a drive: largest change of the steering in so many steps, and the least share of the
+# turning that the steering must explain.
+_CHANGE: Final = 0.1
+_STEADY: Final = 2
+_EXPLAINED: Final = 0.5
+_ROUNDING: Final = 1e-9
 
 # Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
 # is left out because the vehicle is still changing its motion.
@@ -102,6 +111,37 @@ def measure_response(
     return SteeringResponse(float(per_metre), float(per_second))
 
 
+def fit_response(
+    steering: NDArray[np.floating], speed: NDArray[np.floating], yaw_rate: NDArray[np.floating]
+) -> SteeringResponse:
+    """Fit how a vehicle turns to a drive, in steps of 1/20 s.
+
+    Only steps count in which the steering has not changed for 0.1 s, because the turn lags behind
+    it. Those in which something was not measured are left out, too.
+
+    Args:
+        steering: Steering that the outputs had, -1 to 1, positive to the right, shape (n,).
+        speed: Speed along the heading, m/s, shape (n,).
+        yaw_rate: Rate of turn, rad/s, positive to the left, shape (n,).
+
+    Raises:
+        StudyError: If the drive does not tell it.
+    """
+    rows = np.stack((steering * speed, steering, -yaw_rate), axis=1).astype(np.float64)
+    steady = np.isfinite(rows).all(axis=1)
+    for steps in range(1, _STEADY + 1):
+        steady &= np.abs(steering - np.roll(steering, steps)) < _CHANGE
+    turning, rates = rows[steady, :2], rows[steady, 2]
+    numbers, error = nnls(turning, rates) if len(rates) else (np.zeros(2), 0.0)
+    explained = 1.0 - error**2 / max(float(rates @ rates), _ROUNDING)
+    if not numbers.any() or explained < _EXPLAINED:
+        raise StudyError(
+            f"In this drive, steering explains {max(0.0, explained):.0%} of how the vehicle turns, "
+            f"and {_EXPLAINED:.0%} are needed: drive curves to both sides."
+        )
+    return SteeringResponse(float(numbers[0]), float(numbers[1]))
+
+
 _COLUMNS, _ROWS = CANONICAL_SIZE
 
 OBSERVATION_LAYOUT: Final = Layout(
@@ -157,3 +197,54 @@ def command(
     if on_the_spot:
         throttle = min(throttle, max(_LEAST_THROTTLE, 1.0 - abs(steering)))
     return np.array((steering, throttle), np.float32)
+
+
+class WaypointLabels(NamedTuple):
+    """Waypoints that a driver's commands lead to.
+
+    Attributes:
+        actions: Bearing and speed, each from -1 to 1, shape (n, 2).
+        usable: Whether a command says where the way is, shape (n,). Those of a vehicle that stands
+            still, drives backward, or did not measure its speed do not.
+        at_limit: Whether it only says that the way is at least as far aside, shape (n,): at full
+            steering, or beyond the widest bearing.
+    """
+
+    actions: NDArray[np.float32]
+    usable: NDArray[np.bool_]
+    at_limit: NDArray[np.bool_]
+
+
+def waypoints_of(
+    commands: NDArray[np.floating], response: SteeringResponse, speed: NDArray[np.floating]
+) -> WaypointLabels:
+    """Return the waypoints that a driver's commands lead to, the inverse of `command`.
+
+    The steering gives the circle that the vehicle drives, and the waypoint is where it is `AHEAD_M`
+    away. At full steering, and where tracks turn on the spot, the way may be farther aside than the
+    waypoint, which is then the nearest one with the same command. The throttle gives the speed;
+    throttles below a quarter, of brakes too, become speeds that `command` turns into a quarter.
+
+    Args:
+        commands: Steering and throttle, shape (n, 2); values beyond [-1, 1] are clipped.
+        response: How the vehicle turns.
+        speed: Its speed along the heading, m/s, shape (n,); NaN where it was not measured.
+    """
+    values = np.clip(np.asarray(commands, np.float64), -1.0, 1.0)
+    steering, throttle = values.T
+    fast = np.maximum(speed, _SLOWEST_MPS)
+    turn = steering * (response.per_metre * fast + response.per_second)
+    sine = 0.5 * AHEAD_M * turn / fast
+    widest = math.sin(WIDEST_RAD)
+    bearing = np.arcsin(np.clip(sine, -widest, widest)) / WIDEST_RAD
+    moves = np.abs(speed) >= _STANDING_MPS
+    turns = np.abs(steering) * response.per_second >= _STANDING_RADPS
+    # Backwards it cannot point ahead; at rest only a throttle, or tracks that turn, say something.
+    usable = np.where(
+        moves, speed > 0.0, (throttle >= _LEAST_THROTTLE) | ((throttle >= 0.0) & turns)
+    )
+    return WaypointLabels(
+        np.stack((bearing, np.clip(2.0 * throttle - 1.0, -1.0, 1.0)), axis=1).astype(np.float32),
+        usable & np.isfinite(values).all(axis=1) & np.isfinite(speed),
+        (np.abs(steering) >= _AT_LOCK) | (np.abs(sine) >= widest),
+    )

@@ -171,6 +171,8 @@ class InProcessRobot:
             action_layout=action_layout.to_json(),
             state_layout=state_layout.to_json(),
             image_size=None if camera is None else camera.size,
+            camera_pitch_deg=None if camera is None else camera.pitch_deg,
+            camera_fovy_deg=None if camera is None else camera.fovy_deg,
             control_hz=profile.control_hz,
             deadline_ms=profile.limits.deadline_ms,
             max_observation_age_ms=profile.max_observation_age_ms,

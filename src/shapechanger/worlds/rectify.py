@@ -23,6 +23,9 @@ CANONICAL_SIZE: Final = (80, 48)
 # and 21 down, where the car's bonnet begins.
 _FOCAL: Final = 66.0
 _HORIZON: Final = 22.0
+HALF_WIDTH_RAD: Final = math.atan(0.5 * CANONICAL_SIZE[0] / _FOCAL)
+"""Bearing of the left and right edge of a rectified picture, rad."""
+
 _SAMPLES: Final = 3  # In each direction of a pixel.
 _MOST_MISSING: Final = 0.15  # Share of the pixels.
 

@@ -30,6 +30,7 @@ def test_an_experts_recording_replays_identically(
     assert (first.header.seed, second.header.seed) == (7, 8)
     assert first.header.env == "shapechanger/Car-v1"
     assert first.header.body == "car"
+    assert (first.header.camera_pitch_deg, first.header.camera_fovy_deg) == (0.0, 48.8)
     assert first.header.image_size == (64, 48)
     assert {step.driver for step in first.steps} == {"expert"}
     assert any(step.action != step.applied for step in first.steps)

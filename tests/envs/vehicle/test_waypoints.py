@@ -12,7 +12,15 @@ import pytest
 from shapechanger.bodies.vehicles import vehicle_model
 from shapechanger.envs.catalogue import WAYPOINT_ENVS
 from shapechanger.envs.vehicle import RangesEnv, WaypointEnv
-from shapechanger.envs.waypoints import AHEAD_M, SteeringResponse, measure_response
+from shapechanger.envs.waypoints import (
+    AHEAD_M,
+    WIDEST_RAD,
+    SteeringResponse,
+    command,
+    fit_response,
+    measure_response,
+    waypoints_of,
+)
 from shapechanger.errors import ProfileError, SpaceMismatch, StudyError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.worlds.course import HOME
@@ -37,6 +45,91 @@ def test_invalid_responses_are_refused(numbers: tuple[float, float]) -> None:
     """A response without a turn, or with the wrong sign, is refused."""
     with pytest.raises(StudyError, match="must turn to the right when it steers to the right"):
         SteeringResponse(*numbers)
+
+
+_BODIES = {"wheels": SteeringResponse(2.0, 0.0), "tracks": SteeringResponse(0.8, 3.1)}
+
+
+@pytest.mark.parametrize("body", _BODIES)
+@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
+def test_commands_lead_back_to_their_waypoints(body: str, speed: float) -> None:
+    """Within the range of steering and throttle, the two are inverse to each other."""
+    response = _BODIES[body]
+    bearings, shares = np.meshgrid(np.linspace(-0.7, 0.7, 15), np.linspace(-0.5, -0.1, 5))
+    wanted = np.stack((bearings.ravel(), shares.ravel()), axis=1).astype(np.float32)
+    commands = np.array([command(one, response, speed, on_the_spot=False) for one in wanted])
+    speeds = np.full(len(wanted), speed)
+    found = waypoints_of(commands, response, speeds)
+    assert found.usable.all()
+    within = ~found.at_limit
+    assert within.mean() > 0.7
+    np.testing.assert_allclose(found.actions[within], wanted[within], atol=1e-5)
+    # At the limit, too, the waypoint has the same command, if not the same bearing.
+    again = [command(one, response, speed, on_the_spot=False) for one in found.actions]
+    np.testing.assert_allclose(again, commands, atol=1e-5)
+
+
+def test_full_steering_only_bounds_the_waypoint() -> None:
+    """At full lock, and turning on the spot, the way may be farther aside."""
+    car, tank = _BODIES["wheels"], _BODIES["tracks"]
+    locked = waypoints_of(np.array([[1.0, 0.5], [-1.0, 0.5]]), car, np.ones(2))
+    assert locked.at_limit.all()
+    assert locked.usable.all()
+    aside = math.asin(0.5 * AHEAD_M * 2.0) / WIDEST_RAD
+    np.testing.assert_allclose(locked.actions[:, 0], [aside, -aside], rtol=1e-6)
+    turning = waypoints_of(np.array([[-0.8, 0.0]]), tank, np.zeros(1))
+    assert turning.usable.all()
+    assert turning.at_limit.all()
+    np.testing.assert_allclose(turning.actions, [[-1.0, -1.0]])
+
+
+def test_commands_that_do_not_point_ahead_are_not_usable() -> None:
+    """Standing, driving backward, and an unknown speed say nothing; braking and starting do."""
+    commands = np.array(
+        [
+            (0.5, 0.0),  # Stands, with turned wheels.
+            (0.5, 0.1),  # Stands, with too little throttle.
+            (0.0, -0.6),  # Begins to back.
+            (0.3, -0.6),  # Backs.
+            (0.0, 0.5),  # Unknown speed.
+            (np.nan, 0.5),
+            (0.3, 0.5),  # Starts.
+            (0.3, -0.6),  # Brakes.
+        ]
+    )
+    speed = np.array([0.0, 0.0, 0.0, -0.5, np.nan, 1.0, 0.0, 1.5])
+    found = waypoints_of(commands, _BODIES["wheels"], speed)
+    assert found.usable.tolist() == [False] * 6 + [True, True]
+    np.testing.assert_allclose(found.actions[6:, 1], [0.0, -1.0])
+    braked = command(found.actions[7], _BODIES["wheels"], 1.5, on_the_spot=False)
+    assert braked[1] == pytest.approx(0.25)  # A waypoint cannot brake harder.
+
+
+@pytest.mark.parametrize("body", _BODIES)
+def test_the_response_is_fitted_to_a_drive(body: str) -> None:
+    """Steps with changing steering, in which the turn lags, and unknown ones are left out."""
+    rng = np.random.default_rng(0)
+    steering = np.repeat(rng.uniform(-0.6, 0.6, 60), 6)
+    speed = np.repeat(rng.uniform(0.5, 2.0, 60), 6)
+    turn = steering * (_BODIES[body].per_metre * speed + _BODIES[body].per_second)
+    yaw_rate = -turn + rng.normal(0.0, 0.02, len(turn))
+    lags = np.abs(steering - np.roll(steering, 1)) > 0.1
+    yaw_rate[lags] += 3.0 * rng.normal(size=lags.sum())
+    yaw_rate[10] = np.nan
+    found = fit_response(steering, speed, yaw_rate)
+    assert found.per_metre == pytest.approx(_BODIES[body].per_metre, abs=0.05)
+    assert found.per_second == pytest.approx(_BODIES[body].per_second, abs=0.05)
+
+
+def test_a_drive_that_does_not_tell_the_response_is_refused() -> None:
+    """Straight driving, turning against the steering, and no measurement are refused."""
+    rng = np.random.default_rng(0)
+    steering, speed = np.repeat(rng.uniform(-0.6, 0.6, 40), 5), np.ones(200)
+    for yaw_rate in (rng.normal(0.0, 0.3, 200), 2.0 * steering, np.full(200, np.nan)):
+        with pytest.raises(StudyError, match=r"steering explains .* drive curves to both sides"):
+            fit_response(steering, speed, yaw_rate)
+    with pytest.raises(StudyError, match="drive curves to both sides"):
+        fit_response(np.zeros(200), speed, rng.normal(0.0, 0.3, 200))
 
 
 @pytest.mark.parametrize("vehicle", HOME)
@@ -98,6 +191,18 @@ def test_the_full_robot_follows_waypoints() -> None:
         assert seen.shape == (48, 80, 3)
         assert info["collisions"] == 0
         assert info["progress"] > 3.0
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_randomised_episodes_look_different() -> None:
+    """The same start on the same course has other light and another camera each time."""
+    with closing(WaypointEnv("car")) as env, closing(WaypointEnv("car", randomise=True)) as drawn:
+        usual, same = (env.reset(seed=0, options=_COURSE)[0] for _ in range(2))
+        one, other = (drawn.reset(options=_COURSE)[0] for _ in range(2))
+    np.testing.assert_array_equal(usual, same)
+    assert np.abs(one.astype(int) - usual).mean() > 3.0
+    assert np.abs(one.astype(int) - other).mean() > 3.0
 
 
 @pytest.mark.gl

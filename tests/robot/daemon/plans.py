@@ -26,7 +26,7 @@ def car_plan(**changes: Any) -> DaemonPlan:
         "body": "car",
         "action_layout": ACTIONS.to_json(),
         "state_layout": STATE.to_json(),
-        "camera": CameraPlan("pattern", SIZE),
+        "camera": CameraPlan("pattern", SIZE, pitch_deg=3.0, fovy_deg=48.8),
         "port": 0,
         "discovery": False,
     }

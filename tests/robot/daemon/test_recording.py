@@ -112,6 +112,7 @@ def test_a_step_pairs_an_observation_and_its_command(play: Any, tmp_path: Path) 
     assert (header.driver, header.robot, header.body) == ("Grace", "test car", "car")
     assert (header.clock, header.image_size, header.control_hz) == ("real", (160, 120), 20.0)
     assert header.notes == {"name": "corridor", "recorded_by": "Grace"}
+    assert (header.camera_pitch_deg, header.camera_fovy_deg) == (3.0, 48.8)
     assert [mark.text for mark in episode.marks] == ["a corner"]
     assert len(episode.steps) == len(seen) == 12
     for number, (step, observation) in enumerate(zip(episode.steps, seen, strict=True), 1):

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 import numpy as np
 import tyro
@@ -16,13 +16,17 @@ from shapechanger.cli.console import Interrupted, StudyProgress, command_line, s
 from shapechanger.cli.env_arguments import require_file, require_seed
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.dataset import count_steps, load_dataset
-from shapechanger.errors import OutputError
+from shapechanger.demos.episodes import EpisodeHeader
+from shapechanger.errors import DemosError, OutputError
 from shapechanger.transfer.files import write_atomic
 
 if TYPE_CHECKING:
+    from shapechanger.cli.demos.waypoints import CanonicalView
     from shapechanger.demos.cloning.judge import Judgement
     from shapechanger.demos.cloning.learn import MemberCheck
     from shapechanger.demos.cloning.policy import CameraPolicy
+    from shapechanger.envs.waypoints import SteeringResponse
+    from shapechanger.transfer.learners.settings import CloningSettings
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,15 @@ class TrainClone:
     """Held-out data: the last stretch of time, or the last complete episodes."""
     held_out: float = 0.2
     """Share of the steps that judges the policy and is not learned from; 0 to learn from all."""
+    waypoints: bool = False
+    """Learn where the free way is instead of steering and throttle, for any vehicle to follow:
+    shapechanger play TankWaypoint --policy ..."""
+    camera: tuple[float, float] | None = None
+    """Pitch and vertical field of view of the camera, degrees, for --waypoints; those that the
+    recording states if not given."""
+    response: tuple[float, float] | None = None
+    """How far the vehicle turns at full steering, rad for each metre and for each second, for
+    --waypoints; fitted to its recorded motion if not given."""
     seed: int = 0
     """Seed of everything random."""
     sac: Path | None = None
@@ -57,14 +70,25 @@ class TrainClone:
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.learn import learn, settings_for
         from shapechanger.reports.clone import clone_html, write_numbers
-        from shapechanger.transfer.files import write_atomic
         from shapechanger.transfer.learners.sb3 import use_one_thread
+        from shapechanger.transfer.learners.settings import LEARNERS
 
+        view = self._view()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))
+        if view is not None:
+            settings = cast("CloningSettings", LEARNERS["waypoint"]).clone
         if settings.members > 1:
             use_one_thread()  # More threads slow down networks this small.
-        shrinking = Shrinking(settings.framing)
+        shrinking = Shrinking(settings.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
+        origin: dict[str, Any] = {}
+        if view is not None:
+            from shapechanger.cli.demos.waypoints import as_waypoints
+
+            shown = as_waypoints(data, self._response())
+            for note in (view.note(), *shown.notes):
+                say(note)
+            data, origin = shown.data, {"response": astuple(shown.response)}
         judged = judged_steps(data.episodes, self.split, self.held_out)
         learned = ~judged
         n = int(learned.sum())
@@ -75,7 +99,7 @@ class TrainClone:
                     data,
                     learned,
                     settings=settings,
-                    head=self.head,
+                    head="regression" if view is not None else self.head,
                     inputs=self.inputs,
                     seed=self.seed,
                     on_check=progress,
@@ -89,6 +113,7 @@ class TrainClone:
             digest=shrinking.digest(data.actions),
             learned=n,
             steps=len(data),
+            **origin,
         )
         note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."
         if not judged.any():
@@ -105,6 +130,23 @@ class TrainClone:
         say(f"wrote {self.out}, {page} and {numbers}")
         say(note)
         _print_judgement(judgement)
+
+    def _view(self) -> CanonicalView | None:
+        """Return how pictures are warped; None without waypoints."""
+        if not self.waypoints:
+            if self.camera is not None or self.response is not None:
+                raise DemosError("--camera and --response belong to --waypoints: give it, too.")
+            return None
+        if self.head == "class" or self.inputs in {"state", "both"}:
+            raise DemosError("Waypoints are numbers, seen in pictures: leave out --head, --inputs.")
+        from shapechanger.cli.demos.waypoints import CanonicalView, camera_geometry
+
+        return CanonicalView(None if self.camera is None else camera_geometry(*self.camera))
+
+    def _response(self) -> SteeringResponse | None:
+        from shapechanger.envs.waypoints import SteeringResponse
+
+        return None if self.response is None else SteeringResponse(*self.response)
 
     def _require_files(self) -> None:
         """Check before the work that the files can be written."""
@@ -138,18 +180,22 @@ class Shrinking:
 
     Attributes:
         framing: Framing of the policy's view.
-        size: Rows and columns of the raw frames; None before the first.
+        view: How frames are warped before; None for not at all.
+        size: Rows and columns of the frames after that; None before the first.
         seen: Digest of each frame.
     """
 
     framing: Framing
+    view: CanonicalView | None = None
     size: tuple[int, int] | None = None
     seen: list[bytes] = field(default_factory=list[bytes])
 
-    def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the policy's view of a frame."""
+    def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
+        """Return the policy's view of a frame of an episode."""
         import hashlib
 
+        if self.view is not None:
+            picture = self.view(picture, header)
         self.size = picture.shape[0], picture.shape[1]
         small = prepare(picture[None], self.framing)[0]
         self.seen.append(hashlib.sha256(picture.tobytes()).digest())

@@ -16,7 +16,7 @@ from shapechanger.layout import Layout
 
 # Parts of names, between slashes. In the mirror image, the first change their sign and the second
 # do not. Positive yaw is to the left, and y points to the left.
-_NEGATED: Final = frozenset({"steering", "yaw_rate", "acceleration_y"})
+_NEGATED: Final = frozenset({"steering", "bearing", "yaw_rate", "acceleration_y"})
 _KEPT: Final = frozenset(
     {"throttle", "forward", "backward", "speed", "distance", "acceleration_x"}
     | {"bump", "stall", "collision", "battery", "temperature"}

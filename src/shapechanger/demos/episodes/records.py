@@ -31,6 +31,9 @@ class EpisodeHeader:
         control_hz: Steps per second.
         robot: Name of the robot.
         body: Kind of robot, such as "car".
+        camera_pitch_deg: Angle of the camera's optical axis below the horizon, degrees; None if
+            unknown.
+        camera_fovy_deg: Vertical field of view of the camera, degrees; None if unknown.
         env: Id of the env; "" for a robot that was driven without one.
         env_kwargs: Arguments of the env, as JSON can hold them.
         driver: Free text for people to read: who drove.
@@ -52,6 +55,8 @@ class EpisodeHeader:
     control_hz: float = 20.0
     robot: str = ""
     body: str = ""
+    camera_pitch_deg: float | None = None
+    camera_fovy_deg: float | None = None
     env: str = ""
     env_kwargs: dict[str, Any] = field(default_factory=dict[str, Any])
     driver: str = ""

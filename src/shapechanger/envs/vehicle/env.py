@@ -25,7 +25,7 @@ from shapechanger.envs.vehicle.drivers import TeacherDemonstrator
 from shapechanger.envs.vehicle.shift import certify_vehicles
 from shapechanger.errors import MissingExtra, RenderError, UnknownName
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Observation
+from shapechanger.link.messages import Observation, Welcome
 from shapechanger.remote.inbox import Received
 from shapechanger.remote.observations import RobotSpaces, StepScorer, View
 from shapechanger.tasks.drive import DriveReward
@@ -149,6 +149,11 @@ class VehicleEnv(DrivingEnv):
         self.action_space = self._senses.action_space
         self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
         self._last: Observation | None = None
+
+    @property
+    def welcome(self) -> Welcome:
+        """Description of the robot, as it gives it to a client."""
+        return self._robot.welcome
 
     @property
     def action_layout(self) -> Layout:

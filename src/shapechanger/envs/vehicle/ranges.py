@@ -133,6 +133,7 @@ class RangesEnv(DrivingEnv):
         reward: Weights by name that replace the default ones; see `DriveReward`.
         courses: "training" or "held-out", or the seeds of the courses to sample from; the default
             is 48 training courses, which are laid out once.
+        randomise: Whether `reset` samples light, textures and the camera's pose too.
         put_back: Whether to put the vehicle back on the lane after a collision, where its bumper's
             reflex keeps it from going forward for 0.75 s.
         camera: Width and height of the camera's pictures in pixels, for `world.picture()`; None
@@ -153,6 +154,7 @@ class RangesEnv(DrivingEnv):
         robot: str | os.PathLike[str] | None = None,
         reward: Mapping[str, float] | None = None,
         courses: Courses = _COURSES,
+        randomise: bool = False,
         put_back: bool = False,
         camera: tuple[int, int] | None = None,
         render_mode: str | None = None,
@@ -161,7 +163,7 @@ class RangesEnv(DrivingEnv):
         EzPickle.__init__(self, vehicle, **arguments)
         profile = resolve_profile(vehicle, robot, (160, 120))
         self.parts = frozenset(output.part for output in profile.outputs)
-        self._draw = CourseSampler(courses, randomise=False)
+        self._draw = CourseSampler(courses, randomise)
         self.render_mode = render_mode
         size = (160, 120) if camera is None and render_mode else camera
         self._world = MujocoWorld(vehicle, world, self._draw.first, size=size)

@@ -102,6 +102,8 @@ class WaypointEnv(DrivingEnv):
         robot: Path or name of a profile; None for `lab-` followed by the vehicle.
         full_robot: Whether the robot is emulated, as in `VehicleEnv`.
         courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
+        randomise: Whether `reset` samples light, textures and the camera's pose too. Pictures are
+            warped as if the camera were in its place, so a policy sees the error of the pose.
         put_back: Whether to put the vehicle back on the lane after a collision. A collision then
             does not end the episode.
         render_mode: "rgb_array" for `render` to return the camera's picture as it is.
@@ -126,6 +128,7 @@ class WaypointEnv(DrivingEnv):
         robot: str | os.PathLike[str] | None = None,
         full_robot: bool = False,
         courses: Courses = "training",
+        randomise: bool = False,
         put_back: bool = False,
         render_mode: str | None = None,
     ) -> None:
@@ -134,7 +137,8 @@ class WaypointEnv(DrivingEnv):
         body = vehicle_model(vehicle)
         world = world or (FLOODED if body.floats else "corridor")
         common: dict[str, Any] = {
-            "world": world, "robot": robot, "courses": courses, "put_back": put_back,
+            "world": world, "robot": robot, "courses": courses, "randomise": randomise,
+            "put_back": put_back,
         }  # fmt: skip
         self._env: VehicleEnv | RangesEnv = (
             VehicleEnv(vehicle, size=_SIZE, state=True, **common)

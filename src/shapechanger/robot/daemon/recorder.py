@@ -370,6 +370,8 @@ class Recorder:
             control_hz=plan.control_hz,
             robot=plan.robot,
             body=plan.body,
+            camera_pitch_deg=None if plan.camera is None else plan.camera.pitch_deg,
+            camera_fovy_deg=None if plan.camera is None else plan.camera.fovy_deg,
             driver=driver or client.name,
             clock=plan.clock,
             source="shapechanger robot",

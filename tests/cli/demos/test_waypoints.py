@@ -1,0 +1,229 @@
+"""`demos train --waypoints`: from a driver's steering to a policy for any vehicle."""
+
+from __future__ import annotations
+
+import math
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import simplejpeg
+
+from shapechanger.cli import main
+from shapechanger.cli.demos.train import TrainClone
+from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.dataset import Dataset, load_dataset
+from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
+from shapechanger.envs.vehicle import WaypointEnv
+from shapechanger.envs.waypoints import ACTION_LAYOUT, SteeringResponse
+from shapechanger.errors import DemosError, WorldError
+from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings
+
+_ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
+_STATE = Layout(
+    (
+        Feature("speed", "m/s"),
+        Feature("yaw_rate", "rad/s"),
+        Feature("steering/applied", "1", -1.0, 1.0),
+    )
+)
+_PER_METRE = 1.9
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings that train in seconds."""
+    settings = LEARNERS["waypoint"]
+    assert isinstance(settings, CloningSettings)
+    clone = msgspec.structs.replace(settings.clone, fewest_steps=30, most_steps=30)
+    monkeypatch.setitem(LEARNERS, "waypoint", msgspec.structs.replace(settings, clone=clone))
+
+
+def _record(folder: Path, n: int = 60, *, state: Layout | None = _STATE, **changes: Any) -> Path:
+    """Record a car as a person would drive it; it stands for the first ten steps."""
+    fields: dict[str, Any] = {
+        "action_layout": _ACTIONS.to_json(),
+        "state_layout": "" if state is None else state.to_json(),
+        "image_size": (160, 120),
+        "body": "car",
+        "camera_pitch_deg": 0.0,
+        "camera_fovy_deg": 48.8,
+        "clock": "none",
+    }
+    rng = np.random.default_rng(0)
+    with EpisodeWriter.create(folder, EpisodeHeader(**(fields | changes))) as writer:
+        for number in range(n):
+            stands = number < 10
+            steering = 0.1 * (number // 6 % 9 - 4)
+            speed = 0.0 if stands else 1.5
+            motion = {
+                "speed": speed,
+                "yaw_rate": -steering * _PER_METRE * speed,
+                "steering/applied": steering,
+            }
+            picture = rng.integers(0, 255, (120, 160, 3), np.uint8)
+            writer.add(
+                Step(
+                    action=(steering, 0.0 if stands else 0.6),
+                    driver="person",
+                    state=() if state is None else tuple(motion[name] for name in state.names),
+                ),
+                simplejpeg.encode_jpeg(picture, quality=80),
+            )
+        writer.close()
+    return folder
+
+
+def _loaded(data: Path, view: CanonicalView | None = None) -> Dataset:
+    return load_dataset(data, shrink=CanonicalView() if view is None else view)
+
+
+def test_a_drive_becomes_a_policy_of_waypoints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The command says what it did, and the policy's card says what its actions mean."""
+    out = tmp_path / "policy.safetensors"
+    TrainClone(_record(tmp_path / "drive"), out, waypoints=True, ppo=tmp_path / "ppo.zip").run()
+    card = CameraPolicy.load(out).card
+    assert card.action_layout == ACTION_LAYOUT
+    assert card.data["response"] == pytest.approx([_PER_METRE, 0.0], abs=0.01)
+    assert card.data["steps"] == 50
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "looks 0 degrees down with a vertical field of view of 48.8" in printed
+    assert "turns 1.90 rad for each metre and 0.00 for each second" in printed
+    assert "fitted to the recorded motion" in printed
+    assert "16.7% of the steps are left out: it stands still" in printed
+    assert "beside the picture, which ends 31 degrees to each side" in printed
+
+
+def test_waypoints_are_those_of_the_circle_that_was_driven(tmp_path: Path) -> None:
+    """Pictures are warped, standing steps are left out, and the rest is consistent."""
+    _record(tmp_path)
+    shown = as_waypoints(_loaded(_record(tmp_path, 20)))
+    data = shown.data
+    assert data.pictures is not None
+    assert data.pictures.shape == (60, 48, 80, 3)
+    assert data.episodes == (50, 10)
+    assert shown.kept.tolist() == [False] * 10 + [True] * 50 + [False] * 10 + [True] * 10
+    assert len(data.times_s) == len(data.files) == len(data.actions) == 60
+    assert data.states is data.state_layout is None
+    # The last steering of the first episode, 0.1 * (59 // 6 % 9 - 4), as a bearing 0.8 m ahead.
+    np.testing.assert_allclose(data.actions[49], [math.asin(0.4 * 1.9 * -0.4), 0.2], atol=1e-3)
+
+
+def test_cameras_that_differ_are_warped_each_by_its_own_geometry(tmp_path: Path) -> None:
+    """The note names all of them; a given camera replaces those of the recording."""
+    _record(tmp_path)
+    _record(tmp_path, camera_pitch_deg=8.0, camera_fovy_deg=60.0)
+    view = CanonicalView()
+    data = _loaded(tmp_path, view)
+    assert data.pictures is not None
+    # Both episodes have equal pictures in their cameras.
+    assert (data.pictures[0] != data.pictures[60]).any()
+    assert "looks 0 degrees down" in view.note()
+    assert "and looks 8 degrees down with a vertical field of view of 60" in view.note()
+
+
+def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
+    """With it, wheels need no speed, and tracks do."""
+    data = _loaded(_record(tmp_path, state=None))
+    with pytest.raises(DemosError, match=r"lacks steering/applied, speed, yaw_rate: give --resp"):
+        as_waypoints(data)
+    assert as_waypoints(data, SteeringResponse(1.9, 0.0)).kept.sum() == 50
+    with pytest.raises(DemosError, match="has no speed, on which the waypoint depends"):
+        as_waypoints(data, SteeringResponse(0.8, 3.1))
+    only_speed = Layout((Feature("speed", "m/s"),))
+    data = _loaded(_record(tmp_path / "other", state=only_speed))
+    with pytest.raises(DemosError, match=r"lacks steering/applied, yaw_rate: give --response"):
+        as_waypoints(data)
+
+
+def test_a_motion_that_does_not_tell_the_response_is_refused(tmp_path: Path) -> None:
+    """A vehicle that stands all the time is refused with the option to give."""
+    data = _loaded(_record(tmp_path, 10))
+    with pytest.raises(DemosError, match=r"drive curves to both sides: give --response RAD_PER_M"):
+        as_waypoints(data)
+    with pytest.raises(DemosError, match=r"In no step .* drive forward"):
+        as_waypoints(data, SteeringResponse(1.9, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"camera_pitch_deg": None}, "does not state pitch and field of view .* give --camera"),
+        ({"camera_fovy_deg": 0.0}, "from 0 to 180, got 0 and 0"),
+        ({"action_layout": ACTION_LAYOUT.to_json()}, "have waypoints as actions: leave out"),
+        (
+            {"action_layout": Layout((Feature("left", "1"), Feature("right", "1"))).to_json()},
+            "have the actions left, right",
+        ),
+    ],
+)
+def test_unsuitable_recordings_are_refused(
+    tmp_path: Path, changes: dict[str, Any], why: str
+) -> None:
+    """One sentence says what is missing, and nothing is written."""
+    data, out = _record(tmp_path / "drive", **changes), tmp_path / "policy.safetensors"
+    with pytest.raises(DemosError, match=why):
+        TrainClone(data, out, waypoints=True).run()
+    assert not out.exists()
+
+
+def test_several_bodies_are_refused(tmp_path: Path) -> None:
+    """They turn differently."""
+    _record(tmp_path)
+    _record(tmp_path, body="truck")
+    with pytest.raises(DemosError, match="several bodies, car, truck"):
+        _loaded(tmp_path)
+
+
+def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path) -> None:
+    """The error says how much it misses."""
+    view = CanonicalView()
+    with pytest.raises(WorldError, match="misses"):
+        _loaded(_record(tmp_path, camera_fovy_deg=20.0), view)
+
+
+def test_recordings_without_pictures_are_refused(tmp_path: Path) -> None:
+    """A way is seen in pictures."""
+    header = EpisodeHeader(action_layout=_ACTIONS.to_json(), clock="none")
+    with EpisodeWriter.create(tmp_path, header) as writer:
+        writer.add(Step(action=(0.0, 0.5), driver="person"))
+        writer.close()
+    with pytest.raises(DemosError, match="have no pictures"):
+        as_waypoints(_loaded(tmp_path))
+
+
+def test_options_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
+    """Options of waypoints need `--waypoints`, and their kind of policy is given."""
+    data, out = tmp_path / "drive", tmp_path / "policy.safetensors"
+    with pytest.raises(DemosError, match="belong to --waypoints"):
+        TrainClone(data, out, camera=(0.0, 48.8)).run()
+    with pytest.raises(DemosError, match="leave out --head, --inputs"):
+        TrainClone(data, out, waypoints=True, inputs="state").run()
+    with pytest.raises(DemosError, match="from 0 to 180, got 95 and 48"):
+        TrainClone(data, out, waypoints=True, camera=(95.0, 48.0)).run()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_recorded_car_teaches_a_policy_that_drives_a_tank(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two commands, from plain steering to waypoints in another body."""
+    data, out = tmp_path / "drive", tmp_path / "policy.safetensors"
+    main(["demos", "record", "Car", "--out", str(data), "--minutes", "0.1"])
+    main(["demos", "train", str(data), "--out", str(out), "--waypoints"])
+    assert "looks 0 degrees down" in capsys.readouterr().out
+    policy = CameraPolicy.load(out)
+    with closing(WaypointEnv("tank", put_back=True)) as env:
+        policy.card.require_layouts(env.action_layout)
+        seen, _ = env.reset(options={"course": 2, "start": 2})
+        for _ in range(20):
+            seen, *_, info = env.step(policy.predict(seen))
+        assert info["progress"] > 0.1
