@@ -261,7 +261,7 @@ def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] |
     with torch.no_grad():
         least = min(START_LOG_STD, getattr(settings, "log_std_init", START_LOG_STD))
         policy.log_std.clamp_(min=least)
-    return tuple(policy.log_std.tolist())
+    return tuple(float(each) for each in policy.log_std)
 
 
 def _require_finite(model: BaseAlgorithm, learner: str) -> None:
