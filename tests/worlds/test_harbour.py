@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course, Obstacle
-from shapechanger.worlds.harbour import BANK_M, add_banks, dinghy, extent, fittings, moored
+from shapechanger.worlds.harbour import BANK_M, add_banks, add_dinghy, extent, fittings, moored
 from shapechanger.worlds.layout import lay_out
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.patches import Patches
@@ -80,7 +81,7 @@ def test_obstacles_are_drawn_where_the_course_says(seed: int) -> None:
     """Each is drawn within its collision geom, and fills it at the height of a boat's hull."""
     course = lay_out("harbour", seed)
     for obstacle in course.obstacles:
-        alone = Course(**{**_fields(course), "obstacles": (obstacle,)})
+        alone = replace(course, obstacles=(obstacle,))
         points = _points(Surfaces(alone, Look.of("harbour")).obstacles())
         cosine, sine = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
         flat = (points[:, :2] - (obstacle.x, obstacle.y)) @ np.array(
@@ -95,16 +96,12 @@ def test_obstacles_are_drawn_where_the_course_says(seed: int) -> None:
             np.testing.assert_allclose(np.abs(flat).max(axis=0), half, rtol=0.01)
 
 
-def _fields(course: Course) -> dict[str, object]:
-    return {name: getattr(course, name) for name in course.__dataclass_fields__}
-
-
 def test_a_dinghy_is_blunt() -> None:
     """Its bow is at least 70 % as wide as its collision box, so that a boat meets what it sees."""
     for length in (1.600, 1.601):  # An open one, and one with a cabin.
-        faces, stuff = dinghy(Obstacle("dinghy", 0.0, 0.0, 0.0, length, 0.8, 0.45))[0]
-        assert stuff == "hull"
-        bow = faces.reshape(-1, 3)
+        patches = Patches()
+        add_dinghy(patches, Obstacle("dinghy", 0.0, 0.0, 0.0, length, 0.8, 0.45), 1.0)
+        bow = _points(patches)
         bow = bow[bow[:, 0] > 0.49 * length]
         assert np.abs(bow[:, 1]).max() > 0.7 * 0.4
 

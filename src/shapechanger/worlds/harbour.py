@@ -6,6 +6,7 @@ of their wall by 2 cm at most, all of it is behind the walls, where no vehicle c
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
@@ -16,12 +17,11 @@ from shapechanger.bodies.vehicles.shapes import (
     block,
     hull,
     loft,
-    moved,
     rod,
     section,
 )
 from shapechanger.worlds.course import Course, Obstacle, Wall
-from shapechanger.worlds.patches import Array, Patches, add_solid
+from shapechanger.worlds.patches import Array, Patches, Template
 
 BANK_M: Final = 0.4
 """Width of quays and rocks; two parts of the lane are at least twice this apart."""
@@ -33,6 +33,8 @@ _PAVING_PERIOD: Final = 2.4
 # Probabilities that a quay wall of 2 m has them.
 _BOLLARD, _TYRE, _LADDER = 0.55, 0.4, 0.12
 _MOST_BOATS: Final = 12
+_KINDS: Final = ("sail", "motor", "fishing")
+_BEAM: Final = 0.34  # Width of a boat over its length.
 _SPACE_M: Final = 0.15  # Between a moored boat and its quay.
 _SHORE_SIDES: Final = 72
 _HILL_M: Final = (2.0, 9.0)
@@ -101,53 +103,53 @@ def fittings(course: Course) -> Patches:
         draws, place = rng.random(2), float(rng.uniform(0.25, 0.75)) * length
         if wall.surface != "quay":
             continue
-        foot = *wall.start, 0.0
+        x0, y0 = np.asarray(wall.start) + place * along / length
         if draws[0] < _BOLLARD:
-            bollard = moved(_bollard(place, wall.height), foot, yaw)
-            add_solid(patches, bollard, "iron", reflected=False)
+            _bollard().add_to(patches, (x0, y0, wall.height), yaw, reflected=False)
+        x1, y1 = np.asarray(wall.end) - place * along / length
         if draws[1] < _TYRE:
-            tyre = _tyre(length - place, 0.55 * wall.height)
-            add_solid(patches, moved(tyre, foot, yaw), "rubber")
+            _tyre().add_to(patches, (x1, y1, 0.55 * wall.height), yaw)
         elif draws[1] < _TYRE + _LADDER:
-            add_solid(patches, moved(_ladder(length - place, wall.height), foot, yaw), "rust")
+            _ladder().add_to(patches, (x1, y1, 0.0), yaw, (1.0, 1.0, wall.height))
     for boat in moored(course):
-        for faces, stuff in _boat(boat.length, boat.kind):
-            add_solid(patches, moved(faces, (boat.x, boat.y, 0.0), boat.yaw), stuff)
-    for faces, stuff in _village(course, rng):
-        add_solid(patches, faces, stuff, reflected=False)
+        _boat(boat.kind).add_to(patches, (boat.x, boat.y, 0.0), boat.yaw, boat.length)
+    _add_village(patches, course, rng)
     return patches
 
 
-# Fittings stand on the wall from x = 0 to its length, with the lane at y > 0.
+# The wall is along x, with the lane at y > 0.
 
 
-def _bollard(x: float, height: float) -> Faces:
+@functools.cache
+def _bollard() -> Template:
+    """A bollard on a quay at z = 0."""
     y = -0.12
-    neck = rod((x, y, height), (x, y, height + 0.12), 0.045, 6)[:6]
-    head = block((x - 0.075, y - 0.05, height + 0.12), (x + 0.075, y + 0.05, height + 0.17))
-    return np.concatenate([neck, head])
+    neck = rod((0.0, y, 0.0), (0.0, y, 0.12), 0.045, 6)[:6]
+    head = block((-0.075, y - 0.05, 0.12), (0.075, y + 0.05, 0.17))
+    return Template.of([(neck, "iron"), (head, "iron")])
 
 
-def _tyre(x: float, z: float) -> Faces:
+@functools.cache
+def _tyre() -> Template:
+    """A tyre around the origin."""
     angle = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
     rings = [
-        np.stack([x - r * np.cos(angle), np.full(8, y), z + r * np.sin(angle)], axis=1)
+        np.stack([-r * np.cos(angle), np.full(8, y), r * np.sin(angle)], axis=1)
         for r, y in ((0.16, 0.0), (0.14, 0.02), (0.07, 0.012))
     ]
-    return loft(rings, closed=False)
+    return Template.of([(loft(rings, closed=False), "rubber")])
 
 
-def _ladder(x: float, height: float) -> Faces:
-    bars = [((x + side, 0.0), (x + side + 0.025, height)) for side in (-0.14, 0.115)]
-    rungs = np.arange(0.06, height, 0.1)
-    bars += [((x - 0.12, float(z)), (x + 0.12, float(z) + 0.025)) for z in rungs]
-    # Bars are flat: a vehicle can come as near as the wall.
-    return np.array(
-        [
-            [(x1, 0.01, z0), (x0, 0.01, z0), (x0, 0.01, z1), (x1, 0.01, z1)]
-            for (x0, z0), (x1, z1) in bars
-        ]
-    )
+@functools.cache
+def _ladder() -> Template:
+    """A ladder of height 1 with flat bars: a vehicle can come as near as the wall."""
+    bars = [((side, 0.0), (side + 0.025, 1.0)) for side in (-0.14, 0.115)]
+    bars += [((-0.12, z), (0.12, z + 0.042)) for z in (0.1, 0.27, 0.44, 0.61, 0.78, 0.95)]
+    faces = [
+        [(x1, 0.01, z0), (x0, 0.01, z0), (x0, 0.01, z1), (x1, 0.01, z1)]
+        for (x0, z0), (x1, z1) in bars
+    ]
+    return Template.of([(np.array(faces), "rust")])
 
 
 class MooredBoat(NamedTuple):
@@ -202,72 +204,69 @@ def moored(course: Course) -> list[MooredBoat]:
     return placed
 
 
-_KINDS: Final = ("sail", "motor", "fishing")
-_BEAM: Final = 0.34  # Width of a boat over its length.
-
-
-def _boat(length: float, kind: str) -> list[tuple[Faces, str]]:
-    """A boat at the origin, ahead along x: faces and cells."""
-    wide, deep = _BEAM * length, 0.15 * length
+@functools.cache
+def _boat(kind: str) -> Template:
+    """A boat of length 1 at the origin, ahead along x."""
+    wide, deep = _BEAM, 0.15
     skin = {"sail": "white hull", "motor": "blue hull", "fishing": "green hull"}[kind]
-    made: list[tuple[Faces, str]] = [(hull(length, wide, deep), skin)]
+    made: list[tuple[Faces, str]] = [(hull(1.0, wide, deep), skin)]
 
     def add(rear: float, front: float, half: float, low: float, top: float, stuff: str) -> None:
-        ends = (rear * length, -half * wide, low * deep), (front * length, half * wide, top * deep)
+        ends = (rear, -half * wide, low * deep), (front, half * wide, top * deep)
         made.append((block(*ends), stuff))
 
     def spar(x0: float, z0: float, x1: float, z1: float, thick: float, stuff: str) -> None:
-        ends = (x0 * length, 0.0, z0 * length), (x1 * length, 0.0, z1 * length)
-        made.append((rod(*ends, thick, 4), stuff))
+        made.append((rod((x0, 0.0, z0), (x1, 0.0, z1), thick, 4), stuff))
 
     add(-0.47, 0.3, 0.36, 0.85, 1.06, "deck")
     if kind == "sail":
         add(-0.12, 0.22, 0.26, 1.0, 1.5, "cabin")
-        spar(0.08, 0.15, 0.08, 1.1, 0.018, "spar")
-        spar(-0.4, 0.30, 0.06, 0.32, 0.05, "canvas")
+        spar(0.08, 0.15, 0.08, 1.1, 0.009, "spar")
+        spar(-0.4, 0.30, 0.06, 0.32, 0.025, "canvas")
     elif kind == "motor":
         add(-0.25, 0.2, 0.36, 1.0, 1.9, "cabin")
         add(-0.28, 0.1, 0.38, 1.9, 2.0, "white hull")
         add(-0.15, 0.05, 0.28, 2.0, 2.5, "panes")
-        spar(-0.2, 0.3, -0.24, 0.5, 0.012, "spar")
+        spar(-0.2, 0.3, -0.24, 0.5, 0.006, "spar")
     else:
         add(0.02, 0.24, 0.30, 1.0, 2.6, "cabin")
         add(0.0, 0.27, 0.34, 2.6, 2.75, "red hull")
         add(-0.42, -0.1, 0.26, 1.0, 1.25, "rust")
-        spar(-0.08, 0.15, -0.08, 0.68, 0.016, "spar")
-        spar(-0.08, 0.3, -0.4, 0.57, 0.012, "spar")
-    return made
+        spar(-0.08, 0.15, -0.08, 0.68, 0.008, "spar")
+        spar(-0.08, 0.3, -0.4, 0.57, 0.006, "spar")
+    return Template.of(made)
 
 
-def dinghy(obstacle: Obstacle) -> list[tuple[Faces, str]]:
-    """A pram, blunt at both ends and so nearly as wide as its collision box, or one with a cabin.
+def add_dinghy(patches: Patches, obstacle: Obstacle, light: float) -> None:
+    """Add a dinghy, blunt at both ends and so nearly as wide as its collision box.
 
     Args:
+        patches: Patches with the texture "things" to extend.
         obstacle: Its place and size.
-
-    Returns:
-        Its faces in the world, and cells of the texture "things".
+        light: Brightness, 0 to 1.
     """
-    long, wide, high = obstacle.length, obstacle.width, obstacle.height
-    # Position over the length, half width of deck and waterline over the width, and height of the
-    # deck over the whole height.
+    # Half of them have a cabin.
+    model = _dinghy(has_cabin=round(1000.0 * obstacle.length) % 2 == 1)
+    size = obstacle.length, obstacle.width, obstacle.height
+    model.add_to(patches, (obstacle.x, obstacle.y, 0.0), obstacle.yaw, size, light)
+
+
+@functools.cache
+def _dinghy(*, has_cabin: bool) -> Template:
+    """A dinghy of length, width and height 1 at the origin, ahead along x."""
+    # Position, half width of deck and waterline, and height of the deck.
     stations = (
         (-0.5, 0.46, 0.43, 0.60),
         (-0.25, 0.5, 0.48, 0.58),
         (0.25, 0.5, 0.48, 0.60),
         (0.5, 0.40, 0.36, 0.70),
     )
-    skin = [
-        section(x * long, [(water * wide, 0.0), (deck * wide, top * high)])
-        for x, deck, water, top in stations
-    ]
+    skin = [section(x, [(water, 0.0), (deck, top)]) for x, deck, water, top in stations]
     made = [(loft(skin), "hull")]
 
     def add(rear: float, front: float, half: float, low: float, top: float, stuff: str) -> None:
-        ends = (rear * long, -half * wide, low * high), (front * long, half * wide, top * high)
-        made.append((block(*ends), stuff))
+        made.append((block((rear, -half, low), (front, half, top)), stuff))
 
-    has_cabin = round(1000.0 * long) % 2 == 1  # Half of them.
     if has_cabin:
         add(-0.05, 0.30, 0.34, 0.55, 0.92, "hull")
         add(-0.08, 0.33, 0.38, 0.92, 1.0, "wood")
@@ -279,8 +278,7 @@ def dinghy(obstacle: Obstacle) -> list[tuple[Faces, str]]:
         for x in (-0.3, 0.0, 0.26):
             add(x - 0.04, x + 0.04, 0.46, 0.55, 0.70, "wood")
     add(-0.5, -0.44, 0.10, 0.2, 0.8 if has_cabin else 1.0, "metal")  # Outboard motor.
-    place = obstacle.x, obstacle.y, 0.0
-    return [(moved(faces, place, obstacle.yaw), stuff) for faces, stuff in made]
+    return Template.of(made)
 
 
 def extent(course: Course) -> tuple[Array, float]:
@@ -311,23 +309,34 @@ def far_shore(course: Course) -> Patches:
     return patches
 
 
-def _village(course: Course, rng: np.random.Generator) -> list[tuple[Faces, str]]:
-    """Houses in two groups at the foot of the hills, and a lighthouse."""
-    middle, radius = extent(course)
-    made: list[tuple[Faces, str]] = []
+@functools.cache
+def _house() -> Template:
+    """A house of length, depth and height of the walls 1 at the origin."""
+    walls = block((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))[:4]
+    gable = [(-0.55, 1.0), (0.55, 1.0), (0.0, 1.35)]
+    roof = loft([[(x, y, z) for y, z in gable] for x in (-0.55, 0.55)])
+    return Template.of([(walls, "house"), (roof, "roof")])
+
+
+@functools.cache
+def _lighthouse() -> Template:
+    foot, gallery, top = ((0.0, 0.0, z) for z in (0.0, 8.0, 9.2))
+    return Template.of(
+        [(rod(foot, gallery, 0.9, 8), "tower"), (rod(gallery, top, 0.6, 8), "panes")]
+    )
+
+
+def _add_village(patches: Patches, course: Course, rng: np.random.Generator) -> None:
+    """Add houses in two groups at the foot of the hills, and a lighthouse."""
+    (x, y), radius = extent(course)
     centres = rng.uniform(0.0, 2.0 * np.pi, 2)
     for number in range(_HOUSES):
         angle = float(centres[number % 2] + rng.normal(0.0, 0.22))
         away = radius - float(rng.uniform(1.5, 5.0))
-        long, deep, high = rng.uniform((2.0, 1.6, 1.6), (3.6, 2.4, 3.2))
-        place = (*(middle + away * np.array([np.cos(angle), np.sin(angle)])), 0.0)
+        long, deep, high = map(float, rng.uniform((2.0, 1.6, 1.6), (3.6, 2.4, 3.2)))
+        place = float(x + away * np.cos(angle)), float(y + away * np.sin(angle)), 0.0
         yaw = angle + 0.5 * np.pi + float(rng.normal(0.0, 0.3))
-        walls = block((-0.5 * long, -0.5 * deep, 0.0), (0.5 * long, 0.5 * deep, high))[:4]
-        gable = [(-0.55 * deep, high), (0.55 * deep, high), (0.0, 1.35 * high)]
-        roof = loft([[(x, y, z) for y, z in gable] for x in (-0.55 * long, 0.55 * long)])
-        made += [(moved(walls, place, yaw), "house"), (moved(roof, place, yaw), "roof")]
-    angle = float(centres[0] + 0.9)
-    foot = (*(middle + (radius - 6.0) * np.array([np.cos(angle), np.sin(angle)])), 0.0)
-    made.append((moved(rod((0.0, 0.0, 0.0), (0.0, 0.0, 8.0), 0.9, 8), foot), "tower"))
-    made.append((moved(rod((0.0, 0.0, 8.0), (0.0, 0.0, 9.2), 0.6, 8), foot), "panes"))
-    return made
+        _house().add_to(patches, place, yaw, (long, deep, high), reflected=False)
+    angle, away = float(centres[0] + 0.9), radius - 6.0
+    place = float(x + away * np.cos(angle)), float(y + away * np.sin(angle)), 0.0
+    _lighthouse().add_to(patches, place, 0.0, reflected=False)

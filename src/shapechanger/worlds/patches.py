@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.vehicles.shapes import Faces, normals, shading
+from shapechanger.bodies.vehicles.shapes import Faces, moved, normals, shading
 from shapechanger.worlds.paint import CELLS, ROWS
 
 Array = NDArray[np.float64]
@@ -150,29 +151,67 @@ def add_turned(
     patches.add_grid(points, cell(stuff, places), lights)
 
 
-def add_solid(
-    patches: Patches, faces: Faces, stuff: str, light: float = 1.0, *, reflected: bool = True
-) -> None:
-    """Add a solid, on which the cell is upright and stretched over its whole side or top.
+class Template(NamedTuple):
+    """Solids that are added at several places.
 
-    Args:
-        patches: Patches to extend.
-        faces: Its faces, m, (n, 4, 3).
-        stuff: Cell of the texture.
-        light: Brightness, 0 to 1.
-        reflected: See `Patches.add`.
+    Attributes:
+        faces: Faces, m, (n, 4, 3).
+        places: Texture coordinates of their corners, (n, 4, 2).
+        lights: Brightness of each face, 0 to 1, (n, 1).
     """
+
+    faces: Faces
+    places: Array
+    lights: Array
+
+    @staticmethod
+    def of(solids: Iterable[tuple[Faces, str]]) -> Template:
+        """Return a template.
+
+        Args:
+            solids: Faces, m, (n, 4, 3), and the cell of the texture that is stretched, upright,
+                over the whole side or top of each solid.
+        """
+        parts = [_textured(faces, stuff) for faces, stuff in solids]
+        faces, places = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        return Template(faces, places, shading(faces)[:, None])
+
+    def add_to(
+        self,
+        patches: Patches,
+        place: tuple[float, float, float],
+        yaw: float,
+        scale: float | tuple[float, float, float] = 1.0,
+        light: float = 1.0,
+        *,
+        reflected: bool = True,
+    ) -> None:
+        """Add the solids at a place.
+
+        Args:
+            patches: Patches to extend.
+            place: Position of their origin, m.
+            yaw: Rotation about the vertical axis, rad.
+            scale: Factor on all sizes, or on each of them.
+            light: Brightness, 0 to 1.
+            reflected: See `Patches.add`.
+        """
+        faces = moved(self.faces * scale, place, yaw)
+        patches.add(faces, self.places, light * self.lights, reflected=reflected)
+
+
+def _textured(faces: Faces, stuff: str) -> tuple[Faces, Array]:
+    """Faces of a solid that can be seen from above, and their texture coordinates."""
     low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
     faces = faces[normals(faces)[:, 2] > -0.9]  # Nothing looks up from the ground.
     share: Array = (faces - low) / np.maximum(high - low, 1e-9)
     across, down, up = share[..., 0], share[..., 1], share[..., 2]
-    edges = np.abs(np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1]))
-    facing = edges.argmax(axis=1)[:, None]  # Axis along which the face mostly looks.
+    # Axis along which each face mostly looks.
+    facing = np.abs(normals(faces)).argmax(axis=1)[:, None]
     places = np.stack(
         [np.where(facing == 0, down, across), np.where(facing == 2, down, 1.0 - up)], axis=2
     )
-    lights = light * shading(faces)[:, None]
-    patches.add(faces, cell(stuff, places), lights, reflected=reflected)
+    return faces, cell(stuff, places)
 
 
 def cell(stuff: str, places: Array) -> Array:

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from shapechanger.worlds.course import Course, Obstacle, Wall
-from shapechanger.worlds.harbour import add_banks, dinghy, extent
+from shapechanger.worlds.harbour import add_banks, add_dinghy, extent
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.paint import CELLS, ROWS
-from shapechanger.worlds.patches import Array, Patches, add_box, add_solid, add_turned
+from shapechanger.worlds.patches import Array, Patches, add_box, add_turned
 
 # Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
 _REACH: Final = 1.6
@@ -191,8 +191,7 @@ class Surfaces:
         for obstacle in self._course.obstacles:
             bright = float(self._light_at(np.array([obstacle.x, obstacle.y])))
             if obstacle.kind == "dinghy":
-                for faces, stuff in dinghy(obstacle):
-                    add_solid(patches, faces, stuff, bright)
+                add_dinghy(patches, obstacle, bright)
             elif obstacle.is_round:
                 for outline, stuff in _ROUND[obstacle.kind]:
                     profile = np.array(outline) * (obstacle.length, obstacle.height)

@@ -10,14 +10,16 @@ follow T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
 import mujoco
 
-from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress
+from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress, joined
 from shapechanger.bodies.vehicles.model import BoundVehicle, Motion, Outputs, VehicleModel
 from shapechanger.bodies.vehicles.parts import (
     HOBBY_MOTOR,
@@ -403,7 +405,8 @@ def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
     add_camera(chassis, _CAMERA)
 
 
-def _bodywork() -> list[tuple[str, Faces]]:
+@functools.cache
+def _bodywork() -> Mapping[str, Faces]:
     """A workboat above its waterline, with the camera on its foredeck: colours and faces."""
     deep = 0.058
     cabin = ((-0.17, 0.108), (0.01, 0.108), (0.045, 0.056))
@@ -450,7 +453,7 @@ def _bodywork() -> list[tuple[str, Faces]]:
             ("dark", rod((x, 1.62 * y, 0.018), (x, 1.62 * y, 0.045), 0.008, 8))
             for x in (-0.18, -0.02)
         ]
-    return parts
+    return joined(parts)
 
 
 def _add_propeller(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, part: str, y: float) -> None:
@@ -482,7 +485,7 @@ def _add_rudder(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> N
     head = extrude(
         [(-0.058, 0.042), (-0.034, 0.042), (-0.036, 0.105), (-0.050, 0.105)], -0.003, 0.003
     )
-    dress(stock, [("deck", head)], paint, ground_z=_DRAUGHT)
+    dress(stock, {"deck": head}, paint, ground_z=_DRAUGHT)
     HOBBY_SERVO.add(spec, name, name)
 
 

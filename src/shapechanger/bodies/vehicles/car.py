@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Mapping
 from functools import partial
 from typing import Final
 
 import mujoco
 import numpy as np
 
-from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress
+from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress, joined
 from shapechanger.bodies.vehicles.model import VehicleModel
 from shapechanger.bodies.vehicles.parts import (
     HOBBY_MOTOR,
@@ -58,7 +60,8 @@ def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
     add_camera(chassis, _CAMERA)
 
 
-def _bodywork() -> list[tuple[str, Faces]]:
+@functools.cache
+def _bodywork() -> Mapping[str, Faces]:
     """A touring car with a rear wing, and the camera on its roof: colours and faces."""
     # Distance from an axle, and height of the sill there: the wheel arch.
     arch = ((-0.043, 0.024), (-0.037, 0.050), (-0.02, 0.068), (0.02, 0.068), (0.037, 0.050),
@@ -112,7 +115,7 @@ def _bodywork() -> list[tuple[str, Faces]]:
                 block((0.030, side * 0.094 - 0.010, 0.082), (0.042, side * 0.094 + 0.010, 0.092)),
             ),
         ]
-    return parts
+    return joined(parts)
 
 
 CAR: Final = VehicleModel(

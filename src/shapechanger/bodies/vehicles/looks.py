@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import functools
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import mujoco
@@ -132,9 +133,17 @@ def _add_shape(
     )  # fmt: skip
 
 
+def joined(solids: Iterable[tuple[str, Faces]]) -> Mapping[str, Faces]:
+    """Join the faces of each colour."""
+    by_colour: dict[str, list[Faces]] = {}
+    for colour, faces in solids:
+        by_colour.setdefault(colour, []).append(faces)
+    return {colour: np.concatenate(parts) for colour, parts in by_colour.items()}
+
+
 def dress(
     body: mujoco.MjsBody,
-    solids: Iterable[tuple[str, Faces]],
+    solids: Mapping[str, Faces],
     paint: Paint,
     *,
     ground_z: float = 0.0,
@@ -143,15 +152,11 @@ def dress(
 
     Args:
         body: Body to extend.
-        solids: Colours and faces, m, (n, 4, 3).
+        solids: Faces by colour, m, (n, 4, 3).
         paint: Materials.
         ground_z: Height of the ground in the frame of the body, m.
     """
-    by_colour: dict[str, list[Faces]] = {}
-    for colour, faces in solids:
-        by_colour.setdefault(colour, []).append(faces)
-    for colour, parts in by_colour.items():
-        faces = np.concatenate(parts)
+    for colour, faces in solids.items():
         below = faces[:, [0, 3, 2, 1]] * (1.0, 1.0, -1.0) + (0.0, 0.0, 2.0 * ground_z)
         both, light = np.concatenate([faces, below]), np.tile(shading(faces), 2)
         _add_shape(body, f"{body.name}/{colour}", both, light, paint.shaded(colour), paint)
@@ -180,19 +185,24 @@ def add_shadow(
         paint: Materials.
         ground_z: Height of the ground in the frame of the body, m.
     """
+    faces = _layers(low, high, ground_z)
+    name = f"{body.name}/shadow"
+    _add_shape(body, name, faces, np.zeros(len(faces)), paint.shadow(), paint)
+
+
+@functools.cache
+def _layers(low: tuple[float, float], high: tuple[float, float], ground_z: float) -> Faces:
+    """Rectangles with round corners; see `add_shadow`."""
     middle, half = 0.5 * np.add(low, high), 0.5 * np.subtract(high, low)
     angle = np.linspace(0.0, 2.0 * np.pi, 28, endpoint=False)
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     layers: list[Faces] = []
     for number, spread in enumerate(np.linspace(0.05, -0.02, _LAYERS)):
-        # A rectangle with round corners, grown by `spread`.
         flat = middle + np.sign(direction) * (half - 0.03) + direction * (0.03 + spread)
         height = ground_z + 0.001 + _LAYER_RISE_M * number
         ring = np.column_stack([flat, np.full(len(flat), height)])
         layers.append(fan(ring))
-    faces = np.concatenate(layers)
-    name = f"{body.name}/shadow"
-    _add_shape(body, name, faces, np.zeros(len(faces)), paint.shadow(), paint)
+    return np.concatenate(layers)
 
 
 _TYRE_SIDES: Final = 20
@@ -211,7 +221,18 @@ def dress_wheel(
         paint: Materials.
         tyre: "tyre", or "track" for a road wheel within a track.
     """
-    inside = tyre == "track"
+    for colour, faces in _wheel(radius, width, tyre == "track").items():
+        name = f"vehicle/{colour} of wheels"
+        dark, material = np.zeros(len(faces)), paint.even(colour)
+        _add_shape(wheel, name, faces, dark, material, paint)
+        # Its reflection does not turn.
+        mirrored = wheel.pos - (0.0, 0.0, 2.0 * radius)
+        _add_shape(wheel.parent, name, faces, dark, material, paint, mirrored)
+
+
+@functools.cache
+def _wheel(radius: float, width: float, inside: bool) -> Mapping[str, Faces]:
+    """Faces of a wheel by colour, m; `inside` a track it is smaller."""
     outer, half = (0.74 * radius, 0.52 * width) if inside else (radius, 0.5 * width)
     angle = np.linspace(0.0, 2.0 * np.pi, 2 * _TYRE_SIDES, endpoint=False)
 
@@ -232,17 +253,13 @@ def dress_wheel(
             arc = slice(start, start + 5)
             corners = np.concatenate([ring(0.56, y)[arc], ring(0.24, y)[arc][::-1]])
             openings.append(fan(corners[::way]))
-    parts = {
-        "tyre": [*walls, tread[::4], tread[1::4]],
-        "tread": [tread[2::4], tread[3::4]],
-        "olive" if inside else "rim": discs,
-        "dark": openings,
-    }
-    for colour, faces in parts.items():
-        every = np.concatenate(faces)
-        name = f"vehicle/{colour} of wheels"
-        dark, material = np.zeros(len(every)), paint.even(colour)
-        _add_shape(wheel, name, every, dark, material, paint)
-        # Its reflection does not turn.
-        mirrored = wheel.pos - (0.0, 0.0, 2.0 * radius)
-        _add_shape(wheel.parent, name, every, dark, material, paint, mirrored)
+    tyre = [*walls, tread[::4], tread[1::4]]
+    rim = "olive" if inside else "rim"
+    return joined(
+        [
+            *(("tyre", faces) for faces in tyre),
+            *(("tread", faces) for faces in (tread[2::4], tread[3::4])),
+            *((rim, faces) for faces in discs),
+            *(("dark", faces) for faces in openings),
+        ]
+    )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Mapping
 from functools import partial
 from typing import Final
 
 import mujoco
 import numpy as np
 
-from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress
+from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress, joined
 from shapechanger.bodies.vehicles.model import VehicleModel
 from shapechanger.bodies.vehicles.parts import (
     HOBBY_MOTOR,
@@ -58,7 +60,8 @@ def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
     add_camera(chassis, _CAMERA)
 
 
-def _bodywork() -> list[tuple[str, Faces]]:
+@functools.cache
+def _bodywork() -> Mapping[str, Faces]:
     """Hull, tracks and a turret whose gun is the camera: colours and faces."""
     hull = extrude(
         [(-0.145, 0.03), (0.10, 0.026), (0.155, 0.050), (0.12, 0.078), (-0.15, 0.078)],
@@ -112,7 +115,7 @@ def _bodywork() -> list[tuple[str, Faces]]:
             ("lamp", rod((0.118, 0.75 * y, 0.073), (0.137, 0.75 * y, 0.073), 0.007)),
             ("red", block((-0.1512, 0.9 * y - 0.006, 0.062), (-0.149, 0.9 * y + 0.006, 0.068))),
         ]
-    return parts
+    return joined(parts)
 
 
 def _add_track(

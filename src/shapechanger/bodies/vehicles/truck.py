@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Mapping
 from functools import partial
 from typing import Final
 
 import mujoco
 import numpy as np
 
-from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress
+from shapechanger.bodies.vehicles.looks import Paint, add_shadow, dress, joined
 from shapechanger.bodies.vehicles.model import VehicleModel
 from shapechanger.bodies.vehicles.parts import (
     HOBBY_MOTOR,
@@ -63,7 +65,8 @@ def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
     _add_trailer(spec, chassis, paint)
 
 
-def _tractor() -> list[tuple[str, Faces]]:
+@functools.cache
+def _tractor() -> Mapping[str, Faces]:
     """A cab over its front axle, with a wind deflector, tanks and exhausts: colours and faces."""
     # The cab's outline from the side, with the wheel arch cut out.
     sill, arch = 0.052, _AXLES.radius + 0.045
@@ -109,10 +112,11 @@ def _tractor() -> list[tuple[str, Faces]]:
             ("steel", rod((0.050, 0.85 * y, 0.08), (0.050, 0.85 * y, 0.275), 0.006, 8)),
             ("dark", block((-0.20, 0.7 * y - 0.018, 0.080), (-0.10, 0.7 * y + 0.018, 0.084))),
         ]
-    return parts
+    return joined(parts)
 
 
-def _box(rear: float, front: float) -> list[tuple[str, Faces]]:
+@functools.cache
+def _box(rear: float, front: float) -> Mapping[str, Faces]:
     """A ribbed container on its frame, between two positions ahead, m: colours and faces."""
     half, low, high = 0.096, 0.016, 0.165
     parts = [
@@ -144,7 +148,7 @@ def _box(rear: float, front: float) -> list[tuple[str, Faces]]:
                 block((rear - 0.001, 0.75 * y - 0.012, -0.043), (rear, 0.75 * y + 0.012, -0.032)),
             ),
         ]
-    return parts
+    return joined(parts)
 
 
 def _add_trailer(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> None:
