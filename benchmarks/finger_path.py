@@ -48,9 +48,10 @@ def path() -> list[Row]:
             finger_seed=seed,
             max_episode_steps=-1,
         )
-        found = identify(record_babble(env, _SECONDS, 100 + seed)).parameters
+        babble = record_babble(env, _SECONDS, 100 + seed)
         logs = [_played(env, _FIRST_SEED + i) for i in range(_EPISODES)]
-        env.close()
+        env.close()  # A twin does not wait for an identification.
+        found = identify(babble).parameters
         delays.append(found.command_delay)
         chatter += [float(np.abs(np.diff(log.commands, axis=0)).mean()) for log in logs]
         models = found, found.replace(path=None, command_delay=0.0, motor_lag=_LAG_S)

@@ -50,8 +50,8 @@ _DELAY_ERROR_S: Final = 0.002
 _LAG_ERROR_S: Final = 0.0005
 # Delays that the motion is replayed with, s apart.
 _DELAY_STEP_S: Final = 0.0025
-PATH_DELAY_ERROR_S: Final = 0.005
-"""Half the interval of a delay found from motion, s: on five twins, with 10 ms, 7 to 13 ms were
+PATH_DELAY_ERROR_S: Final = 0.007
+"""Half the interval of a delay found from motion, s: on twins, whose delay is 10 ms, 4 to 9 ms were
 found (`python -m benchmarks.run finger-path`)."""
 # Largest stiffness, N/m, that can be told from infinity: at it all tension there is stretches a
 # tendon by less than 0.1 mm.

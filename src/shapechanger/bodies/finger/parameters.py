@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import msgspec
 import numpy as np
@@ -149,8 +149,10 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
     def __post_init__(self) -> None:
         numbers = msgspec.structs.asdict(self)
-        if isinstance(path := numbers.pop("path"), Mapping):
-            msgspec.structs.force_setattr(self, "path", CommandPath.from_mapping(path))
+        path: Any = numbers.pop("path")
+        if isinstance(path, Mapping):
+            named = cast("Mapping[str, Any]", path)
+            msgspec.structs.force_setattr(self, "path", CommandPath.from_mapping(named))
         if self.tendon_stiffness is None:
             if self.backlash:
                 raise FingerError("backlash needs a tendon_stiffness: a stiff tendon has none.")

@@ -25,7 +25,7 @@ _LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"}
 # Relative errors of identified arms and stretch, and of joints: `benchmarks.finger_identify`.
 _FOUND: Final = 0.03
 _JOINTS_FOUND: Final = 0.2
-# Error of an identified delay on the path of a rig, s: `benchmarks.finger_path`.
+# Spread around an identified delay, s. Chosen: most errors are smaller (`benchmarks.finger_path`).
 _DELAY_FOUND_S: Final = 0.005
 
 Range = tuple[float, float]

@@ -155,8 +155,10 @@ def record_babble(
     for step in range(round(seconds / control_dt)):
         observation, _, terminated, truncated, info = env.step(babble(observation))
         if terminated or truncated or info.get("diverged"):
+            because = str(info.get("truncated_because") or "").rstrip(".")
             raise FingerError(
-                f"The env ended after {(step + 1) * control_dt:.1f} s of {seconds:g} s."
+                f"The env ended after {(step + 1) * control_dt:.1f} s of {seconds:g} s"
+                + (f": {because}." if because else ".")
             )
         rows.append(np.array(observation, np.float64))
     seen = np.array(rows)

@@ -42,6 +42,8 @@ _START_S: Final = 1.0
 _SLACK_S: Final = 0.6
 # Weight of the reward in a source for a rig: what changes fast costs, because a rig cannot follow.
 _CALM: Final = {"change": 5.0}
+_TIMEOUT_S: Final = 2.0
+_OWN_TIMEOUT_S: Final = 30.0
 # Prefixes of infos that concern driving only.
 _DRIVING: Final = ("reward", "frame", "captured_ns")
 
@@ -90,7 +92,8 @@ class RemoteFingerEnv(FingerReachEnv):
         on_reset: As for `RemoteVehicleEnv`.
         on_waiting: As for `RemoteVehicleEnv`.
         reset_timeout_s: Time limit of a reset, s.
-        timeout_s: Silence of the rig after which the link is lost, s.
+        timeout_s: Silence of the rig after which the link is lost, s; None for 2 s, or 30 s with
+            its own twin, whose clock waits for a busy machine.
         actions: What an action commands; see `shapechanger.bodies.finger.DRIVES`.
         goal: Whether observations are Dicts with goals.
         reward: Weights that replace the default ones, by name.
@@ -121,7 +124,7 @@ class RemoteFingerEnv(FingerReachEnv):
         on_reset: OnReset = "operator",
         on_waiting: Callable[[str], object] | None = None,
         reset_timeout_s: float = 60.0,
-        timeout_s: float = 2.0,
+        timeout_s: float | None = None,
         actions: str = "impedance",
         goal: bool = False,
         reward: Mapping[str, float] | None = None,
@@ -158,7 +161,7 @@ class RemoteFingerEnv(FingerReachEnv):
             "on_reset": on_reset,
             "on_waiting": on_waiting,
             "reset_timeout_s": reset_timeout_s,
-            "timeout_s": timeout_s,
+            "timeout_s": timeout_s or (_TIMEOUT_S if self._own is None else _OWN_TIMEOUT_S),
         }
         self._operator: Operator | None = None
         try:

@@ -255,13 +255,12 @@ def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] |
         Logarithms of the standard deviations that the training starts with; None for policies whose
         deviation depends on the observation, as SAC's, which their entropy target raises.
     """
-    policy = model.policy
-    if not isinstance(policy, ActorCriticPolicy):
+    if not isinstance(model.policy, ActorCriticPolicy):
         return None
+    log_std: torch.Tensor = model.policy.log_std
     with torch.no_grad():
-        least = min(START_LOG_STD, getattr(settings, "log_std_init", START_LOG_STD))
-        policy.log_std.clamp_(min=least)
-    return tuple(float(each) for each in policy.log_std)
+        log_std.clamp_(min=min(START_LOG_STD, getattr(settings, "log_std_init", START_LOG_STD)))
+    return tuple(map(float, log_std.detach().numpy()))
 
 
 def _require_finite(model: BaseAlgorithm, learner: str) -> None:
