@@ -5,6 +5,8 @@ from __future__ import annotations
 from shapechanger.errors import MissingExtra
 
 try:
+    import mujoco as _mujoco  # noqa: F401 - Bodies would name one of the two extras.
+
     from shapechanger.envs.vehicle.env import VehicleEnv
     from shapechanger.envs.vehicle.ranges import RangesEnv
     from shapechanger.envs.vehicle.waypoints import WaypointEnv
