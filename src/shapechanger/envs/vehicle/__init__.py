@@ -5,7 +5,8 @@ from __future__ import annotations
 from shapechanger.errors import MissingExtra
 
 try:
-    import mujoco as _mujoco  # noqa: F401 - Bodies would name one of the two extras.
+    # Without MuJoCo, the bodies would name only one of the two extras.
+    import mujoco  # noqa: F401  # pyright: ignore[reportUnusedImport]
 
     from shapechanger.envs.vehicle.env import VehicleEnv
     from shapechanger.envs.vehicle.ranges import RangesEnv
