@@ -85,9 +85,13 @@ def _study(
 def rows_of(study: Study, where: str) -> list[Row]:
     """Return the success of each arm next to its target; the nominal finger reaches all."""
     shares = {arm: successes(study, arm) for arm in study.plan.arms}
-    best = max(("randomised", "identified"), key=lambda arm: float(shares[arm].mean()))
+    adapted = [arm for arm in ("randomised", "identified") if arm in shares]
+    best = max(adapted, key=lambda arm: float(shares[arm].mean()))
     limits = {"zero-shot": ("< 50 %", float(shares["zero-shot"].mean()) < _MILD)}
-    limits[best] = (">= 80 %, this or the other", float(shares[best].mean()) >= _RECOVERED)
+    limits[best] = (
+        ">= 80 %" + (", this or the other" if len(adapted) > 1 else ""),
+        float(shares[best].mean()) >= _RECOVERED,
+    )
     seeds = study.plan.seeds
     return [
         Row(

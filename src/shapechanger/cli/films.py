@@ -13,9 +13,9 @@ from shapechanger.cli.pictures import write_film
 from shapechanger.reports.suite import FilmStrip
 from shapechanger.reports.verdict import finals
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
-from shapechanger.transfer.env_ref import EnvRef, measures_of
+from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, measures_of
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act
-from shapechanger.transfer.learners.settings import Sb3Settings
+from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.runs import learner_of
 
@@ -26,6 +26,9 @@ _WIDTH, _HEIGHT = 240, 180
 _FILM_S: Final = 10.0
 _PICTURES: Final = 6
 _GAP: Final = 4
+# View of a vehicle: radius around it, m, and direction from its heading, rad.
+_REACH_M: Final = 0.6
+_BESIDE_RAD: Final = 0.5
 
 
 class _Scene(NamedTuple):
@@ -35,6 +38,7 @@ class _Scene(NamedTuple):
     env: EnvRef
     act: Act
     body_map: BodyMap | None
+    drives: bool = False  # Its env renders what it sees, so it is filmed from outside.
 
 
 def film_study(study: Study, folder: Path, film: Path | None = None) -> list[FilmStrip]:
@@ -46,14 +50,12 @@ def film_study(study: Study, folder: Path, film: Path | None = None) -> list[Fil
         film: A film to write with all of them side by side; None for none.
 
     Returns:
-        A strip for each; none for learners from pictures, or if the envs draw nothing.
+        A strip for each; none if the envs draw nothing.
 
     Raises:
         RenderError: If frames cannot be drawn here.
         OutputError: If the film cannot be written.
     """
-    if not isinstance(study.plan.settings, Sb3Settings):
-        return []
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []
     fps = 0.0
@@ -82,23 +84,25 @@ def film_study(study: Study, folder: Path, film: Path | None = None) -> list[Fil
 def _scenes(study: Study, folder: Path) -> list[_Scene]:
     plan = study.plan
     learner = learner_of(plan.learner, plan.settings)
+    drives = isinstance(plan.settings, CloningSettings)
     scenes: list[_Scene] = []
 
     def policy(run: Run) -> Act:
-        return learner.load(run.policy_file(folder)).act
+        loaded = learner.load(run.policy_file(folder))
+        return loaded.predict_many if drives else loaded.act
 
     has_source = bool(study.of(SOURCE))
     if has_source:
         best = Run(SOURCE, _median(study, SOURCE))
-        scenes.append(_Scene("source, in the source", plan.task.source, policy(best), None))
+        scenes.append(_Scene("source, in the source", plan.task.source, policy(best), None, drives))
     for arm in sorted(plan.arms, key=lambda arm: arm == "scratch"):  # The baseline comes last.
         run = Run(arm, _median(study, arm))
         target = plan.target_of(run)
         if plan.trains(arm):
-            scenes.append(_Scene(arm, target, policy(run), None))
+            scenes.append(_Scene(arm, target, policy(run), None, drives))
         elif has_source:
             source = policy(Run(SOURCE, run.index))
-            scenes.append(_Scene(arm, target, source, plan.body_map))
+            scenes.append(_Scene(arm, target, source, None if drives else plan.body_map, drives))
     return scenes
 
 
@@ -112,20 +116,31 @@ def _median(study: Study, kind: str) -> int:
 
 def _play(scene: _Scene) -> tuple[list[NDArray[np.uint8]], float, str]:
     """Return frames, their rate, and the default measure over them."""
-    env: Any = scene.env.make(render_mode="rgb_array", width=_WIDTH, height=_HEIGHT)
+    size = {} if scene.drives else {"render_mode": "rgb_array", "width": _WIDTH, "height": _HEIGHT}
+    env: Any = scene.env.make(**size)
+
+    def frame() -> NDArray[Any]:
+        if scene.drives:
+            return env.unwrapped.world.outside(_WIDTH, _HEIGHT, _REACH_M, azimuth_rad=_BESIDE_RAD)
+        return env.render()
+
     try:
+        if scene.drives and not hasattr(env.unwrapped, "world"):
+            return [], 0.0, ""  # A robot.
+        if isinstance(env.unwrapped, HasHeldOutStarts):
+            env.unwrapped.hold_out()
         fps = float(env.metadata["render_fps"])
         measure = measures_of(env)[0]
         acting = env if scene.body_map is None else MappedEnv(env, scene.body_map)
         observation, _ = acting.reset(seed=EVALUATION_SEED)
-        frames: list[NDArray[np.uint8]] = [env.render()]
+        frames: list[NDArray[np.uint8]] = [frame()]
         steps, total, over = round(_FILM_S * fps), 0.0, False
         while not over and len(frames) < steps:
             action = scene.act(np.asarray(observation)[None])[0]
             observation, reward, terminated, truncated, info = acting.step(action)
             value = float(info[measure.key]) if measure.key else float(reward)
             total = value if measure.key and measure.over == "end" else total + value
-            frames.append(env.render())
+            frames.append(frame())
             over = terminated or truncated
         value = total / steps if measure.over == "episode" else total
         fell = f", ends after {len(frames) / fps:.1f} s" if over and len(frames) < steps else ""
