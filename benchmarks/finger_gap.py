@@ -88,10 +88,8 @@ def rows_of(study: Study, where: str) -> list[Row]:
     adapted = [arm for arm in ("randomised", "identified") if arm in shares]
     best = max(adapted, key=lambda arm: float(shares[arm].mean()))
     limits = {"zero-shot": ("< 50 %", float(shares["zero-shot"].mean()) < _MILD)}
-    limits[best] = (
-        ">= 80 %" + (", this or the other" if len(adapted) > 1 else ""),
-        float(shares[best].mean()) >= _RECOVERED,
-    )
+    wanted = ">= 80 %" + (", this or the other" if len(adapted) > 1 else "")
+    limits[best] = (wanted, float(shares[best].mean()) >= _RECOVERED)
     seeds = study.plan.seeds
     return [
         Row(
