@@ -285,7 +285,6 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
         assert np.isfinite(observation).all()
 
 
-@pytest.mark.slow
 def test_a_delay_on_a_path_follows_from_the_motion() -> None:
     """Tensions hide it within a period; the log says by itself that it is a rig's."""
     path = CommandPath(slew_per_s=20.0, slew_down_per_s=20.0)
