@@ -54,6 +54,10 @@ _Command = (
 )
 
 
+# Options that take several values.
+_SEVERAL: Final = ("--set", "--rule", "--arms", "--only")
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line.
 
@@ -113,10 +117,13 @@ def _require_commands(arguments: Sequence[str]) -> None:
 
 
 def _require_single(arguments: Sequence[str]) -> None:
-    """Raise StudyError for an option that is given twice: the first one would be dropped."""
-    options = [word.partition("=")[0] for word in arguments if word.startswith("--")]
-    for name in options:
-        if name != "--" and options.count(name) > 1:
+    """Raise StudyError for an option of several values that is given twice.
+
+    Values of the first one would be dropped without a word. For other options the last one counts.
+    """
+    options = [word.partition("=")[0] for word in arguments]
+    for name in _SEVERAL:
+        if options.count(name) > 1:
             raise StudyError(f"{name} is given twice: give it once, with all its values after it.")
 
 
