@@ -17,7 +17,7 @@ from shapechanger.errors import WorldError
 from shapechanger.worlds.camera import CameraJitter, OnboardCamera, OutsideCamera, move_camera
 from shapechanger.worlds.course import HOME, Course, require_element
 from shapechanger.worlds.expert.line import CourseProgress
-from shapechanger.worlds.expert.path import CoursePath, plan_path
+from shapechanger.worlds.expert.path import CoursePath, plan_path_for
 from shapechanger.worlds.expert.traits import traits_of
 from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.lens import find_lens
@@ -396,10 +396,7 @@ def _compiled(vehicle: str, world: str, seed: int, look: Look) -> tuple[Course, 
 @lru_cache(maxsize=_KEPT_COURSES)
 def _planned(vehicle: str, world: str, seed: int) -> CoursePath:
     """Return a path around a course for a vehicle."""
-    traits = traits_of(vehicle)
-    return plan_path(
-        lay_out(world, seed), traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m
-    )
+    return plan_path_for(lay_out(world, seed), traits_of(vehicle))
 
 
 class ContactTracker:

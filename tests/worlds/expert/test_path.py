@@ -12,7 +12,7 @@ from shapechanger.errors import WorldError
 from shapechanger.worlds.course import Course, Obstacle
 from shapechanger.worlds.expert import CoursePath, plan_path
 from shapechanger.worlds.expert.line import ClosedLine
-from shapechanger.worlds.expert.path import FAR_M, ClearanceField
+from shapechanger.worlds.expert.path import FAR_M, ClearanceField, plan_path_for
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out
 from tests.worlds.expert.courses import ring
@@ -98,6 +98,23 @@ def test_a_gap_is_found_until_it_is_too_narrow() -> None:
     assert plan_path(course, 0.1, 0.15).clearance.min() >= 0.25
     with pytest.raises(WorldError):
         plan_path(course, 0.1, 0.25)
+
+
+@pytest.mark.parametrize("seed", [480, 889, 1_000_074])
+def test_a_boat_gets_through_every_flooded_corridor(seed: int) -> None:
+    """With two thirds of its clearance, where the whole does not fit."""
+    course, boat = lay_out("flooded-corridor", seed), TRAITS["boat"]
+    with pytest.raises(WorldError):
+        plan_path(course, boat.half_width_m, boat.margin_m, comfort_m=boat.comfort_m)
+    path = plan_path_for(course, boat)
+    assert path.clearance.min() >= boat.half_width_m + boat.margin_m * 2.0 / 3.0
+
+
+def test_other_courses_keep_the_whole_clearance() -> None:
+    """The path is the one with a vehicle's own clearance."""
+    course, boat = lay_out("flooded-corridor", 0), TRAITS["boat"]
+    own = plan_path(course, boat.half_width_m, boat.margin_m, comfort_m=boat.comfort_m)
+    np.testing.assert_array_equal(plan_path_for(course, boat).points, own.points)
 
 
 def test_stations_wrap_around() -> None:

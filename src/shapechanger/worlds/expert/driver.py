@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.worlds.course import Course
-from shapechanger.worlds.expert.path import ClearanceField, CoursePath, plan_path, speed_profile
+from shapechanger.worlds.expert.path import ClearanceField, CoursePath, plan_path_for, speed_profile
 from shapechanger.worlds.expert.traits import PERIOD_S, Traits, traits_of
 from shapechanger.worlds.world import Pose
 
@@ -279,9 +279,7 @@ class CourseExpert:
         path: CoursePath | None = None,
     ) -> None:
         traits = self._traits = traits_of(vehicle)
-        self.path = path or plan_path(
-            course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m
-        )
+        self.path = path or plan_path_for(course, traits)
         self.speeds = speed_profile(self.path, traits)
         self._obstacles = ClearanceField(course)
         self._pursuit = Pursuit(traits)
