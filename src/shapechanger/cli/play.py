@@ -11,23 +11,15 @@ from numpy.typing import NDArray
 
 from shapechanger.cli.console import say
 from shapechanger.cli.env_arguments import Body, EnvId, env_ref, opened, policy_file, require_seed
-from shapechanger.cli.policies import acting_in
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
 from shapechanger.transfer.env_ref import EnvRef
 
 
-@dataclass(frozen=True)
-class Play:
-    """Watch a policy in an env, in a window or as a video."""
+@dataclass(frozen=True, kw_only=True)
+class Watching:
+    """Options of a command that shows episodes."""
 
-    env: EnvId
-    """Id of the env, such as BigAnt."""
-    policy: Path | None = None
-    """A policy that `train`, a study or `policies export` has written, or `reference` for the one
-    that ships for the env; random actions if not given. One of another body acts through the body
-    map of same names."""
-    body: Body = ""
     out: Path | None = None
     """A film to write in place of a window, such as ant.mp4; play.mp4 where there is no screen."""
     episodes: int = 1
@@ -37,60 +29,66 @@ class Play:
     max_steps: int = 1000
     """Longest episode to show."""
 
+    def show(self, ref: EnvRef, policy: Path | None) -> None:
+        """Show episodes in a window or write them as a film, and print the returns.
+
+        Args:
+            ref: The env.
+            policy: File of the policy; None for random actions.
+
+        Raises:
+            StudyError: If there is nothing to play.
+            OutputError: If the film cannot be written.
+            MapError: If the policy's layouts do not fit the env.
+        """
+        from shapechanger.cli.policies import acting_in
+        from shapechanger.transfer.learners.evaluation import random_actions
+
+        require_seed(self.seed)
+        if self.episodes < 1 or self.max_steps < 1:
+            raise StudyError("Playing takes at least one episode of one step.")
+        out = self.out or (None if has_screen() else Path("play.mp4"))
+        if out is not None:
+            from shapechanger.cli.pictures import require_film
+
+            require_film(out)
+        frames: list[NDArray[Any]] = []
+        with opened(ref, render_mode="human" if out is None else "rgb_array") as env:
+            if policy is None:
+                acting, act = env, random_actions(env.action_space, self.seed)
+            else:
+                acting, act = acting_in(env, policy)
+            for episode in range(self.episodes):
+                observation, _ = acting.reset(seed=self.seed + episode)
+                worth, steps, over = 0.0, 0, False
+                while not over and steps < self.max_steps:
+                    action = act(np.asarray(observation)[None])[0]
+                    observation, reward, terminated, truncated, _ = acting.step(action)
+                    worth, steps = worth + float(reward), steps + 1
+                    over = terminated or truncated
+                    if out is not None:
+                        frames.append(cast("NDArray[Any]", env.render()))
+                say(f"episode {episode}: return {worth:.1f} in {steps} steps")
+            if out is not None:
+                from shapechanger.cli.pictures import write_film
+
+                write_film(frames, out, float(env.metadata["render_fps"]))
+                say(f"wrote {out}")
+
+
+@dataclass(frozen=True)
+class Play(Watching):
+    """Watch a policy in an env, in a window or as a video."""
+
+    env: EnvId
+    """Id of the env, such as BigAnt."""
+    policy: Path | None = None
+    """A policy that `train`, a study or `policies export` has written, or `reference` for the one
+    that ships for the env; random actions if not given. One of another body acts through the body
+    map of same names."""
+    body: Body = ""
+
     def run(self) -> None:
         """Play and print the returns."""
         ref = env_ref(self.env, self.body)
-        policy = self.policy and policy_file(self.policy, ref)
-        play(ref, policy, self.out, self.episodes, self.seed, self.max_steps)
-
-
-def play(
-    ref: EnvRef, policy: Path | None, out: Path | None, episodes: int, seed: int, max_steps: int
-) -> None:
-    """Show episodes in a window or write them as a film, and print the returns.
-
-    Args:
-        ref: The env.
-        policy: File of the policy; None for random actions.
-        out: File of the film; None for a window, or play.mp4 where there is no screen.
-        episodes: Number of episodes, at least 1.
-        seed: Seed of the first start, which grows by 1 for each episode, and of random actions.
-        max_steps: Longest episode, in steps, at least 1.
-
-    Raises:
-        StudyError: If there is nothing to play.
-        OutputError: If the film cannot be written.
-        MapError: If the policy's layouts do not fit the env.
-    """
-    from shapechanger.transfer.learners.evaluation import random_actions
-
-    require_seed(seed)
-    if episodes < 1 or max_steps < 1:
-        raise StudyError("Playing takes at least one episode of one step.")
-    out = out or (None if has_screen() else Path("play.mp4"))
-    if out is not None:
-        from shapechanger.cli.pictures import require_film
-
-        require_film(out)
-    frames: list[NDArray[Any]] = []
-    with opened(ref, render_mode="human" if out is None else "rgb_array") as env:
-        if policy is None:
-            acting, act = env, random_actions(env.action_space, seed)
-        else:
-            acting, act = acting_in(env, policy)
-        for episode in range(episodes):
-            observation, _ = acting.reset(seed=seed + episode)
-            worth, steps, over = 0.0, 0, False
-            while not over and steps < max_steps:
-                action = act(np.asarray(observation)[None])[0]
-                observation, reward, terminated, truncated, _ = acting.step(action)
-                worth, steps = worth + float(reward), steps + 1
-                over = terminated or truncated
-                if out is not None:
-                    frames.append(cast("NDArray[Any]", env.render()))
-            say(f"episode {episode}: return {worth:.1f} in {steps} steps")
-        if out is not None:
-            from shapechanger.cli.pictures import write_film
-
-            write_film(frames, out, float(env.metadata["render_fps"]))
-            say(f"wrote {out}")
+        self.show(ref, self.policy and policy_file(self.policy, ref))

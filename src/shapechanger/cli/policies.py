@@ -14,6 +14,7 @@ from rich.table import Table
 
 from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, driven, env_ref, opened
+from shapechanger.cli.play import Watching
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
@@ -157,8 +158,7 @@ class EvaluatePolicy:
     env: str = ""
     """Id of another env, where it acts through the body map of same names; that of its training by
     default."""
-    body: str = ""
-    """Another body of that env's family: its name, or edits as JSON."""
+    body: Body = ""
     episodes: int = 10
     """Number of episodes; their starts are those of every evaluation."""
 
@@ -180,7 +180,7 @@ class EvaluatePolicy:
 
 
 @dataclass(frozen=True)
-class PlayPolicy:
+class PlayPolicy(Watching):
     """Watch a policy in the env of its training, in a window or as a video."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -189,21 +189,10 @@ class PlayPolicy:
     """Id of another env, where it acts through the body map of same names; that of its training by
     default."""
     body: Body = ""
-    out: Path | None = None
-    """A film to write in place of a window, such as ant.mp4; play.mp4 where there is no screen."""
-    episodes: int = 1
-    """Number of episodes."""
-    seed: int = 0
-    """Seed of the starts."""
-    max_steps: int = 1000
-    """Longest episode to show."""
 
     def run(self) -> None:
         """Play and print the returns."""
-        from shapechanger.cli.play import play
-
-        ref = _env_of(self.file, self.env, self.body)
-        play(ref, self.file, self.out, self.episodes, self.seed, self.max_steps)
+        self.show(_env_of(self.file, self.env, self.body), self.file)
 
 
 def _env_of(file: Path, env: str, body: str) -> EnvRef:

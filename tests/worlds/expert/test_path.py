@@ -110,6 +110,12 @@ def test_a_boat_gets_through_every_flooded_corridor(seed: int) -> None:
     assert path.clearance.min() >= boat.half_width_m + boat.margin_m * 2.0 / 3.0
 
 
+def test_two_thirds_of_the_clearance_must_fit() -> None:
+    """A boat 0.2 m wide then needs 0.67 m."""
+    with pytest.raises(WorldError, match="0\\.67 m wide"):
+        plan_path_for(_plug(ring(0, obstacles=0), 2.0), TRAITS["boat"])
+
+
 def test_other_courses_keep_the_whole_clearance() -> None:
     """The path is the one with a vehicle's own clearance."""
     course, boat = lay_out("flooded-corridor", 0), TRAITS["boat"]
