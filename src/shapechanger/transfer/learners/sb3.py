@@ -55,9 +55,10 @@ OnSteps = Callable[[int], None]
 START_LOG_STD: Final = -1.0
 """Smallest logarithm of an action's standard deviation at the start of training from a policy.
 
-A converged policy hardly explores: with standard deviations of 0.06 to 0.22 a fine-tuned finger
-reached no target in 30,720 steps, with this one 30 and 25 %, and 80 and 85 % in 61,440. A source
-that explores more keeps its own, and nothing explores more than a new policy.
+A converged policy hardly explores: with the standard deviations of 0.06 to 0.22 of the shipped
+finger's policy, fine-tuning reached no target of another finger in 30,720 steps
+(`python -m benchmarks.run finger-gap`, measured before this was raised). A source that explores
+more keeps its own deviation, and none starts above that of a new policy because of this.
 """
 
 
