@@ -1,4 +1,4 @@
-"""What the envs with waypoints share: the action, and how it becomes steering and back."""
+"""The action of the envs with waypoints, and its conversion to steering and back."""
 
 from __future__ import annotations
 

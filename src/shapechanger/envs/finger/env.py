@@ -228,7 +228,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     @property
     def motors(self) -> FingerParameters | None:
-        """What a rig's profile tells about its motors and path; None where there is no path."""
+        """Motors and path that a rig's profile states; None where there is no path."""
         own = self.parameters
         if own.path is None:
             return None

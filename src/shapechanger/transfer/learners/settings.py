@@ -447,7 +447,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "ppo-swim": ("Swimmer",),
     "ppo-planar": ("Hopper", "Walker2d", "InvertedDoublePendulum"),
     "ppo-humanoid": ("Humanoid",),
-    "ppo-finger": ("Finger",),
+    "ppo-finger": ("Finger", "FingerTrack"),
     "ppo-rig": ("Finger",),
     "ppo-drive": ("CarRanges",),
     "cloning": ("Car", "Tank", "Truck", "Boat"),
@@ -460,7 +460,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
 
 Settings count as tuned on another body of the same family if a policy that ships, or a benchmark,
 reached its target there with them as they are: `shapechanger policies list --references`, and the
-rows `vehicles-clone` and `vehicles-waypoints`.
+rows `finger-learned`, `vehicles-clone` and `vehicles-waypoints`.
 """
 
 
