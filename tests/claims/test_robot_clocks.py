@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -16,6 +18,7 @@ from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.wiring import TwinWiring
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import Clock, Served, driving
+from tests.twin.robots import until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
@@ -208,3 +211,14 @@ def test_the_twins_clock_is_deterministic(profile: Profile, tmp_path: Path) -> N
     assert again_ledger == ledger
     assert again_pictures == pictures
     assert recorded(profile, 4, folders[2])[1] != pictures
+
+
+def test_a_client_waits_for_a_restarted_daemon(robot: RunningRobot, clock: Clock) -> None:
+    """A killed daemon comes back at another port; who connects meanwhile gets that one."""
+    before = robot.port
+    os.kill(robot.pid_of("daemon"), signal.SIGKILL)
+    ready = robot.folder / "ready.json"
+    until(lambda: not ready.exists() or str(before) not in ready.read_text())
+    with driving(robot, clock) as served:
+        served.drive_until(drives, 0.0, 1.0)
+    assert robot.port != before

@@ -201,8 +201,8 @@ class RunningRobot:
 
     @property
     def port(self) -> int:
-        """Port on 127.0.0.1; another one after a restart of the daemon."""
-        if (self.folder / _READY).exists():
+        """Port on 127.0.0.1; another one after a restart of the daemon, which this waits out."""
+        if self.supervisor.poll() is None:
             self._ready = self._await_ready()
         return self._ready.port
 

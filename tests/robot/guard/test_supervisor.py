@@ -238,10 +238,10 @@ class _Daemon(_Stuck):
 
 
 @contextlib.contextmanager
-def _supervisor(end_reason: str) -> Iterator[Supervisor]:
+def _supervisor(end_reason: str, **daemon: object) -> Iterator[Supervisor]:
     """A supervisor without processes."""
     log = logging.getLogger("test")
-    one = Supervisor(ServePlan(quick_car(), {}), -1, ProcessCommands((), ()), log)
+    one = Supervisor(ServePlan(quick_car(), daemon), -1, ProcessCommands((), ()), log)
     one._end_reason = end_reason
     with one._woken, one._waker:
         yield one
@@ -277,6 +277,24 @@ def test_a_guard_that_never_exits_is_given_up(
     with _supervisor("ended by SIGTERM") as one:
         one._stop(_Stuck(looks=10**9), _Daemon(looks=9))
     assert not one._is_safe
+
+
+@pytest.mark.parametrize("ready_file", ["ready.json", "folder"])
+def test_the_ready_file_goes_with_its_daemon(
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    tmp_path: Path,
+    ready_file: str,
+) -> None:
+    """A file that cannot be removed is logged, and does not keep the supervisor from its work."""
+    (tmp_path / "ready.json").write_text("{}")
+    (tmp_path / "folder").mkdir()
+    monkeypatch.setattr(supervisor, "make_safe", lambda plan, hardware: [])
+    with _supervisor("", ready_file=str(tmp_path / ready_file)) as one:
+        one._stop(_Stuck(looks=0), _Daemon(looks=9))
+    assert one._is_safe
+    assert (tmp_path / "ready.json").exists() == (ready_file == "folder")
+    assert ("cannot be removed" in caplog.text) == (ready_file == "folder")
 
 
 def test_garbage_is_counted_and_refused(tmp_path: Path) -> None:
