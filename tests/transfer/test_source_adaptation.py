@@ -12,11 +12,13 @@ import pytest
 from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger import identification
 from shapechanger.envs.finger.reach import FingerReachEnv
-from shapechanger.errors import StudyError
+from shapechanger.errors import RobotError, StudyError
 from shapechanger.reports.verdict import arm_rows, caveats
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.plan import ARMS, Run, TransferTask
+from shapechanger.transfer.runs import load_result, perform_run
 from shapechanger.transfer.study import Study, default_arms, inspect_task, run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan
 
@@ -99,6 +101,39 @@ def test_a_failed_study_keeps_finished_runs(
     again = run_study(made.plan, out, executor=Serial())
     assert len(moved) == before
     assert again.summaries == made.summaries
+
+
+def test_a_failed_evaluation_costs_no_training(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The policy is saved before it is evaluated, and the repeated run evaluates it."""
+    plan = tiny_plan(
+        task=TransferTask(FINGER, REAL_LIKE), arms=("scratch", "randomised"), source_steps=64
+    )
+    run = Run("randomised", 0)
+    trained: list[Any] = []
+    evaluate, train = Sb3Learner.evaluate, Sb3Learner.train
+
+    def fails(*_: Any) -> Any:
+        raise RobotError("The rig has stopped.")
+
+    def counted(self: Sb3Learner, *arguments: Any, **more: Any) -> Any:
+        trained.append(arguments[0])
+        return train(self, *arguments, **more)
+
+    monkeypatch.setattr(Sb3Learner, "train", counted)
+    monkeypatch.setattr(Sb3Learner, "evaluate", fails)
+    with pytest.raises(RobotError, match="has stopped"):
+        perform_run(plan, run, str(tmp_path), None, lambda _: None)
+    saved = run.policy_file(tmp_path).read_bytes()
+    assert load_result(plan, tmp_path, run) is None
+    monkeypatch.setattr(Sb3Learner, "evaluate", evaluate)
+    perform_run(plan, run, str(tmp_path), None, lambda _: None)
+    assert len(trained) == 1
+    assert run.policy_file(tmp_path).read_bytes() == saved
+    result = load_result(plan, tmp_path, run)
+    assert result is not None
+    assert [evaluation.steps for evaluation in result.curve] == [0]
 
 
 def test_default_arms() -> None:

@@ -6,7 +6,6 @@ Everything random in a run follows from its own seed.
 from __future__ import annotations
 
 import math
-import shutil
 import time
 from pathlib import Path
 from typing import Final
@@ -104,7 +103,7 @@ def last_evaluation(study: Path, run: Run) -> Evaluation | None:
 
 
 def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: ReportSteps) -> None:
-    """Perform a run from its start; results of an earlier attempt are deleted.
+    """Perform a run; results of an earlier attempt are deleted, except what its method has saved.
 
     Args:
         plan: Plan of the study.
@@ -119,8 +118,9 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
     """
     use_one_thread()
     folder = run.folder(Path(study))
-    shutil.rmtree(folder, ignore_errors=True)
     make_folder(folder)
+    for stale in (_CURVE, _RESULT):
+        (folder / stale).unlink(missing_ok=True)
     began = time.monotonic()
     curve: list[Evaluation] = []
 
@@ -150,7 +150,7 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         else:
             policy = load_method(run.kind).learn(context)
         if policy is not None:
-            learner.save(policy, run.policy_file(Path(study)))
+            context.save(policy)
     result = RunResult(run, plan.seed_of(run), tuple(curve), time.monotonic() - began)
     write_json(folder / _RESULT, result)
 

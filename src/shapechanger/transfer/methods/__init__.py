@@ -151,6 +151,19 @@ class MethodRun:
         self._done += steps
         return policy
 
+    def saved_policy(self) -> Any:
+        """Load the policy that an earlier attempt of this run has saved; None without one."""
+        file = self._run.policy_file(self._study)
+        return self.learner.load(file) if file.exists() else None
+
+    def save(self, policy: Any) -> None:
+        """Save the policy of this run, so that a failure from here on does not cost its training.
+
+        Args:
+            policy: The policy.
+        """
+        self.learner.save(policy, self._run.policy_file(self._study))
+
     def source_demonstrations(self) -> DemonstrationFile:
         """Return the file of the demonstrations that the source policy is cloned from."""
         return self._demonstrations("source")
