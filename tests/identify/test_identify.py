@@ -18,7 +18,16 @@ from shapechanger.identify.kinematics import ARMS, Kinematics, interval_quantile
 from shapechanger.identify.motion import FACTORS, Dynamics, Window, cut_windows
 from shapechanger.identify.motors import Motors
 from shapechanger.identify.result import PATH_DELAY_ERROR_S, HeldOut, replay
-from shapechanger.reports.finger import finger_html, interval, label, number, summary_line
+from shapechanger.reports.finger import (
+    arm_cell,
+    finger_html,
+    interval,
+    label,
+    number,
+    summary_line,
+    unbounded,
+    unknown,
+)
 from tests.identify.logs import changed, made_up, recorded
 
 
@@ -232,6 +241,33 @@ def test_errors_are_root_mean_squares() -> None:
     assert found.off == (0.5, 1.0)
 
 
+def test_unbounded_intervals_are_unknown() -> None:
+    """An open side, or more than the range of fingers, reads "unknown" with the reason."""
+    found = estimates(1e-5, 1e-5)
+    assert interval(found["tendon_stiffness"]) == "unknown"
+    assert "above 31.2 N/mm" in unbounded(found["tendon_stiffness"])
+    assert "no stretch" in unbounded(estimates(-1e-4, 1e-6)["tendon_stiffness"])
+    assert interval(estimates()["tendon_stiffness"]) == "8.19 to 12.8"
+    assert interval(found["tendon_friction"]) == "unknown"
+    assert "the 3 N by which fingers differ" in unbounded(found["tendon_friction"])
+    stiffness = found["joint_stiffness/PIP_flexion"]
+    assert unbounded(stiffness) == ""
+    assert "60 mN·m/rad" in unbounded(dataclasses.replace(stiffness, high=1.0))
+    arm = found["moment_arms/FDP/MCP_flexion"]
+    assert arm_cell(arm) == "8.60 ±0.22"
+    assert arm_cell(dataclasses.replace(arm, nominal=0.0)) == "8.60 ±0.22*"
+    assert arm_cell(dataclasses.replace(arm, high=0.03)) == "unknown"
+
+
+def test_the_page_names_what_is_unknown() -> None:
+    """A chart of the arms, the joints in a table, and unknown intervals with their reasons."""
+    _, _, found, _ = quick()
+    page = unescape(finger_html(found, "finger.npz"))
+    assert page.count("<img") == 5
+    assert dict(unknown(found)).keys() == {"tendon_stiffness"}
+    assert all(why in page for _, why in unknown(found))
+
+
 @pytest.mark.slow
 def test_without_noise_all_parameters_are_found() -> None:
     """Arms to 1 %, joints and motors are found, and the motion is repeated."""
@@ -271,13 +307,15 @@ def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
         assert low < truth.joint_stiffness[j] < high
     page = finger_html(found, "finger.npz")
     for e in found.estimates:
+        if e in found.arms:  # They are in the chart.
+            continue
         assert label(e) in page
         assert interval(e) in page
         assert number(e, e.value) in page
     for name, why in found.undetermined:
         assert name in page
         assert why in unescape(page)
-    assert page.count("<img") == 4
+    assert page.count("<img") == 5
     assert summary_line(found).startswith("arms: 25 intervals, the widest of those above 2 mm ±")
     with gym.make("shapechanger/Finger-v1", parameters=found.parameters.to_json()) as env:
         env.reset(seed=0)

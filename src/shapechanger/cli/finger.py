@@ -35,7 +35,7 @@ class Identify:
     def run(self) -> None:
         """Print the parameters, and write them and the report."""
         from shapechanger.identify import identify, load_log
-        from shapechanger.reports.finger import finger_html, summary_line
+        from shapechanger.reports.finger import finger_html, summary_line, unknown
 
         page = self.report or self.log.with_name(f"{self.log.stem}.html")
         files = [path for path in (self.out, page) if path is not None]
@@ -49,19 +49,38 @@ class Identify:
         write_atomic(page, finger_html(found, self.log.name).encode())
         if self.out is not None:
             write_atomic(self.out, found.parameters.to_json().encode())
+        print_table(_arms_table(found))
+        say("* the nominal arm is outside the 95 % interval\n")
         print_table(_table(found))
+        for name, why in unknown(found):
+            say(f"{name} is unknown: {why}")
         for name, why in found.undetermined:
             say(f"{name} cannot be determined: {why}")
         say(f"wrote {' and '.join(str(path) for path in files)}")
         say(summary_line(found))
 
 
+def _arms_table(found: IdentifiedFinger) -> Table:
+    """Moment arms, tendon by joint."""
+    from shapechanger.bodies.finger import JOINTS, TENDONS
+    from shapechanger.reports.finger import arm_cell
+
+    cells = {e.name: arm_cell(e) for e in found.arms}
+    table = Table("moment arm [mm]", *JOINTS, box=None, pad_edge=False)
+    for tendon in TENDONS:
+        names = (f"moment_arms/{tendon}/{joint}" for joint in JOINTS)
+        table.add_row(tendon, *(cells.get(name, "") for name in names))
+    return table
+
+
 def _table(found: IdentifiedFinger) -> Table:
+    """Parameters other than the moment arms."""
     from shapechanger.reports.finger import interval, label, number
 
     table = Table("parameter", "identified", "95 % interval", "nominal", box=None, pad_edge=False)
     for e in found.estimates:
-        table.add_row(label(e), number(e, e.value), interval(e), number(e, e.nominal))
+        if e not in found.arms:
+            table.add_row(label(e), number(e, e.value), interval(e), number(e, e.nominal))
     return table
 
 

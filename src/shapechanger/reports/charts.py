@@ -216,6 +216,51 @@ def joint_chart(found: IdentifiedFinger, joint: int) -> str:
     return _svg(_LOW_PANEL, draw)
 
 
+def arms_chart(found: IdentifiedFinger) -> str:
+    """Plot the moment arms with their 95 % intervals beside the nominal ones, joint by joint.
+
+    Args:
+        found: The identified finger.
+    """
+
+    def draw(figure: Figure, axes: Axes) -> None:
+        axes.remove()
+        tendons = list(dict.fromkeys(e.name.split("/")[1] for e in found.arms))
+        joints = list(dict.fromkeys(e.name.split("/")[2] for e in found.arms))
+        panels = figure.subplots(1, len(joints), sharey=True)
+        for panel, joint in zip(panels, joints, strict=True):
+            for e in found.arms:
+                _, tendon, own = e.name.split("/")
+                if own != joint:
+                    continue
+                row = tendons.index(tendon)
+                first = row == 0
+                ends = [1e3 * e.low, 1e3 * e.high]
+                label = "identified, 95 % interval" if first else None
+                panel.plot(ends, [row, row], color=_BLUE, linewidth=5.0, alpha=0.4)
+                panel.plot([1e3 * e.value], [row], "o", color=_BLUE, markersize=4.5, label=label)
+                panel.plot(
+                    [1e3 * e.nominal],
+                    [row],
+                    "D",
+                    markersize=8.0,
+                    label="nominal" if first else None,
+                    markerfacecolor="none",
+                    markeredgecolor=_ORANGE,
+                    markeredgewidth=1.4,
+                )
+            panel.axvline(0.0, color="#999999", linewidth=0.8)
+            panel.set_title(joint.replace("_", " "), fontsize=10.0)
+            panel.set_xlabel("mm")
+            panel.margins(x=0.12)
+        panels[0].set_yticks(range(len(tendons)), tendons)
+        panels[0].invert_yaxis()
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+
+    return _svg(_WIDE, draw)
+
+
 def _svg(size_in: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> str:
     """Render one set of axes, `size_in` (width, height) inches, as SVG text."""
     with matplotlib.style.context(["default", _STYLE]):

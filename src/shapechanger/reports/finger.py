@@ -19,6 +19,18 @@ _SHOWN: Final = {
     "N": ("N", 1.0),
     "1": ("of nominal", 1.0),
 }
+# Widest interval that says something, in SI units. Chosen: arms a finger's thickness; the others
+# about twice the range of the gap "wide".
+_WIDEST: Final = {
+    "moment_arms": 0.015,
+    "tendon_friction": 3.0,
+    "tendon_stiffness": 60e3,
+    "motor_lag": 0.05,
+    "command_delay": 0.1,
+    "strength": 0.6,
+}
+# The same for stiffness and damping of the joints, over the nominal value.
+_WIDEST_OF_NOMINAL: Final = 3.0
 # m. The relative error of a shorter moment arm hardly matters.
 _SMALL_ARM_M: Final = 2e-3
 
@@ -33,7 +45,7 @@ def finger_html(found: IdentifiedFinger, name: str) -> str:
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
     """
-    from shapechanger.reports.charts import joint_chart
+    from shapechanger.reports.charts import arms_chart, joint_chart
 
     return render(
         "finger.html",
@@ -41,6 +53,8 @@ def finger_html(found: IdentifiedFinger, name: str) -> str:
         verdict=f"{summary_line(found).capitalize()}.",
         log=f"{found.seconds:.1f} s" + (f" of {found.source}" if found.source else ""),
         charts=[(joint, svg_uri(joint_chart(found, i))) for i, joint in enumerate(JOINTS)],
+        arms=svg_uri(arms_chart(found)),
+        arm_count=len(found.arms),
         rows=[
             {
                 "label": label(e),
@@ -50,7 +64,9 @@ def finger_html(found: IdentifiedFinger, name: str) -> str:
                 "nominal": number(e, e.nominal),
             }
             for e in found.estimates
+            if e not in found.arms
         ],
+        unknown=unknown(found),
         undetermined=found.undetermined,
     )
 
@@ -75,8 +91,42 @@ def number(estimate: ParameterEstimate, value: float) -> str:
 
 
 def interval(estimate: ParameterEstimate) -> str:
-    """Format the 95 % interval of a parameter."""
+    """Format the 95 % interval of a parameter; one that the log does not bound is unknown."""
+    if unbounded(estimate):
+        return "unknown"
     return f"{number(estimate, estimate.low)} to {number(estimate, estimate.high)}"
+
+
+def arm_cell(estimate: ParameterEstimate) -> str:
+    """Format a moment arm with half its interval, mm; a star if the nominal arm is outside."""
+    half = 0.5e3 * (estimate.high - estimate.low)
+    if unbounded(estimate):
+        return "unknown"
+    return f"{1e3 * estimate.value:.2f} ±{half:.2f}{'*' if estimate.differs else ''}"
+
+
+def unbounded(estimate: ParameterEstimate) -> str:
+    """Reason why the log does not bound a parameter; empty if it does."""
+    unit, factor = _SHOWN[estimate.unit]
+    low, high = (f"{factor * end:.3g}" for end in (estimate.low, estimate.high))
+    if math.isinf(estimate.low):
+        return "no stretch is visible, so every large value fits."
+    if math.isinf(estimate.high):
+        return f"the stretch is hardly visible, so every value above {low} {unit} fits."
+    kind = estimate.name.split("/")[0]
+    widest = _WIDEST.get(kind, _WIDEST_OF_NOMINAL * estimate.nominal)
+    if estimate.high - estimate.low <= widest:
+        return ""
+    return (
+        f"every value from {low} to {high} {unit} fits, a wider range than the "
+        f"{factor * widest:.3g} {unit} by which fingers differ."
+    )
+
+
+def unknown(found: IdentifiedFinger) -> list[tuple[str, str]]:
+    """Names of the parameters that the log does not bound, each with the reason."""
+    pairs = ((e.name, unbounded(e)) for e in found.estimates)
+    return [(name, why) for name, why in pairs if why]
 
 
 def summary_line(found: IdentifiedFinger) -> str:

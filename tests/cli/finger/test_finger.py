@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import FingerParameters
+from shapechanger.bodies.finger import TENDONS, FingerParameters
 from shapechanger.cli import main
 from shapechanger.identify import load_log
 from tests.identify.logs import recorded
@@ -64,12 +64,15 @@ def test_invalid_logs_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 @pytest.mark.slow
 def test_a_finger_is_identified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One line per parameter, those that cannot be determined, and a summary."""
+    """Arms by tendon and joint, other parameters, those not determined, and a summary."""
     log, out = tmp_path / "log.npz", tmp_path / "finger.json"
     gap = ("--gap", "real-like", "--finger-seed", 3)
     output_of(capsys, "record", "Finger", "--out", log, "--seconds", 6, *gap)
     lines = output_of(capsys, "identify", log, "--out", out).splitlines()
-    assert sum(line.startswith("moment arm ") for line in lines) == 25
+    rows = [line.split() for line in lines]
+    assert [row[0] for row in rows if row and row[0] in TENDONS] == list(TENDONS)
+    assert sum(line.startswith("joint ") for line in lines) == 8
+    assert len(lines) < 35
     assert any(line.startswith("backlash cannot be determined: ") for line in lines)
     assert lines[-1].startswith("arms: 25 intervals, ")
     assert FingerParameters.from_json(out.read_text()).gives
