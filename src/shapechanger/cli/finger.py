@@ -1,4 +1,4 @@
-"""`shapechanger finger`: record and identify a finger."""
+"""`shapechanger finger`: record, identify and export a finger."""
 
 from __future__ import annotations
 
@@ -138,10 +138,54 @@ class RecordFinger:
 
 
 @dataclass(frozen=True)
+class ExportFinger:
+    """Export a finger as MJCF, which MuJoCo loads without Shapechanger."""
+
+    out: Path
+    """The file to write, such as finger.xml."""
+    parameters: Path | None = None
+    """Parameters that `shapechanger finger identify --out` has written; the nominal finger if not
+    given."""
+    actions: str = "impedance"
+    """Meaning of a control: impedance, tension or length."""
+    gap: str = ""
+    """Name of the gap that the finger is drawn from instead, such as real-like."""
+    finger_seed: int = 0
+    """Seed of the finger drawn from the gap."""
+
+    def run(self) -> None:
+        """Write the file."""
+        import numpy as np
+
+        from shapechanger.bodies.finger import NOMINAL, FingerParameters, drive_of
+        from shapechanger.bodies.finger.export import finger_mjcf
+        from shapechanger.envs.finger.gap import resolve_gap
+
+        require_seed(self.finger_seed)
+        require_file(self.out)
+        if self.gap and self.parameters:
+            raise FingerError("Give either --parameters or --gap, not both.")
+        finger = NOMINAL
+        if self.gap:
+            finger = resolve_gap(self.gap).draw(np.random.default_rng(self.finger_seed))
+        elif self.parameters is not None:
+            try:
+                finger = FingerParameters.from_json(self.parameters.read_bytes())
+            except OSError as error:
+                raise FingerError(
+                    f"{self.parameters} cannot be read: {error.strerror or error}."
+                ) from error
+        text = finger_mjcf(finger, drive_of(self.actions, NOMINAL))
+        write_atomic(self.out, text.encode())
+        say(f"wrote {self.out}")
+
+
+@dataclass(frozen=True)
 class Finger:
-    """Record and identify a finger."""
+    """Record, identify and export a finger."""
 
     command: (
         Annotated[RecordFinger, tyro.conf.subcommand("record")]
         | Annotated[Identify, tyro.conf.subcommand("identify")]
+        | Annotated[ExportFinger, tyro.conf.subcommand("export")]
     )
