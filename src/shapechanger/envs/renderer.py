@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import weakref
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, cast
 
@@ -58,8 +58,13 @@ class Renderer(MujocoRenderer):
         # An env that is garbage-collected unclosed must not delete the contexts of another.
         weakref.finalize(self, _free, self._viewers).atexit = False
 
-    def render(self, render_mode: str | None) -> Any:
+    def render(self, render_mode: str | None, markers: Sequence[dict[str, Any]] = ()) -> Any:
         """Return a frame of `render_mode`, as Gymnasium's renderer does.
+
+        Args:
+            render_mode: The mode.
+            markers: Shapes to draw besides the model, as `add_marker` of Gymnasium's viewers takes
+                them.
 
         Raises:
             RenderError: If nothing can be drawn here.
@@ -73,6 +78,8 @@ class Renderer(MujocoRenderer):
         viewer.make_context_current()
         if self._follow is not None and self.camera_id == -1:
             viewer.cam.lookat[:] = self.data.xpos[self._follow]
+        for marker in markers:
+            viewer.add_marker(**marker)
         return cast("Any", super().render(render_mode))
 
     def _get_viewer(self, render_mode: str | None) -> OffScreenViewer | WindowViewer:

@@ -11,6 +11,7 @@ import pytest
 
 from shapechanger.bodies.finger.anatomy import JOINT_REST
 from shapechanger.bodies.finger.looks import TENDON_COLOURS
+from shapechanger.envs.finger.drawing import polyline, tendon_legend
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
@@ -147,3 +148,51 @@ def test_depth_frames_show_the_finger() -> None:
         assert (depth.shape, depth.dtype) == ((120, 160), np.float32)
         # OpenGL depths: 1 is infinity, and 0.995 about 30 cm.
         assert 0.02 < (depth < 0.995).mean() < 0.5
+
+
+def test_the_legend_shows_tensions() -> None:
+    """Bars grow with the tension, in the colours of the tendons; small frames have none."""
+    frame = np.full((360, 480, 3), 230, np.uint8)
+    slack, taut = (tendon_legend(frame, np.full(7, pulled)) for pulled in (0.0, 1.0))
+    assert slack.shape == frame.shape
+    for colour in TENDON_COLOURS.values():
+        paint = np.round(255 * np.array(colour))
+        drawn = [int((one == paint).all(axis=2).sum()) for one in (slack, taut)]
+        assert drawn[1] > 20 * drawn[0]
+        assert drawn[1] > 200
+    assert (taut[45:] == 230).all()  # The finger is below it.
+    assert (frame == 230).all()
+    small = frame[:120, :160]
+    assert tendon_legend(small, np.ones(7)) is small
+
+
+def test_a_frame_of_a_path_shows_path_and_trail() -> None:
+    """The path is a green line, and the fingertip leaves a purple one; depth has neither."""
+    size = {"width": 480, "height": 360}
+    with gym.make("shapechanger/FingerTrack-v1", render_mode="rgb_array", **size) as env:
+        env.reset(seed=0)
+        env.render()
+        before = _purple(env.render())
+        for _ in range(20):
+            env.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
+        assert _purple(env.render()) > before + 50
+        env.unwrapped._trail.clear()
+        with_path = env.render()
+        env.unwrapped._markers = list
+        assert _differs(env.render(), with_path).sum() > 300
+        env.reset(seed=0)
+        assert len(env.unwrapped._trail) == 1
+
+
+def _purple(frame: np.ndarray) -> int:
+    red, green, blue = np.moveaxis(frame.astype(int), 2, 0)
+    return int(((blue > green + 30) & (red > green + 5)).sum())
+
+
+def test_a_line_joins_points() -> None:
+    """A capsule between each two points, along z of its axes; equal points have none."""
+    points = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.0, 0.0]])
+    (marker,) = polyline(points, 0.001, (1.0, 0.0, 0.0, 1.0))
+    np.testing.assert_allclose(marker["pos"], [0.1, 0.0, 0.0])
+    np.testing.assert_allclose(marker["size"], [0.001, 0.001, 0.1])
+    np.testing.assert_allclose(marker["mat"].reshape(3, 3)[:, 2], [1.0, 0.0, 0.0], atol=1e-12)

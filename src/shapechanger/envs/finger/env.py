@@ -22,6 +22,7 @@ from shapechanger.bodies.finger import (
 from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TENSION_N
 from shapechanger.bodies.finger.model import FingerFigure
 from shapechanger.envs.actions import check_action
+from shapechanger.envs.finger.drawing import tendon_legend
 from shapechanger.envs.finger.gap import Gap, resolve_gap, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
@@ -168,8 +169,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def _terms(self, place: NDArray[np.float64]) -> tuple[float, dict[str, float]]:
         """Return the distance of the fingertip from its target, m, and the terms of the reward."""
         distance = float(np.linalg.norm(self.plant.fingertip - place))
-        tension = np.abs(self.plant.data.actuator_force) / self._most
-        effort, change = float(np.mean(tension**2)), float(np.mean(self._change**2))
+        effort, change = float(np.mean(self._pulled**2)), float(np.mean(self._change**2))
         return distance, self._reward.terms(distance, effort, change, CONTROL_DT)
 
     def _stepped(
@@ -194,15 +194,25 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             self._renderer = Renderer(
                 figure.model, figure.data, dict(_CAMERA), self.width, self.height
             )
-        return self._renderer.render(self.render_mode)
+        if self.render_mode == "depth_array":
+            return self._renderer.render(self.render_mode)
+        frame = self._renderer.render(self.render_mode, self._markers())
+        return frame if frame is None else tendon_legend(frame, self._pulled)
+
+    def _markers(self) -> list[dict[str, Any]]:
+        """Return what frames show besides the finger."""
+        return []
+
+    @property
+    def _pulled(self) -> NDArray[np.float64]:
+        """Tensions over the largest, (7,)."""
+        return np.abs(self.plant.data.actuator_force) / self._most
 
     def _shown(self) -> FingerFigure:
         """Return a figure of the present finger; the simulated model has no visible geoms."""
         if self._figure is None:
             self._figure = FingerFigure()
-        data = self.plant.data
-        pulled = np.abs(data.actuator_force) / self._most
-        self._figure.show(self.plant.angles, pulled, data.mocap_pos[0])
+        self._figure.show(self.plant.angles, self._pulled, self.plant.data.mocap_pos[0])
         return self._figure
 
     def close(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Any, Final
 
 import gymnasium as gym
@@ -17,6 +18,7 @@ from shapechanger.bodies.finger.anatomy import (
     PHALANX_LENGTH_M,
 )
 from shapechanger.bodies.finger.tensions import tensions_for_torque
+from shapechanger.envs.finger.drawing import polyline
 from shapechanger.envs.finger.env import FingerEnv
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import angles_for, draw_posture, moving_torque
@@ -148,6 +150,14 @@ _TARGET: Final = Element("task", "target")
 # Time in which the fingertip reaches the path's speed, not counted in the error, s.
 _SETTLES_S: Final = 0.5
 _TOLERANCE_M: Final = 0.003
+# Frames show this much of a path that does not end, s, and the trail of one second.
+_DRAWN_S: Final = 5.0
+_DRAWN_POINTS: Final = 97
+_TRAIL_STEPS: Final = 50
+_LINE_M: Final = 0.0005
+_TRAIL_M: Final = 0.0007
+_PATH_COLOUR: Final = (0.10, 0.55, 0.25, 1.0)
+_TRAIL_COLOUR: Final = (0.35, 0.20, 0.60, 1.0)
 _SEEN_S: Final = np.array([0.0, CONTROL_DT, *PREVIEW_S])
 
 
@@ -200,6 +210,8 @@ class FingerTrackEnv(FingerEnv):
         self._begin = require_reachable(self._path)
         self._t = 0.0
         self._look()
+        # Places of the fingertip, m, for frames.
+        self._trail = deque([self.plant.fingertip], _TRAIL_STEPS)
         self._squares = 0.0
         self._counted = 0
         self._steps = 0
@@ -253,6 +265,8 @@ class FingerTrackEnv(FingerEnv):
         self._squares, self._counted, self._steps = 0.0, 0, 0
         self._look()
         self.plant.mark(self._points[0])
+        self._trail.clear()
+        self._trail.append(self.plant.fingertip)
         distance = float(np.linalg.norm(self.plant.fingertip - self._points[0]))
         return self._observation(senses), self._info(distance)
 
@@ -275,7 +289,14 @@ class FingerTrackEnv(FingerEnv):
             self._squares += distance**2
             self._counted += 1
         self.plant.mark(point)
+        self._trail.append(self.plant.fingertip)
         return self._stepped(self._observation(senses), self._info(distance), terms)
+
+    def _markers(self) -> list[dict[str, Any]]:
+        """Return the path and the trail of the fingertip."""
+        times = np.linspace(0.0, min(self._path.duration_s, _DRAWN_S), _DRAWN_POINTS)
+        path = polyline(self._path.at(times), _LINE_M, _PATH_COLOUR)
+        return path + polyline(np.array([*self._trail]), _TRAIL_M, _TRAIL_COLOUR)
 
     def _look(self) -> None:
         """Compute the present and coming points of the path."""
