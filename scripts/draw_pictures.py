@@ -1,8 +1,9 @@
-"""Draw the pictures of the README: `python scripts/draw_pictures.py`.
+"""Draw the pictures of README and docs: `python scripts/draw_pictures.py`.
 
-`--only vehicles` draws one of them. `--sheets results/sheets` draws contact sheets instead, one of
-each world: a row for each vehicle and course, with the camera's picture, the same through each
-lens, and two views from outside. The last course of each vehicle is held out and has a random look.
+`--only vehicles` draws one of them, and `--only finger-film` films reach and follow.
+`--sheets results/sheets` draws contact sheets instead, one of each world: a row for each vehicle
+and course, with the camera's picture, the same through each lens, and two views from outside. The
+last course of each vehicle is held out and has a random look.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from shapechanger.envs.finger.oracle import FingerOracle
+from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.worlds.course import FLOODED, HELD_OUT, HOME
 from shapechanger.worlds.lens import LENSES
 from shapechanger.worlds.look import LOOKS, Look
@@ -36,7 +39,7 @@ _DRIVEN_S: Final = 3.0
 def main() -> None:
     """Draw four ants, four vehicles with what their cameras see, and a finger on its way."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--only", choices=("ants", "vehicles", "finger"))
+    parser.add_argument("--only", choices=("ants", "vehicles", "finger", "finger-film"))
     parser.add_argument("--sheets", type=Path, help="folder for contact sheets of the worlds")
     asked = parser.parse_args()
     if asked.sheets is not None:
@@ -48,6 +51,8 @@ def main() -> None:
     for name, draw in (("ants", _ants), ("vehicles", _vehicles), ("finger", _finger)):
         if asked.only in (None, name):
             iio.imwrite(PICTURES / f"{name}.jpg", draw(), quality=85)
+    if asked.only in (None, "finger-film"):
+        _film_finger(PICTURES / "finger-reach-follow.gif")
 
 
 def _ants() -> NDArray[np.uint8]:
@@ -101,6 +106,46 @@ def _finger() -> NDArray[np.uint8]:
         observation, *_ = env.step(act(observation))
     env.close()
     return np.concatenate(frames, axis=1)
+
+
+_FILM_SIZE: Final = {"width": 400, "height": 300}
+_FILM_STEPS: Final = 200
+_FILM_SKIP: Final = 4
+_FILM_COLOURS: Final = 256
+
+
+def _film_finger(path: Path) -> None:
+    """Film the shipped policies: two targets reached, and a figure eight followed."""
+    reach = EnvRef("shapechanger/Finger-v1", {})
+    follow = EnvRef("shapechanger/FingerTrack-v1", {"path": "figure-eight"})
+    films = [_filmed(reach, "reach", (1, 4)), _filmed(follow, "track", (1,))]
+    frames = [Image.fromarray(np.concatenate(pair, axis=1)) for pair in zip(*films, strict=True)]
+    # One palette for all frames, so that colours do not flicker, with those of thin tendons.
+    palette = frames[-1].quantize(_FILM_COLOURS, Image.Quantize.MAXCOVERAGE)
+    drawn = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    drawn[0].save(
+        path,
+        save_all=True,
+        append_images=drawn[1:],
+        duration=20 * _FILM_SKIP,
+        loop=0,
+        optimize=True,
+    )
+
+
+def _filmed(env_ref: EnvRef, name: str, seeds: tuple[int, ...]) -> list[NDArray[np.uint8]]:
+    """Frames of a shipped policy, for the same time from each start."""
+    policy = load_policy(POLICIES[name])
+    env = cast("Any", env_ref.make(render_mode="rgb_array", **_FILM_SIZE))
+    frames: list[NDArray[np.uint8]] = []
+    for seed in seeds:
+        observation, _ = env.reset(seed=seed)
+        for step in range(_FILM_STEPS // len(seeds)):
+            if step % _FILM_SKIP == 0:
+                frames.append(env.render())
+            observation, *_ = env.step(policy.act(observation[None])[0])
+    env.close()
+    return frames
 
 
 def _row(names: tuple[str, ...]) -> NDArray[np.uint8]:
