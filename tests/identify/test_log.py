@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import JOINTS, TENDONS
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, CommandPath
 from shapechanger.errors import FingerError, OutputError, UnknownName
 from shapechanger.identify import FingerLog, identify, load_log, save_log
 from shapechanger.identify.log import SIGNALS, require_informative
@@ -205,3 +205,28 @@ def test_an_unwritable_path_is_refused(tmp_path: Path) -> None:
     """Saving to a folder raises OutputError."""
     with pytest.raises(OutputError, match="cannot be written"):
         save_log(made_up(), tmp_path)
+
+
+def test_a_path_that_contradicts_the_log_is_refused() -> None:
+    """Rate of the path and period of the log are both named; a fitting path is no error."""
+    log = made_up()
+    fits = changed(log, motors=NOMINAL.replace(path=CommandPath(control_hz=100.0)))
+    require_informative(fits)
+    for hz in (40.0, 75.0):
+        path = CommandPath(control_hz=hz, tick_hz=2.0 * hz)
+        with pytest.raises(FingerError, match=rf"control_hz={hz:g}, but the log has 50 .*=0.02"):
+            require_informative(changed(log, motors=NOMINAL.replace(path=path)))
+
+
+def test_a_log_of_an_old_version_knows_no_motors(tmp_path: Path) -> None:
+    """A header without motors reads as one of a finger about whose motors nothing is known."""
+    path = tmp_path / "old.npz"
+    save_log(made_up(), path)
+    with np.load(path) as read:
+        arrays = {name: read[name] for name in read.files}
+    header = json.loads(bytes(arrays["header"]))
+    del header["motors"]
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+    assert load_log(path).motors is None

@@ -29,6 +29,8 @@ SIGNALS: Final = {
 
 # Longest step between two rows, in control periods. Clocks jitter; a missing row is a gap.
 _LONGEST_STEP: Final = 1.5
+# Tolerance of a ratio that must be whole.
+_WHOLE: Final = 1e-6
 _FORMAT: Final = "shapechanger finger log"
 _VERSION: Final = 1
 # Shortest log, s. The intervals rest on how errors repeat within half a second.
@@ -115,8 +117,18 @@ def require_informative(log: FingerLog) -> None:
     """Check that every joint moves far enough and independently of the others.
 
     Raises:
-        FingerError: If the log is too short, or a joint hardly moves or only along with others.
+        FingerError: If the log is too short, a joint hardly moves or only along with others, or its
+            rows do not fit the path of its rig.
     """
+    path = None if log.motors is None else log.motors.path
+    if path is not None:
+        computations = log.control_dt * path.control_hz
+        if round(computations) < 1 or abs(computations - round(computations)) > _WHOLE:
+            raise FingerError(
+                f"The rig's path computes tensions at control_hz={path.control_hz:g}, but the log "
+                f"has {1.0 / log.control_dt:g} commands per second (control_dt={log.control_dt:g} "
+                "s), and the first must be a multiple of the second."
+            )
     if log.seconds < _SHORTEST_S - 0.5 * log.control_dt:
         raise FingerError(
             f"The log is {log.seconds:.1f} s long; identification needs at least "

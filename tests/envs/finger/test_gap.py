@@ -12,7 +12,7 @@ import pytest
 from shapechanger.bodies.finger import NOMINAL
 from shapechanger.bodies.finger.tensions import spans_all_torques
 from shapechanger.envs.finger import FingerReachEnv
-from shapechanger.envs.finger.gap import GAPS, Gap, resolve_gap
+from shapechanger.envs.finger.gap import GAPS, Gap, require_balance, resolve_gap
 from shapechanger.errors import FingerError, UnknownName
 
 _REAL_LIKE = GAPS["real-like"]
@@ -147,3 +147,16 @@ def test_invalid_gaps_are_refused() -> None:
         resolve_gap({**msgspec.to_builtins(_REAL_LIKE), "fricton": (0.0, 1.0)})
     with pytest.raises(FingerError, match="Expected `object`, got `int`"):
         resolve_gap(3)  # pyright: ignore[reportArgumentType]
+
+
+def test_arms_that_cannot_balance_name_the_joint() -> None:
+    """No arm of one sign, and a torque that always comes with another, are refused by name."""
+    one_way = NOMINAL.arms
+    one_way[:, 2] = abs(one_way[:, 2])
+    with pytest.raises(FingerError, match=r"balance PIP_flexion: no moment arm there is negative"):
+        FingerReachEnv(parameters={"moment_arms": one_way.tolist()})
+    coupled = NOMINAL.arms
+    coupled[:, 3] = coupled[:, 2]  # PIP and DIP only together.
+    with pytest.raises(FingerError, match=r"balance PIP_flexion: no tensions give it a positive"):
+        FingerReachEnv(parameters={"moment_arms": coupled.tolist()})
+    require_balance(NOMINAL)

@@ -23,7 +23,7 @@ from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TEN
 from shapechanger.bodies.finger.model import FingerFigure
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.finger.drawing import tendon_legend
-from shapechanger.envs.finger.gap import Gap, resolve_gap, with_gears
+from shapechanger.envs.finger.gap import Gap, require_balance, resolve_gap, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.renderer import Renderer, body_reach, draw
@@ -73,7 +73,8 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     Raises:
         UnknownName: If there is no such mode of action, gap, parameter, weight or render mode.
-        FingerError: If the parameters contradict themselves, or come with a gap.
+        FingerError: If the parameters contradict themselves, come with a gap, or have moment arms
+            with which the tendons cannot balance a joint.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it without ClassVar.
@@ -116,7 +117,9 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self._figure: FingerFigure | None = None
         self._renderer: Renderer | None = None
         if self._gap is None:
-            self._use(_parameters(parameters))
+            given = _parameters(parameters)
+            require_balance(given)
+            self._use(given)
         else:
             self._use(self._gap.draw(np.random.default_rng(finger_seed or 0)))
         self._senses: FingerSenses | None = None

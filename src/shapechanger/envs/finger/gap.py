@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.finger import NOMINAL, CommandPath, FingerParameters
-from shapechanger.bodies.finger.tensions import spans_all_torques
+from shapechanger.bodies.finger import JOINTS, NOMINAL, CommandPath, FingerParameters
+from shapechanger.bodies.finger.tensions import spans_all_torques, tensions_for_torque
 from shapechanger.errors import FingerError, UnknownName
 
 # Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
@@ -22,6 +22,8 @@ _TRIES: Final = 1000
 # Parameters whose logarithm is drawn.
 _LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"})
 
+# Torque that the tendons must give each joint alone, N·m.
+_BALANCE_NM: Final = 0.01
 # Relative errors of identified arms and stretch, and of joints: `benchmarks.finger_identify`.
 _FOUND: Final = 0.03
 _JOINTS_FOUND: Final = 0.2
@@ -194,6 +196,35 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
     }
 )
 """Gaps by name."""
+
+
+def require_balance(parameters: FingerParameters) -> None:
+    """Require tendons that can pull against one another at every joint.
+
+    Args:
+        parameters: The finger.
+
+    Raises:
+        FingerError: If there is a torque that no tensions give; the message names the joint.
+    """
+    arms = parameters.arms
+    if spans_all_torques(arms):
+        return
+    for joint, own in zip(JOINTS, arms.T, strict=True):
+        for arm, way in ((own.max(), "positive"), (-own.min(), "negative")):
+            if arm <= 0.0:
+                raise FingerError(
+                    f"The tendons cannot balance {joint}: no moment arm there is {way}."
+                )
+    for j, joint in enumerate(JOINTS):
+        for sign, way in ((1.0, "positive"), (-1.0, "negative")):
+            torque = sign * _BALANCE_NM * np.eye(len(JOINTS))[j]
+            if not tensions_for_torque(arms, torque, 0.0, np.inf)[1]:
+                raise FingerError(
+                    f"The tendons cannot balance {joint}: no tensions give it a {way} torque "
+                    "without one at another joint."
+                )
+    raise FingerError("The tendons cannot balance the joints: change the moment arms.")
 
 
 def with_gears(parameters: FingerParameters) -> FingerParameters:
