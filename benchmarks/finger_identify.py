@@ -16,9 +16,6 @@ from benchmarks.row import Row
 from shapechanger.bodies.finger import JOINTS, FingerParameters
 from shapechanger.envs.finger.identification import record_babble
 from shapechanger.identify import FingerLog, IdentifiedFinger, identify
-from shapechanger.identify.kinematics import fit_kinematics
-from shapechanger.identify.motion import fit_dynamics
-from shapechanger.identify.motors import fit_motors
 
 _SECONDS = 10.0
 _SMALL_M = 2e-3
@@ -93,29 +90,6 @@ def identified() -> list[Row]:
             "< 120 s",
             max(seconds) < 120.0,
         ),
-    ]
-
-
-def with_arms() -> list[Row]:
-    """Compare arms fitted to lengths with arms also fitted to the motion."""
-    many = min(4, int(os.environ.get("FINGERS", "4")))
-    by_lengths: list[float] = []
-    by_motion: list[float] = []
-    for seed in range(many):
-        log, truth = _recorded(seed)
-        kinematics, motors = fit_kinematics(log), fit_motors(log)
-        refined = fit_dynamics(log, kinematics, motors, with_arms=True)
-        for arms, errors in ((kinematics.arms, by_lengths), (refined.arms, by_motion)):
-            errors.append(float(_off(arms, truth.arms).max()))
-    return [
-        Row(
-            f"largest error of arms above 2 mm, by {name}",
-            f"{max(errors):.1%}",
-            ", ".join(f"{error:.1%}" for error in errors),
-            "none",
-            True,
-        )
-        for name, errors in (("lengths", by_lengths), ("motion as well", by_motion))
     ]
 
 

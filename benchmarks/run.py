@@ -160,7 +160,6 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "finger-speed": finger_speed.against_myosuite,
     "finger-learned": finger_learned.learned,
     "finger-identify": finger_identify.identified,
-    "finger-identify-arms": finger_identify.with_arms,
     "references": references.references,
     "speed": speed.single,
     "speed-vector": speed_vector.vector,

@@ -106,7 +106,6 @@ MOTORS = Motors(0.03, 0.001, 0.9, (0.001, 0.002, 0.01), saturates=True, tension_
 DYNAMICS = Dynamics(
     values={name: 2.0 * value for name, value in FACTORS.items()},
     sd={name: 0.1 for name in FACTORS},
-    arms=NOMINAL.arms,
 )
 
 

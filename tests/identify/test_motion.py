@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.bodies.finger import JOINTS, NOMINAL, FingerParameters
 from shapechanger.errors import MissingExtra
-from shapechanger.identify import FingerLog
+from shapechanger.identify import FingerLog, motion
 from shapechanger.identify.kinematics import ARMS, Kinematics
 from shapechanger.identify.motion import (
     FACTORS,
@@ -71,7 +71,6 @@ def test_joints_and_friction_are_found() -> None:
     assert found.values["tendon_friction"] == pytest.approx(0.3, rel=0.15)
     assert set(found.sd) == set(FACTORS)
     assert all(1e-3 < sd < 0.2 for sd in found.sd.values())
-    np.testing.assert_array_equal(found.arms, NOMINAL.arms)
 
 
 def test_the_covariance_has_the_correction_for_few_windows(
@@ -79,26 +78,13 @@ def test_the_covariance_has_the_correction_for_few_windows(
 ) -> None:
     """Two windows with opposite errors: a sandwich, times two windows over one."""
     fit = _MotionFit.__new__(_MotionFit)
-    fit._prior_sd = np.ones(1)
+    monkeypatch.setattr(motion, "_PRIOR_SD", 1.0)
     parts = [np.array([3.0]), np.array([-3.0]), np.zeros(1)]
     monkeypatch.setattr(_MotionFit, "residual", lambda *_: (parts, None, None))
     monkeypatch.setattr(_MotionFit, "parameters", lambda _: None)
     found = fit.covariance(np.zeros(1), np.array([[1.0], [2.0], [1.0]]))
     bread, filling = 1.0 / 6.0, 1.0 + 3.0**2 + 6.0**2
     assert found[0, 0] == pytest.approx(2.0 * bread**2 * filling)
-
-
-def test_arms_can_be_fitted_with_the_motion() -> None:
-    """Fitting the motion reduces errors of the arms."""
-    log, _ = short()
-    rng = np.random.default_rng(1)
-    wrong = NOMINAL.arms.copy()
-    wrong[ARMS] += ARM_SD_M * rng.standard_normal(int(ARMS.sum()))
-    found = fit_dynamics(log, exact(wrong), motors(), 80, with_arms=True)
-    before = np.abs(wrong - NOMINAL.arms)[ARMS]
-    after = np.abs(found.arms - NOMINAL.arms)[ARMS]
-    assert np.sqrt(np.mean(after**2)) < 0.95 * np.sqrt(np.mean(before**2))
-    assert (found.arms[~ARMS] == 0.0).all()
 
 
 def test_windows_begin_in_the_measured_state() -> None:

@@ -28,7 +28,7 @@ from shapechanger.bodies.finger import (
     drive_of,
 )
 from shapechanger.errors import MissingExtra
-from shapechanger.identify.kinematics import ARMS, Kinematics
+from shapechanger.identify.kinematics import Kinematics
 from shapechanger.identify.log import FingerLog
 from shapechanger.identify.motors import FINE_S, CommandSignal, Motors
 
@@ -57,11 +57,8 @@ _ROWS: Final = 7
 # stay at their initial values.
 _PRIOR_SD: Final = math.log(3.0)
 _MAX_LOG_FACTOR: Final = math.log(30.0)
-_MAX_ARM_ERRORS: Final = 5.0
 # Standard deviation of simulated minus measured angles under the best model, rad.
 _ANGLE_SD: Final = math.radians(1.0)
-# Added to the arms' covariance, m², so that exactly known arms leave it a Cholesky factor.
-_ROUNDING: Final = 1e-18
 _ITERATIONS: Final = 12
 # Step of finite differences, and the step that ends the search, in logarithms.
 _STEP: Final = 1e-3
@@ -161,12 +158,10 @@ class Dynamics:
     Attributes:
         values: Parameters by the names of `FACTORS`, in SI units.
         sd: Standard errors of their logarithms, by name, if the model is right.
-        arms: Moment arms, m, (7, 4); those of the kinematics unless they were fitted as well.
     """
 
     values: dict[str, float]
     sd: dict[str, float]
-    arms: NDArray[np.float64]
 
 
 def fit_dynamics(
@@ -174,8 +169,6 @@ def fit_dynamics(
     kinematics: Kinematics,
     motors: Motors,
     last: int | None = None,
-    *,
-    with_arms: bool = False,
 ) -> Dynamics:
     """Fit joint and friction parameters to a log.
 
@@ -185,14 +178,12 @@ def fit_dynamics(
         motors: Fit of its tensions.
         last: Row before which the fit ends, to leave the rest for validation; None for the end of
             the log.
-        with_arms: Whether to fit the arms again, with those of the kinematics and their covariance
-            as the prior.
 
     Raises:
         MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
     """
     sysid = _load_sysid()
-    fit = _MotionFit(sysid, log, kinematics, motors, last, with_arms=with_arms)
+    fit = _MotionFit(sysid, log, kinematics, motors, last)
     found, result = sysid.optimize(
         fit.parameters(),
         fit.residual,
@@ -208,7 +199,6 @@ def fit_dynamics(
     return Dynamics(
         values={name: begin * math.exp(x[i]) for i, (name, begin) in enumerate(FACTORS.items())},
         sd={name: float(sd[i]) for i, name in enumerate(FACTORS)},
-        arms=fit.arms(x),
     )
 
 
@@ -224,9 +214,8 @@ def _load_sysid() -> Any:
 class _MotionFit:
     """Residuals of the simulated motion.
 
-    The parameters are the logarithms of the factors over `FACTORS`, (9,), and with `with_arms` the
-    offsets of the 25 arms from those of the kinematics, in standard errors along the axes of their
-    covariance. See `fit_dynamics` for the arguments.
+    The parameters are the logarithms of the factors over `FACTORS`, (9,). See `fit_dynamics` for
+    the arguments.
     """
 
     def __init__(
@@ -236,15 +225,9 @@ class _MotionFit:
         kinematics: Kinematics,
         motors: Motors,
         last: int | None,
-        *,
-        with_arms: bool,
     ) -> None:
         self._sysid = sysid
         self._arms = kinematics.arms
-        rounding = _ROUNDING * np.eye(len(kinematics.arms_covariance))
-        self._arm_axes = np.linalg.cholesky(kinematics.arms_covariance + rounding)
-        self._n_arms = int(ARMS.sum()) if with_arms else 0
-        self._prior_sd = np.concatenate([np.full(len(FACTORS), _PRIOR_SD), np.ones(self._n_arms)])
         spec = build_finger(with_motors(motors, log.motors), drive_of(log.actions, NOMINAL))
         for name in JOINTS:
             spec.add_sensor(
@@ -268,27 +251,16 @@ class _MotionFit:
     def parameters(self) -> Any:
         """Initial parameters and their bounds, as `mujoco.sysid` takes them."""
         found = self._sysid.ParameterDict()
-        for name, count, bound in (
-            ("factors", len(FACTORS), _MAX_LOG_FACTOR),
-            ("arms", self._n_arms, _MAX_ARM_ERRORS),
-        ):
-            if count:
-                zero = np.zeros(count)
-                found.add(self._sysid.Parameter(name, zero, zero - bound, zero + bound))
+        zero = np.zeros(len(FACTORS))
+        bounds = zero - _MAX_LOG_FACTOR, zero + _MAX_LOG_FACTOR
+        found.add(self._sysid.Parameter("factors", zero, *bounds))
         return found
 
     def residual(self, x: NDArray[np.float64], parameters: Any, **more: Any) -> Any:
         """Errors of the angles, window by window, then those of the prior, each over its sd."""
         errors, predicted, measured = self._residual(x, parameters, **more)
-        priors = (x.T / self._prior_sd).T
+        priors = x / _PRIOR_SD
         return [*errors, priors], predicted, measured
-
-    def arms(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Moment arms of a parameter vector, m, (7, 4)."""
-        arms = self._arms.copy()
-        if self._n_arms:
-            arms[ARMS] += self._arm_axes @ x[len(FACTORS) :]
-        return arms
 
     def covariance(
         self, x: NDArray[np.float64], jacobian: NDArray[np.float64]
@@ -301,7 +273,7 @@ class _MotionFit:
         """
         parts, _, _ = self.residual(x, self.parameters())
         bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
-        filling = np.diag(self._prior_sd**-2)
+        filling = np.eye(len(x)) / _PRIOR_SD**2
         row = 0
         for part in parts[:-1]:
             score = jacobian[row : row + np.size(part)].T @ np.ravel(part)
@@ -316,13 +288,13 @@ class _MotionFit:
     def _build(self, parameters: Any, spec: mujoco.MjSpec) -> mujoco.MjModel:
         del spec  # Compiling it for each candidate would take most of the time.
         x = parameters.as_vector()
-        values = np.array(list(FACTORS.values())) * np.exp(x[: len(FACTORS)])
+        values = np.array(list(FACTORS.values())) * np.exp(x)
         model = copy.copy(self._model)
         model.jnt_stiffness[:_N] = values[:_N]
         model.dof_damping[:_N] = values[_N : 2 * _N]
         model.tendon_frictionloss[:] = values[2 * _N]
         # The coefficients of fixed tendons: minus the arms, tendon by tendon.
-        model.wrap_prm[:] = -self.arms(x).ravel()
+        model.wrap_prm[:] = -self._arms.ravel()
         return model
 
     def _sequences(
