@@ -65,10 +65,12 @@ def _tendon_features(sensor: SensorPlan) -> list[Feature]:
     """Return length, speed and tension of each tendon on a servo bus."""
     most = dict(zip(sensor.settings["tendons"], sensor.settings["most_tensions_n"], strict=True))
     parts = {name: Element("tendon", name) for name in most}
-    spans = dict(zip(most, sensor.settings["lengths_m"], strict=True))
-    lengths = {name: spans[name] or (-math.inf, math.inf) for name in most}
+    spans = zip(most, sensor.settings["lengths_m"], strict=True)
+    lengths: dict[str, tuple[float, float]] = {
+        name: tuple(span) if span else (-math.inf, math.inf) for name, span in spans
+    }
     return [
-        *(Feature(f"{name}/length", "m", *lengths[name], part) for name, part in parts.items()),
+        *(Feature(f"{n}/length", "m", *ends, element=parts[n]) for n, ends in lengths.items()),
         *(Feature(f"{name}/speed", "m/s", element=part) for name, part in parts.items()),
         *(Feature(f"{name}/tension", "N", 0.0, most[name], part) for name, part in parts.items()),
     ]

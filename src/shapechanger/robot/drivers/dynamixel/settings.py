@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any, Final, Literal, get_args
 
@@ -312,20 +312,8 @@ def servo_settings(plan: OutputPlan) -> ServoSettings:
         RobotError: If a setting is out of range.
         UnknownName: If there is no such model.
     """
-    settings = plan.settings
-    return ServoSettings(
-        name=plan.name,
-        id=settings["id"],
-        model=settings["model"],
-        spool_radius_m=settings["spool_radius_m"],
-        most_tension_n=settings["most_tension_n"],
-        pretension_n=settings["pretension_n"],
-        direction=settings["direction"],
-        homing_n=settings["homing_n"],
-        control=settings["control"],
-        longest_m=settings["longest_m"],
-        shortest_m=settings["shortest_m"],
-    )
+    keys = [field.name for field in fields(ServoSettings) if field.name != "name"]
+    return ServoSettings(plan.name, **{key: plan.settings[key] for key in keys})
 
 
 def bus_settings(settings: Mapping[str, Any], servos: tuple[ServoSettings, ...]) -> BusSettings:
@@ -338,11 +326,5 @@ def bus_settings(settings: Mapping[str, Any], servos: tuple[ServoSettings, ...])
     Raises:
         RobotError: If a setting is out of range, or two servos have the same id or name.
     """
-    return BusSettings(
-        device=settings["device"],
-        servos=servos,
-        baud=settings["baud"],
-        answer_ms=settings["answer_ms"],
-        watchdog_ms=settings["watchdog_ms"],
-        ramp_ms=settings["ramp_ms"],
-    )
+    keys = [field.name for field in fields(BusSettings) if field.name in settings]
+    return BusSettings(servos=servos, **{key: settings[key] for key in keys})
