@@ -1,4 +1,4 @@
-"""Bus of servos that pull tendons, in current mode.
+"""Bus of servos that pull tendons, in current or current-based position mode.
 
 The bus has no thread, never sleeps, and takes the time from its caller.
 """
