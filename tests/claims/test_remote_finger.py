@@ -14,7 +14,7 @@ import pytest
 
 from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger.gap import GAPS, resolve_gap
-from shapechanger.errors import BadAction, UnknownName
+from shapechanger.errors import BadAction, FingerError, UnknownName
 from shapechanger.identify.result import PATH_DELAY_ERROR_S
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import RunningRobot, run_robot
@@ -312,3 +312,33 @@ def test_ten_seconds_identify_the_finger() -> None:
     assert np.abs(NOMINAL.arms / np.where(large, truth.arms, 1.0) - 1.0)[large].max() > 0.15
     np.testing.assert_allclose(found.joint_stiffness, truth.joint_stiffness, rtol=0.2)
     assert found.tendon_stiffness == pytest.approx(truth.tendon_stiffness, rel=0.05)
+
+
+def test_actions_of_length_drive_servos_that_control_lengths(tmp_path: Path) -> None:
+    """The same env moves a rig in current-based position mode, from the start of its episode."""
+    text = find_profile("finger").read_text()
+    keys = 'control = "length"\nlongest_m = 0.03\nshortest_m = -0.05\nmodel ='
+    path = tmp_path / "finger.toml"
+    path.write_text(text.replace("model =", keys))
+    flex = np.array([0.2, 0.2, -0.5, -0.5, 0.0, 0.0, 0.0], np.float32)
+    with run_robot(path, clock="twin") as robot:
+        with pytest.raises(FingerError, match='controls lengths, so actions must be "length"'):
+            _env(robot, actions="tension")
+        env = _env(robot, actions="length")
+        start, info = env.reset(seed=2)
+        unwrapped: Any = env.unwrapped
+        with gym.make("shapechanger/Finger-v1", actions="length") as simulated:
+            begins, _ = simulated.reset(seed=2)
+        np.testing.assert_allclose(start[:4], begins[:4], atol=0.06)
+        held = unwrapped._command.astype(np.float32)
+        for _ in range(20):
+            kept, *_, info = env.step(held)
+        assert info["truncated_because"] == ""
+        for _ in range(40):
+            bent, *_ = env.step(held + flex)
+        for _ in range(60):
+            straight, *_, info = env.step(held - flex)
+        env.close()
+    assert info["truncated_because"] == ""
+    np.testing.assert_allclose(kept[:4], start[:4], atol=0.15)
+    assert bent[0] > straight[0] + 0.3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from shapechanger.bodies.finger.anatomy import JOINT_REST, MOMENT_ARMS
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
-from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.twin.servos.rig import Rig, ServoFault
 from shapechanger.twin.world.finger import FingerWorld
@@ -199,3 +200,28 @@ def test_unknown_tendons_and_faults_are_refused(bench: _Bench) -> None:
         bench.rig.break_servo("FDPP", "mute")
     with pytest.raises(UnknownName, match="fault of a servo"):
         bench.rig.break_servo("FDP", "hott")  # pyright: ignore[reportArgumentType]
+
+
+def test_a_rig_that_controls_lengths_flexes_and_releases(tmp_path: Path) -> None:
+    """Lengths move the finger through guard and bus, and the rest is the pretension."""
+    text = shipped_profiles()["finger"].read_text()
+    keys = 'control = "length"\nlongest_m = 0.012\nshortest_m = -0.03\nmodel ='
+    path = tmp_path / "finger.toml"
+    path.write_text(text.replace("model =", keys))
+    robot = InProcessRobot(load_profile(path), FingerWorld(NOMINAL, seed=3))
+    names = Layout.from_json(robot.welcome.state_layout).names
+    try:
+        robot.start()
+        rig = robot.pins.rig
+        assert rig is not None
+        for _ in range(60):  # Flexors to -17 mm, the others let out.
+            seen, _ = robot.step((0.7, 0.7, 0.01, 0.01, 0.01, 0.01, 0.01))
+        assert seen.state[names.index("FDP/length")] == pytest.approx(-0.0174, abs=2e-3)
+        assert seen.state[names.index("PIP_flexion/angle")] > 0.3
+        assert all(servo.register(11) == 5 for servo in rig.bus.servos.values())
+        for _ in range(60):
+            robot.step(_REST)
+        # The friction of the gears, 0.5 N, adds to the pretension of 1 N.
+        assert max(rig.tensions().values()) < 1.6
+    finally:
+        robot.close()

@@ -75,3 +75,27 @@ def test_an_invalid_bus_is_refused(text: str, words: str) -> None:
     """The error names the problem, with the line where there is one."""
     with pytest.raises(ProfileError, match=words):
         read(text)
+
+
+_LENGTH = 'control = "length"\nlongest_m = 0.01\nshortest_m = -0.03\n'
+
+
+def test_control_of_the_length_has_its_gain_in_metres() -> None:
+    """The action of such a tendon goes from the longest to the shortest length."""
+    text = _TEXT.replace("id = 1\n", "id = 1\n" + _LENGTH, 1)
+    layout = read(text).action_layout()
+    assert (layout["FDP"].gain, layout["FDP"].gain_unit) == (pytest.approx(0.04), "m")
+    assert layout["FDS"].gain_unit == "N"
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (_LENGTH.replace('"length"', '"lenght"'), "did you mean \"?'?length"),
+        ('control = "length"\n', "needs shortest_m below longest_m, not 0 and 0 m"),
+    ],
+)
+def test_invalid_control_is_refused_with_its_line(keys: str, words: str) -> None:
+    """A misspelt control and a missing range of lengths name the problem and its line."""
+    with pytest.raises(ProfileError, match=r"line \d+: .*" + words):
+        read(_TEXT.replace("id = 1\n", "id = 1\n" + keys, 1))

@@ -20,7 +20,7 @@ from shapechanger.envs.finger.gap import GAPS, geared_around, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
-from shapechanger.envs.remote.finger_rig import RigSenses, StartApproach
+from shapechanger.envs.remote.finger_rig import LengthApproach, RigSenses, StartApproach
 from shapechanger.envs.remote.vehicle import OnReset, RemoteVehicleEnv
 from shapechanger.errors import FingerError, RobotRefused, UnknownName
 from shapechanger.link.messages import Pace
@@ -178,6 +178,11 @@ class RemoteFingerEnv(FingerReachEnv):
                 tendon_stiffness,
                 CONTROL_DT,
             )
+            if self._rig_senses.controls_length and actions != "length":
+                raise FingerError(
+                    f'{welcome.robot} controls lengths, so actions must be "length", not '
+                    f'{actions!r}; control = "tension" in its profile allows all modes.'
+                )
             if twin_folder:
                 self._operator = Operator(str(Path(twin_folder) / "board.socket"))
         except BaseException:
@@ -308,10 +313,14 @@ class RemoteFingerEnv(FingerReachEnv):
             senses = self._pull_on_the_way(self._rig_senses.least)
         self._rig_senses.require_fit(senses)
         way = StartApproach(start, self._rig_senses.least, self._rig_senses.most)
+        by_length = LengthApproach(start)
         for _ in range(round(_START_S / CONTROL_DT)):
             if way.off(senses) < _START_OFF_RAD:
                 break
-            senses = self._pull_on_the_way(way.tensions(senses))
+            if self._rig_senses.controls_length:
+                senses = self._on_the_way(self._rig_senses.length_values(by_length.lengths(senses)))
+            else:
+                senses = self._pull_on_the_way(way.tensions(senses))
         # The command for the present tensions, as in simulation.
         least = np.clip(senses.tensions, self._rig_senses.least, self._rig_senses.most)
         command = self.drive.command(least, senses.lengths, self._rig_senses.speeds)
@@ -320,23 +329,36 @@ class RemoteFingerEnv(FingerReachEnv):
         return self._senses
 
     def _move(self, command: NDArray[np.float64]) -> FingerSenses:
-        """Convert a command to tensions, and pull for one control period."""
+        """Convert a command to tensions or lengths, and pull for one control period."""
         self._command = command
+        if self._rig_senses.controls_length:
+            # The length at which the drive pulls with nothing but the least tension.
+            still = self.drive.tension(command, np.zeros(len(command)), np.zeros(len(command)))
+            lengths = (self._rig_senses.least - still) / self.drive.stiffness
+            return self._send(self._rig_senses.length_values(lengths))
         lengths = cast("FingerSenses", self._senses).lengths
         return self._pull(self.drive.tension(command, lengths, self._rig_senses.speeds))
 
     def _pull(self, tensions: NDArray[np.float64]) -> FingerSenses:
         """Command tensions, N, (7,), for one control period."""
-        state, _, _, _, self._rig_info = self._rig.step(self._rig_senses.values(tensions))
+        return self._send(self._rig_senses.values(tensions))
+
+    def _send(self, values: NDArray[np.float32]) -> FingerSenses:
+        """Send a command of the rig for one control period."""
+        state, _, _, _, self._rig_info = self._rig.step(values)
         return self._sense(state)
 
     def _pull_on_the_way(self, tensions: NDArray[np.float64]) -> FingerSenses:
-        """Do the same before an episode.
+        """Command tensions before an episode; see `_on_the_way`."""
+        return self._on_the_way(self._rig_senses.values(tensions))
+
+    def _on_the_way(self, values: NDArray[np.float32]) -> FingerSenses:
+        """Send a command of the rig before an episode.
 
         Raises:
             RobotRefused: If the rig stops.
         """
-        senses = self._pull(tensions)
+        senses = self._send(values)
         if because := self._rig_info["truncated_because"]:
             raise RobotRefused(f"The finger did not come to its start: {because}")
         return senses

@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.bodies.finger import JOINTS, TENDONS
-from shapechanger.bodies.finger.anatomy import JOINT_RANGE, MOMENT_ARMS, PHALANX_LENGTH_M
+from shapechanger.bodies.finger.anatomy import (
+    JOINT_RANGE,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    PHALANX_LENGTH_M,
+)
 from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.envs.finger.plant import CONTROL_DT, JointVelocities
 from shapechanger.envs.finger.postures import moving_torque
@@ -18,6 +23,7 @@ from shapechanger.tasks.finger import FingerSenses, fingertip
 
 # Length errors above this, m, come from a lost turn (30 mm on a small spool), not from arms.
 _MISFIT_M: Final = 0.012
+_ABOVE_REST: Final = 1e-3
 _QUANTITIES: Final = ("length", "speed", "tension")
 
 
@@ -40,6 +46,7 @@ class RigSenses:
         has_encoders: Whether it has encoders at all four joints.
         most: Largest tension of each tendon, N, (7,).
         least: Tension of each tendon at command 0, N, (7,).
+        controls_length: Whether its commands are lengths, held with at most `most`.
 
     Raises:
         RobotRefused: If it has other tendons, or does not measure them.
@@ -75,12 +82,17 @@ class RigSenses:
         }
         self.most = np.array([state_layout[f"{name}/tension"].high for name in TENDONS])
         spans = [(actions[name].gain, actions[name].gain_unit) for name in TENDONS]
-        if any(unit != "N" for _, unit in spans) or not np.isfinite(self.most).all():
+        units = {unit for _, unit in spans}
+        self.controls_length = units == {"m"}
+        if not (self.controls_length or units == {"N"}) or not np.isfinite(self.most).all():
             raise RobotRefused(
                 f"The profile of {robot} does not define the tension of its commands: each action "
-                "must pull a single tendon, with a weight of 1."
+                "must pull a single tendon, with a weight of 1, and all have the same control."
             )
-        self.least = self.most - np.array([span for span, _ in spans])
+        self._span = np.array([span for span, _ in spans])
+        self._longest = np.array([state_layout[f"{name}/length"].high for name in TENDONS])
+        least = np.full(len(TENDONS), LEAST_TENSION_N)
+        self.least = least if self.controls_length else self.most - self._span
         self._compliance = 1.0 / tendon_stiffness
         # Least squares; positive arms shorten the tendons.
         self._angles_of = np.linalg.pinv(-MOMENT_ARMS)
@@ -117,6 +129,16 @@ class RigSenses:
         """Return how much longer each tendon is than its angles require, m, (7,)."""
         wound = -MOMENT_ARMS @ senses.angles
         return senses.lengths + self._compliance * senses.tensions - wound
+
+    def length_values(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return the command of a rig that controls lengths, clipped to their range.
+
+        Args:
+            lengths: Length of each tendon beyond that of the straight finger, m, (7,).
+        """
+        # 0 is the pretension, not the longest length.
+        shares = np.clip((self._longest - lengths) / self._span, _ABOVE_REST, 1.0)
+        return shares[self._order].astype(np.float32)
 
     def values(self, tensions: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the rig's command for tensions, N, (7,), clipped to their range."""
@@ -156,6 +178,31 @@ class RigSenses:
             fingertip=fingertip(angles, PHALANX_LENGTH_M),
         )
 
+
+class LengthApproach:
+    """Controller that brings a finger whose lengths are controlled to a start posture.
+
+    Args:
+        posture: The posture, rad, (4,).
+    """
+
+    def __init__(self, posture: NDArray[np.float64]) -> None:
+        self._posture = posture
+        self._aim = posture.copy()
+
+    def lengths(self, senses: FingerSenses) -> NDArray[np.float64]:
+        """Return the lengths for the next control period, m, (7,)."""
+        low, high = JOINT_RANGE.T
+        lag = np.clip(self._posture - senses.angles, -_MOST_LAG_RAD, _MOST_LAG_RAD)
+        self._aim = np.clip(self._aim + _AIM_RATE * CONTROL_DT * lag, low - 0.2, high + 0.2)
+        return -MOMENT_ARMS @ self._aim - _TAUT_M
+
+
+# Tuned on the twin of the shipped rig. Rate at which the aim corrects an error of the posture, 1/s,
+# the largest error that counts, rad, and the length that is wound in further to keep taut, m.
+_AIM_RATE: Final = 2.0
+_MOST_LAG_RAD: Final = 0.2
+_TAUT_M: Final = 0.5e-3
 
 # Tuned on a twin with geared servos, XL330-M077 on spools of 10 mm. Approach rate, 1/s, and speed
 # limit, rad/s; and gain of the speed controller, 1/s.

@@ -65,8 +65,12 @@ def _tendon_features(sensor: SensorPlan) -> list[Feature]:
     """Return length, speed and tension of each tendon on a servo bus."""
     most = dict(zip(sensor.settings["tendons"], sensor.settings["most_tensions_n"], strict=True))
     parts = {name: Element("tendon", name) for name in most}
+    spans = zip(most, sensor.settings["lengths_m"], strict=True)
+    lengths: dict[str, tuple[float, float]] = {
+        name: tuple(span) if span else (-math.inf, math.inf) for name, span in spans
+    }
     return [
-        *(Feature(f"{name}/length", "m", element=part) for name, part in parts.items()),
+        *(Feature(f"{n}/length", "m", *ends, element=parts[n]) for n, ends in lengths.items()),
         *(Feature(f"{name}/speed", "m/s", element=part) for name, part in parts.items()),
         *(Feature(f"{name}/tension", "N", 0.0, most[name], part) for name, part in parts.items()),
     ]
@@ -80,17 +84,24 @@ def _joint_features(sensor: SensorPlan) -> list[Feature]:
     ]
 
 
-def _tension_spans(outputs: Sequence[OutputPlan]) -> dict[str, float]:
-    """Return the tension span, N, of each action that alone pulls one tendon."""
+def _tendon_spans(outputs: Sequence[OutputPlan]) -> dict[str, tuple[float, str]]:
+    """Return the span and its unit of each action that alone moves one tendon.
+
+    From 0 to 1 a tension rises by so many N, or a length falls by so many m.
+    """
     moved = [name for output in outputs for name in output.mix]
-    spans: dict[str, float] = {}
+    spans: dict[str, tuple[float, str]] = {}
     for output in outputs:
         if output.driver != "dynamixel" or output.offset or len(output.mix) != 1:
             continue
         ((name, weight),) = output.mix.items()
         if weight == 1.0 and moved.count(name) == 1:
-            spans[name] = output.settings["most_tension_n"] - output.settings["pretension_n"]
-    return {name: span for name, span in spans.items() if span > 0.0}
+            one = output.settings
+            if one["control"] == "length":
+                spans[name] = one["longest_m"] - one["shortest_m"], "m"
+            elif span := one["most_tension_n"] - one["pretension_n"]:
+                spans[name] = span, "N"
+    return spans
 
 
 # Layouts are in SI units; profiles may use degrees.
@@ -146,9 +157,10 @@ class Profile(GuardPlan):
 
         The range is the full range of each action. The caps of the robot clip commands, and
         `action_applied` shows the result. The action of a tendon has a gain in newtons, from its
-        pretension at 0 to its largest tension at 1.
+        pretension at 0 to its largest tension at 1, or in metres wound in where its length is
+        controlled.
         """
-        spans = _tension_spans(self.outputs)
+        spans = _tendon_spans(self.outputs)
         return Layout(
             tuple(_action_feature(action, spans.get(action.name)) for action in self.actions)
         )
@@ -168,11 +180,11 @@ class Profile(GuardPlan):
         return Layout((*_state_features(self), *applied))
 
 
-def _action_feature(action: ActionPlan, span_n: float | None) -> Feature:
-    """Return the feature of an action; `span_n` is the tension span of its tendon, N."""
+def _action_feature(action: ActionPlan, span: tuple[float, str] | None) -> Feature:
+    """Return the feature of an action; `span` is that of its tendon, with its unit."""
     unit, factor = _SI.get(action.unit, (action.unit, 1.0))
-    if span_n is not None and unit == "1":
-        unit, factor = "N", span_n
+    if span is not None and unit == "1":
+        factor, unit = span
     return Feature(
         action.name,
         "1",

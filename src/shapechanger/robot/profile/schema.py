@@ -337,6 +337,9 @@ OUTPUT_SETTINGS: Final = {
         ProfileKey("most_tension_n", "number", low=0.0, high=1000.0, above=True),
         ProfileKey("pretension_n", "number", low=0.0, high=1000.0, above=True),
         ProfileKey("homing_n", "number", 3.0, low=0.0, high=1000.0, above=True),
+        ProfileKey("control", "choice", "tension", names=("tension", "length")),
+        ProfileKey("longest_m", "number", 0.0, low=-1.0, high=1.0),
+        ProfileKey("shortest_m", "number", 0.0, low=-1.0, high=1.0),
         # Position of the servo with a straight finger, in counts of 1/4096 turn.
         ProfileKey("zero", "whole", 0, low=-1_000_000, high=1_000_000),
     ),

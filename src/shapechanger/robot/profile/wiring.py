@@ -217,6 +217,13 @@ def with_servo_bus(
         "device": bus["device"],
         "tendons": [output.name for output in on_bus],
         "most_tensions_n": [output.settings["most_tension_n"] for output in on_bus],
+        # Shortest and longest where the length is controlled.
+        "lengths_m": [
+            [output.settings["shortest_m"], output.settings["longest_m"]]
+            if output.settings["control"] == "length"
+            else None
+            for output in on_bus
+        ],
     }
     by_name = {output.name: output for output in whole}
     return (

@@ -10,6 +10,8 @@ driver uses. Assumed for want of a source, to be tried on a rig:
   the gaps, so a driver must not rely on an error.)
 - Without power the count of turns is lost: the position starts again within one turn.
 - It needs 0.3 s to start.
+- In current-based position mode (5) the current is proportional to the error of the position, with
+  that of a stall at 1/32 turn, and within the goal current.
 """
 
 from __future__ import annotations
@@ -27,9 +29,12 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
     DRIVE_MODE,
     FIRMWARE,
     GOAL_CURRENT,
+    GOAL_POSITION,
     HARDWARE_ERROR,
+    LENGTH_MODE,
     OPERATING_MODE,
     PING,
+    PRESENT_POSITION,
     READ,
     REBOOT,
     RETURN_DELAY,
@@ -46,7 +51,6 @@ from shapechanger.twin.servos.motor import SimulatedMotor, Tendon, motor_model
 _MODEL_NUMBER: Final = Register("model number", 0, 2)
 _PRESENT_CURRENT: Final = Register("present current", 126, 2, signed=True)
 _PRESENT_VELOCITY: Final = Register("present velocity", 128, 4, signed=True)
-_PRESENT_POSITION: Final = Register("present position", 132, 4, signed=True)
 _VELOCITY_TRAJECTORY: Final = Register("velocity trajectory", 136, 4, signed=True)
 _POSITION_TRAJECTORY: Final = Register("position trajectory", 140, 4, signed=True)
 _PRESENT_VOLTAGE: Final = Register("present input voltage", 144, 2)
@@ -69,6 +73,7 @@ _OVERLOAD: Final = 0x20
 _COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
 _PER_RAD_PER_S: Final = 60.0 / (2.0 * math.pi * 0.229)
 _START_NS: Final = 300_000_000
+_STALL_AT: Final = 2.0 * math.pi / 32.0  # rad.
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,9 +146,10 @@ class SimulatedServo:
             _Field(HARDWARE_ERROR, 0),
             _Field(BUS_WATCHDOG, 0, range(128)),
             _Field(GOAL_CURRENT, most, range(-32768, 32768)),
+            _Field(GOAL_POSITION, 0, range(-1_048_575, 1_048_576)),
             _Field(_PRESENT_CURRENT, 0),
             _Field(_PRESENT_VELOCITY, 0),
-            _Field(_PRESENT_POSITION, 0),
+            _Field(PRESENT_POSITION, 0),
             _Field(_VELOCITY_TRAJECTORY, 0),
             _Field(_POSITION_TRAJECTORY, 0),
             _Field(_PRESENT_VOLTAGE, 0),
@@ -169,7 +175,7 @@ class SimulatedServo:
 
     @property
     def pulls_a(self) -> float:
-        """Goal current in effect, A, with the sign of its registers."""
+        """Goal current in effect, A, with the sign of its registers; in mode 5 its limit."""
         return self._goal_a
 
     def register(self, at: int) -> int:
@@ -203,10 +209,10 @@ class SimulatedServo:
         for at, one in self._fields.items():
             if at >= _EEPROM_END:
                 self._values[one.register] = one.initial
-        self._cache()
         self._turns = math.floor(self.motor.angle / (2.0 * math.pi)) * COUNTS_PER_TURN
         self._starts_until_ns = self._now_ns + _START_NS
         self._fed_ns = self._starts_until_ns
+        self._cache()
 
     def advance(self, now_ns: int, travel_m: float) -> None:
         """Advance to a time.
@@ -219,11 +225,19 @@ class SimulatedServo:
         self._now_ns = now_ns
         if self._watchdog_ns is not None and now_ns - self._fed_ns >= self._watchdog_ns:
             self._trip()
-        self.motor.advance(self._goal_a, self.volts, travel_m, dt_s)
+        self.motor.advance(self._controlled_a(), self.volts, travel_m, dt_s)
         if self.motor.temperature > self._model.most_c:
             self._fail(_HOT)
         if not self._model.least_v <= self.volts <= self._model.most_v:
             self._fail(_VOLTAGE)
+
+    def _controlled_a(self) -> float:
+        """Return the current that its controller asks for, A."""
+        if self._goal_angle is None:
+            return self._goal_a
+        limit = abs(self._goal_a)
+        wanted = self._model.stall_a * (self._goal_angle - self.motor.angle) / _STALL_AT
+        return min(max(wanted, -limit), limit)
 
     def _cache(self) -> None:
         """Cache what each step needs of the registers."""
@@ -231,8 +245,11 @@ class SimulatedServo:
         steps = values[BUS_WATCHDOG]
         counts = self.has_torque and 0 < steps < TRIPPED
         self._watchdog_ns = steps * WATCHDOG_STEP_NS if counts else None
-        in_current_mode = values[OPERATING_MODE] == CURRENT_MODE  # Others are not simulated.
-        pulls = self.has_torque and steps != TRIPPED and in_current_mode
+        mode = values[OPERATING_MODE]
+        known = mode in (CURRENT_MODE, LENGTH_MODE)  # Others are not simulated.
+        pulls = self.has_torque and steps != TRIPPED and known
+        counts_ahead = values[GOAL_POSITION] + self._turns + 0.5
+        self._goal_angle = counts_ahead / _COUNTS_PER_RAD if mode == LENGTH_MODE else None
         self._goal_a = values[GOAL_CURRENT] * self._model.ampere_per_count if pulls else 0.0
 
     def _trip(self) -> None:
@@ -314,6 +331,6 @@ class SimulatedServo:
         motor, values = self.motor, self._values
         values[_PRESENT_CURRENT] = round(motor.current / self._model.ampere_per_count)
         values[_PRESENT_VELOCITY] = round(motor.speed * _PER_RAD_PER_S)
-        values[_PRESENT_POSITION] = math.floor(motor.angle * _COUNTS_PER_RAD) - self._turns
+        values[PRESENT_POSITION] = math.floor(motor.angle * _COUNTS_PER_RAD) - self._turns
         values[_PRESENT_VOLTAGE] = round(10 * self.volts)
         values[_PRESENT_TEMPERATURE] = round(motor.temperature)

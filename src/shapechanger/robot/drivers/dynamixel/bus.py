@@ -1,4 +1,4 @@
-"""Bus of servos that pull tendons, in current mode.
+"""Bus of servos that pull tendons, in current or current-based position mode.
 
 The bus has no thread, never sleeps, and takes the time from its caller.
 """
@@ -23,9 +23,12 @@ from shapechanger.robot.drivers.dynamixel.protocol import (
     DRIVE_MODE,
     FIRMWARE,
     GOAL_CURRENT,
+    GOAL_POSITION,
     HARDWARE_ERROR,
+    LENGTH_MODE,
     OPERATING_MODE,
     PRESENT,
+    PRESENT_POSITION,
     RETURN_DELAY,
     TORQUE_ENABLE,
     WATCHDOG_STEP_NS,
@@ -41,6 +44,8 @@ from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSett
 
 # One of them is read in each cycle, so a trip is detected within four.
 _AUDITED: Final = (BUS_WATCHDOG, TORQUE_ENABLE, GOAL_CURRENT, HARDWARE_ERROR)
+# Counts ahead of its position to which a servo with control of the length is sent to pull.
+_AHEAD: Final = 1024
 
 
 class ServoBus:
@@ -67,6 +72,8 @@ class ServoBus:
         self._stopped_ns = 0
         self._goals = dict.fromkeys(self._ids, 0)  # Counts, as last sent.
         self._requested = dict.fromkeys(self._servos, 0.0)  # N, as last requested.
+        self._lengths: dict[str, float] = {}  # m, of tendons that are to have a length.
+        self._positions: dict[int, int] = {}  # Counts, as last read.
         self._cycles = 0
         self._gone = ""
         self._is_ready = False
@@ -123,10 +130,15 @@ class ServoBus:
             why = why or ("they are not set up." if not self._is_ready else "they are already.")
             raise RobotError(f"The servos at {self._settings.device} are not held: {why}")
         self._goals = dict.fromkeys(self._ids, 0)
+        self._lengths = {}
         try:
             for servo in self._settings.servos:
                 self._registers.write(servo.id, BUS_WATCHDOG, 0)
                 self._start_watchdog(servo)
+                if servo.control == "length":  # An old goal must not turn it.
+                    at = self._registers.read(servo.id, PRESENT_POSITION)
+                    self._registers.write(servo.id, GOAL_POSITION, at)
+                    self._positions[servo.id] = at
                 self._registers.write(servo.id, TORQUE_ENABLE, 1)
         except RobotError:
             self.release()
@@ -160,7 +172,7 @@ class ServoBus:
             UnknownName: If there is no such tendon.
         """
         if tensions is not None:
-            self._request(tensions)
+            self._request(tensions, {})
         if self._mode == "silent":
             return BusState(now_ns, "silent", {}, self.faults)
         heard: dict[int, ServoReply] = {}
@@ -179,20 +191,25 @@ class ServoBus:
         self._cycles += 1
         return BusState(now_ns, self._mode, servos, self.faults)
 
-    def send(self, tensions: Mapping[str, float]) -> None:
+    def send(
+        self, tensions: Mapping[str, float], lengths: Mapping[str, float] | None = None
+    ) -> None:
         """Send tensions at once, without reading anything.
 
         As with `cycle`, they take effect only while the bus is "held". If the bus is gone, the next
         cycle reports it.
 
         Args:
-            tensions: Tension of each tendon, N, by name.
+            tensions: Tension of each tendon, N, by name; the limit for one with a length.
+            lengths: Length beyond the zero, m, by name, of tendons with control of the length.
+                Without one, such a tendon is pulled with its tension, as all others.
 
         Raises:
-            RobotError: If a tension is missing or not finite. Then nothing is sent.
+            RobotError: If a tension is missing or not finite, or a length has no meaning. Then
+                nothing is sent.
             UnknownName: If there is no such tendon.
         """
-        self._request(tensions)
+        self._request(tensions, lengths or {})
         if self._mode != "held":
             return
         try:
@@ -276,7 +293,7 @@ class ServoBus:
                 )
 
     def _prepare(self, servo: ServoSettings) -> None:
-        """Set up current mode, the current limit, no goal and no torque.
+        """Set up the mode, the current limit, no goal and no torque.
 
         Raises:
             RobotError: If the servo does not answer, refuses, or has switched itself off.
@@ -293,7 +310,7 @@ class ServoBus:
         for register, value in (
             (RETURN_DELAY, 0),
             (DRIVE_MODE, 0),
-            (OPERATING_MODE, CURRENT_MODE),
+            (OPERATING_MODE, LENGTH_MODE if servo.control == "length" else CURRENT_MODE),
             (CURRENT_LIMIT, servo.most_counts),
         ):
             # These are in the EEPROM, which wears out: write them only if they differ.
@@ -318,14 +335,23 @@ class ServoBus:
             if TORQUE_ENABLE.decode(answer.data) == 0
         }
 
-    def _request(self, tensions: Mapping[str, float]) -> None:
+    def _request(self, tensions: Mapping[str, float], lengths: Mapping[str, float]) -> None:
         for name in tensions:
             self._servo(name)
         if missing := [name for name in self._servos if name not in tensions]:
             raise RobotError(f"There is no tension for {', '.join(missing)}.")
         for name, servo in self._servos.items():
             servo.clip(tensions[name])  # Check all before using any.
+        for name, length in lengths.items():
+            servo = self._servo(name)
+            if servo.control != "length" or name not in self._zeros:
+                lacks = (
+                    "no zero" if servo.control == "length" else f"control of its {servo.control}"
+                )
+                raise RobotError(f"{servo.words} cannot go to a length: it has {lacks}.")
+            servo.position_at(length, self._zeros[name])
         self._requested = {name: tensions[name] for name in self._servos}
+        self._lengths = dict(lengths)
 
     def _send_goals(self, now_ns: int) -> None:
         if self._mode == "off":
@@ -340,7 +366,21 @@ class ServoBus:
                 end = min(servo.pretension_n, start)  # A tendon that was not pulled yet stays so.
                 pull = end + self._ramp_left(now_ns) * (start - end)
             self._goals[servo.id] = servo.goal_count(pull)
+        if positions := self._goal_positions():
+            self._registers.sync_write(GOAL_POSITION, positions)
         self._registers.sync_write(GOAL_CURRENT, self._goals)
+
+    def _goal_positions(self) -> dict[int, int]:
+        """Return the goals of the servos with control of the length, in counts, by id."""
+        goals: dict[int, int] = {}
+        for name, servo in self._servos.items():
+            if servo.control != "length":
+                continue
+            if name in self._lengths and name in self._zeros:
+                goals[servo.id] = servo.position_at(self._lengths[name], self._zeros[name])
+            else:
+                goals[servo.id] = self._positions[servo.id] + servo.direction * _AHEAD
+        return goals
 
     def _ramp_left(self, now_ns: int) -> float:
         """Return the share of the ramp of a stop that is left, 1 to 0."""
@@ -380,6 +420,7 @@ class ServoBus:
                 health.miss(late=late)
                 continue
             present = decode_present(heard[servo_id].data)
+            self._positions[servo_id] = present.position
             zero = self._zeros.get(servo.name)
             length = None if zero is None else servo.length_m(present.position, zero)
             health.see(present, length, now_ns, pulls=self._mode != "off")
@@ -393,7 +434,7 @@ class ServoBus:
         return states
 
     def _goal_n(self, servo: ServoSettings) -> float:
-        return servo.tension_n(self._goals[servo.id])
+        return abs(servo.tension_n(self._goals[servo.id]))
 
     def _servo(self, name: str) -> ServoSettings:
         if name not in self._servos:

@@ -36,6 +36,7 @@ class SharedBus:
         self._servos: dict[str, ServoSettings] = {}
         self._zeros: dict[str, int] = {}
         self._tensions: dict[str, float] = {}
+        self._lengths: dict[str, float] = {}
         self._bus: ServoBus | None = None
 
     def add(self, plan: OutputPlan) -> ServoSettings:
@@ -77,17 +78,21 @@ class SharedBus:
                 "with `shapechanger robot home`, and serve the robot afresh."
             )
 
-    def stage(self, name: str, tension: float) -> bool:
-        """Set the tension of a tendon from the next `flush` on.
+    def stage(self, name: str, tension: float, length: float | None = None) -> bool:
+        """Set the tension or the length of a tendon from the next `flush` on.
 
         Args:
             name: Name of the tendon.
-            tension: Tension, N.
+            tension: Tension, N; with a length its limit.
+            length: Length beyond the zero, m; None to pull with the tension.
 
         Returns:
             Whether it will be pulled; a bus with a fault lets go.
         """
         self._tensions[name] = tension
+        self._lengths.pop(name, None)
+        if length is not None:
+            self._lengths[name] = length
         return not self._open_bus().faults
 
     def flush(self, *, grip: bool) -> None:
@@ -98,7 +103,7 @@ class SharedBus:
         if bus.mode == "off" and grip:
             bus.hold()
         if bus.mode == "held":
-            bus.send(self._tensions)
+            bus.send(self._tensions, self._lengths)
 
     def let_go(self) -> None:
         """Switch the torque of all servos off."""
@@ -166,7 +171,10 @@ def bus_at(device: str, hardware: Hardware) -> SharedBus:
 
 
 class TendonOutput:
-    """A tendon as an output: 0 is its pretension, 1 its largest tension; see `OutputDriver`.
+    """A tendon as an output; see `OutputDriver`.
+
+    0 is its pretension in every control, so that a stop ends alike, and 1 its largest tension. With
+    control "length" values above 0 go from its longest to its shortest length.
 
     Args:
         plan: The output.
@@ -183,7 +191,7 @@ class TendonOutput:
         self.device: SharedBus
         self.device, servo = _join_bus(plan, hardware)
         self._name = plan.name
-        self._least_n, self._most_n = servo.pretension_n, servo.most_tension_n
+        self._servo = servo
 
     def write(self, value: float, now_ns: int) -> float:
         """Set the value from the next flush on.
@@ -196,8 +204,14 @@ class TendonOutput:
             The value in effect: 0 if the bus has a fault and lets go.
         """
         value = min(max(value, 0.0), 1.0)
-        tension = self._least_n + value * (self._most_n - self._least_n)
-        return value if self.device.stage(self._name, tension) else 0.0
+        servo = self._servo
+        tension, length = servo.pretension_n, None
+        if servo.control == "tension":
+            tension += value * (servo.most_tension_n - servo.pretension_n)
+        elif value > 0.0:
+            tension = servo.most_tension_n
+            length = servo.longest_m + value * (servo.shortest_m - servo.longest_m)
+        return value if self.device.stage(self._name, tension, length) else 0.0
 
     def release(self) -> None:
         """Switch the torque of all servos on the bus off."""

@@ -50,10 +50,14 @@ TORQUE_ENABLE: Final = Register("torque enable", 64, 1)
 HARDWARE_ERROR: Final = Register("hardware error status", 70, 1)
 BUS_WATCHDOG: Final = Register("bus watchdog", 98, 1)
 GOAL_CURRENT: Final = Register("goal current", 102, 2, signed=True)
+GOAL_POSITION: Final = Register("goal position", 116, 4, signed=True)
+PRESENT_POSITION: Final = Register("present position", 132, 4, signed=True)
 PRESENT: Final = Register("present current to present temperature", 126, 21)
 """Block of current, velocity, position, two trajectories, voltage and temperature, without gaps."""
 
 CURRENT_MODE: Final = 0
+LENGTH_MODE: Final = 5
+"""Current-based position mode: goes to the goal position with at most the goal current."""
 TRIPPED: Final = 0xFF
 """Value of the bus watchdog after it has stopped the servo."""
 WATCHDOG_STEP_NS: Final = 20_000_000

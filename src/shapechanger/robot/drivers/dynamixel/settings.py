@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Literal, get_args
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.guard.plan import OutputPlan
@@ -90,6 +90,9 @@ def model_named(name: str) -> ServoModel:
     return MODELS[name]
 
 
+Control = Literal["tension", "length"]
+"""Control of a tendon: by its tension, or by its length with a limit of the tension."""
+
 _MOST_ID: Final = 252  # Protocol 2.0: 253 to 255 are reserved, 254 is broadcast.
 _MOST_WATCHDOG_MS: Final = 127 * 20
 _BAUD_RATES: Final = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
@@ -111,6 +114,9 @@ class ServoSettings:
         pretension_n: Smallest tension while it holds the tendon, N.
         homing_n: Tension for finding the zero, N.
         direction: 1 if rising positions wind the tendon in, -1 if they let it out.
+        control: Control of its tendon.
+        longest_m: With control "length": length beyond the zero at the lowest command, m.
+        shortest_m: The same at the highest command, m.
     """
 
     name: str
@@ -121,6 +127,9 @@ class ServoSettings:
     pretension_n: float
     homing_n: float
     direction: int = 1
+    control: Control = "tension"
+    longest_m: float = 0.0
+    shortest_m: float = 0.0
 
     def __post_init__(self) -> None:
         known = model_named(self.model)
@@ -128,6 +137,11 @@ class ServoSettings:
             self._refuse(f"its id must be 0 to {_MOST_ID}, not {self.id}")
         if self.direction not in (1, -1):
             self._refuse(f"its direction must be 1 or -1, not {self.direction}")
+        if self.control not in get_args(Control):
+            raise UnknownName("control of a tendon", self.control, get_args(Control))
+        if self.control == "length" and not -math.inf < self.shortest_m < self.longest_m < math.inf:
+            words = f"{self.shortest_m:g} and {self.longest_m:g} m"
+            self._refuse(f"control of its length needs shortest_m below longest_m, not {words}")
         if not 0.0 < self.spool_radius_m < math.inf:  # Also refuses NaN.
             self._refuse(f"its spool radius must be above 0, not {self.spool_radius_m:g}")
         least, most = self.newton_per_count, known.most_counts * self.newton_per_count
@@ -195,7 +209,24 @@ class ServoSettings:
         # Clip first: the quotient of a huge number could overflow to infinity.
         pulled = min(max(tension, 0.0), self.most_tension_n)
         counts = math.floor(pulled / self.newton_per_count + _ROUNDING)
-        return self.direction * min(counts, self.most_counts)
+        counts = min(counts, self.most_counts)
+        # With control of the length the goal current is a limit, which has no sign.
+        return counts if self.control == "length" else self.direction * counts
+
+    def position_at(self, length: float, zero: int) -> int:
+        """Return the position for a length, in counts, the inverse of `length_m`.
+
+        Args:
+            length: Length beyond the zero, m, clipped to its range.
+            zero: Position at the zero, in counts.
+
+        Raises:
+            RobotError: If the length is not finite.
+        """
+        if not math.isfinite(length):
+            raise RobotError(f"{self.words} cannot go to a length of {length} m.")
+        kept = min(max(length, self.shortest_m), self.longest_m)
+        return zero + round(kept / self.metre_per_count)
 
     def tension_n(self, current: int) -> float:
         """Return the tension of a current in counts, N; negative for one that lets out."""
@@ -281,17 +312,8 @@ def servo_settings(plan: OutputPlan) -> ServoSettings:
         RobotError: If a setting is out of range.
         UnknownName: If there is no such model.
     """
-    settings = plan.settings
-    return ServoSettings(
-        name=plan.name,
-        id=settings["id"],
-        model=settings["model"],
-        spool_radius_m=settings["spool_radius_m"],
-        most_tension_n=settings["most_tension_n"],
-        pretension_n=settings["pretension_n"],
-        direction=settings["direction"],
-        homing_n=settings["homing_n"],
-    )
+    keys = [field.name for field in fields(ServoSettings) if field.name != "name"]
+    return ServoSettings(plan.name, **{key: plan.settings[key] for key in keys})
 
 
 def bus_settings(settings: Mapping[str, Any], servos: tuple[ServoSettings, ...]) -> BusSettings:
@@ -304,11 +326,5 @@ def bus_settings(settings: Mapping[str, Any], servos: tuple[ServoSettings, ...])
     Raises:
         RobotError: If a setting is out of range, or two servos have the same id or name.
     """
-    return BusSettings(
-        device=settings["device"],
-        servos=servos,
-        baud=settings["baud"],
-        answer_ms=settings["answer_ms"],
-        watchdog_ms=settings["watchdog_ms"],
-        ramp_ms=settings["ramp_ms"],
-    )
+    keys = [field.name for field in fields(BusSettings) if field.name in settings]
+    return BusSettings(servos=servos, **{key: settings[key] for key in keys})
