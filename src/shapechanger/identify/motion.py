@@ -290,11 +290,14 @@ class _MotionFit:
         x = parameters.as_vector()
         values = np.array(list(FACTORS.values())) * np.exp(x)
         model = copy.copy(self._model)
+        # The stiffness at the ends of the ranges keeps its ratio.
+        model.jnt_stiffnesspoly[:_N] *= (values[:_N] / model.jnt_stiffness[:_N])[:, None]
         model.jnt_stiffness[:_N] = values[:_N]
         model.dof_damping[:_N] = values[_N : 2 * _N]
-        model.tendon_frictionloss[:] = values[2 * _N]
+        n = len(self._arms)
+        model.tendon_frictionloss[:n] = values[2 * _N]
         # The coefficients of fixed tendons: minus the arms, tendon by tendon.
-        model.wrap_prm[:] = -self._arms.ravel()
+        model.wrap_prm[: n * _N] = -self._arms.ravel()
         return model
 
     def _sequences(

@@ -115,7 +115,6 @@ def fit_motors(log: FingerLog) -> Motors:
     drive = drive_of(log.actions, NOMINAL)
     commands = CommandSignal(log)
     speeds = np.gradient(log.lengths, log.control_dt, axis=0)
-    passive = drive.stiffness * log.lengths + drive.damping * speeds
     steps = int(np.ceil(log.seconds / FINE_S)) + 1
     fine = log.t[0] + FINE_S * np.arange(1, steps + 1)
     rows = log.t >= log.t[0] + _FORGETS_S
@@ -126,7 +125,7 @@ def fit_motors(log: FingerLog) -> Motors:
         at_rows = np.empty(log.commands.shape)
         for i, column in enumerate(activations.T):
             at_rows[:, i] = np.interp(log.t, fine, column)
-        return (drive.offset + drive.gain * at_rows + passive)[rows]
+        return drive.tension(at_rows, log.lengths, speeds)[rows]
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
         tensions = np.clip(demanded(x), known.least_tension, x[2] * most)

@@ -6,6 +6,7 @@ the hand; the origin is the knuckle (MCP). Flexion and radial abduction are posi
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -38,9 +39,14 @@ JOINT_RANGE: Final[NDArray[np.float64]] = np.radians(
 lower end of the knuckle is its hyperextension, 0 to 45 degrees in adults."""
 
 DIP_BY_PIP: Final = 0.6
-"""Angle of the end joint over that of the middle joint, as its ligaments couple them. Chosen;
-animators take two thirds (Rijpkema & Girard 1991, "Computer animation of knowledge-based
-human grasping", SIGGRAPH)."""
+"""Angle of the end joint over that of the middle joint, as the extensor hood and its ligaments
+couple them. Chosen; animators take two thirds (Rijpkema & Girard 1991, "Computer animation of
+knowledge-based human grasping", SIGGRAPH)."""
+DIP_BAND: Final = math.radians(8.0)
+"""Distance from that angle within which the end joint moves freely, rad. Chosen."""
+DIP_COUPLING: Final = 0.3
+"""Stiffness of the coupling beyond the band, N·m/rad. Chosen so that the full tension of the deep
+flexor, about 0.09 N·m at the end joint, takes it less than 20 degrees out of the band."""
 
 JOINT_REST: Final[NDArray[np.float64]] = np.radians([25.0, 0.0, 35.0, 12.0])
 """Equilibrium angles of the passive tissue, rad: the slightly curled finger of a resting hand.
@@ -49,7 +55,11 @@ Chosen."""
 # For flexion of the knuckle, 0.033 to 0.047 N·m/rad was measured in the middle of its range, in
 # four healthy people (PMC7775510, table 2). The others are chosen, smaller towards the tip.
 JOINT_STIFFNESS: Final[NDArray[np.float64]] = np.array([0.04, 0.04, 0.02, 0.008])
-"""Passive joint stiffness, N·m/rad; near the ends of their range, human joints are stiffer."""
+"""Passive joint stiffness around the rest angles, N·m/rad."""
+END_STIFFNESS: Final = 4.0
+"""Stiffness of a joint at the farther end of its range over that at rest. The torque of human
+knuckles rises there like an exponential (fitted by Kuo & Deshpande 2012, J. Biomechanics 45:2531);
+a cubic rises likewise, and this size is chosen."""
 
 JOINT_DAMPING: Final[NDArray[np.float64]] = np.array([0.015, 0.015, 0.010, 0.005])
 """Passive joint damping, N·m·s/rad. Chosen so that even full, alternating tensions move no joint
@@ -78,6 +88,21 @@ _MOMENT_ARMS_MM: Final = {
 MOMENT_ARMS: Final[NDArray[np.float64]] = np.array([_MOMENT_ARMS_MM[t] for t in TENDONS]) * 1e-3
 """Torque about each joint per newton of each tendon, m, (7, 4); zero where a tendon passes no
 joint."""
+
+# An, Ueba, Chao, Cooney & Linscheid 1983, "Tendon excursion and moment arm of index finger
+# muscles", J. Biomechanics 16:419: straight fingers of cadavers, as quoted by other models.
+_AN_1983_MM: Final = {
+    "FDP": (11.1, 1.1, 7.9, 4.1),
+    "FDS": (11.9, 1.7, 6.2, 0.0),
+    "EIP": (-9.0, -1.3, -2.6, -1.9),
+    "EDC": (-8.6, 0.2, -2.8, -2.2),
+    "LUM": (9.3, 4.8, -1.8, -0.7),
+    "DI": (3.7, 6.1, 0.0, 0.0),
+    "PI": (6.6, -5.8, -2.6, -1.6),
+}
+AN_1983_ARMS: Final[NDArray[np.float64]] = np.array([_AN_1983_MM[t] for t in TENDONS]) * 1e-3
+"""Another set of moment arms, m, (7, 4). No tensions balance it in abduction of the knuckle: the
+interossei cannot hold the pull of the others, so passive tissue has to."""
 
 # From the same laboratory and file.
 FORCE_POTENTIAL_N: Final[NDArray[np.float64]] = np.array(

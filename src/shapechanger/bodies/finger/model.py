@@ -10,6 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.bodies.finger.anatomy import (
+    DIP_BAND,
+    DIP_BY_PIP,
+    DIP_COUPLING,
+    END_STIFFNESS,
     JOINT_RANGE,
     JOINT_REST,
     JOINTS,
@@ -41,6 +45,8 @@ half the step changes the motion by less than 0.05 degrees RMS."""
 
 FINGERTIP: Final = "fingertip"
 """Name of the site at the end of the distal phalanx."""
+HOOD: Final = "extensor_hood"
+"""Name of the tendon that couples the end joint with the middle one."""
 TARGET: Final = "target"
 """Name of the body that marks the target of the fingertip, for pictures."""
 
@@ -92,9 +98,10 @@ def build_finger(
     _add_bones(spec, parameters)
     if parameters.path is not None:
         half = 0.5 * (np.array(parameters.most_tension) - parameters.least_tension)
-        drive = TendonDrive(parameters.least_tension + half, half, 0.0, 0.0)
+        drive = TendonDrive(parameters.least_tension + half, half)
     for i in range(len(TENDONS)):
         _add_tendon(spec, i, parameters, drive)
+    _add_hood(spec)
     mark = spec.worldbody.add_body(name=TARGET, mocap=True)
     mark.add_geom(
         name=TARGET, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_MARK_RADIUS_M, 0, 0], rgba=_MARK
@@ -136,12 +143,16 @@ def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
 def _add_hinge(
     body: mujoco.MjsBody, j: int, axis: tuple[float, float, float], parameters: FingerParameters
 ) -> None:
+    stiffness = parameters.joint_stiffness[j]
+    farther = max(abs(JOINT_RANGE[j] - JOINT_REST[j]))
+    # The torque k x + c x³ is END_STIFFNESS times as stiff at the end as at rest.
+    rise = (END_STIFFNESS - 1.0) / (3.0 * farther**2)
     body.add_joint(
         name=JOINTS[j],
         type=mujoco.mjtJoint.mjJNT_HINGE,
         axis=axis,
         range=np.degrees(JOINT_RANGE[j]),
-        stiffness=[parameters.joint_stiffness[j], 0.0, 0.0],
+        stiffness=[stiffness, 0.0, stiffness * rise],
         springref=math.degrees(JOINT_REST[j]),
         damping=[parameters.joint_damping[j], 0.0, 0.0],
         frictionloss=parameters.joint_friction[j],
@@ -158,6 +169,15 @@ def _add_path(
     for joint, arm in zip(JOINTS, arms, strict=True):
         path.wrap_joint(joint, -arm)
     return path
+
+
+def _add_hood(spec: mujoco.MjSpec) -> None:
+    """Add the extensor hood: a spring that the end joint feels beyond its band."""
+    hood = spec.add_tendon(name=HOOD)
+    hood.wrap_joint(JOINTS[2], -DIP_BY_PIP)
+    hood.wrap_joint(JOINTS[3], 1.0)
+    hood.stiffness = [DIP_COUPLING, 0.0, 0.0]
+    hood.springlength = [-DIP_BAND, DIP_BAND]
 
 
 def _add_tendon(
@@ -206,13 +226,15 @@ def _add_tendon(
         # `sign` is that of a pulling force.
         forcerange=sorted((sign * parameters.least_tension, sign * parameters.most_tension[i])),
         dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
-        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        gaintype=mujoco.mjtGain.mjGAIN_AFFINE,
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
     )
     motor.dynprm[0] = parameters.motor_lag
-    motor.gainprm[0] = sign * drive.gain[i]
-    # Travel shortens the tendon, so the length has the opposite sign.
-    motor.biasprm[:3] = (sign * drive.offset[i], -drive.stiffness, -drive.damping)
+    # Travel shortens the tendon, so length and speed have the opposite sign.
+    rest = 1.0 - drive.muscle_stiffness * drive.rest[i]
+    muscle = np.array([sign * rest, -drive.muscle_stiffness, -drive.muscle_damping])
+    motor.gainprm[:3] = drive.gain[i] * muscle
+    motor.biasprm[:3] = drive.offset[i] * muscle - (0.0, drive.stiffness, drive.damping)
     if parameters.command_delay > 0.0:
         motor.delay = parameters.command_delay
         motor.nsample = 1 + math.ceil(parameters.command_delay / spec.option.timestep)

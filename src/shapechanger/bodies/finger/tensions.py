@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final, cast
 
@@ -16,14 +16,20 @@ from shapechanger.bodies.finger.anatomy import (
     JOINT_REST,
     LEAST_TENSION_N,
     MOMENT_ARMS,
+    TENDONS,
 )
 from shapechanger.bodies.finger.parameters import FingerParameters
 from shapechanger.errors import UnknownName
 
-# N/m and N·s/m, like the short-range stiffness of active muscle. The size is chosen: 3 N per
-# centimetre of stretch.
-_MUSCLE_STIFFNESS: Final = 300.0
-_MUSCLE_DAMPING: Final = 6.0
+# Stiffness and damping of an active muscle over its tension, 1/m and s/m. Both grow with tension,
+# as Cui, Perreault, Maas & Sandercock 2008 measured (J. Biomechanics 41:1945, PMC2488157). The size
+# is that of a slow stretch rather than of the first millimetres, which are ten times as stiff: at
+# full flexion, 18 mm shorter than at rest, a flexor with fibres of 65 mm has about half of its
+# force left, as on the ascending limb of the force-length curve. The damping is chosen.
+_MUSCLE_STIFFNESS: Final = 25.0
+_MUSCLE_DAMPING: Final = 1.0
+# Smallest share of its tension that a muscle is taken to have left.
+_WEAKEST: Final = 0.05
 # Gains of a servo that holds its spool. Chosen: 20 N, nearly its largest force, per centimetre.
 _SERVO_STIFFNESS: Final = 2000.0
 _SERVO_DAMPING: Final = 10.0
@@ -31,22 +37,29 @@ _SERVO_DAMPING: Final = 10.0
 
 @dataclass(frozen=True, slots=True)
 class TendonDrive:
-    """Affine map from commands to tensions, which are clipped to the tendons' range.
+    """Map from commands to tensions, which are clipped to the tendons' range.
 
-    tension = `offset` + `gain` u + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1,
-    and the tendon's length l beyond that of the straight finger, m.
+    tension = (`offset` + `gain` u) (1 + `muscle_stiffness` (l - `rest`) + `muscle_damping` dl/dt)
+    + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1, and the tendon's length l beyond
+    that of the straight finger, m.
 
     Attributes:
         offset: Tension at rest, N, (7,).
         gain: Tension per command, N, (7,), > 0.
         stiffness: Stiffness, N/m.
         damping: Damping, N·s/m.
+        muscle_stiffness: Stiffness over tension, 1/m.
+        muscle_damping: Damping over tension, s/m.
+        rest: Length of each tendon at which a muscle has the tension of its command, m, (7,).
     """
 
     offset: NDArray[np.float64]
     gain: NDArray[np.float64]
-    stiffness: float
-    damping: float
+    stiffness: float = 0.0
+    damping: float = 0.0
+    muscle_stiffness: float = 0.0
+    muscle_damping: float = 0.0
+    rest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(TENDONS)))
 
     def tension(
         self,
@@ -62,7 +75,7 @@ class TendonDrive:
             speed: Rates of the lengths, m/s, (7,).
         """
         pulled = self.stiffness * length + self.damping * speed
-        return self.offset + self.gain * command + pulled
+        return (self.offset + self.gain * command) * self._strength(length, speed) + pulled
 
     def command(
         self,
@@ -78,19 +91,30 @@ class TendonDrive:
             speed: Rates of the lengths, m/s, (7,).
         """
         pulled = self.stiffness * length + self.damping * speed
-        return (tension - self.offset - pulled) / self.gain
+        # A muscle too short to pull has no such command; the largest is the nearest.
+        strength = np.maximum(self._strength(length, speed), _WEAKEST)
+        return ((tension - pulled) / strength - self.offset) / self.gain
+
+    def _strength(
+        self, length: NDArray[np.float64], speed: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Tension of a muscle over that of its command at rest, (7,)."""
+        stretch = length - self.rest
+        return 1.0 + self.muscle_stiffness * stretch + self.muscle_damping * speed
 
 
 def _tension(most: NDArray[np.float64]) -> TendonDrive:
     half = 0.5 * (most - LEAST_TENSION_N)
-    return TendonDrive(LEAST_TENSION_N + half, half, 0.0, 0.0)
+    return TendonDrive(LEAST_TENSION_N + half, half)
 
 
 def _impedance(most: NDArray[np.float64]) -> TendonDrive:
-    plain = _tension(most)
-    rest = -MOMENT_ARMS @ JOINT_REST
-    offset = plain.offset - _MUSCLE_STIFFNESS * rest
-    return TendonDrive(offset, plain.gain, _MUSCLE_STIFFNESS, _MUSCLE_DAMPING)
+    return replace(
+        _tension(most),
+        muscle_stiffness=_MUSCLE_STIFFNESS,
+        muscle_damping=_MUSCLE_DAMPING,
+        rest=-MOMENT_ARMS @ JOINT_REST,
+    )
 
 
 def _length(most: NDArray[np.float64]) -> TendonDrive:
@@ -106,7 +130,7 @@ def _length(most: NDArray[np.float64]) -> TendonDrive:
 
 DRIVES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "impedance": "a muscle: the command pulls, and the longer a tendon the more it resists",
+        "impedance": "a muscle: the command pulls, and the more it pulls the more it resists a stretch",
         "tension": "a tension: -1 is the least, 1 the most",
         "length": "a length: -1 is the longest, 1 the shortest, held as a servo holds it",
     }

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.bodies.finger import NOMINAL, build_finger, drive_of
 from shapechanger.bodies.finger.anatomy import (
+    DIP_BAND,
     DIP_BY_PIP,
     JOINT_RANGE,
     JOINT_REST,
@@ -26,8 +27,6 @@ from shapechanger.tasks.finger import fingertip, fingertip_jacobian
 
 # Distance of a joint from either end, as a fraction of its range.
 _MARGIN: Final = 0.1
-# The end joint follows the middle one within this, rad. Chosen.
-_COUPLING_SPREAD: Final = math.radians(8.0)
 # A flexed finger hardly spreads: fraction of the abduction range left at full flexion. Chosen.
 _SPREAD_LEFT: Final = 0.3
 # Friction changes its sign smoothly around this speed, rad/s.
@@ -45,7 +44,7 @@ def draw_posture(rng: np.random.Generator) -> NDArray[np.float64]:
         flexion, abduction, middle = rng.uniform(low[:3], high[:3])
         share = 1.0 - (1.0 - _SPREAD_LEFT) * max(flexion, 0.0) / float(JOINT_RANGE[0, 1])
         abduction *= share
-        end = DIP_BY_PIP * middle + rng.uniform(-_COUPLING_SPREAD, _COUPLING_SPREAD)
+        end = DIP_BY_PIP * middle + rng.uniform(-DIP_BAND, DIP_BAND)
         angles = np.array([flexion, abduction, middle, end]).clip(low, high)
         if can_hold(angles):
             return angles
