@@ -41,7 +41,7 @@ def test_anatomy_does_not_change_the_simulation(parameters: FingerParameters, mo
 def test_without_anatomy_there_are_no_visual_elements() -> None:
     """The numbers of tendons, sites, geoms and textures are minimal."""
     plain, shown = made(), made(anatomy=True)
-    assert (plain.ntendon, plain.nsite, plain.ngeom, plain.ntex) == (7, 1, 5, 0)
+    assert (plain.ntendon, plain.nsite, plain.ngeom, plain.ntex) == (8, 1, 5, 0)
     assert (plain.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT).all()
     assert shown.ntendon > 14
     np.testing.assert_array_equal(shown.body_mass.sum(), plain.body_mass.sum())

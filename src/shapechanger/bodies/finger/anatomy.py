@@ -44,11 +44,11 @@ couple them. Chosen; animators take two thirds (Rijpkema & Girard 1991, "Compute
 knowledge-based human grasping", SIGGRAPH)."""
 DIP_BAND: Final = math.radians(8.0)
 """Distance from that angle within which the end joint moves freely, rad. Chosen."""
-DIP_COUPLING: Final = 0.3
-"""Stiffness of the coupling beyond the band, N·m/rad. Chosen so that the full tension of the deep
-flexor, about 0.09 N·m at the end joint, takes it less than 20 degrees out of the band."""
+DIP_COUPLING: Final = 0.15
+"""Stiffness of the coupling beyond the band, N·m/rad. Chosen so that random commands leave the end
+joint within 16 degrees of that angle, and identification can still tell the two joints apart."""
 
-JOINT_REST: Final[NDArray[np.float64]] = np.radians([25.0, 0.0, 35.0, 12.0])
+JOINT_REST: Final[NDArray[np.float64]] = np.radians([25.0, 0.0, 35.0, 21.0])
 """Equilibrium angles of the passive tissue, rad: the slightly curled finger of a resting hand.
 Chosen."""
 

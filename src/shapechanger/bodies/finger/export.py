@@ -38,7 +38,7 @@ _UNITS: Final[Mapping[str, str]] = {
 }
 # Attributes of MJCF with the arrays of the compiled model that hold them exactly.
 _EXACT: Final[Mapping[str, Mapping[str, str]]] = {
-    "jnt": {"range": "jnt_range", "stiffness": "jnt_stiffness"},
+    "jnt": {"range": "jnt_range"},
     "geom": {"size": "geom_size", "pos": "geom_pos", "quat": "geom_quat"},
     "site": {"pos": "site_pos"},
     "body": {"pos": "body_pos"},
@@ -76,6 +76,7 @@ def finger_mjcf(parameters: FingerParameters, drive: TendonDrive) -> str:
             dof, place = model.jnt_dofadr[number], model.jnt_qposadr[number]
             _write(joint, "jnt", number, model)
             for key, value in (
+                ("stiffness", [model.jnt_stiffness[number], *model.jnt_stiffnesspoly[number]]),
                 ("damping", model.dof_damping[dof]),
                 ("frictionloss", model.dof_frictionloss[dof]),
                 ("springref", model.qpos_spring[place]),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Final, cast
 
 import msgspec
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.bodies.finger.anatomy import (
+    AN_1983_ARMS,
     JOINT_DAMPING,
     JOINT_FRICTION,
     JOINT_STIFFNESS,
@@ -221,3 +223,9 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
 NOMINAL: Final = FingerParameters()
 """Finger of the anatomy, with stiff tendons without friction, delay and noise."""
+
+PARAMETER_SETS: Final[Mapping[str, FingerParameters]] = MappingProxyType(
+    {"an-1983": NOMINAL.replace(moment_arms=AN_1983_ARMS)}
+)
+"""Other sets of parameters, by name. No tensions balance the moment arms of "an-1983"; see
+`anatomy.AN_1983_ARMS`."""

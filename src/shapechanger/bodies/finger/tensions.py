@@ -130,7 +130,7 @@ def _length(most: NDArray[np.float64]) -> TendonDrive:
 
 DRIVES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "impedance": "a muscle: the command pulls, and the more it pulls the more it resists a stretch",
+        "impedance": "a muscle: the command pulls, and the more it pulls the stiffer it is",
         "tension": "a tension: -1 is the least, 1 the most",
         "length": "a length: -1 is the longest, 1 the shortest, held as a servo holds it",
     }

@@ -21,6 +21,7 @@ from shapechanger.bodies.finger import (
 )
 from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TENSION_N
 from shapechanger.bodies.finger.model import FingerFigure
+from shapechanger.bodies.finger.parameters import PARAMETER_SETS
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.finger.drawing import tendon_legend
 from shapechanger.envs.finger.gap import Gap, require_balance, resolve_gap, with_gears
@@ -55,8 +56,8 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     Args:
         actions: What an action commands; see `shapechanger.bodies.finger.DRIVES`.
-        parameters: Parameters of the finger, as `FingerParameters`, their JSON, or some by name; by
-            default the nominal finger.
+        parameters: Parameters of the finger, as `FingerParameters`, their JSON, some by name, or
+            the name of a set, "an-1983"; by default the nominal finger.
         gap: Distribution, or its name, that the finger is drawn from instead of `parameters`; see
             `shapechanger.envs.finger.gap`.
         finger_seed: Seed of the finger drawn from the gap; None draws another finger at each reset
@@ -118,7 +119,8 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self._renderer: Renderer | None = None
         if self._gap is None:
             given = _parameters(parameters)
-            require_balance(given)
+            if given not in PARAMETER_SETS.values():
+                require_balance(given)
             self._use(given)
         else:
             self._use(self._gap.draw(np.random.default_rng(finger_seed or 0)))
@@ -308,7 +310,11 @@ def _parameters(value: FingerParameters | Mapping[str, Any] | str | None) -> Fin
     if isinstance(value, FingerParameters):
         return value
     if isinstance(value, str):
-        return FingerParameters.from_json(value)
+        if value.lstrip().startswith("{"):
+            return FingerParameters.from_json(value)
+        if value not in PARAMETER_SETS:
+            raise UnknownName("set of finger parameters", value, PARAMETER_SETS)
+        return PARAMETER_SETS[value]
     given: Any = value  # May be anything where nothing checks types.
     if not isinstance(given, Mapping):
         raise FingerError(f"Parameters of a finger must be numbers by name or JSON, got {given!r}.")

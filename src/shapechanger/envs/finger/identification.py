@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import gymnasium as gym
@@ -18,7 +19,12 @@ from shapechanger.bodies.finger import (
     build_finger,
     drive_of,
 )
-from shapechanger.bodies.finger.anatomy import JOINT_RANGE, MOMENT_ARMS, MOST_TENSION_N
+from shapechanger.bodies.finger.anatomy import (
+    DIP_BY_PIP,
+    JOINT_RANGE,
+    MOMENT_ARMS,
+    MOST_TENSION_N,
+)
 from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import joint_torque
@@ -37,6 +43,9 @@ _WAVES: Final = 4
 _SPREAD: Final = 1.5
 # Distance of the commanded posture from either end of a joint's range, as a fraction of it.
 _MARGIN: Final = 0.05
+# Farthest that the end joint is commanded from where the hood has it, rad: beyond its band, and as
+# far as the tendons are strong enough.
+_DIP_OFF: Final = math.radians(20.0)
 # Range of the lowest tension, which varies over time, N: a slack tendon reveals nothing about its
 # arms, and a constant tension nothing about its stretch.
 _LEAST_N: Final = (2.0, 4.5)
@@ -100,7 +109,10 @@ class FingerBabble:
         """Return the commanded posture at a time, s: angles, rad, (4,)."""
         low, high = JOINT_RANGE.T
         inner = _MARGIN * (high - low)
-        return low + inner + (high - low - 2.0 * inner) * self._joints.at(t)
+        shares = self._joints.at(t)
+        angles = low + inner + (high - low - 2.0 * inner) * shares
+        angles[3] = DIP_BY_PIP * angles[2] + _DIP_OFF * (2.0 * shares[3] - 1.0)
+        return np.clip(angles, low + inner, high - inner)
 
 
 class _Waves:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import threading
 from typing import Final
 
@@ -123,6 +122,8 @@ _CLOSE_ENOUGH_M: Final = 1e-6
 # the point.
 _PREFERENCE: Final = 1e-3
 _DAMPING: Final = 1e-3
+# Steps shorter than this end the search for preferred angles, rad.
+_SETTLED_RAD: Final = 1e-3
 _MOST_STEP_RAD: Final = 0.5
 # Factors by which the damping grows after a worse step, and falls after a better one.
 _GROWS: Final = 4.0
@@ -141,36 +142,36 @@ def angles_for(
 ) -> tuple[NDArray[np.float64], float]:
     """Return joint angles whose fingertip is closest to a point: inverse kinematics.
 
-    Damped Gauss-Newton steps, kept within the joints' ranges.
+    Damped Gauss-Newton steps, kept within the joints' ranges. Of the angles for a point, those are
+    preferred whose end joint bends 0.6 times as far as the middle one, as the hood has it.
 
     Args:
         place: The point, m, (3,).
-        near: Angles to start from, rad, (4,); by default, angles are preferred whose end joint
-            bends about 0.6 times as far as the middle one.
+        near: Angles to start from, rad, (4,); those of a finger at rest by default.
 
     Returns:
         The angles, rad, (4,), and the distance of their fingertip from the point, m.
     """
-    best = _search(place, JOINT_REST if near is None else near, near is None)
+    best = _search(place, JOINT_REST if near is None else near)
     if best[1] > _FAR_M:
         # The point is out of reach, or the search ended in a local minimum.
-        others = (_search(place, start, False) for start in _STARTS)
+        others = (_search(place, start) for start in _STARTS)
         best = min((best, *others), key=lambda found: found[1])
     return best
 
 
 def _search(
-    place: NDArray[np.float64], start: NDArray[np.float64], coupled: bool
+    place: NDArray[np.float64], start: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
     """Return the angles, rad, (4,), that a search from `start` ends with, and their error, m."""
     low, high = JOINT_RANGE.T
     q = np.clip(start, low, high)
     coupling = np.array([[0.0, 0.0, -DIP_BY_PIP, 1.0]])
-    preference = _PREFERENCE if coupled else 0.0
+    preference = _PREFERENCE
     error = place - fingertip(q, PHALANX_LENGTH_M)
-    damping = _DAMPING
+    damping, settled = _DAMPING, False
     for step in range(_STEPS):
-        if step == _STEPS // 3:
+        if step == _STEPS // 3 or settled:
             preference = 0.0  # A preference must not keep the fingertip off the point.
         if preference == 0.0 and float(np.linalg.norm(error)) < _CLOSE_ENOUGH_M:
             break
@@ -187,6 +188,7 @@ def _search(
             if not stuck.any():
                 break
             free &= ~stuck
+        settled = float(np.abs(change).max()) < _SETTLED_RAD
         next_q = np.clip(q + np.clip(change, -_MOST_STEP_RAD, _MOST_STEP_RAD), low, high)
         next_error = place - fingertip(next_q, PHALANX_LENGTH_M)
         # Out of reach, full steps oscillate around the closest angles.
