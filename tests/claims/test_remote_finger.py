@@ -291,8 +291,8 @@ def test_each_seed_of_a_study_gets_another_rig() -> None:
     with gym.make("shapechanger/RemoteFinger-v1", twin="real-like") as many:
         own: Any = many.unwrapped
         assert own.individual == "finger_seed"
-        assert own.randomised_source() == {"gap": "geared", "reward": {"change": 5.0}}
-        assert own.motors.path == GAPS["geared"].around.path
+        assert own.randomised_source() == {"gap": "wide", "reward": {"change": 5.0}}
+        assert own.motors.path == GAPS["real-like"].around.path
         assert not own.side_by_side
 
 

@@ -76,7 +76,10 @@ def test_adapted_sources_are_saved(study: tuple[Study, Path, list[Any]]) -> None
         kind: json.loads((Run(kind, 0).folder(out) / "source.json").read_text())
         for kind in ("randomised", "identified")
     }
-    assert sources["randomised"] == {"id": FINGER.id, "kwargs": {"gap": "wide"}}
+    assert sources["randomised"] == {
+        "id": FINGER.id,
+        "kwargs": {"gap": "wide", "reward": {"change": 5.0}},
+    }
     assert sources["identified"]["kwargs"]["parameters"]["tendon_friction"] == 0.25
     assert all(Run(kind, 1).policy_file(out).exists() for kind in sources)
     assert made.plan.task.source == FINGER

@@ -59,6 +59,8 @@ _PRIOR_SD: Final = math.log(3.0)
 _MAX_LOG_FACTOR: Final = math.log(30.0)
 # Standard deviation of simulated minus measured angles under the best model, rad.
 _ANGLE_SD: Final = math.radians(1.0)
+# Lag of a motor whose tensions are known, s.
+_INSTANT_S: Final = 1e-4
 _ITERATIONS: Final = 12
 # Step of finite differences, and the step that ends the search, in logarithms.
 _STEP: Final = 1e-3
@@ -228,7 +230,14 @@ class _MotionFit:
     ) -> None:
         self._sysid = sysid
         self._arms = kinematics.arms
-        spec = build_finger(with_motors(motors, log.motors), drive_of(log.actions, NOMINAL))
+        moved = with_motors(motors, log.motors)
+        self._path = None if log.motors is None else log.motors.path
+        if self._path is not None:
+            # The measured tensions act, which the path has delayed already.
+            moved = moved.replace(path=self._path, motor_lag=_INSTANT_S)
+        self._least, most = moved.least_tension, np.array(moved.most_tension)
+        self._range = most - self._least
+        spec = build_finger(moved, drive_of(log.actions, NOMINAL))
         for name in JOINTS:
             spec.add_sensor(
                 name=name,
@@ -305,6 +314,7 @@ class _MotionFit:
     ) -> Any:
         step = self._model.opt.timestep
         commands = CommandSignal(log)
+        shares = np.clip(2.0 * (log.tensions - self._least) / self._range - 1.0, -1.0, 1.0)
         sensor = self._sysid.SignalType.MjSensor
         columns = {name: (sensor, np.array([j])) for j, name in enumerate(JOINTS)}
         series = self._sysid.TimeSeries
@@ -312,12 +322,19 @@ class _MotionFit:
         controls: list[Any] = []
         measured: list[Any] = []
         for window in windows:
-            state = (window.angles[0], window.velocities, window.activations)
+            begun = window.activations
+            if self._path is not None:
+                begun = np.array([np.interp(window.start, log.t, one) for one in shares.T])
+            state = (window.angles[0], window.velocities, begun)
             starts.append(self._sysid.create_initial_state(self._model, *state))
             # One more than there are steps: the last one is not simulated.
             steps = (len(window.angles) - 1) * self._skip + 1
-            late = commands.delayed(window.start, step, steps, delay)
-            controls.append(series(window.start + step * np.arange(steps), late))
+            at = window.start + step * np.arange(steps)
+            if self._path is None:
+                acting = commands.delayed(window.start, step, steps, delay)
+            else:
+                acting = np.array([np.interp(at, log.t, one) for one in shares.T]).T
+            controls.append(series(at, acting))
             times = window.start + log.control_dt * np.arange(len(window.angles))
             measured.append(series(times, window.angles, columns))
         names = [f"{window.start:.1f} s" for window in windows]

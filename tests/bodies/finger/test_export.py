@@ -48,7 +48,7 @@ def numbers(parameters: FingerParameters) -> dict[str, list[float]]:
 
 def test_the_file_holds_the_parameters_with_units() -> None:
     """Numbers are exact, each has a unit, and a comment says what is not simulated."""
-    parameters = FINGERS["geared"]
+    parameters = FINGERS["real-like"]
     found = numbers(parameters)
     assert found["moment_arms"] == parameters.arms.ravel().tolist()
     assert found["slew_per_s"] == [20.0]

@@ -6,16 +6,20 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, FingerParameters
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, FingerParameters, drive_of
 from shapechanger.bodies.finger.anatomy import (
+    DIP_BY_PIP,
+    END_STIFFNESS,
     JOINT_RANGE,
     JOINT_REST,
     LEAST_TENSION_N,
     MOMENT_ARMS,
     PHALANX_LENGTH_M,
 )
-from shapechanger.bodies.finger.model import FINGERTIP, SIM_DT
+from shapechanger.bodies.finger.model import FINGERTIP, HOOD, SIM_DT
+from shapechanger.bodies.finger.tensions import co_contraction
 from shapechanger.envs.finger.gap import GAPS
+from shapechanger.envs.finger.postures import draw_posture
 from tests.bodies.finger.commands import STRETCHED, at_rest, harsh_commands, made, modes
 
 # Tolerated overshoot of each joint beyond its range, degrees; measured 4.8, 1.6, 5.9 and 15.3
@@ -166,3 +170,73 @@ def test_a_command_acts_after_its_delay() -> None:
     now, later = tensions
     np.testing.assert_allclose(later[:15], LEAST_TENSION_N, atol=1e-6)
     np.testing.assert_allclose(later[15:], now[:45], atol=1e-6)
+
+
+@pytest.mark.parametrize("level", [1.0, 1.5, 2.0])
+def test_co_contraction_stiffens_the_joints(level: float) -> None:
+    """Active stiffness is proportional to tensions that have no torque."""
+    model = made(NOMINAL, "impedance")
+    tensions = level * np.asarray(co_contraction(MOMENT_ARMS))
+    drive = drive_of("impedance", NOMINAL)
+    rest = -MOMENT_ARMS @ JOINT_REST
+    data = at_rest(model)
+    data.ctrl[:] = data.act[:] = drive.command(tensions, rest, np.zeros(7))
+    torques = []
+    for side in (-0.01, 0.01):
+        data.qpos[:] = JOINT_REST + side
+        mujoco.mj_forward(model, data)
+        torques.append(data.qfrc_actuator.copy())
+    stiffness = (torques[0] - torques[1]) / 0.02
+    expected = 25.0 * MOMENT_ARMS.T @ np.diag(tensions) @ MOMENT_ARMS @ np.ones(4)
+    np.testing.assert_allclose(stiffness, expected, rtol=1e-9)
+
+
+def test_joints_stiffen_towards_the_ends_of_their_ranges() -> None:
+    """At the farther end, four times as stiff as at rest."""
+    model, data = made(), mujoco.MjData(made())
+    model.tendon_stiffness[model.tendon(HOOD).id] = 0.0
+    for j, (low, high) in enumerate(JOINT_RANGE):
+        farther = max((low, high), key=lambda end: abs(end - JOINT_REST[j]))
+        stiffness = []
+        for angle in (JOINT_REST[j], farther):
+            torques = []
+            for side in (-1e-4, 1e-4):
+                data.qpos[:] = JOINT_REST
+                data.qpos[j] = angle + side
+                mujoco.mj_forward(model, data)
+                torques.append(data.qfrc_spring[j])
+            stiffness.append((torques[0] - torques[1]) / 2e-4)
+        assert stiffness[0] == pytest.approx(NOMINAL.joint_stiffness[j], rel=1e-6)
+        assert stiffness[1] == pytest.approx(END_STIFFNESS * stiffness[0], rel=1e-6)
+
+
+def test_the_end_joint_follows_the_middle_one() -> None:
+    """After 2 s of any constant command, it is within 16 degrees of 0.6 times that angle."""
+    model, rng = made(NOMINAL, "impedance"), np.random.default_rng(0)
+    off = []
+    for _ in range(60):
+        data = at_rest(model)
+        data.ctrl[:] = rng.uniform(-1.0, 1.0, 7)
+        mujoco.mj_step(model, data, round(2.0 / SIM_DT))
+        off.append(abs(data.qpos[3] - DIP_BY_PIP * data.qpos[2]))
+    assert np.degrees(max(off)) < 16.0
+    assert np.degrees(np.median(off)) < 11.0
+
+
+def test_a_finger_that_is_let_go_gains_no_energy() -> None:
+    """Under constant tensions, which have a potential, energy falls in every step."""
+    model, rng = made(), np.random.default_rng(0)
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    for _ in range(5):
+        data = at_rest(model)
+        data.qpos[:] = draw_posture(rng)
+        energies = []
+        for _ in range(300):
+            mujoco.mj_step(model, data)
+            x = data.qpos - JOINT_REST
+            quartic = 0.25 * model.jnt_stiffnesspoly[:, 1] @ x**4
+            pulled = np.abs(data.actuator_force) @ (-MOMENT_ARMS @ data.qpos)
+            # MuJoCo's energy is that of the state before the step.
+            energies.append(float(data.energy.sum() + pulled + quartic))
+        assert np.diff(energies).max() < 2e-5 * np.ptp(energies)
+        assert energies[-1] < energies[0]

@@ -31,7 +31,7 @@ def test_finger_seed_needs_a_gap(twin: str) -> None:
 def test_a_geared_finger_is_within_its_gap() -> None:
     """Arms stay nominal, and the motors are within the ranges of the gap."""
     geared = with_gears(NOMINAL)
-    gap = GAPS["geared"]
+    gap = GAPS["real-like"]
     assert geared.moment_arms == NOMINAL.moment_arms
     for name in ("motor_kg", "tendon_damping", "tendon_friction", "motor_lag"):
         low, high = getattr(gap, name)
@@ -43,7 +43,7 @@ def test_a_geared_finger_is_within_its_gap() -> None:
 def test_geared_fingers_have_the_path_of_the_shipped_rig() -> None:
     """Rates and slew are those of its profile, so its tensions fall as fast as they rise."""
     profile = load_profile(find_profile("finger"))
-    path = GAPS["geared"].around.path
+    path = GAPS["real-like"].around.path
     assert path is not None
     assert path.control_hz == profile.control_hz
     assert path.tick_hz == profile.guard_plan().tick_hz

@@ -24,7 +24,13 @@ from shapechanger.bodies.finger.model import FingerFigure
 from shapechanger.bodies.finger.parameters import PARAMETER_SETS
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.finger.drawing import tendon_legend
-from shapechanger.envs.finger.gap import Gap, require_balance, resolve_gap, with_gears
+from shapechanger.envs.finger.gap import (
+    Gap,
+    geared_around,
+    require_balance,
+    resolve_gap,
+    with_gears,
+)
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.renderer import Renderer, body_reach, draw
@@ -46,6 +52,9 @@ _CAMERA: Final[Mapping[str, Any]] = {
     "elevation": -15.0,
 }
 _PICTURE: Final = 480
+
+# Weight of the reward in a source for a rig: what changes fast costs, because a rig cannot follow.
+_CALM: Final = {"change": 5.0}
 
 SMOOTHNESS: Final = Measure("smoothness", "1", "smoothness", "episode")
 """1 minus the mean change of a tendon's command per step, over its range of 2."""
@@ -281,10 +290,13 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     def randomised_source(self) -> dict[str, Any]:
         """Arguments with which an env of the finger has other fingers that this one may be."""
-        return {"gap": "wide"}
+        return {"gap": "wide", "reward": _CALM}
 
     def identified_source(self, seed: int) -> dict[str, Any]:
-        """Identify this finger, and return env arguments that reproduce it.
+        """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
+
+        On a rig's path, parameters of the motors, which a log hardly reveals, are drawn for each
+        episode as in the gap "wide".
 
         Args:
             seed: Seed of the motions, which take ten seconds.
@@ -296,7 +308,10 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         # An optimiser, which an env that only steps does not need.
         from shapechanger.envs.finger.identification import identify_env
 
-        return {"parameters": msgspec.to_builtins(identify_env(self, self._actions, seed))}
+        found = identify_env(self, self._actions, seed)
+        if found.path is None:
+            return {"parameters": msgspec.to_builtins(found)}
+        return {"gap": msgspec.to_builtins(geared_around(found)), "reward": _CALM}
 
     def _sense_features(self) -> list[Feature]:
         return features_of_senses(

@@ -134,68 +134,99 @@ def _log_uniform(rng: np.random.Generator, bounds: Range) -> float:
 
 _DEGREE: Final = math.radians(1.0)
 
+# Rates and slew of the shipped profile "finger", and the resolution of its servos' tension.
+_RIG: Final = NOMINAL.replace(
+    path=CommandPath(control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0)
+)
+
 GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
     {
-        # A tendon-driven finger on a bench. Arms, delay, noise and friction are those of the study
-        # of the gap; the others are chosen: cords of some decimetres have 5 to 20 N/mm, servos lag
-        # by tens of milliseconds.
+        # A finger on the shipped rig: seven XL330-M077 with spools of 1 cm.
         "real-like": Gap(
+            # Chosen; the two published sets in `anatomy` differ by two fifths in the median.
             arm_error=0.2,
+            # Knuckles of four healthy people had 0.7 to 1.2 of the nominal stiffness (PMC7775510,
+            # table 2); the rest is chosen.
             joint_factor=(0.7, 1.4),
-            strength=(0.9, 1.1),
-            tendon_friction=(1.0, 1.0),
+            # The rig pulls 1 to 15 N of 25 N.
+            strength=(0.55, 0.65),
+            least_tension=(1.0, 1.0),
+            # Rotors at the tendon have 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's numbers
+            # (`shapechanger.twin.servos.motor`) divided by the spool's radius.
+            motor_kg=(1.2, 1.6),
+            tendon_damping=(3.0, 5.0),
+            tendon_friction=(0.3, 0.8),
+            # The current takes 1 ms to settle, and a command waits up to 10 ms for the guard's
+            # tick, exactly so long on a twin.
+            motor_lag=(0.001, 0.005),
+            command_delay=(0.005, 0.015),
+            # Cords of some decimetres have 5 to 20 N/mm. Chosen.
             tendon_stiffness=(5e3, 20e3),
             backlash=(0.0, 0.5e-3),
-            motor_kg=(0.02, 0.05),
-            motor_lag=(0.015, 0.030),
-            command_delay=(0.020, 0.040),
-            joint_noise=(_DEGREE, _DEGREE),
-            tension_noise=(0.2, 0.5),
+            # An AS5600 has 0.09 degrees per count; a magnet off its axis errs by up to a degree.
+            joint_noise=(0.1 * _DEGREE, _DEGREE),
+            tension_noise=(0.1, 0.5),
+            around=_RIG,
         ),
-        # For policies that must cope with all of them: from almost no gap to slightly more than
-        # the one above.
+        # For policies that must cope with all of them: slightly more than the one above. Chosen.
         "wide": Gap(
             arm_error=0.25,
             joint_factor=(0.6, 1.6),
-            strength=(0.85, 1.15),
-            tendon_friction=(0.0, 1.5),
-            tendon_stiffness=(4e3, 30e3),
-            backlash=(0.0, 1e-3),
-            motor_kg=(0.01, 0.06),
-            motor_lag=(0.010, 0.035),
-            command_delay=(0.0, 0.050),
-            joint_noise=(0.0, 1.5 * _DEGREE),
-            tension_noise=(0.0, 0.6),
-        ),
-        # The same for geared servos with spools of 1 cm, as in the profile "finger": the rotors
-        # have 1.4 kg, 4 N·s/m of damping and 0.5 N of friction at the tendon (the motor's numbers,
-        # `shapechanger.twin.servos.motor`, divided by the spool's radius). Rates and slew are those
-        # of the profile. A command waits up to 10 ms for the guard's tick, exactly so long on a
-        # twin; the current takes 1 ms. Tensions are 1 to 15 of 25 N. The width of the ranges around
-        # these numbers is chosen.
-        "geared": Gap(
-            arm_error=0.25,
-            joint_factor=(0.6, 1.6),
             strength=(0.55, 0.75),
-            tendon_friction=(0.2, 0.9),
-            tendon_stiffness=(5e3, 30e3),
-            backlash=(0.0, 0.5e-3),
+            least_tension=(0.5, 1.5),
             motor_kg=(1.0, 2.0),
+            tendon_damping=(3.0, 10.0),
+            tendon_friction=(0.2, 0.9),
             motor_lag=(0.001, 0.005),
             command_delay=(0.005, 0.015),
+            tendon_stiffness=(5e3, 30e3),
+            backlash=(0.0, 0.5e-3),
             joint_noise=(0.0, 1.5 * _DEGREE),
             tension_noise=(0.0, 0.6),
-            tendon_damping=(3.0, 10.0),
-            least_tension=(0.5, 1.5),
-            around=NOMINAL.replace(
-                path=CommandPath(
-                    control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0
-                )
-            ),
+            around=_RIG,
         ),
     }
 )
 """Gaps by name."""
+
+
+def with_gears(parameters: FingerParameters) -> FingerParameters:
+    """Return the same finger on geared servos.
+
+    Mass, damping, friction and lag of the motors are the middle of their ranges in "real-like".
+    """
+    rig = GAPS["real-like"]
+    return parameters.replace(
+        motor_kg=math.sqrt(rig.motor_kg[0] * rig.motor_kg[1]),
+        tendon_damping=sum(rig.tendon_damping) / 2,
+        tendon_friction=sum(rig.tendon_friction) / 2,
+        motor_lag=sum(rig.motor_lag) / 2,
+    )
+
+
+def geared_around(found: FingerParameters) -> Gap:
+    """Return the gap of a finger on geared servos after identification.
+
+    Path, arms, joints, stretch and delay are those identified, within their errors; parameters of
+    the motors, which a log hardly reveals, keep their ranges in "wide".
+
+    Args:
+        found: The identified parameters.
+    """
+    late = found.command_delay + _DELAY_FOUND_S
+    stiffness = found.tendon_stiffness or GAPS["wide"].tendon_stiffness[1]
+    return msgspec.structs.replace(
+        GAPS["wide"],
+        around=found,
+        arm_error=_FOUND,
+        joint_factor=(1.0 - _JOINTS_FOUND, 1.0 + _JOINTS_FOUND),
+        strength=(1.0, 1.0),
+        command_delay=(max(0.0, found.command_delay - _DELAY_FOUND_S), late),
+        tendon_stiffness=((1.0 - _FOUND) * stiffness, (1.0 + _FOUND) * stiffness),
+        joint_noise=(found.joint_noise, found.joint_noise),
+        tension_noise=(found.tension_noise, found.tension_noise),
+        least_tension=(found.least_tension, found.least_tension),
+    )
 
 
 def require_balance(parameters: FingerParameters) -> None:
@@ -225,45 +256,6 @@ def require_balance(parameters: FingerParameters) -> None:
                     "without one at another joint."
                 )
     raise FingerError("The tendons cannot balance the joints: change the moment arms.")
-
-
-def with_gears(parameters: FingerParameters) -> FingerParameters:
-    """Return the same finger on geared servos.
-
-    Mass, damping, friction and lag of the motors are the middle of their ranges in "geared".
-    """
-    geared = GAPS["geared"]
-    return parameters.replace(
-        motor_kg=math.sqrt(geared.motor_kg[0] * geared.motor_kg[1]),
-        tendon_damping=sum(geared.tendon_damping) / 2,
-        tendon_friction=sum(geared.tendon_friction) / 2,
-        motor_lag=sum(geared.motor_lag) / 2,
-    )
-
-
-def geared_around(found: FingerParameters) -> Gap:
-    """Return the gap of a finger on geared servos after identification.
-
-    Path, arms, joints, stretch and delay are those identified, within their errors; parameters of
-    the motors, which a log hardly reveals, keep their ranges in "geared".
-
-    Args:
-        found: The identified parameters.
-    """
-    late = found.command_delay + _DELAY_FOUND_S
-    stiffness = found.tendon_stiffness or GAPS["geared"].tendon_stiffness[1]
-    return msgspec.structs.replace(
-        GAPS["geared"],
-        around=found,
-        arm_error=_FOUND,
-        joint_factor=(1.0 - _JOINTS_FOUND, 1.0 + _JOINTS_FOUND),
-        strength=(1.0, 1.0),
-        command_delay=(max(0.0, found.command_delay - _DELAY_FOUND_S), late),
-        tendon_stiffness=((1.0 - _FOUND) * stiffness, (1.0 + _FOUND) * stiffness),
-        joint_noise=(found.joint_noise, found.joint_noise),
-        tension_noise=(found.tension_noise, found.tension_noise),
-        least_tension=(found.least_tension, found.least_tension),
-    )
 
 
 def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:

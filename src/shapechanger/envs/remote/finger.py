@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Final, cast
 
-import msgspec
 import mujoco
 import numpy as np
 from gymnasium.utils import EzPickle
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, CommandPath, FingerParameters
 from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
 from shapechanger.envs.finger.env import check_posture
-from shapechanger.envs.finger.gap import GAPS, geared_around, with_gears
+from shapechanger.envs.finger.gap import GAPS, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
@@ -40,8 +39,6 @@ _START_OFF_RAD: Final = 0.03
 _START_S: Final = 1.0
 # Time for the pretension to wind in slack, s.
 _SLACK_S: Final = 0.6
-# Weight of the reward in a source for a rig: what changes fast costs, because a rig cannot follow.
-_CALM: Final = {"change": 5.0}
 _TIMEOUT_S: Final = 2.0
 _OWN_TIMEOUT_S: Final = 30.0
 # Prefixes of infos that concern driving only.
@@ -250,29 +247,6 @@ class RemoteFingerEnv(FingerReachEnv):
         """Name of the argument that selects one finger of a gap; empty if there is only one."""
         many = bool(self._twin) and self._twin != NOMINAL_TWIN
         return "finger_seed" if many and self._finger_seed is None else ""
-
-    def randomised_source(self) -> dict[str, Any]:
-        """Return arguments of `Finger-v1` for random fingers with geared servos."""
-        return {"gap": "geared", "reward": _CALM}
-
-    def identified_source(self, seed: int) -> dict[str, Any]:
-        """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
-
-        Parameters of geared servos that a log hardly reveals are drawn for each episode, as in the
-        gap "geared"; the range of tensions is the rig's.
-
-        Args:
-            seed: Seed of the motions, which take ten seconds.
-
-        Raises:
-            FingerError: If the motions do not suffice, or observations are not a vector.
-            MissingExtra: If `mujoco.sysid` is not installed.
-        """
-        # An optimiser, which an env that only steps does not need.
-        from shapechanger.envs.finger.identification import identify_env
-
-        found = identify_env(self, self._actions, seed)
-        return {"gap": msgspec.to_builtins(geared_around(found)), "reward": _CALM}
 
     @property
     def motors(self) -> FingerParameters:
