@@ -18,6 +18,7 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 from scipy.signal import savgol_filter
 
 from shapechanger.bodies.finger import (
@@ -314,7 +315,8 @@ class _MotionFit:
     ) -> Any:
         step = self._model.opt.timestep
         commands = CommandSignal(log)
-        shares = np.clip(2.0 * (log.tensions - self._least) / self._range - 1.0, -1.0, 1.0)
+        tensions = 2.0 * (log.tensions - self._least) / self._range - 1.0
+        measured_at = make_interp_spline(log.t, np.clip(tensions, -1.0, 1.0), k=1)
         sensor = self._sysid.SignalType.MjSensor
         columns = {name: (sensor, np.array([j])) for j, name in enumerate(JOINTS)}
         series = self._sysid.TimeSeries
@@ -322,9 +324,7 @@ class _MotionFit:
         controls: list[Any] = []
         measured: list[Any] = []
         for window in windows:
-            begun = window.activations
-            if self._path is not None:
-                begun = np.array([np.interp(window.start, log.t, one) for one in shares.T])
+            begun = window.activations if self._path is None else measured_at(window.start)
             state = (window.angles[0], window.velocities, begun)
             starts.append(self._sysid.create_initial_state(self._model, *state))
             # One more than there are steps: the last one is not simulated.
@@ -333,7 +333,7 @@ class _MotionFit:
             if self._path is None:
                 acting = commands.delayed(window.start, step, steps, delay)
             else:
-                acting = np.array([np.interp(at, log.t, one) for one in shares.T]).T
+                acting = measured_at(at)
             controls.append(series(at, acting))
             times = window.start + log.control_dt * np.arange(len(window.angles))
             measured.append(series(times, window.angles, columns))
