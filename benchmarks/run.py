@@ -179,6 +179,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "vehicles-waypoints": waypoints.pairs,
     "vehicles-waypoints-labels": waypoints.labels,
     "vehicles-waypoints-worlds": waypoints.worlds,
+    "vehicles-waypoints-robot": waypoints.whole_robot,
     "vehicles-waypoints-remote": waypoints.remote,
     "vehicles-waypoint-studies": vehicles_studies.waypoints,
 }
