@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.remote_drive import drive_remote
-from benchmarks.row import Row
+from benchmarks.row import Row, asked
 from benchmarks.vehicles import counted
 from shapechanger.cli.demos.train import Shrinking
 from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
@@ -37,7 +37,6 @@ from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
 from shapechanger.envs.vehicle.drivers import CLONES, VehicleDemonstrator
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 from shapechanger.envs.vehicle.waypoints import WaypointDemonstrator
-from shapechanger.errors import UnknownName
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
@@ -142,11 +141,8 @@ def worlds() -> list[Row]:
         *(pair for land in VEHICLES for pair in (("boat", land), (land, "boat"))),
     ]
     named = {f"{source}-to-{target}": (source, target) for source, target in (*boats, *land)}
-    asked = os.environ.get("ONLY", "").split() or list(named)
-    for name in asked:
-        if name not in named:
-            raise UnknownName("pair", name, named)
-    return [_row(pair, drives) for pair, drives in _measure([named[one] for one in asked]).items()]
+    wanted = [named[one] for one in asked("pair", named)]
+    return [_row(pair, drives) for pair, drives in _measure(wanted).items()]
 
 
 def labels() -> list[Row]:
@@ -166,7 +162,9 @@ def _seeds() -> range:
     return range(int(os.environ.get("SEEDS", SEEDS)))
 
 
-def _measure(asked: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[list[DriveResult]]]:
+def _measure(
+    crossings: Sequence[tuple[str, str]],
+) -> dict[tuple[str, str], list[list[DriveResult]]]:
     """Train the sources of pairs, and drive them in their targets; cache both.
 
     Returns:
@@ -174,14 +172,14 @@ def _measure(asked: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[lis
     """
     OUT.mkdir(parents=True, exist_ok=True)
     seeds = _seeds()
-    trained = [(source, seed) for source in dict(asked) for seed in seeds]
-    jobs = [(source, target, seed, False) for source, target in asked for seed in seeds]
+    trained = [(source, seed) for source in dict(crossings) for seed in seeds]
+    jobs = [(source, target, seed, False) for source, target in crossings for seed in seeds]
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         for _ in pool.map(_train, trained):
             pass
         drives = list(pool.map(_driven, jobs))
     n = len(seeds)
-    return {pair: drives[n * i : n * (i + 1)] for i, pair in enumerate(asked)}
+    return {pair: drives[n * i : n * (i + 1)] for i, pair in enumerate(crossings)}
 
 
 def _score(by_seed: list[list[DriveResult]]) -> DriveScore:
@@ -208,10 +206,7 @@ def whole_robot() -> list[Row]:
     one by default, and `ONLY` names sources.
     """
     OUT.mkdir(parents=True, exist_ok=True)
-    names = os.environ.get("ONLY", "").split() or list(OWN)
-    for name in names:
-        if name not in OWN:
-            raise UnknownName("source", name, OWN)
+    names = asked("source", OWN)
     seeds = range(int(os.environ.get("SEEDS", "1")))
     jobs = [
         (name, name, seed, whole) for name in names for whole in (False, True) for seed in seeds
