@@ -68,6 +68,7 @@ class MujocoWorld:
         lenses: Names of camera faults.
         model: Compiled MuJoCo model.
         data: State of the simulation.
+        placed: How often the vehicle was put somewhere, at a start or back on its path.
         resting_v: Voltage of the battery without load.
 
     Raises:
@@ -94,6 +95,7 @@ class MujocoWorld:
         self._distortions = [find_lens(name) for name in lenses]
         self.resting_v = RESTING_V
         self._travelled_m = 0.0
+        self.placed = 0
         self.lay_out(seed)
 
     @property
@@ -359,6 +361,7 @@ class MujocoWorld:
         self._camera = self._outside = None
 
     def _rest_at(self, pose: Pose) -> None:
+        self.placed += 1
         mujoco.mj_resetData(self.model, self.data)
         self._bound.place(pose.x, pose.y, pose.heading)
         mujoco.mj_forward(self.model, self.data)
