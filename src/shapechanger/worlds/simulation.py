@@ -278,7 +278,8 @@ class MujocoWorld:
             )
         )
         angles = pose.heading + bearings
-        rays = np.stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))), axis=1)
+        rays = np.zeros((len(angles), 3))
+        rays[:, 0], rays[:, 1] = np.cos(angles), np.sin(angles)
         hit = np.empty(len(angles), np.int32)
         found = np.empty(len(angles))
         mujoco.mj_multiRay(
@@ -295,7 +296,8 @@ class MujocoWorld:
             len(angles),
             farthest_m,
         )
-        return np.where(hit >= 0, np.minimum(found, farthest_m), farthest_m)
+        found[hit < 0] = farthest_m
+        return np.minimum(found, farthest_m, out=found)
 
     def picture(self) -> NDArray[np.uint8]:
         """Picture of the front camera; see `World.picture`.
