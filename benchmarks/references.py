@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 import shapechanger
-from benchmarks.row import Row
+from benchmarks.row import Row, asked
 from shapechanger.cli.env_arguments import default_learner
 from shapechanger.transfer.env_ref import EnvRef, measures_of
 from shapechanger.transfer.files import read_json, write_atomic, write_json
@@ -78,7 +78,7 @@ TARGETS: Final = {
 
 def references() -> list[Row]:
     """Train the missing policies and write the shipped files."""
-    names = os.environ.get("ONLY", "").split() or list(TARGETS)
+    names = asked("env", TARGETS)
     most = int(os.environ.get("SEEDS", "10"))
     wanted = [(name, seed) for name in names for seed in range(_seeds(name, most))]
     RESULTS.mkdir(parents=True, exist_ok=True)

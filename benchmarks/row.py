@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+from shapechanger.errors import UnknownName
 
 
 @dataclass(frozen=True)
@@ -22,3 +26,21 @@ class Row:
     spread: str
     target: str
     met: bool
+
+
+def asked(kind: str, names: Iterable[str]) -> list[str]:
+    """Return the names in `ONLY`, which are separated by spaces, or all where it is not set.
+
+    Args:
+        kind: What they are names of, for the message.
+        names: All names.
+
+    Raises:
+        UnknownName: If there is none of this name.
+    """
+    known = list(names)
+    found = os.environ.get("ONLY", "").split() or known
+    for name in found:
+        if name not in known:
+            raise UnknownName(kind, name, known)
+    return found

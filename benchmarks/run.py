@@ -2,7 +2,7 @@
 
 `make bench` prints a table and writes `benchmarks/results/*.json` with the machine's facts. Times
 are the median of several rounds, with their spread; compare ratios, not milliseconds, between
-machines.
+machines. Rows that `ONLY` leaves out stay as they were.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import mujoco
 from gymnasium.envs.mujoco.mujoco_env import expand_model_path
@@ -180,6 +181,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "vehicles-waypoints": waypoints.pairs,
     "vehicles-waypoints-labels": waypoints.labels,
     "vehicles-waypoints-worlds": waypoints.worlds,
+    "vehicles-waypoints-robot": waypoints.whole_robot,
     "vehicles-waypoints-remote": waypoints.remote,
     "vehicles-waypoint-studies": vehicles_studies.waypoints,
 }
@@ -201,6 +203,26 @@ def _processor() -> str:
     return next(names, platform.processor() or platform.machine())
 
 
+def kept(path: Path, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the rows of a former result, with new ones in place of those of the same name.
+
+    A row that is kept from a former run has its command as `measured_by`.
+
+    Args:
+        path: The former result, which need not exist.
+        rows: The new rows.
+    """
+    if not path.exists():
+        return rows
+    former = json.loads(path.read_text())
+    new = {row["name"]: row for row in rows}
+    merged = {
+        row["name"]: {**row, "measured_by": row.get("measured_by", former["command"])}
+        for row in former["rows"]
+    }
+    return list((merged | new).values())
+
+
 def main() -> None:
     """Run the suites named on the command line, or all."""
     names = sys.argv[1:] or list(SUITES)
@@ -209,10 +231,15 @@ def main() -> None:
             sys.exit(str(UnknownName("suite", name, SUITES)))
     table = Table("measured", "value", "spread", "target", "met", box=None)
     for name in names:
-        rows = SUITES[name]()
+        try:
+            rows = SUITES[name]()
+        except UnknownName as error:  # In `ONLY`.
+            sys.exit(str(error))
         for row in rows:
             table.add_row(row.name, row.value, row.spread, row.target, "yes" if row.met else "NO")
         RESULTS.mkdir(exist_ok=True)
+        path = RESULTS / f"{name}.json"
+        measured = [asdict(row) for row in rows]
         facts = {
             "command": f"{_asked()}python -m benchmarks.run {name}",
             "machine": f"{platform.system()}, {os.cpu_count()} cores of {_processor()}",
@@ -221,9 +248,9 @@ def main() -> None:
                 package: version(package)
                 for package in ("shapechanger", "mujoco", "gymnasium", "torch")
             },
-            "rows": [asdict(row) for row in rows],
+            "rows": kept(path, measured) if "ONLY" in os.environ else measured,
         }
-        (RESULTS / f"{name}.json").write_text(json.dumps(facts, indent=1) + "\n")
+        path.write_text(json.dumps(facts, indent=1) + "\n")
     Console().print(table)
 
 

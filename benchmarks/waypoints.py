@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.remote_drive import drive_remote
-from benchmarks.row import Row
+from benchmarks.row import Row, asked
 from benchmarks.vehicles import counted
 from shapechanger.cli.demos.train import Shrinking
 from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
@@ -37,7 +37,6 @@ from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
 from shapechanger.envs.vehicle.drivers import CLONES, VehicleDemonstrator
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 from shapechanger.envs.vehicle.waypoints import WaypointDemonstrator
-from shapechanger.errors import UnknownName
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
@@ -80,6 +79,7 @@ SOURCES: Final = {
     "harbour-random-boat": Source("boat", ("harbour",), randomise=True),
     "mixed-boat": Source("boat", ("harbour", FLOODED)),
 }
+OWN: Final = tuple(list(SOURCES)[:4])  # Each is named as its vehicle.
 # Those that see other worlds than their targets.
 ACROSS: Final = tuple(list(SOURCES)[4:])
 # Two clones of the same pictures, whose labels differ.
@@ -141,11 +141,8 @@ def worlds() -> list[Row]:
         *(pair for land in VEHICLES for pair in (("boat", land), (land, "boat"))),
     ]
     named = {f"{source}-to-{target}": (source, target) for source, target in (*boats, *land)}
-    asked = os.environ.get("ONLY", "").split() or list(named)
-    for name in asked:
-        if name not in named:
-            raise UnknownName("pair", name, named)
-    return [_row(pair, drives) for pair, drives in _measure([named[one] for one in asked]).items()]
+    wanted = [named[one] for one in asked("pair", named)]
+    return [_row(pair, drives) for pair, drives in _measure(wanted).items()]
 
 
 def labels() -> list[Row]:
@@ -165,7 +162,9 @@ def _seeds() -> range:
     return range(int(os.environ.get("SEEDS", SEEDS)))
 
 
-def _measure(asked: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[list[DriveResult]]]:
+def _measure(
+    crossings: Sequence[tuple[str, str]],
+) -> dict[tuple[str, str], list[list[DriveResult]]]:
     """Train the sources of pairs, and drive them in their targets; cache both.
 
     Returns:
@@ -173,14 +172,14 @@ def _measure(asked: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[lis
     """
     OUT.mkdir(parents=True, exist_ok=True)
     seeds = _seeds()
-    trained = [(source, seed) for source in dict(asked) for seed in seeds]
-    jobs = [(source, target, seed) for source, target in asked for seed in seeds]
+    trained = [(source, seed) for source in dict(crossings) for seed in seeds]
+    jobs = [(source, target, seed, False) for source, target in crossings for seed in seeds]
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         for _ in pool.map(_train, trained):
             pass
         drives = list(pool.map(_driven, jobs))
     n = len(seeds)
-    return {pair: drives[n * i : n * (i + 1)] for i, pair in enumerate(asked)}
+    return {pair: drives[n * i : n * (i + 1)] for i, pair in enumerate(crossings)}
 
 
 def _score(by_seed: list[list[DriveResult]]) -> DriveScore:
@@ -198,6 +197,43 @@ def _row(pair: tuple[str, str], drives: list[list[DriveResult]]) -> Row:
         "none for a single pair",
         True,
     )
+
+
+def whole_robot() -> list[Row]:
+    """Compare drives in the env that leaves the robot out with drives of the whole robot.
+
+    Each source drives its own vehicle, along the same courses from the same starts. `SEEDS` are
+    one by default, and `ONLY` names sources.
+    """
+    OUT.mkdir(parents=True, exist_ok=True)
+    names = asked("source", OWN)
+    seeds = range(int(os.environ.get("SEEDS", "1")))
+    jobs = [
+        (name, name, seed, whole) for name in names for whole in (False, True) for seed in seeds
+    ]
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        for _ in pool.map(_train, [(name, seed) for name in names for seed in seeds]):
+            pass
+        drives = list(pool.map(_driven, jobs))
+    rows: list[Row] = []
+    for i, name in enumerate(names):
+        first = 2 * i * len(seeds)
+        without, whole = (
+            _score(drives[at : at + len(seeds)]) for at in (first, first + len(seeds))
+        )
+        alike = without.low <= whole.per_100_m <= without.high
+        alike |= whole.low <= without.per_100_m <= whole.high
+        rows.append(
+            Row(
+                f"waypoints, {name} in the whole robot: collisions per 100 m",
+                f"{whole.per_100_m:.1f}",
+                f"{counted(whole)}; {whole.speed:.2f} m/s; without the robot "
+                f"{without.per_100_m:.1f}, {counted(without)}; {without.speed:.2f} m/s",
+                "one rate inside the other's interval",
+                alike,
+            )
+        )
+    return rows
 
 
 def remote() -> list[Row]:
@@ -255,15 +291,15 @@ def _train(job: tuple[str, int]) -> None:
     _source(*job)
 
 
-def _driven(job: tuple[str, str, int]) -> list[DriveResult]:
-    """Drive a source in a target; cache it."""
-    source, target, seed = job
+def _driven(job: tuple[str, str, int, bool]) -> list[DriveResult]:
+    """Drive a source in a target, the whole robot of it if asked; cache it."""
+    source, target, seed, whole = job
     use_one_thread()
-    kept = OUT / f"{source}-to-{target}-{seed}.json"
+    kept = OUT / f"{source}-to-{target}-{seed}{'-whole' if whole else ''}.json"
     if kept.exists():
         return [DriveResult(**one) for one in json.loads(kept.read_bytes())]
     policy = _source(source, seed)
-    with closing(WaypointEnv(target, courses="held-out", put_back=True)) as env:
+    with closing(WaypointEnv(target, full_robot=whole, courses="held-out", put_back=True)) as env:
         drives = [drive(env, policy.predict, course=course) for course in COURSES]
     kept.write_text(json.dumps([asdict(one) for one in drives]), encoding="utf-8")
     return drives

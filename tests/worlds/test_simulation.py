@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -34,6 +35,28 @@ def _world(vehicle: str = "car", seed: int = 3) -> MujocoWorld:
 def _drive(world: MujocoWorld, outputs: Mapping[str, float | None], seconds: float) -> None:
     for _ in range(round(seconds / 0.01)):
         world.advance(0.01, outputs)
+
+
+@_EACH
+def test_poses_that_are_computed_once_change_no_drive(
+    vehicle: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With MuJoCo's sleep flag a drive into a wall and a picture's poses are bit for bit alike."""
+    states: list[tuple[bytes, ...]] = []
+    world = _world(vehicle)
+    assert world.model.opt.enableflags == mujoco.mjtEnableBit.mjENBL_SLEEP
+    for flags in (mujoco.mjtEnableBit.mjENBL_SLEEP, 0):
+        monkeypatch.setattr(world.model.opt, "enableflags", int(flags))
+        world.put(_before_a_wall(world, 0.3))
+        _drive(world, _AHEAD[vehicle], 2.0)
+        assert world.collisions
+        data = world.data
+        states.append(tuple(x.tobytes() for x in (data.qpos, data.qvel, data.geom_xpos)))
+        world.put(world.pose)
+        _drive(world, {}, 30.0)  # At rest: it would fall asleep.
+        _drive(world, _AHEAD[vehicle], 0.1)
+        states[-1] += (world.data.qpos.tobytes(),)
+    assert states[0] == states[1]
 
 
 def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:

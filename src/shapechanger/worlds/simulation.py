@@ -68,6 +68,7 @@ class MujocoWorld:
         lenses: Names of camera faults.
         model: Compiled MuJoCo model.
         data: State of the simulation.
+        placed: How often the vehicle was put somewhere, at a start or back on its path.
         resting_v: Voltage of the battery without load.
 
     Raises:
@@ -94,6 +95,7 @@ class MujocoWorld:
         self._distortions = [find_lens(name) for name in lenses]
         self.resting_v = RESTING_V
         self._travelled_m = 0.0
+        self.placed = 0
         self.lay_out(seed)
 
     @property
@@ -276,7 +278,8 @@ class MujocoWorld:
             )
         )
         angles = pose.heading + bearings
-        rays = np.stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))), axis=1)
+        rays = np.zeros((len(angles), 3))
+        rays[:, 0], rays[:, 1] = np.cos(angles), np.sin(angles)
         hit = np.empty(len(angles), np.int32)
         found = np.empty(len(angles))
         mujoco.mj_multiRay(
@@ -293,7 +296,8 @@ class MujocoWorld:
             len(angles),
             farthest_m,
         )
-        return np.where(hit >= 0, np.minimum(found, farthest_m), farthest_m)
+        found[hit < 0] = farthest_m
+        return np.minimum(found, farthest_m, out=found)
 
     def picture(self) -> NDArray[np.uint8]:
         """Picture of the front camera; see `World.picture`.
@@ -359,6 +363,7 @@ class MujocoWorld:
         self._camera = self._outside = None
 
     def _rest_at(self, pose: Pose) -> None:
+        self.placed += 1
         mujoco.mj_resetData(self.model, self.data)
         self._bound.place(pose.x, pose.y, pose.heading)
         mujoco.mj_forward(self.model, self.data)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shapechanger.envs.vehicle import VehicleEnv
+from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
+from shapechanger.errors import ProfileError
+from shapechanger.robot.profile.load import find_profile
 from shapechanger.transfer.env_ref import TaskDemonstrator
 from shapechanger.worlds.course import HOME
 
@@ -65,3 +68,32 @@ def test_begin_takes_the_present_course() -> None:
                 _, _, terminated, _, info = env.step(driver.act()[1])
                 assert not terminated
             assert info["progress"] > 0.3
+
+
+def test_put_back_it_goes_on_as_from_a_start() -> None:
+    """It forgets the manoeuvre that would have freed it where it was stuck."""
+    with closing(VehicleEnv("car", image=False)) as env:
+        driver = env.demonstrator(1)
+        env.reset(options={"course": 3, "start": 1})
+        driver.begin()
+        # Without steps it drives in vain, until it backs away.
+        throttles = [driver.act()[0][1] for _ in range(20)]
+        assert throttles[0] > 0.5
+        assert throttles[-1] < 0.0
+        env.world.put_back()
+        assert driver.act()[0][1] > 0.5
+
+
+def test_another_control_rate_is_refused(tmp_path: Path) -> None:
+    """The experts count in steps of 1/20 s."""
+    text = find_profile("lab-car").read_text()
+    slow = tmp_path / "slow.toml"
+    slow.write_text(text.replace("control_hz = 20", "control_hz = 10"))
+    assert slow.read_text() != text
+    with closing(VehicleEnv("car", robot=slow, image=False)) as env:
+        with pytest.raises(ProfileError, match=r"control_hz = 10.*20 actions a second"):
+            env.demonstrator(1)
+        with pytest.raises(ProfileError, match=r"set control_hz = 20"):
+            env.taught_by(lambda seen: seen[:, :2], 1)
+    with closing(WaypointEnv("car", robot=slow)) as env, pytest.raises(ProfileError, match="20"):
+        env.demonstrator(1)

@@ -58,6 +58,11 @@ def add_vehicle(
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
     model.build(spec, Paint(spec, light))
+    # Poses of what never moves are then computed once, not in each step. The vehicle itself never
+    # sleeps, so that its motion is the same.
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    for body in spec.worldbody.bodies:
+        body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
     return model
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,6 +22,7 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.worlds.camera import CameraJitter
 from shapechanger.worlds.course import HELD_OUT, TRAINING
+from shapechanger.worlds.expert.traits import PERIOD_S
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.simulation import MujocoWorld
 
@@ -219,7 +221,11 @@ class DrivingEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
         Args:
             seed: Seed of the mistakes.
+
+        Raises:
+            ProfileError: If the robot has another control rate than the expert.
         """
+        self._require_rate_of_expert()
         return VehicleDemonstrator(self._world, seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -229,6 +235,19 @@ class DrivingEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def close(self) -> None:
         """Release the renderer, if there is one."""
         self._world.close()
+
+    def _require_rate_of_expert(self) -> None:
+        """Check that the robot takes an action when an expert chooses one.
+
+        Raises:
+            ProfileError: If its control rate is another.
+        """
+        rate = self.metadata["render_fps"]
+        if not math.isclose(rate * PERIOD_S, 1.0):
+            raise ProfileError(
+                f"This robot has control_hz = {rate:g}, and the experts that demonstrate driving "
+                f"choose {1.0 / PERIOD_S:g} actions a second: set control_hz = {1.0 / PERIOD_S:g}."
+            )
 
     def _lay_out(self, options: Mapping[str, Any] | None) -> EpisodeSetup:
         """Sample the next episode, and lay out its course."""

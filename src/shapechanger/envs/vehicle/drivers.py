@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,7 +15,6 @@ from shapechanger.worlds.course import Course
 from shapechanger.worlds.expert import CourseExpert, Disturbance
 from shapechanger.worlds.expert.traits import traits_of
 from shapechanger.worlds.simulation import MujocoWorld
-from shapechanger.worlds.world import Pose
 
 BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
 """Bearings of the distances that a teacher sees, degrees from the heading, positive to the left."""
@@ -26,8 +24,6 @@ FARTHEST_M: Final = 6.0
 
 _BEARINGS: Final = np.radians(BEARINGS_DEG)
 
-# A vehicle that is farther away after one period of 1/20 s was put back, m.
-_MOVED_M: Final = 0.3
 _FOLDER: Final = Path(__file__).parent / "clones"
 
 CLONES: Final[Mapping[str, Path]] = MappingProxyType(
@@ -78,12 +74,10 @@ class VehicleDemonstrator(Demonstrator):
     def begin(self) -> None:
         """Begin an episode."""
         super().begin()
-        self._expert = course_expert(self._world)
-        self._expert.reset(self._world.pose)
+        self._expert = ExpertDriver(self._world)
 
     def _action(self) -> NDArray[np.float32]:
-        seen = self._world.inputs()
-        return self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
+        return self._expert(None)
 
 
 def course_expert(world: MujocoWorld) -> CourseExpert:
@@ -131,6 +125,7 @@ class ExpertDriver:
     def __init__(self, world: MujocoWorld) -> None:
         self._world = world
         self._course: Course | None = None
+        self._placed = 0
 
     def __call__(self, observation: Any) -> NDArray[np.float32]:
         """Return an action, (2,), steering and throttle; the observation is ignored."""
@@ -138,10 +133,7 @@ class ExpertDriver:
         if self._world.course is not self._course:
             self._course = self._world.course
             self._expert = course_expert(self._world)
-        elif self._was_moved(seen.pose):
+        if self._world.placed != self._placed:
+            self._placed = self._world.placed
             self._expert.reset(seen.pose)
-        self._before = seen.pose
         return self._expert.act(seen.pose, seen.speed, seen.yaw_rate)
-
-    def _was_moved(self, pose: Pose) -> bool:
-        return math.hypot(pose.x - self._before.x, pose.y - self._before.y) > _MOVED_M

@@ -230,7 +230,11 @@ class VehicleEnv(DrivingEnv):
         Args:
             act: Policy of `teacher_env`: maps observations, (n, 11), to actions, (n, 2).
             seed: Seed of its mistakes.
+
+        Raises:
+            ProfileError: If the robot has another control rate than the teacher.
         """
+        self._require_rate_of_expert()
         return TeacherDemonstrator(self._world, act, seed)
 
     def render(self) -> NDArray[np.uint8] | None:

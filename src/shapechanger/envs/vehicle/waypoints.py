@@ -185,7 +185,11 @@ class WaypointEnv(DrivingEnv):
 
         Args:
             seed: Seed of the mistakes.
+
+        Raises:
+            ProfileError: If the robot has another control rate than the expert.
         """
+        self._require_rate_of_expert()
         return WaypointDemonstrator(self.world, seed)
 
     def close(self) -> None:
