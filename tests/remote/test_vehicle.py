@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import logging
 import time
 from collections.abc import Callable
@@ -16,7 +17,7 @@ import pytest
 
 from shapechanger import testing
 from shapechanger.envs.remote.four_way import FOUR_WAYS, FourWay
-from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
+from shapechanger.envs.remote.vehicle import RemoteVehicleEnv, Schedule
 from shapechanger.errors import LinkError, RenderError, RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.layout import Element, Feature
 from shapechanger.link import messages as m
@@ -461,10 +462,24 @@ def test_steps_last_a_control_period(run: Run) -> None:
     env.reset(seed=0)
     began = time.monotonic()
     for _ in range(20):
-        *_, info = env.step(REST)
+        env.step(REST)
     took_s = time.monotonic() - began
     assert took_s > 0.9 * 20 / 50.0
-    assert info["deadline_missed"] <= 20
+    env.close()
+
+
+@pytest.mark.parametrize(("pace", "missed"), [("realtime", [1, 1, 2, 2]), ("lockstep", [0] * 4)])
+def test_late_steps_are_counted(
+    run: Run, monkeypatch: pytest.MonkeyPatch, pace: str, missed: list[int]
+) -> None:
+    """In real time each late step counts, from 0 in every episode; in lockstep none is late."""
+    late = itertools.cycle((True, False))
+    monkeypatch.setattr(Schedule, "advance", lambda *_: next(late))
+    env = made(run(control_hz=50.0, clock="real"), pace=pace)
+    for _ in range(2):
+        _, info = env.reset(seed=0)
+        assert info["deadline_missed"] == 0
+        assert [env.step(REST)[-1]["deadline_missed"] for _ in range(4)] == missed
     env.close()
 
 

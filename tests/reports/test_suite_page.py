@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from shapechanger.errors import StudyError
 from shapechanger.reports.suite import FilmStrip, Sweep, suite_html
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.study import Study
@@ -134,7 +135,11 @@ def test_without_learning_there_are_no_scores() -> None:
     }
     words = Reader(suite_html("flat", studies, seeds=5)).words
     assert "1 show nothing" in words
-    with pytest.raises(StopIteration):
+
+
+def test_a_page_needs_a_study() -> None:
+    """A suite of which nothing is finished is refused in a sentence."""
+    with pytest.raises(StudyError, match="suite none has no finished study"):
         suite_html("none", {}, seeds=5)
 
 

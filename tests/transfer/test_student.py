@@ -77,7 +77,10 @@ def test_invalid_arguments_give_one_sentence(
     path = tmp_path / "teacher.safetensors"
     save_policy(teacher, path)
     for arguments, sentence in (
-        (["Car", "--teacher", str(tmp_path / "none.safetensors")], "none.safetensors"),
+        (
+            ["Car", "--teacher", str(tmp_path / "none.safetensors")],
+            "none.safetensors: `shapechanger train CarRanges`",
+        ),
         (["Tank", "--teacher", str(path)], "train one by `shapechanger train TankRanges`"),
         (["Car", "--teacher", str(path), "--learner", "cloning"], "give --teacher without one"),
     ):

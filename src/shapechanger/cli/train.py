@@ -138,6 +138,10 @@ class Train:
 
         if self.learner is not None or self.set or self.tensorboard is not None:
             raise StudyError("A student has no learner of its own: give --teacher without one.")
+        if not teacher.exists():
+            raise StudyError(
+                f"There is no teacher {teacher}: `shapechanger train CarRanges` makes a car's."
+            )
         steps = STUDENT_STEPS if self.steps is None else self.steps
 
         def training(on_steps: Callable[[int], None]) -> None:

@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.errors import StudyError
 from shapechanger.reports.numbers import count, estimate_text, number
 from shapechanger.reports.page import jpeg_uri, render, svg_uri
 from shapechanger.reports.verdict import direction, finals, is_flat, verdict
@@ -75,8 +76,11 @@ def suite_html(
         sweep: The number in which targets differ; None if they differ in more.
 
     Raises:
+        StudyError: If there is no study.
         MissingExtra: If matplotlib or Jinja2 is not installed.
     """
+    if not studies:
+        raise StudyError(f"The suite {name} has no finished study to make a page of.")
     from shapechanger.reports.charts import learning_curves, sweep_chart
 
     first = next(iter(studies.values()))

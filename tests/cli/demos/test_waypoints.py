@@ -13,7 +13,7 @@ import pytest
 import simplejpeg
 
 from shapechanger.cli import main
-from shapechanger.cli.demos.train import TrainClone
+from shapechanger.cli.demos.train import Evaluate, TrainClone
 from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset
@@ -99,6 +99,25 @@ def test_a_drive_becomes_a_policy_of_waypoints(
     assert "fitted to the recorded motion" in printed
     assert "16.7% of the steps are left out: it stands still" in printed
     assert "beside the picture, which ends 31 degrees to each side" in printed
+
+
+def test_a_policy_of_waypoints_is_evaluated_on_steering(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The recording is labelled as in training, so its own one is recognised."""
+    data, out = _record(tmp_path / "drive"), tmp_path / "policy.safetensors"
+    TrainClone(data, out, waypoints=True).run()
+    capsys.readouterr()
+    Evaluate(out, data).run()
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "fitted to the recorded motion" in printed
+    assert "learned from the first 40 of these 50 steps" in printed
+    assert "waypoint/bearing: mean absolute error" in printed
+    other = _record(tmp_path / "other", state=None)
+    with pytest.raises(DemosError, match="give --response"):
+        Evaluate(out, other).run()
+    Evaluate(out, other, response=(1.9, 0.0)).run()
+    assert "as given" in " ".join(capsys.readouterr().out.split())
 
 
 def test_waypoints_are_those_of_the_circle_that_was_driven(tmp_path: Path) -> None:

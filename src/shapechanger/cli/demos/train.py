@@ -85,7 +85,7 @@ class TrainClone:
         if view is not None:
             from shapechanger.cli.demos.waypoints import as_waypoints
 
-            shown = as_waypoints(data, self._response())
+            shown = as_waypoints(data, _response(self.response))
             for note in (view.note(), *shown.notes):
                 say(note)
             data, origin = shown.data, {"response": astuple(shown.response)}
@@ -139,14 +139,7 @@ class TrainClone:
             return None
         if self.head == "class" or self.inputs in {"state", "both"}:
             raise DemosError("Waypoints are numbers, seen in pictures: leave out --head, --inputs.")
-        from shapechanger.cli.demos.waypoints import CanonicalView, camera_geometry
-
-        return CanonicalView(None if self.camera is None else camera_geometry(*self.camera))
-
-    def _response(self) -> SteeringResponse | None:
-        from shapechanger.envs.waypoints import SteeringResponse
-
-        return None if self.response is None else SteeringResponse(*self.response)
+        return _view(self.camera)
 
     def _require_files(self) -> None:
         """Check before the work that the files can be written."""
@@ -172,6 +165,19 @@ class TrainClone:
                 write_atomic(path, whole.getvalue())
                 written.append(path)
         return written
+
+
+def _view(camera: tuple[float, float] | None) -> CanonicalView:
+    """Return how pictures are warped to the virtual camera, from pitch and field of view given."""
+    from shapechanger.cli.demos.waypoints import CanonicalView, camera_geometry
+
+    return CanonicalView(None if camera is None else camera_geometry(*camera))
+
+
+def _response(given: tuple[float, float] | None) -> SteeringResponse | None:
+    from shapechanger.envs.waypoints import SteeringResponse
+
+    return None if given is None else SteeringResponse(*given)
 
 
 @dataclass
@@ -259,6 +265,10 @@ class Evaluate:
     """A recording, one episode of it, or anything that `demos import` reads."""
     report: Path | None = None
     """A page to write, with the worst frames as pictures; the numbers come beside it as JSON."""
+    camera: tuple[float, float] | None = None
+    """Of a policy of waypoints and a recording of steering, as in `demos train`."""
+    response: tuple[float, float] | None = None
+    """Of a policy of waypoints and a recording of steering, as in `demos train`."""
 
     def run(self) -> None:
         """Evaluate and print."""
@@ -266,8 +276,18 @@ class Evaluate:
         from shapechanger.demos.cloning.policy import CameraPolicy
 
         policy = CameraPolicy.load(self.policy)
-        shrinking = Shrinking(policy.card.framing)
+        layout = policy.card.action_layout
+        has_waypoints = layout is not None and layout.names[0].startswith("waypoint/")
+        view = _view(self.camera) if has_waypoints else None
+        shrinking = Shrinking(policy.card.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
+        if view is not None and view.rectifiers:
+            from shapechanger.cli.demos.waypoints import as_waypoints
+
+            shown = as_waypoints(data, _response(self.response))
+            for note in (view.note(), *shown.notes):
+                say(note)
+            data = shown.data
         judgement = judge(policy, data)
         note = f"These are the {len(data)} steps of {self.data}."
         learned = policy.card.data.get("learned", 0)

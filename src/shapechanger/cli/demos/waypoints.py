@@ -20,6 +20,7 @@ from shapechanger.envs.waypoints import (
     waypoints_of,
 )
 from shapechanger.errors import DemosError, StudyError
+from shapechanger.layout import Layout
 from shapechanger.worlds.rectify import HALF_WIDTH_RAD, CameraGeometry, Rectifier
 
 _COMMANDS: Final = ("steering", "throttle")
@@ -49,6 +50,8 @@ class CanonicalView:
     def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
         """Return a picture of an episode as the virtual camera would have taken it.
 
+        Pictures of episodes whose actions are waypoints are so already.
+
         Raises:
             DemosError: If the camera is unknown, the actions are not those of a vehicle, or the
                 episodes are of several bodies.
@@ -60,6 +63,8 @@ class CanonicalView:
                 f"These demonstrations are of several bodies, {', '.join(sorted(self.bodies))}, "
                 "which turn differently: learn from one at a time."
             )
+        if Layout.from_json(header.action_layout).names == ACTION_LAYOUT.names:
+            return picture
         size = picture.shape[1], picture.shape[0]
         key = self.camera or _camera_of(header), size
         if key not in self.rectifiers:
