@@ -41,18 +41,27 @@ from shapechanger.identify.motors import CommandSignal, Motors, fit_motors
 _FITTED: Final = 0.8
 _NORMAL: Final = 1.96
 # Standard deviations, in logarithms, of the motion fit's errors that come from the model: measured
-# over twenty fingers of the gap "real-like" (`benchmarks/finger_identify.py`), for the joint with
-# the largest. Their tendons stretch; those of the fit do not.
-_MODEL_ERROR: Final = {"joint_stiffness": 0.15, "joint_damping": 0.20, "tendon_friction": 1.15}
+# over twenty fingers of the gap "real-like" (`benchmarks/finger_identify.py`). Their tendons
+# stretch; those of the fit do not. The hood hides the stiffness of the end joint, and without a
+# rig's path, stretch hides friction.
+_MODEL_ERROR: Final = {
+    "joint_stiffness": 0.15,
+    "joint_stiffness/DIP_flexion": 0.40,
+    "joint_damping": 0.20,
+    "tendon_friction": 1.15,
+}
+_RIG_FRICTION_ERROR: Final = 0.15
+# The same of the stretch, as a share of it, from play and friction of the gears.
+_STRETCH_ERROR: Final = 0.02
 # Uncertainty of the time in a period at which a sensor is read, and of the motors' first-order
 # model, s. In simulation, tensions are one or two steps old.
 _DELAY_ERROR_S: Final = 0.002
 _LAG_ERROR_S: Final = 0.0005
 # Delays that the motion is replayed with, s apart.
 _DELAY_STEP_S: Final = 0.0025
-PATH_DELAY_ERROR_S: Final = 0.007
-"""Half the interval of a delay found from motion, s: on twins, whose delay is 10 ms, 4 to 9 ms were
-found (`python -m benchmarks.run finger-path`)."""
+PATH_DELAY_ERROR_S: Final = 0.009
+"""Half the interval of a delay found from motion, s: over twenty fingers with play, errors were
+below 9 ms in nineteen (`benchmarks/finger_identify.py`); on twins, 2.6 to 4.8 ms."""
 # Largest stiffness, N/m, that can be told from infinity: at it all tension there is stretches a
 # tendon by less than 0.1 mm.
 _STIFFEST: Final = 2.5e5
@@ -274,6 +283,7 @@ def _estimates(
 ) -> tuple[ParameterEstimate, ...]:
     """All identified parameters with their intervals, the moment arms first."""
     reach = interval_quantile(len(log), log.control_dt)
+    on_rig = log.motors is not None and log.motors.path is not None
     found: list[ParameterEstimate] = []
     for i, j in np.argwhere(ARMS).tolist():
         value, sd = float(kinematics.arms[i, j]), float(kinematics.arms_sd[i, j])
@@ -286,10 +296,13 @@ def _estimates(
         nominal[f"joint_damping/{joint}"] = NOMINAL.joint_damping[j]
     for name, value in dynamics.values.items():
         kind = name.split("/")[0]
-        by = math.exp(_NORMAL * math.hypot(dynamics.sd[name], _MODEL_ERROR[kind]))
+        error = _MODEL_ERROR.get(name, _MODEL_ERROR[kind])
+        if on_rig and name == "tendon_friction":
+            error = _RIG_FRICTION_ERROR
+        by = math.exp(_NORMAL * math.hypot(dynamics.sd[name], error))
         unit = _UNITS[kind]
         found.append(ParameterEstimate(name, unit, value, value / by, value * by, nominal[name]))
-    if log.motors is not None and log.motors.path is not None:
+    if on_rig:
         late = _around("command_delay", "s", motors.delay, PATH_DELAY_ERROR_S, 0.0, least=0.0)
         return (*found, late)
     lag = reach * math.hypot(motors.sd[0], _LAG_ERROR_S)
@@ -354,8 +367,8 @@ def _stiffness(kinematics: Kinematics) -> float | None:
 
 def _stiffness_estimate(kinematics: Kinematics, reach: float) -> ParameterEstimate:
     """Estimate of the stiffness; its interval is asymmetric, as that of the compliance is not."""
-    most = kinematics.compliance + reach * kinematics.compliance_sd
-    least = kinematics.compliance - reach * kinematics.compliance_sd
+    half = reach * math.hypot(kinematics.compliance_sd, _STRETCH_ERROR * kinematics.compliance)
+    most, least = kinematics.compliance + half, kinematics.compliance - half
     low = 1.0 / most if most > 0.0 else math.inf
     high = 1.0 / least if least > 1.0 / _STIFFEST else math.inf
     value = _stiffness(kinematics) or math.inf
