@@ -17,7 +17,7 @@ from shapechanger.identify import FingerLog, IdentifiedFinger, ParameterEstimate
 from shapechanger.identify.kinematics import ARMS, Kinematics, interval_quantile
 from shapechanger.identify.motion import FACTORS, Dynamics, Window, cut_windows
 from shapechanger.identify.motors import Motors
-from shapechanger.identify.result import PATH_DELAY_ERROR_S, HeldOut, replay
+from shapechanger.identify.result import HeldOut, replay
 from shapechanger.reports.finger import (
     arm_cell,
     finger_html,
@@ -333,7 +333,7 @@ def test_a_delay_on_a_path_follows_from_the_motion() -> None:
     assert log.motors == with_gears(NOMINAL.replace(path=path, **known))
     found = identify(log)
     assert found.parameters.path == path
-    assert found.parameters.command_delay == pytest.approx(0.008, abs=PATH_DELAY_ERROR_S)
+    assert found.parameters.command_delay == pytest.approx(0.008, abs=0.007)
     names = [e.name for e in found.estimates]
     assert "command_delay" in names
     assert "motor_lag" not in names

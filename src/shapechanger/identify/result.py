@@ -51,8 +51,10 @@ _MODEL_ERROR: Final = {
     "tendon_friction": 1.15,
 }
 _RIG_FRICTION_ERROR: Final = 0.15
-# The same of the stretch, as a share of it, from play and friction of the gears.
+# The same of the stretch, as a share of it, and of the arms on a rig, m: from play and sticking of
+# the gears.
 _STRETCH_ERROR: Final = 0.02
+RIG_ARM_ERROR_M: Final = 0.04e-3
 # Uncertainty of the time in a period at which a sensor is read, and of the motors' first-order
 # model, s. In simulation, tensions are one or two steps old.
 _DELAY_ERROR_S: Final = 0.002
@@ -287,6 +289,8 @@ def _estimates(
     found: list[ParameterEstimate] = []
     for i, j in np.argwhere(ARMS).tolist():
         value, sd = float(kinematics.arms[i, j]), float(kinematics.arms_sd[i, j])
+        if on_rig:
+            sd = math.hypot(sd, RIG_ARM_ERROR_M)
         name = f"moment_arms/{TENDONS[i]}/{JOINTS[j]}"
         found.append(_around(name, "m", value, reach * sd, NOMINAL.moment_arms[i][j]))
     found.append(_stiffness_estimate(kinematics, reach))

@@ -15,15 +15,19 @@ from tests.identify.logs import recorded
 @pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
 @pytest.mark.parametrize("finger_seed", [0, 7])
 def test_every_joint_moves_far_and_on_its_own(actions: str, finger_seed: int) -> None:
-    """Joints cover a third of their range, and move as independently as the hood allows."""
+    """Joints cover half of their range, and move as independently as the hood allows.
+
+    A rig extends the knuckle with 14 N against flexors and stiff tissue: it covers a third.
+    """
     log, _ = recorded(10.0, gap="real-like", finger_seed=finger_seed, actions=actions)
     low, high = np.percentile(log.angles, [5.0, 95.0], axis=0)
-    assert ((high - low) > 0.33 * (JOINT_RANGE[:, 1] - JOINT_RANGE[:, 0])).all()
+    share = (high - low) / (JOINT_RANGE[:, 1] - JOINT_RANGE[:, 0])
+    assert (share > [0.33, 0.5, 0.5, 0.5]).all()
     correlation = np.corrcoef(log.angles.T) - np.eye(4)
     assert abs(correlation[2, 3]) < 0.97  # Middle and end joint.
     correlation[2, 3] = correlation[3, 2] = 0.0
     assert np.abs(correlation).max() < 0.8
-    assert (log.tensions > 1.0).mean() > 0.85  # Tendons are rarely slack.
+    assert (log.tensions > 1.0).mean() > 0.88  # Tendons are rarely slack.
 
 
 def test_the_seed_determines_the_motion() -> None:

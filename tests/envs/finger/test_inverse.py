@@ -69,7 +69,7 @@ def test_angles_are_continuous() -> None:
     """A displacement of 0.1 mm changes the angles by less than 3 degrees."""
     rng = np.random.default_rng(1)
     for _ in range(30):
-        place = fingertip(draw_posture(rng), PHALANX_LENGTH_M)
-        posture, _ = angles_for(place)
+        posture = draw_posture(rng)
+        place = fingertip(posture, PHALANX_LENGTH_M)
         angles, _ = angles_for(place + rng.uniform(-1e-4, 1e-4, 3), posture)
         assert np.degrees(np.abs(angles - posture)).max() < 3.0

@@ -90,7 +90,8 @@ MOMENT_ARMS: Final[NDArray[np.float64]] = np.array([_MOMENT_ARMS_MM[t] for t in 
 joint."""
 
 # An, Ueba, Chao, Cooney & Linscheid 1983, "Tendon excursion and moment arm of index finger
-# muscles", J. Biomechanics 16:419: straight fingers of cadavers, as quoted by other models.
+# muscles", J. Biomechanics 16:419. The numbers are recalled, not copied from the paper: check them
+# there before you rely on them.
 _AN_1983_MM: Final = {
     "FDP": (11.1, 1.1, 7.9, 4.1),
     "FDS": (11.9, 1.7, 6.2, 0.0),

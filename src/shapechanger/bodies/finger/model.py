@@ -40,8 +40,8 @@ _SIM_DT_STRETCHED: Final = 0.0005
 Hz and more."""
 _SIM_DT_GEARED: Final = 0.001
 _GEARED_KG: Final = 0.5
-"""Simulation step with heavier motors than this, s: with gears they oscillate at some 20 Hz, and
-half the step changes the motion by less than 0.05 degrees RMS."""
+"""Simulation step with heavier motors than this, s: with gears they oscillate at some 20 Hz. The
+error of each step is a row of `python -m benchmarks.run finger-physics`."""
 
 FINGERTIP: Final = "fingertip"
 """Name of the site at the end of the distal phalanx."""

@@ -139,37 +139,40 @@ _RIG: Final = NOMINAL.replace(
     path=CommandPath(control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0)
 )
 
+# A finger on the shipped rig: seven XL330-M077 with spools of 1 cm.
+_REAL_LIKE: Final = Gap(
+    # Chosen; the two published sets in `anatomy` differ by two fifths in the median.
+    arm_error=0.2,
+    # Knuckles of four healthy people had 0.7 to 1.2 of the nominal stiffness (PMC7775510,
+    # table 2); the rest is chosen.
+    joint_factor=(0.7, 1.4),
+    # The rig pulls 1 to 15 N of 25 N.
+    strength=(0.55, 0.65),
+    least_tension=(1.0, 1.0),
+    # Rotors at the tendon have 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's numbers
+    # (`shapechanger.twin.servos.motor`) divided by the spool's radius.
+    motor_kg=(1.2, 1.6),
+    tendon_damping=(3.0, 5.0),
+    tendon_friction=(0.3, 0.8),
+    # The current takes 1 ms to settle, and a command waits up to 10 ms for the guard's
+    # tick, exactly so long on a twin.
+    motor_lag=(0.001, 0.005),
+    command_delay=(0.005, 0.015),
+    # Cords of some decimetres have 5 to 20 N/mm. Chosen.
+    tendon_stiffness=(5e3, 20e3),
+    backlash=(0.0, 0.5e-3),
+    # An AS5600 has 0.09 degrees per count; a magnet off its axis errs by up to a degree.
+    joint_noise=(0.1 * _DEGREE, _DEGREE),
+    tension_noise=(0.1, 0.5),
+    around=_RIG,
+)
+
 GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
     {
-        # A finger on the shipped rig: seven XL330-M077 with spools of 1 cm.
-        "real-like": Gap(
-            # Chosen; the two published sets in `anatomy` differ by two fifths in the median.
-            arm_error=0.2,
-            # Knuckles of four healthy people had 0.7 to 1.2 of the nominal stiffness (PMC7775510,
-            # table 2); the rest is chosen.
-            joint_factor=(0.7, 1.4),
-            # The rig pulls 1 to 15 N of 25 N.
-            strength=(0.55, 0.65),
-            least_tension=(1.0, 1.0),
-            # Rotors at the tendon have 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's numbers
-            # (`shapechanger.twin.servos.motor`) divided by the spool's radius.
-            motor_kg=(1.2, 1.6),
-            tendon_damping=(3.0, 5.0),
-            tendon_friction=(0.3, 0.8),
-            # The current takes 1 ms to settle, and a command waits up to 10 ms for the guard's
-            # tick, exactly so long on a twin.
-            motor_lag=(0.001, 0.005),
-            command_delay=(0.005, 0.015),
-            # Cords of some decimetres have 5 to 20 N/mm. Chosen.
-            tendon_stiffness=(5e3, 20e3),
-            backlash=(0.0, 0.5e-3),
-            # An AS5600 has 0.09 degrees per count; a magnet off its axis errs by up to a degree.
-            joint_noise=(0.1 * _DEGREE, _DEGREE),
-            tension_noise=(0.1, 0.5),
-            around=_RIG,
-        ),
+        "real-like": _REAL_LIKE,
         # For policies that must cope with all of them: slightly more than the one above. Chosen.
-        "wide": Gap(
+        "wide": msgspec.structs.replace(
+            _REAL_LIKE,
             arm_error=0.25,
             joint_factor=(0.6, 1.6),
             strength=(0.55, 0.75),
@@ -177,13 +180,9 @@ GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
             motor_kg=(1.0, 2.0),
             tendon_damping=(3.0, 10.0),
             tendon_friction=(0.2, 0.9),
-            motor_lag=(0.001, 0.005),
-            command_delay=(0.005, 0.015),
             tendon_stiffness=(5e3, 30e3),
-            backlash=(0.0, 0.5e-3),
             joint_noise=(0.0, 1.5 * _DEGREE),
             tension_noise=(0.0, 0.6),
-            around=_RIG,
         ),
     }
 )

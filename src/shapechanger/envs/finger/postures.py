@@ -142,8 +142,8 @@ def angles_for(
 ) -> tuple[NDArray[np.float64], float]:
     """Return joint angles whose fingertip is closest to a point: inverse kinematics.
 
-    Damped Gauss-Newton steps, kept within the joints' ranges. Of the angles for a point, those are
-    preferred whose end joint bends 0.6 times as far as the middle one, as the hood has it.
+    Damped Gauss-Newton steps, kept within the joints' ranges. Of the angles for a point, those near
+    the start are preferred whose end joint is within the band of the hood.
 
     Args:
         place: The point, m, (3,).
@@ -175,8 +175,11 @@ def _search(
             preference = 0.0  # A preference must not keep the fingertip off the point.
         if preference == 0.0 and float(np.linalg.norm(error)) < _CLOSE_ENOUGH_M:
             break
-        rows = [fingertip_jacobian(q, PHALANX_LENGTH_M), preference * coupling, damping * np.eye(4)]
-        goal = [error, -preference * (coupling @ q), np.zeros(4)]
+        off = coupling @ q
+        beyond = off - np.clip(off, -DIP_BAND, DIP_BAND)
+        weight = preference if beyond.any() else 0.0
+        rows = [fingertip_jacobian(q, PHALANX_LENGTH_M), weight * coupling, damping * np.eye(4)]
+        goal = [error, -weight * beyond, np.zeros(4)]
         free = np.ones(4, bool)
         change = np.zeros(4)
         # A joint that would leave its range stays at its limit, and the others compensate.
