@@ -110,10 +110,13 @@ DYNAMICS = Dynamics(
 
 
 def estimates(
-    compliance: float = 1e-4, compliance_sd: float = 1e-5, motors: Motors = MOTORS
+    compliance: float = 1e-4,
+    compliance_sd: float = 1e-5,
+    motors: Motors = MOTORS,
+    rig: FingerParameters | None = None,
 ) -> dict[str, ParameterEstimate]:
     """Return the estimates of a synthetic fit over a log of 300 rows, by name."""
-    log = made_up()
+    log = dataclasses.replace(made_up(), motors=rig)
     found = result._estimates(kinematics(compliance, compliance_sd), motors, DYNAMICS, log)
     return {e.name: e for e in found}
 
@@ -232,6 +235,19 @@ def test_replay_of_the_true_finger_repeats_its_motion(stiffness: float | None) -
     weak = true.replace(joint_damping=tuple(3.0 * v for v in true.joint_damping))
     other = replay(log, weak, window)
     assert np.sqrt(np.mean((other - window.angles) ** 2)) > np.radians(5.0)
+
+
+def test_a_rig_changes_what_the_model_lacks() -> None:
+    """Its tensions reveal friction; play and sticking of its gears add to the errors of arms."""
+    plain, rig = estimates(), estimates(rig=NOMINAL.replace(path=CommandPath()))
+    reach = interval_quantile(300, 0.02)
+    arm = "moment_arms/FDP/MCP_flexion"
+    assert half(rig[arm]) == pytest.approx(reach * math.hypot(1e-4, 0.04e-3))
+    assert half(rig[arm]) > half(plain[arm])
+    found, wide = (np.log(one["tendon_friction"].high) for one in (rig, plain))
+    assert found < wide
+    by = 1.96 * math.hypot(DYNAMICS.sd["tendon_friction"], 0.15)
+    assert found == pytest.approx(math.log(DYNAMICS.values["tendon_friction"]) + by)
 
 
 def test_errors_are_root_mean_squares() -> None:

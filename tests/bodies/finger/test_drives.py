@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ from shapechanger.bodies.finger.anatomy import (
     MOST_TENSION_N,
 )
 from shapechanger.errors import UnknownName
+from tests.bodies.finger.commands import made
 
 _STILL = np.zeros(7)
 _REST = -MOMENT_ARMS @ JOINT_REST
@@ -49,6 +51,21 @@ def test_impedance_stiffens_with_tension() -> None:
     np.testing.assert_array_equal(
         plain.tension(_STILL, longer, _STILL), plain.tension(_STILL, _REST, _STILL)
     )
+
+
+@pytest.mark.parametrize("mode", DRIVES)
+def test_the_model_pulls_as_the_drive(mode: str) -> None:
+    """For any command, posture and speed, the forces of MuJoCo's actuators are its tensions."""
+    model, drive = made(mode=mode), drive_of(mode, NOMINAL)
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    for _ in range(20):
+        data.qpos[:] = JOINT_REST + rng.uniform(-0.2, 0.2, 4)
+        data.qvel[:] = rng.uniform(-3.0, 3.0, 4)
+        data.act[:] = rng.uniform(-1.0, 1.0, 7)
+        mujoco.mj_forward(model, data)
+        asked = drive.tension(data.act, -MOMENT_ARMS @ data.qpos, -MOMENT_ARMS @ data.qvel)
+        expected = np.clip(asked, LEAST_TENSION_N, MOST_TENSION_N)
+        np.testing.assert_allclose(-data.actuator_force, expected, atol=1e-9)
 
 
 def test_length_commands_span_all_postures() -> None:

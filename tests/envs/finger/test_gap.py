@@ -9,10 +9,17 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import NOMINAL
+from shapechanger.bodies.finger import NOMINAL, CommandPath
+from shapechanger.bodies.finger.anatomy import AN_1983_ARMS
 from shapechanger.bodies.finger.tensions import spans_all_torques
-from shapechanger.envs.finger import FingerReachEnv
-from shapechanger.envs.finger.gap import GAPS, Gap, require_balance, resolve_gap
+from shapechanger.envs.finger import FingerReachEnv, identification
+from shapechanger.envs.finger.gap import (
+    GAPS,
+    Gap,
+    geared_around,
+    require_balance,
+    resolve_gap,
+)
 from shapechanger.errors import FingerError, UnknownName
 
 _REAL_LIKE = GAPS["real-like"]
@@ -160,3 +167,30 @@ def test_arms_that_cannot_balance_name_the_joint() -> None:
     with pytest.raises(FingerError, match=r"balance PIP_flexion: no tensions give it a positive"):
         FingerReachEnv(parameters={"moment_arms": coupled.tolist()})
     require_balance(NOMINAL)
+
+
+def test_the_arms_of_an_et_al_are_used_although_they_do_not_balance() -> None:
+    """By the name of their set; as numbers of one's own they are refused."""
+    env = FingerReachEnv(parameters="an-1983")
+    env.reset(seed=0)
+    assert env.step(np.zeros(7, np.float32))[4]["distance"] > 0.0
+    np.testing.assert_array_equal(env.plant.parameters.arms, AN_1983_ARMS)
+    with pytest.raises(FingerError, match="balance MCP_flexion: no tensions give it a negative"):
+        FingerReachEnv(parameters={"moment_arms": (AN_1983_ARMS * 1.0001).tolist()})
+    with pytest.raises(UnknownName, match=r"'an-1938'. Did you mean 'an-1983'"):
+        FingerReachEnv(parameters="an-1938")
+
+
+@pytest.mark.parametrize("on_rig", [False, True])
+def test_an_identified_source_has_what_was_found(
+    monkeypatch: pytest.MonkeyPatch, on_rig: bool
+) -> None:
+    """On a rig's path, motors are drawn around it; otherwise it is that finger."""
+    found = NOMINAL.replace(tendon_friction=0.25, path=CommandPath() if on_rig else None)
+    monkeypatch.setattr(identification, "identify_env", lambda env, actions, seed: found)
+    source = FingerReachEnv().identified_source(0)
+    if on_rig:
+        assert source["reward"] == {"change": 5.0}
+        assert resolve_gap(source["gap"]) == geared_around(found)
+    else:
+        assert source == {"parameters": msgspec.to_builtins(found)}

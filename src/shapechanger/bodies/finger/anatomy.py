@@ -102,8 +102,8 @@ _AN_1983_MM: Final = {
     "PI": (6.6, -5.8, -2.6, -1.6),
 }
 AN_1983_ARMS: Final[NDArray[np.float64]] = np.array([_AN_1983_MM[t] for t in TENDONS]) * 1e-3
-"""Another set of moment arms, m, (7, 4). No tensions balance it in abduction of the knuckle: the
-interossei cannot hold the pull of the others, so passive tissue has to."""
+"""Another set of moment arms, m, (7, 4). No tensions balance it: none extend the knuckle without
+moving another joint, so passive tissue has to hold those."""
 
 # From the same laboratory and file.
 FORCE_POTENTIAL_N: Final[NDArray[np.float64]] = np.array(
