@@ -41,11 +41,10 @@ _LATE: Final = {"parameters": {"command_delay": 0.010}}
 
 
 def gap() -> list[Row]:
-    """Measure the success of each arm on fingers of the gap "real-like", and of their parts.
+    """Measure the success of each arm on fingers of the gap "real-like", and what makes the gap.
 
-    Two policies without the arms show what makes the gap: the shipped one in the nominal finger
-    with a delay alone, and one that was trained with the rig's motors, delay and noise in the
-    nominal finger, in the fingers of the gap.
+    The shipped policy in the nominal finger with a delay shows what a delay alone costs, and a
+    policy of the nominal finger on the rig's motors what the other moment arms and joints cost.
     """
     target = _FINGER.having({"gap": "real-like"})
     study = _study(

@@ -201,7 +201,7 @@ class RunningRobot:
 
     @property
     def port(self) -> int:
-        """Port on 127.0.0.1; another one after a restart of the daemon, which this waits out."""
+        """Port on 127.0.0.1; while the daemon restarts, wait for its new one."""
         if self.supervisor.poll() is None:
             self._ready = self._await_ready()
         return self._ready.port

@@ -266,9 +266,11 @@ class Evaluate:
     report: Path | None = None
     """A page to write, with the worst frames as pictures; the numbers come beside it as JSON."""
     camera: tuple[float, float] | None = None
-    """Of a policy of waypoints and a recording of steering, as in `demos train`."""
+    """Pitch and vertical field of view of the camera, degrees, for a waypoint policy on steering;
+    those that the recording states if not given."""
     response: tuple[float, float] | None = None
-    """Of a policy of waypoints and a recording of steering, as in `demos train`."""
+    """How far the vehicle turns at full steering, rad for each metre and for each second, for a
+    waypoint policy on steering; fitted to its recorded motion if not given."""
 
     def run(self) -> None:
         """Evaluate and print."""

@@ -357,7 +357,7 @@ class Supervisor:
             child.close()
 
     def _remove_ready_file(self) -> None:
-        """Remove the file that a daemon wrote, so that nobody looks for it at its old port."""
+        """Remove the ready file, so that no client connects to the old port."""
         if ready_file := self._plan.daemon.get("ready_file"):
             try:
                 Path(ready_file).unlink(missing_ok=True)
