@@ -2,19 +2,20 @@
 
 The study equals `shapechanger transfer Finger Finger --target-options '{"gap": "real-like"}'
 --source-policy ...` with the shipped policy; each seed has another finger. It is kept in
-`results/finger-gap`, and finished runs are not repeated. The study with `RemoteFinger-v1`, on twins
-of a rig that the env serves itself, is kept in `results/finger-rig`.
+`results/finger-gap`, and finished runs are not repeated. The studies with `RemoteFinger-v1` and
+`RemoteFingerTrack-v1`, on twins of a rig that the env serves itself, are kept in
+`results/finger-rig` and `results/finger-follow`.
 """
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
-from benchmarks.finger_learned import played, trained
+from benchmarks.finger_learned import CIRCLE, TRACKS, played, trained
 from benchmarks.row import Row
 from shapechanger.cli.transfer import write_study_report
 from shapechanger.envs.finger.policies import POLICIES
@@ -22,7 +23,7 @@ from shapechanger.reports.numbers import share_text
 from shapechanger.reports.verdict import successes
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Processes
-from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 from shapechanger.transfer.learners.settings import learner_settings
 from shapechanger.transfer.plan import ARMS, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
@@ -37,6 +38,7 @@ _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 # Zero-shot success below this counts as a gap.
 _MILD: Final = 0.5
 _RECOVERED: Final = 0.8
+_FOLLOWED: Final = 2.0
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
 
 
@@ -113,23 +115,77 @@ def rig() -> list[Row]:
     return rows_of(study, "twins of a rig, real-like")
 
 
+def follow() -> list[Row]:
+    """Measure how closely a circle is followed on twins of a rig, by policies that never saw one.
+
+    Each policy learns other paths in the finger that was identified on its rig. The same policy on
+    the same finger without link, daemon, guard and servo bus is the reference.
+    """
+    source = EnvRef("shapechanger/FingerTrack-v1", {"path": "random"})
+    circle = {"path": CIRCLE}
+    target = EnvRef("shapechanger/RemoteFingerTrack-v1", {"twin": "real-like", **circle})
+    out = Path("results", "finger-follow")
+    arms = ("scratch", "zero-shot", "identified")
+    study = _study(target, "ppo-rig", arms, RIGS, RIG_STEPS, out, source=source, policy="track")
+    errors: dict[str, list[float]] = {"a rig's twin": [], "the same finger in process": []}
+    shipped: list[float] = []
+    for seed in range(study.plan.seeds):
+        identified = load_policy(out / "runs" / f"identified-{seed}" / "policy.safetensors")
+        rig = target.having({"finger_seed": seed})
+        finger = EnvRef(source.id, {"gap": "real-like", "finger_seed": seed, **circle})
+        for where, env in zip(errors, (rig, finger), strict=True):
+            errors[where].append(_rms_mm(identified, env))
+        shipped.append(_rms_mm(load_policy(POLICIES["track"]), rig))
+    there, here = (np.array(each) for each in errors.values())
+    known = f"circle of 12 mm at 0.5 Hz, {len(there)} fingers of the gap real-like"
+    return [
+        Row(
+            f"{known}: error of the identified policy on a rig's twin over that in process",
+            f"{np.mean(there / here):.2f}x",
+            f"{', '.join(f'{each:.2f}x' for each in there / here)}; {np.mean(there):.2f} mm and "
+            f"{np.mean(here):.2f} mm RMS",
+            "<= 2x",
+            bool((there / here).max() <= _FOLLOWED),
+        ),
+        Row(
+            f"{known}: error of the shipped policy on a rig's twin, zero-shot",
+            f"{np.mean(shipped):.2f} mm RMS",
+            ", ".join(f"{each:.2f}" for each in shipped),
+            "none",
+            True,
+        ),
+    ]
+
+
+def _rms_mm(policy: TrainedPolicy, env: EnvRef) -> float:
+    return 1e3 * float(np.mean([info["rms"] for info in played(policy, env, TRACKS)]))
+
+
 def _study(
-    target: EnvRef, learner: str, arms: tuple[str, ...], seeds: int, steps: int, out: Path
+    target: EnvRef,
+    learner: str,
+    arms: tuple[str, ...],
+    seeds: int,
+    steps: int,
+    out: Path,
+    *,
+    source: EnvRef = _FINGER,
+    policy: Literal["reach", "track"] = "reach",
 ) -> Study:
-    """Run a study of the shipped policy and write its report."""
+    """Run a study of a shipped policy and write its report."""
     plan = make_plan(
-        TransferTask(_FINGER, target),
+        TransferTask(source, target),
         learner,
         learner_settings(learner),
         seeds=int(os.environ.get("SEEDS", seeds)),
         steps=steps,
-        source_policy=POLICIES["reach"],
+        source_policy=POLICIES[policy],
         arms=arms,
     )
     study = run_study(
         plan,
         out,
-        source_policy=POLICIES["reach"],
+        source_policy=POLICIES[policy],
         executor=Processes(int(os.environ.get("WORKERS", os.cpu_count() or 1))),
         command=f"python -m benchmarks.run {out.name}",
     )

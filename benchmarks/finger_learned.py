@@ -33,7 +33,7 @@ TARGETS: Final = 200
 TRACKS: Final = 5
 FOLDER: Final = Path("results", "finger")
 CURVES: Final = Path(__file__).parent / "results" / "finger-curves.json"
-_CIRCLE: Final = {"kind": "circle", "radius": 0.012, "hz": 0.5}
+CIRCLE: Final = {"kind": "circle", "radius": 0.012, "hz": 0.5}
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def _reach_row(seeds: range) -> Row:
 
 
 def _track_row(seeds: range) -> Row:
-    env = EnvRef("shapechanger/FingerTrack-v1", {"path": _CIRCLE})
+    env = EnvRef("shapechanger/FingerTrack-v1", {"path": CIRCLE})
     errors = [
         1e3 * float(np.mean([info["rms"] for info in played(_tracker(seed), env, TRACKS)]))
         for seed in seeds

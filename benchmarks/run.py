@@ -157,6 +157,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "demo": demo,
     "finger-gap": finger_gap.gap,
     "finger-rig": finger_gap.rig,
+    "finger-follow": finger_gap.follow,
     "finger-path": finger_path.path,
     "finger-physics": finger_physics.physics,
     "finger-oracle": finger_oracle.oracle,

@@ -13,6 +13,7 @@ from shapechanger.envs import CATALOGUE, register_all
 from shapechanger.envs.catalogue import (
     FINGER_ENVS,
     REMOTE_FINGER,
+    REMOTE_FINGER_TRACK,
     REMOTE_VEHICLE,
     REMOTE_WAYPOINT,
     VEHICLE_ENVS,
@@ -88,7 +89,7 @@ def test_import_registers_ids_without_a_simulator() -> None:
     loaded, ids = _run(script).splitlines()
     assert loaded == ""
     vehicles = (*_VEHICLES, *_MORE_VEHICLES)
-    remote = (REMOTE_FINGER, REMOTE_VEHICLE, REMOTE_WAYPOINT)
+    remote = (REMOTE_FINGER, REMOTE_FINGER_TRACK, REMOTE_VEHICLE, REMOTE_WAYPOINT)
     assert tuple(ids.split()) == (*_IDS, *vehicles, *_FINGERS, *remote)
     assert (tuple(VEHICLE_ENVS), tuple(FINGER_ENVS)) == (_VEHICLES, _FINGERS)
 

@@ -1,4 +1,4 @@
-"""`RemoteFinger-v1` through connection, daemon, guard and drivers to a simulated finger."""
+"""The envs of a finger on a rig through connection, daemon, guard and drivers to a simulation."""
 
 from __future__ import annotations
 
@@ -14,9 +14,12 @@ import pytest
 
 from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.envs.finger.gap import GAPS, resolve_gap
-from shapechanger.errors import BadAction, FingerError, UnknownName
+from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.errors import BadAction, FingerError, PathError, UnknownName
 from shapechanger.identify.result import PATH_DELAY_ERROR_S
 from shapechanger.robot.profile.load import find_profile
+from shapechanger.tasks.paths import as_path
+from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.twin.robots import until
 
@@ -312,6 +315,41 @@ def test_ten_seconds_identify_the_finger() -> None:
     assert np.abs(NOMINAL.arms / np.where(large, truth.arms, 1.0) - 1.0)[large].max() > 0.15
     np.testing.assert_allclose(found.joint_stiffness, truth.joint_stiffness, rtol=0.2)
     assert found.tendon_stiffness == pytest.approx(truth.tendon_stiffness, rel=0.05)
+
+
+def test_a_path_is_followed_on_its_own_twin() -> None:
+    """Layouts, start and point are those of `FingerTrack-v1`, and the truth judges."""
+    path = {"kind": "circle", "radius": 0.012, "hz": 0.5}
+    policy = load_policy(POLICIES["track"])
+    errors: list[float] = []
+    begins: list[Any] = []
+    with (
+        gym.make("shapechanger/FingerTrack-v1", path=path) as simulated,
+        gym.make("shapechanger/RemoteFingerTrack-v1", path=path, twin="nominal") as rig,
+    ):
+        here: Any = simulated.unwrapped
+        there: Any = rig.unwrapped
+        assert here.observation_layout == there.observation_layout
+        assert there.individual == ""
+        for env in (simulated, rig):
+            observation, info = env.reset(seed=7)
+            begins.append((observation[:4], info["target"]))
+            truncated = False
+            while not truncated:
+                observation, _, _, truncated, info = env.step(policy.act(observation[None])[0])
+            errors.append(info["rms"])
+        assert info["truncated_because"] == ""
+        assert info["distance"] == pytest.approx(info["true_distance"], abs=1e-6)
+        # Another path, on the same connection.
+        _, info = rig.reset(seed=8, options={"path": "line"})
+        assert there.path == as_path("line")
+        with pytest.raises(PathError, match="leaves the finger's reach"):
+            rig.reset(options={"path": lambda t: (0.5, 0.0, 0.0)})
+    (start, target), (sensed, same) = begins
+    np.testing.assert_array_equal(same, target)
+    np.testing.assert_allclose(sensed, start, atol=0.1)
+    # The policy was trained without gears, delay and slew; it still follows, at a distance.
+    assert errors[0] < 0.001 < errors[1] < 0.015
 
 
 def test_actions_of_length_drive_servos_that_control_lengths(tmp_path: Path) -> None:

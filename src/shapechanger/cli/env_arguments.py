@@ -18,6 +18,7 @@ from shapechanger.envs.catalogue import (
     FINGER_ENVS,
     RANGES_ENVS,
     REMOTE_FINGER,
+    REMOTE_FINGER_TRACK,
     VEHICLE_ENVS,
     WAYPOINT_ENVS,
     find,
@@ -104,7 +105,7 @@ def default_learner(env: EnvRef) -> str:
         return "waypoint"
     if env.id in RANGES_ENVS:
         return "ppo-drive"
-    if env.id == REMOTE_FINGER:
+    if env.id in (REMOTE_FINGER, REMOTE_FINGER_TRACK):
         return "ppo-rig"
     entry = CATALOGUE.get(env.id) or FINGER_ENVS.get(env.id)
     return entry.learner if entry else "ppo-run"

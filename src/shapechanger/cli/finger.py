@@ -17,6 +17,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 
 if TYPE_CHECKING:
+    from shapechanger.bodies.finger import FingerParameters
     from shapechanger.identify import IdentifiedFinger
 
 
@@ -143,9 +144,9 @@ class ExportFinger:
 
     out: Path
     """The file to write, such as finger.xml."""
-    parameters: Path | None = None
-    """Parameters that `shapechanger finger identify --out` has written; the nominal finger if not
-    given."""
+    parameters: str = ""
+    """File that `shapechanger finger identify --out` has written, or the name of a set, such as
+    an-1983; the nominal finger if not given."""
     actions: str = "impedance"
     """Meaning of a control: impedance, tension or length."""
     gap: str = ""
@@ -157,7 +158,7 @@ class ExportFinger:
         """Write the file."""
         import numpy as np
 
-        from shapechanger.bodies.finger import NOMINAL, FingerParameters, drive_of
+        from shapechanger.bodies.finger import NOMINAL, drive_of
         from shapechanger.bodies.finger.export import finger_mjcf
         from shapechanger.envs.finger.gap import resolve_gap
 
@@ -168,16 +169,26 @@ class ExportFinger:
         finger = NOMINAL
         if self.gap:
             finger = resolve_gap(self.gap).draw(np.random.default_rng(self.finger_seed))
-        elif self.parameters is not None:
-            try:
-                finger = FingerParameters.from_json(self.parameters.read_bytes())
-            except OSError as error:
-                raise FingerError(
-                    f"{self.parameters} cannot be read: {error.strerror or error}."
-                ) from error
+        elif self.parameters:
+            finger = _parameters(self.parameters)
         text = finger_mjcf(finger, drive_of(self.actions, NOMINAL))
         write_atomic(self.out, text.encode())
         say(f"wrote {self.out}")
+
+
+def _parameters(given: str) -> FingerParameters:
+    """Return a set of parameters by name, or from a file."""
+    from shapechanger.bodies.finger.parameters import PARAMETER_SETS, FingerParameters
+
+    if given in PARAMETER_SETS:
+        return PARAMETER_SETS[given]
+    path = Path(given)
+    if not path.suffix and not path.exists():
+        raise UnknownName("set of finger parameters", given, PARAMETER_SETS)
+    try:
+        return FingerParameters.from_json(path.read_bytes())
+    except OSError as error:
+        raise FingerError(f"{path} cannot be read: {error.strerror or error}.") from error
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,9 @@ NAMESPACE: Final = "shapechanger"
 REMOTE_FINGER: Final = "shapechanger/RemoteFinger-v1"
 """Id of the env of a finger on a rig, with the layouts of `Finger-v1`."""
 
+REMOTE_FINGER_TRACK: Final = "shapechanger/RemoteFingerTrack-v1"
+"""Id of the env of a finger on a rig, with the layouts of `FingerTrack-v1`."""
+
 REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
 """Id of the env of a robot on the network, whose body is unknown until the robot answers."""
 
@@ -157,7 +160,14 @@ CATALOGUE: Final[dict[str, CatalogueEntry]] = {
 }
 
 # Envs whose bodies form no family, except the vehicle on the network.
-_TASK_IDS: Final = (*VEHICLE_ENVS, *RANGES_ENVS, *WAYPOINT_ENVS, *FINGER_ENVS, REMOTE_FINGER)
+_TASK_IDS: Final = (
+    *VEHICLE_ENVS,
+    *RANGES_ENVS,
+    *WAYPOINT_ENVS,
+    *FINGER_ENVS,
+    REMOTE_FINGER,
+    REMOTE_FINGER_TRACK,
+)
 _EPISODE_STEPS: Final = 1000
 _RANGES_STEPS: Final = 400  # A learner meets more courses.
 # Families with a fast step of their own, which Gymnasium's wrappers would slow down.
@@ -188,9 +198,11 @@ def register_all() -> None:
             _register(env_id, entry_point, limit, kwargs={"vehicle": vehicle})
     for env_id, task in FINGER_ENVS.items():
         _register(env_id, task.entry_point, task.episode_steps)
-    remote, reach = "shapechanger.envs.remote", FINGER_ENVS["shapechanger/Finger-v1"]
+    remote = "shapechanger.envs.remote"
+    reach, track = FINGER_ENVS.values()
     for env_id, entry_point, limit in (
         (REMOTE_FINGER, f"{remote}.finger:RemoteFingerEnv", reach.episode_steps),
+        (REMOTE_FINGER_TRACK, f"{remote}.finger:RemoteFingerTrackEnv", track.episode_steps),
         (REMOTE_VEHICLE, f"{remote}.vehicle:RemoteVehicleEnv", None),
         (REMOTE_WAYPOINT, f"{remote}.waypoints:RemoteWaypointEnv", None),
     ):

@@ -9,6 +9,7 @@ import pytest
 
 from shapechanger.bodies.finger import NOMINAL, TENDONS, FingerParameters, drive_of
 from shapechanger.bodies.finger.export import finger_mjcf
+from shapechanger.bodies.finger.parameters import PARAMETER_SETS
 from shapechanger.cli import main
 from shapechanger.envs.finger.gap import GAPS
 from shapechanger.identify import load_log
@@ -82,21 +83,28 @@ def test_a_finger_is_identified(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_a_finger_is_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A finger of a gap, of a file of parameters, and the nominal one; others are refused."""
+    """A finger of a gap, a file or a set of parameters, and the nominal one; others are refused."""
     out, file = tmp_path / "finger.xml", tmp_path / "finger.json"
     drawn = GAPS["real-like"].draw(np.random.default_rng(3))
     file.write_text(drawn.to_json())
     texts = []
-    for words in (("--gap", "real-like", "--finger-seed", 3), ("--parameters", file), ()):
+    for words in (
+        ("--gap", "real-like", "--finger-seed", 3),
+        ("--parameters", file),
+        (),
+        ("--parameters", "an-1983"),
+    ):
         assert f"wrote {out}" in output_of(capsys, "export", "--out", out, *words)
         texts.append(out.read_text())
     drive = drive_of("impedance", NOMINAL)
     assert texts[0] == texts[1] == finger_mjcf(drawn, drive)
     assert texts[2] == finger_mjcf(NOMINAL, drive)
+    assert texts[3] == finger_mjcf(PARAMETER_SETS["an-1983"], drive)
     to = ("--out", out)
     both = ("--gap", "wide", "--parameters", file)
     assert "not both" in refused(capsys, "export", *to, *both)
     assert "real-like" in refused(capsys, "export", *to, "--gap", "real-lik")
-    assert "cannot be read" in refused(capsys, "export", *to, "--parameters", tmp_path / "no")
+    assert "cannot be read" in refused(capsys, "export", *to, "--parameters", tmp_path / "no.json")
+    assert "an-1983" in refused(capsys, "export", *to, "--parameters", "an-1984")
     file.write_text("{}]")
     assert "Invalid finger parameters" in refused(capsys, "export", *to, "--parameters", file)

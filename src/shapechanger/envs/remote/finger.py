@@ -1,4 +1,4 @@
-"""`RemoteFinger-v1`: the task of `Finger-v1` on a rig of servos, or on its twin."""
+"""The tasks of the finger on a rig of servos, or on its twin."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ from numpy.typing import NDArray
 
 from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, CommandPath, FingerParameters
 from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
-from shapechanger.envs.finger.env import check_posture
+from shapechanger.envs.finger.env import FingerEnv, check_posture
 from shapechanger.envs.finger.gap import GAPS, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
+from shapechanger.envs.finger.track import FingerTrackEnv
 from shapechanger.envs.remote.finger_rig import LengthApproach, RigSenses, StartApproach
 from shapechanger.envs.remote.vehicle import OnReset, RemoteVehicleEnv
 from shapechanger.errors import FingerError, RobotRefused, UnknownName
 from shapechanger.link.messages import Pace
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.tasks.finger import FingerSenses
+from shapechanger.tasks.paths import PathSource
 from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 
 NOMINAL_TWIN: Final = "nominal"
@@ -45,37 +47,15 @@ _OWN_TIMEOUT_S: Final = 30.0
 _DRIVING: Final = ("reward", "frame", "captured_ns")
 
 
-class RemoteFingerEnv(FingerReachEnv):
-    """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
+class OnRig(FingerEnv):
+    """Perform a task of the finger on a rig; mixed into the env of the task.
 
-    ## Action and observation space, reward
-    Those of `Finger-v1`, with the same layouts, so a script runs on both by changing the id.
-    Actions are converted to tensions here, by the newest lengths and speeds of the tendons at the
-    servos. On a rig with encoders at its joints, as the shipped one, the angles are theirs, noise
-    included, and velocities are their differences over 20 ms, smoothed over 40 ms. Otherwise angles
-    and velocities follow from lengths and speeds with the nominal moment arms, and are as accurate
-    as these. The fingertip follows from the angles; so do the distance, the reward and
-    `info["is_success"]`. With its own twin (`twin`) these three use the true state, as in
-    `Finger-v1`, while observations remain measurements.
-
-    ## Start
-    The operator arms a rig; the env arms a twin. The finger is then brought close to the start of
-    `Finger-v1` for the same seed, which takes up to 1 s and ends within some hundredths of a radian
-    as measured, or farther off where gears stick; the target is the same. The servos of its own
-    twin are cool at the start; those of a rig need pauses, or switch off by themselves.
-
-    ## End
-    Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost
-    link. `info["truncated_because"]` says why.
-
-    ## Info
-    As `Finger-v1`, and from `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
-    `refused`, `events`, `latency`, `armed`, `emergency`, `absent`, `truncated_because`. With
-    `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), of the twin.
+    The simulation is never stepped: it mirrors the rig, for rendering and rewards.
 
     Args:
         robot: Name of a known rig, or its address as HOST or HOST:PORT. A twin of the profile
             "finger" that is served on this machine is known under that name.
+        task: Arguments of the task's own env.
         key: The rig's key, for an address.
         fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
         pace: As for `RemoteVehicleEnv`; None for "lockstep" with a twin's own clock, else
@@ -92,7 +72,6 @@ class RemoteFingerEnv(FingerReachEnv):
         timeout_s: Silence of the rig after which the link is lost, s; None for 2 s, or 30 s with
             its own twin, whose clock waits for a busy machine.
         actions: What an action commands; see `shapechanger.bodies.finger.DRIVES`.
-        goal: Whether observations are Dicts with goals.
         reward: Weights that replace the default ones, by name.
         render_mode: "human", "rgb_array" or "depth_array": the finger as measured.
         width: Width of frames, pixels.
@@ -109,7 +88,8 @@ class RemoteFingerEnv(FingerReachEnv):
 
     def __init__(
         self,
-        robot: str = "finger",
+        robot: str,
+        task: Mapping[str, Any],
         *,
         key: str = "",
         fingerprint: str = "",
@@ -123,23 +103,19 @@ class RemoteFingerEnv(FingerReachEnv):
         reset_timeout_s: float = 60.0,
         timeout_s: float | None = None,
         actions: str = "impedance",
-        goal: bool = False,
         reward: Mapping[str, float] | None = None,
         render_mode: str | None = None,
         width: int = 480,
         height: int = 480,
     ) -> None:
-        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
-        # The simulation is never stepped: it mirrors the rig, for rendering and rewards.
         super().__init__(
-            goal=goal,
+            **task,
             actions=actions,
             reward=reward,
             render_mode=render_mode,
             width=width,
             height=height,
         )
-        EzPickle.__init__(self, **arguments)
         self._twin, self._finger_seed = twin, finger_seed
         self._true_tip: NDArray[np.float64] | None = None
         self._true_angles: NDArray[np.float64] | None = None
@@ -192,11 +168,12 @@ class RemoteFingerEnv(FingerReachEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Start an episode; see `Finger-v1`.
+        """Start an episode; the options are those of the task in simulation.
 
         Raises:
             UnknownName: If there is no such option.
             FingerError: If a posture or a target is malformed or out of range.
+            PathError: If a path is none, or the finger cannot follow it.
             RobotRefused: If the rig was not armed in time, refuses the connection, stops on the way
                 to the start, or its lengths fit no posture.
             LinkError: If it cannot be reached in time.
@@ -204,7 +181,7 @@ class RemoteFingerEnv(FingerReachEnv):
         self._seed = seed
         self._rest()
         observation, info = super().reset(seed=seed, options=options)
-        return observation, self._finger_info() | info | self._truth()
+        return observation, self._finger_info() | info | self._truth(info)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take one step.
@@ -214,8 +191,8 @@ class RemoteFingerEnv(FingerReachEnv):
             ResetNeeded: If `reset` was never called, or the link was lost.
         """
         observation, reward, terminated, _, info = super().step(action)
-        info = self._finger_info() | info | self._truth()
-        return observation, reward, terminated, bool(info["truncated_because"]), info
+        info = self._finger_info() | info | self._truth(info)
+        return observation, float(reward), terminated, bool(info["truncated_because"]), info
 
     def _rest(self) -> None:
         """Cool the servos of its own twin; those of a rig cool in pauses."""
@@ -362,14 +339,88 @@ class RemoteFingerEnv(FingerReachEnv):
         self._true_tip = np.array([truth[f"fingertip/{axis}"] for axis in "xyz"])
         self._true_angles = np.array([truth[f"{name}/angle"] for name in JOINTS])
 
-    def _truth(self) -> dict[str, Any]:
-        """Return the info of the true state."""
+    def _truth(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Return the info of the true state, next to the target in the info of the task."""
         if self._true_tip is None or self._true_angles is None:
             return {}
         return {
-            "true_distance": float(np.linalg.norm(self._true_tip - self._target)),
+            "true_distance": float(np.linalg.norm(self._true_tip - info["target"])),
             "true_angles": self._true_angles.copy(),
         }
+
+
+class RemoteFingerEnv(OnRig, FingerReachEnv):
+    """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
+
+    ## Action and observation space, reward
+    Those of `Finger-v1`, with the same layouts, so a script runs on both by changing the id.
+    Actions are converted to tensions here, by the newest lengths and speeds of the tendons at the
+    servos. On a rig with encoders at its joints, as the shipped one, the angles are theirs, noise
+    included, and velocities are their differences over 20 ms, smoothed over 40 ms. Otherwise angles
+    and velocities follow from lengths and speeds with the nominal moment arms, and are as accurate
+    as these. The fingertip follows from the angles; so do the distance, the reward and
+    `info["is_success"]`. With its own twin (`twin`) these three use the true state, as in
+    `Finger-v1`, while observations remain measurements.
+
+    ## Start
+    The operator arms a rig; the env arms a twin. The finger is then brought close to the start of
+    `Finger-v1` for the same seed, which takes up to 1 s and ends within some hundredths of a radian
+    as measured, or farther off where gears stick; the target is the same. The servos of its own
+    twin are cool at the start; those of a rig need pauses, or switch off by themselves.
+
+    ## End
+    Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost
+    link. `info["truncated_because"]` says why.
+
+    ## Info
+    As `Finger-v1`, and from `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
+    `refused`, `events`, `latency`, `armed`, `emergency`, `absent`, `truncated_because`. With
+    `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), of the twin.
+
+    Args:
+        robot: Name of a known rig, or its address; see `OnRig`.
+        goal: Whether observations are Dicts with goals.
+        **rig: Arguments of `OnRig`.
+
+    Raises:
+        UnknownName, LinkError, RobotRefused: As `OnRig`.
+    """
+
+    def __init__(self, robot: str = "finger", *, goal: bool = False, **rig: Any) -> None:
+        super().__init__(robot, {"goal": goal}, **rig)
+        EzPickle.__init__(self, robot, goal=goal, **rig)
+
+
+class RemoteFingerTrackEnv(OnRig, FingerTrackEnv):
+    """Follow a point that moves along a known path with a real finger, or its twin.
+
+    ## Action and observation space, reward
+    Those of `FingerTrack-v1`, with the same layouts; they are converted and measured as in
+    `RemoteFinger-v1`.
+
+    ## Start
+    The finger is brought to the point of the path where `FingerTrack-v1` starts for the same seed,
+    as in `RemoteFinger-v1`; then the point moves.
+
+    ## End
+    Truncated after 250 steps, 5 s, and when the rig stops; `info["truncated_because"]` says why.
+
+    ## Info
+    As `FingerTrack-v1`, and the entries of a rig as in `RemoteFinger-v1`.
+
+    Args:
+        robot: Name of a known rig, or its address; see `OnRig`.
+        path: As for `FingerTrack-v1`.
+        **rig: Arguments of `OnRig`.
+
+    Raises:
+        PathError: If it is not a path, or the nominal finger cannot follow it.
+        UnknownName, LinkError, RobotRefused: As `OnRig`.
+    """
+
+    def __init__(self, robot: str = "finger", *, path: PathSource = "circle", **rig: Any) -> None:
+        super().__init__(robot, {"path": path}, **rig)
+        EzPickle.__init__(self, robot, path=path, **rig)
 
 
 def _connected(access: dict[str, Any], pace: Pace | None) -> RemoteVehicleEnv:
