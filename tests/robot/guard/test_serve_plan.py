@@ -33,10 +33,11 @@ def test_a_plan_round_trips() -> None:
     assert ServePlan.from_json(plan.to_json()) == plan
 
 
-def test_the_guard_may_be_silent_for_its_deadline() -> None:
-    """The limit is the deadline, or `patience_ms` on a twin."""
-    assert _PLAN.guard_silence_ms == 250
-    assert replace(_PLAN, patience_ms=5_000).guard_silence_ms == 5_000
+def test_processes_may_be_silent_for_their_limits() -> None:
+    """The guard for its deadline, the daemon for two seconds, or `patience_ms` on a twin."""
+    assert (_PLAN.guard_silence_ms, _PLAN.daemon_silence_ms) == (250, 2_000)
+    patient = replace(_PLAN, patience_ms=5_000)
+    assert (patient.guard_silence_ms, patient.daemon_silence_ms) == (5_000, 5_000)
 
 
 def test_several_processes_can_read_the_plan() -> None:

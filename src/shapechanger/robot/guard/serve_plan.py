@@ -20,6 +20,8 @@ from shapechanger.robot.guard import start
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import REAL
 
+_DAEMON_SILENCE_MS: Final = 2000
+
 
 @dataclass(frozen=True, slots=True)
 class ServePlan:
@@ -31,9 +33,9 @@ class ServePlan:
         hardware: Factory of the hardware and its argument; see
             `shapechanger.robot.hardware.connect`.
         python: The interpreter that runs the processes.
-        patience_ms: Lower bound on the silence after which the guard is killed, ms; its deadline
-            applies if that is longer. 0 on a robot. A twin's clock is paused while a world is
-            drawn, and a guard that waits for it is alive.
+        patience_ms: Lower bound on the silence after which guard and daemon are killed, ms; their
+            own limits apply if those are longer. 0 on a robot. A twin's clock waits for a busy
+            machine, and is paused while a world is drawn; a guard that waits for it is alive.
     """
 
     guard: GuardPlan
@@ -46,6 +48,11 @@ class ServePlan:
     def guard_silence_ms(self) -> int:
         """Silence after which the guard is killed, ms."""
         return max(self.patience_ms, self.guard.limits.deadline_ms)
+
+    @property
+    def daemon_silence_ms(self) -> int:
+        """Silence after which the daemon is killed, ms."""
+        return max(self.patience_ms, _DAEMON_SILENCE_MS)
 
     def to_json(self) -> str:
         """Return the plan as JSON."""

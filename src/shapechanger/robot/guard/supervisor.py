@@ -184,7 +184,6 @@ _NOT_SAFE: Final = 3
 
 # To the first heartbeat: a Pi Zero takes several seconds to load the daemon.
 _START_S: Final = 30.0
-_DAEMON_SILENCE_S: Final = 2.0
 _END_S: Final = 1.0  # For a process to exit after SIGTERM.
 _REAP_S: Final = 0.05  # For a killed process to disappear; the pins wait no longer.
 _AGAIN_S: Final = 0.1  # Between attempts to put the outputs to rest.
@@ -315,7 +314,7 @@ class Supervisor:
             poll.register(fd, select.POLLIN)
         silence_ns = {
             guard: self._plan.guard_silence_ms * 1_000_000,
-            daemon: round(_DAEMON_SILENCE_S * 1e9),
+            daemon: self._plan.daemon_silence_ms * 1_000_000,
         }
         checked_ns = time.monotonic_ns()
         while not self._end_reason:
