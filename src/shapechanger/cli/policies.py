@@ -15,6 +15,7 @@ from rich.table import Table
 from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, driven, env_ref, opened
 from shapechanger.cli.play import Watching
+from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
@@ -276,7 +277,7 @@ class ExportPolicy:
     """Export a policy for other programs, which need neither PyTorch nor Shapechanger."""
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A policy."""
+    """A policy, or a clone, which a robot then runs on board."""
     out: Path
     """The file to write, such as ant.onnx."""
     format: Literal["onnx"] = "onnx"
@@ -284,11 +285,31 @@ class ExportPolicy:
 
     def run(self) -> None:
         """Write the file."""
+        from shapechanger.demos.cloning.onnx_policy import export_clone
+        from shapechanger.demos.cloning.policy import CameraPolicy
+        from shapechanger.transfer.learners.cloning import is_clone
         from shapechanger.transfer.learners.policy_file import load_policy
         from shapechanger.transfer.onnx_policy import export_onnx
 
-        export_onnx(load_policy(self.file), self.out)
+        if is_clone(self.file):
+            clone = CameraPolicy.load(self.file)
+            body, control_hz = _learned_with(clone.card)
+            export_clone(clone, self.out, body=body, control_hz=control_hz)
+        else:
+            export_onnx(load_policy(self.file), self.out)
         say(f"wrote {self.out}")
+
+
+def _learned_with(card: CloneCard) -> tuple[str, float | None]:
+    """Return the body and the rate of a clone's demonstrations, as far as its card tells."""
+    from shapechanger.worlds.expert.traits import PERIOD_S
+
+    env = card.data.get("env")
+    if env is None:
+        return str(card.data.get("body", "")), card.data.get("control_hz")
+    # Waypoints are the same in all bodies.
+    body, _ = VEHICLE_ENVS.get(str(env), ("", ""))
+    return body, 1.0 / PERIOD_S if body or env in WAYPOINT_ENVS else None
 
 
 @dataclass(frozen=True)

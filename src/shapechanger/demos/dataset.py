@@ -44,6 +44,7 @@ class Dataset:
         action_layout: Meaning of the values of an action.
         state_layout: Meaning of the values of a state; None without states.
         control_hz: Steps per second.
+        body: Kind of robot of the first episode, such as "car"; "" if unknown.
     """
 
     pictures: NDArray[np.uint8] | None
@@ -55,6 +56,7 @@ class Dataset:
     action_layout: Layout
     state_layout: Layout | None
     control_hz: float
+    body: str = ""
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -107,6 +109,7 @@ def load_dataset(
         action_layout=Layout.from_json(first.header.action_layout),
         state_layout=Layout.from_json(layout) if layout else None,
         control_hz=first.header.control_hz,
+        body=first.header.body,
     )
 
 

@@ -9,7 +9,6 @@ from typing import Any, Final, NamedTuple
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from shapechanger.errors import SpaceMismatch, StudyError
 from shapechanger.layout import Element, Feature, Layout
@@ -93,6 +92,8 @@ def measure_response(
     Raises:
         StudyError: If it does not turn as it steers.
     """
+    from scipy.optimize import nnls  # Not there on a robot, which does not measure itself.
+
     rng = np.random.default_rng(seed)
     env.reset(seed=seed)
     command = np.zeros(2, np.float32)
@@ -127,6 +128,8 @@ def fit_response(
     Raises:
         StudyError: If the drive does not tell it.
     """
+    from scipy.optimize import nnls
+
     rows = np.stack((steering * speed, steering, -yaw_rate), axis=1).astype(np.float64)
     steady = np.isfinite(rows).all(axis=1)
     for steps in range(1, _STEADY + 1):

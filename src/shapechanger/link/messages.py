@@ -252,6 +252,19 @@ class Judge(_Message, frozen=True):
     keep: bool = False
 
 
+class RunPolicy(_Message, frozen=True):
+    """Start of a policy on board, in place of the one that runs; only from a person.
+
+    Answered by `Policies` to all clients, or by `Refused`. The policy is a client of its own, a
+    program: it waits until nobody has control, takes it, and drives once a person arms the robot.
+
+    Attributes:
+        policy: Name of the policy, one of `Policies.names`; "" to end the one that runs.
+    """
+
+    policy: _Name = ""
+
+
 ClientMessage = (
     Hello
     | Command
@@ -269,6 +282,7 @@ ClientMessage = (
     | Browse
     | Fetch
     | Judge
+    | RunPolicy
 )
 
 
@@ -314,6 +328,8 @@ class Welcome(_Message, frozen=True):
         clock: Source of the robot's time.
         session: Number of this connection.
         can_record: Whether the robot has a folder for recordings.
+        turning: Turn at full steering, rad for each metre and for each second; None if the profile
+            does not state it.
     """
 
     robot: str
@@ -335,6 +351,7 @@ class Welcome(_Message, frozen=True):
     slew_down_per_s: tuple[float, ...] = ()
     camera_pitch_deg: float | None = None
     camera_fovy_deg: float | None = None
+    turning: tuple[float, float] | None = None
 
 
 class Refused(_Message, frozen=True):
@@ -518,6 +535,20 @@ class Piece(_Message, frozen=True):
     header: str = ""
 
 
+class Policies(_Message, frozen=True):
+    """The policies on board, sent to a new client and at each change.
+
+    Attributes:
+        names: Names of those that can be started.
+        running: Name of the one that runs; "" for none.
+        text: What it does, or why the last one ended, a sentence; "" for nothing to say.
+    """
+
+    names: tuple[str, ...]
+    running: str = ""
+    text: str = ""
+
+
 RobotMessage = (
     Challenge
     | Welcome
@@ -529,6 +560,7 @@ RobotMessage = (
     | RecorderState
     | Recordings
     | Piece
+    | Policies
 )
 
 _ENCODER: Final = msgspec.msgpack.Encoder()

@@ -113,6 +113,8 @@ class TrainClone:
             digest=shrinking.digest(data.actions),
             learned=n,
             steps=len(data),
+            body="" if view is not None else data.body,
+            control_hz=data.control_hz,
             **origin,
         )
         note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Self
+from typing import TYPE_CHECKING, Annotated, Final
 
 import tyro
 from rich.live import Live
@@ -23,8 +22,7 @@ from shapechanger.remote.known_robots import KnownRobot, recall
 from shapechanger.teleop import DIRECTIONS, HeldKeys, Terminal
 
 if TYPE_CHECKING:
-    from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
+    from shapechanger.cli.robot.pilot import DrivingPolicy, PolicyDriver
     from shapechanger.remote.client import RobotClient
 
 _LOOK_EVERY_S: Final = 0.2
@@ -282,117 +280,23 @@ class Driving:
         return f"recording {state.seconds:.0f} s, {state.steps - state.dropped} steps"
 
 
-# s. A reset waits in steps of this length, and checks between them whether to end.
-_PILOTING_LOOK_EVERY_S: Final = 1.0
-_END_S: Final = 10.0
-
-
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
-    from shapechanger.demos.cloning.policy import CameraPolicy
-
-    policy = CameraPolicy.load(path)
+    from shapechanger.cli.robot.pilot import Origin, PolicyDriver, RobotFacts, require_fit
     from shapechanger.remote.client import RobotClient
 
+    policy: DrivingPolicy
+    origin = Origin()
+    if path.suffix == ".onnx":
+        from shapechanger.demos.cloning.onnx_policy import OnnxClone
+
+        policy = exported = OnnxClone(path)
+        origin = Origin(exported.body, exported.control_hz)
+    else:
+        from shapechanger.demos.cloning.policy import CameraPolicy
+
+        policy = CameraPolicy.load(path)
     with RobotClient.connect(robot, frames=False) as there:
-        welcome = there.welcome
-    actions = Layout.from_json(welcome.action_layout)
-    policy.card.require_layouts(actions, Layout.from_json(welcome.state_layout))
-    if policy.card.eyes != "none" and welcome.image_size is None:
-        raise RobotRefused(f"{robot.name} has no camera, and the policy drives by pictures.")
-    return PolicyDriver(policy, path.stem, robot, welcome.image_size or (160, 120))
-
-
-class PolicyDriver:
-    """A policy that drives between a person's permission and their next intervention.
-
-    Between these it waits. It runs in a thread from `__enter__` to `__exit__`.
-
-    Args:
-        policy: The policy.
-        name: Displayed name.
-        robot: The robot.
-        size: Width and height of the policy's frames, pixels.
-
-    Attributes:
-        note: Its state, for display.
-    """
-
-    def __init__(
-        self, policy: CameraPolicy, name: str, robot: KnownRobot, size: tuple[int, int]
-    ) -> None:
-        self.note = ""
-        self._policy = policy
-        self._ended = threading.Event()
-        self._failure: Exception | None = None
-        self._why = ""
-        self._options: dict[str, Any] = {
-            "robot": robot.address,
-            "key": robot.key,
-            "fingerprint": robot.fingerprint,
-            "size": size,
-            "image": policy.card.eyes != "none",
-            "state": policy.card.state_layout is not None,
-            "interventions": True,
-            "on_reset": "person",
-            "on_waiting": self._wait_for,
-            "reset_timeout_s": _PILOTING_LOOK_EVERY_S,
-            "name": name,
-        }
-        self._thread = threading.Thread(target=self._run, name="pilot", daemon=True)
-
-    def __enter__(self) -> Self:
-        """Start the thread."""
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Release the robot and end the thread."""
-        self._ended.set()
-        self._thread.join(_END_S)
-
-    def require_well(self) -> None:
-        """Raise the error that ended the thread.
-
-        Raises:
-            Exception: If there is one.
-        """
-        if self._failure is not None:
-            raise self._failure
-
-    def _run(self) -> None:
-        try:
-            from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
-
-            env = RemoteVehicleEnv(**self._options)
-            try:
-                while not self._ended.is_set():
-                    # Refused while the robot is disarmed or held by another client.
-                    with contextlib.suppress(RobotRefused):
-                        self._drive(env, env.reset()[0])
-            finally:
-                env.close()
-        except Exception as error:  # Raised again in the main thread.
-            self._failure = error
-
-    def _drive(self, env: RemoteVehicleEnv, observation: Any) -> None:
-        """Drive until the episode ends."""
-        self._why, self.note = "", "it drives"
-        while not self._ended.is_set():
-            action = self._policy.predict(*self._perceived(observation))
-            observation, _, terminated, truncated, info = env.step(action)
-            self.note = (
-                "you drive, and the policy watches" if "intervene_action" in info else "it drives"
-            )
-            if terminated or truncated:
-                self._why = info["truncated_because"] or "It collided."
-                return
-
-    def _perceived(self, observation: Any) -> tuple[Any, Any]:
-        """Split an observation into frame and state; None for unused parts."""
-        if self._options["image"] and self._options["state"]:
-            return observation["image"], observation["state"]
-        return (observation, None) if self._options["image"] else (None, observation)
-
-    def _wait_for(self, text: str) -> None:
-        self.note = f"{self._why} {text}".strip()
+        facts = RobotFacts.of_welcome(there.welcome)
+    require_fit(policy.card, origin, facts, measures=True)
+    return PolicyDriver(policy, path.stem, robot)

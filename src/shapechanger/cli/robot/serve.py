@@ -21,7 +21,15 @@ import tyro
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.key import robot_at
 from shapechanger.cli.robot.setup import require_pins
-from shapechanger.errors import LinkError, MissingExtra, ProfileError, RobotError, UnknownName
+from shapechanger.demos.cloning.pictures import PolicyError
+from shapechanger.errors import (
+    LinkError,
+    MissingExtra,
+    ProfileError,
+    RobotError,
+    RobotRefused,
+    UnknownName,
+)
 from shapechanger.link.address import Address, is_loopback, parse_address
 from shapechanger.remote.known_robots import KnownRobot, check_name, known_names, recall, remember
 from shapechanger.robot.daemon.credentials import (
@@ -30,6 +38,7 @@ from shapechanger.robot.daemon.credentials import (
     make_credentials,
 )
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.daemon.policies import ENDING, policies_in
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd, supervisor_command
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -92,6 +101,9 @@ class Serve:
     recordings: Path | None = None
     """Folder for the robot's recordings; ~/.local/share/shapechanger/recordings/NAME if not
     given."""
+    policy: Path | None = None
+    """A policy on board, as `shapechanger policies export` writes it, which drives once a person
+    arms the robot for it; or a folder of them, among which the console chooses."""
 
     def run(self) -> None:
         """Become the robot's supervisor; return only on an error."""
@@ -101,6 +113,7 @@ class Serve:
         with contextlib.ExitStack() as undo:
             board = self._board(profile, undo) if self.twin else None
             plan = self._plan(profile, board)
+            self._require_policy(DaemonPlan.from_dict(plan.daemon))
             if board is None:
                 require_pins(profile.guard_plan())
             _require_free(str(plan.daemon["host"]), self.port)
@@ -180,6 +193,7 @@ class Serve:
         """Return the plan for the robot's processes; without a board, on this machine's pins."""
         folder = self.credentials or credentials_folder(profile.name)
         is_twin = board is not None
+        policies, policy = self._policies()
         credentials = (
             make_credentials(folder, profile.name) if is_twin else load_credentials(folder)
         )
@@ -206,6 +220,9 @@ class Serve:
             discovery=self.announce,
             ready_file=str(self.ready_file.absolute()) if self.ready_file else "",
             recordings=str((self.recordings or recordings_folder(profile.name)).absolute()),
+            turning=profile.turning,
+            policies=policies,
+            policy=policy,
         )
         guard = profile.guard_plan()
         if board is None:
@@ -214,6 +231,41 @@ class Serve:
         daemon = msgspec.structs.replace(daemon, camera=camera, clock=self.clock)
         patience_ms = _TWIN_PATIENCE_MS if self.clock == "twin" else 0
         return ServePlan(guard, daemon.to_dict(), board.hardware, patience_ms=patience_ms)
+
+    def _policies(self) -> tuple[str, str]:
+        """Return the folder of the policies on board, and the one that starts with the robot."""
+        if self.policy is None:
+            return "", ""
+        path = self.policy.absolute()
+        return (str(path), "") if path.is_dir() else (str(path.parent), path.stem)
+
+    def _require_policy(self, plan: DaemonPlan) -> None:
+        """Refuse a policy that does not fit the robot, before anything moves."""
+        if self.policy is None:
+            return
+        from shapechanger.cli.robot.pilot import Origin, RobotFacts, require_fit
+        from shapechanger.demos.cloning.onnx_policy import OnnxClone
+
+        files = [self.policy]
+        if self.policy.is_dir():
+            files = [self.policy / f"{name}{ENDING}" for name in policies_in(self.policy)]
+            if not files:
+                raise PolicyError(
+                    f"There is no policy NAME{ENDING} in {self.policy}: "
+                    "`shapechanger policies export` writes one."
+                )
+        elif self.policy.suffix != ENDING:
+            raise PolicyError(
+                f"A policy on board is a file NAME{ENDING}, got {self.policy.name}: "
+                "`shapechanger policies export` writes one."
+            )
+        for file in files:
+            policy = OnnxClone(file)
+            origin = Origin(policy.body, policy.control_hz)
+            try:
+                require_fit(policy.card, origin, RobotFacts.of_plan(plan), measures=False)
+            except (PolicyError, RobotRefused) as error:
+                raise PolicyError(f"{file} cannot drive {plan.robot}: {error}") from error
 
 
 def _limit(slew_per_s: float) -> float:

@@ -28,7 +28,12 @@ def plain(pictures: Tensor, index: Tensor) -> Tensor:
     Returns:
         Pictures in [0, 1], shape (batch, 3, height, width).
     """
-    return pictures[index].permute(0, 3, 1, 2).float() / _BRIGHTEST
+    return scaled(pictures[index])
+
+
+def scaled(pictures: Tensor) -> Tensor:
+    """Return pictures in [0, 1], shape (n, 3, height, width), of uint8 as in `plain`."""
+    return pictures.permute(0, 3, 1, 2).float() / _BRIGHTEST
 
 
 def augmented(

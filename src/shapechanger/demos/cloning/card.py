@@ -119,6 +119,53 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         low, high = np.asarray(self.low, np.float32), np.asarray(self.high, np.float32)
         return (2.0 * (actions - low) / (high - low) - 1.0).astype(np.float32).clip(-1.0, 1.0)
 
+    def actions(self, outputs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the actions for outputs of the network, the inverse of `targets`.
+
+        Args:
+            outputs: Class probabilities, shape (n, classes), or actions in [-1, 1], shape (n, m).
+
+        Returns:
+            Actions, shape (n, m).
+        """
+        if self.classes:
+            return np.asarray(self.classes, np.float32)[outputs.argmax(axis=1)]
+        if not self.low:
+            return outputs
+        low, high = np.asarray(self.low, np.float32), np.asarray(self.high, np.float32)
+        return (low + 0.5 * (outputs + 1.0) * (high - low)).astype(np.float32)
+
+    def require_picture(self, picture: object) -> None:
+        """Refuse a missing picture.
+
+        Raises:
+            CloningError: If the policy sees, and there is no picture.
+        """
+        if self.eyes != "none" and picture is None:
+            raise CloningError("This policy needs a picture, but there is none.")
+
+    def known_states(self, states: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
+        """Return states as the network takes them; None for a policy without a state.
+
+        Args:
+            states: Shape (n, k), NaN for unknown values.
+
+        Raises:
+            CloningError: If they are missing or have another shape.
+        """
+        layout = self.state_layout
+        if layout is None:
+            return None
+        if states is None or states.ndim != 2 or states.shape[1] != layout.size:
+            raise CloningError(
+                f"This policy needs the state {', '.join(layout.names)} with shape "
+                f"(n, {layout.size}), got {'none' if states is None else states.shape}."
+            )
+        known = np.array(states, np.float32)
+        for name in self.unseen:
+            known[:, layout.slices[name]] = np.nan
+        return known
+
     def require_layouts(self, actions: Layout, state: Layout | None = None) -> None:
         """Refuse a robot, an env or data whose layouts differ from the policy's.
 

@@ -113,13 +113,7 @@ class CameraPolicy:
         Raises:
             CloningError: If an input is missing or has another shape.
         """
-        out = self.outputs(pictures, states)
-        if self.card.classes:
-            return np.asarray(self.card.classes, np.float32)[out.argmax(axis=1)]
-        if not self.card.low:
-            return out
-        low, high = (np.asarray(x, np.float32) for x in (self.card.low, self.card.high))
-        return (low + 0.5 * (out + 1.0) * (high - low)).astype(np.float32)
+        return self.card.actions(self.outputs(pictures, states))
 
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
@@ -162,25 +156,14 @@ class CameraPolicy:
             return self.network.hands(found)
 
     def _prepared(self, pictures: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
-        if self.card.eyes == "none":
+        self.card.require_picture(pictures)
+        if self.card.eyes == "none" or pictures is None:
             return None
-        if pictures is None:
-            raise CloningError("This policy needs a picture, but there is none.")
         return prepare(pictures, self.card.framing)
 
     def _state_tensor(self, states: NDArray[np.floating] | None) -> Tensor | None:
-        layout = self.card.state_layout
-        if layout is None:
-            return None
-        if states is None or states.ndim != 2 or states.shape[1] != layout.size:
-            raise CloningError(
-                f"This policy needs the state {', '.join(layout.names)} with shape "
-                f"(n, {layout.size}), got {'none' if states is None else states.shape}."
-            )
-        known = np.array(states, np.float32)
-        for name in self.card.unseen:
-            known[:, layout.slices[name]] = np.nan
-        return torch.as_tensor(known)
+        known = self.card.known_states(states)
+        return None if known is None else torch.as_tensor(known)
 
     def described(self, *, command: str = "", **data: Any) -> CameraPolicy:
         """Return the same policy with more information on its card.

@@ -33,9 +33,10 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
     The camera's frames are warped to the virtual camera of `WaypointEnv`, by the pitch and the
     field of view that the robot's profile states (`shapechanger robot camera` measures them). The
     vehicle turns waypoints into steering by its own `SteeringResponse`. The first reset measures it
-    unless it is given: **the robot drives for 5 s with random commands**, at 0.4 to 0.8 of its
-    throttle, without looking where it goes; its guard's limits and reflexes hold. Put it on free
-    ground for that. The env then waits for the operator again, who puts it at the start.
+    unless the profile states it or it is given: **the robot drives for 5 s with random commands**,
+    at 0.4 to 0.8 of its throttle, without looking where it goes; its guard's limits and reflexes
+    hold. Put it on free ground for that. The env then waits for the operator again, who puts it at
+    the start.
 
     ## Action space and observation space
     Those of `WaypointEnv`.
@@ -46,7 +47,8 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
     Args:
         robot: Name of a known robot, or its address, HOST or HOST:PORT.
         response: Turn for each metre, rad/m, and for each second, rad/s, at full steering, as a
-            former env measured them (`response`); None to measure them in the first reset.
+            former env measured them (`response`); None for those of the robot's profile, or to
+            measure them in the first reset.
         options: Further arguments of `RemoteVehicleEnv`, but for `size`, `state` and `image`.
 
     Attributes:
@@ -67,6 +69,8 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
         self._env = RemoteVehicleEnv(robot, size=None, image=True, state=True, **options)
         try:
             welcome = self._env.welcome
+            if self.response is None and welcome.turning is not None:
+                self.response = SteeringResponse(*welcome.turning)
             size, geometry = _camera_of(welcome)
             self._rectifier = Rectifier(geometry, size)
             self._state_at = _state_places(welcome, self.response is None)

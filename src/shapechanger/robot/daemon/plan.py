@@ -42,6 +42,10 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         discovery: Whether to announce the robot on the local network.
         ready_file: File that the port is written to; "" for none.
         recordings: Folder of the recorded episodes; "" for none.
+        policies: Folder of the policies that may drive on board; "" for none.
+        policy: Name of the one that starts with the robot; "" for none.
+        turning: Turn at full steering, rad for each metre and for each second; None if not
+            measured.
     """
 
     robot: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -68,6 +72,9 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     discovery: bool = True
     ready_file: str = ""
     recordings: str = ""
+    policies: str = ""
+    policy: str = ""
+    turning: tuple[float, float] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the plan as values that JSON can hold."""

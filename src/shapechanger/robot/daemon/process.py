@@ -105,6 +105,7 @@ class Daemon:
                 await self._guard_reported.wait()
             if not self._ended.is_set():
                 port = await server.start()
+                self._hub.policies.serve(port, fingerprint)
                 self._report_ready(port, fingerprint)
                 if plan.discovery and is_loopback(plan.host):
                     words = "%s is not announced: only this machine reaches %s."
@@ -116,6 +117,7 @@ class Daemon:
             # First of all the guard stops the robot, when it sees this socket close.
             self._guard.close()
             self._hub.recorder.end()
+            await self._hub.policies.close()
             if camera is not None:
                 await asyncio.to_thread(camera.close)
             await server.close()

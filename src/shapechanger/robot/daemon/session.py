@@ -38,6 +38,7 @@ from shapechanger.link.messages import (
     Refused,
     Release,
     RobotMessage,
+    RunPolicy,
     Suggest,
     Take,
     Undo,
@@ -297,6 +298,8 @@ class Session:
         self._is_known, self.pace, self._wants_frames = True, hello.pace, hello.frames
         if (recorded := self._hub.recorder.state()).episode:
             self.post(recorded)
+        if self._hub.plan.policies:
+            self.post(self._hub.policies.state())
         return self._welcome()
 
     def receive(self, data: bytes) -> None:
@@ -328,6 +331,8 @@ class Session:
                 self.post(Pong(token=message.token, now_ns=self._hub.now_ns()))
             case Suggest():
                 self._suggest(message)
+            case RunPolicy():
+                self._refuse(self._run_policy(message.policy))
             case Record() | Mark() | Undo() | Browse() | Fetch() | Judge():
                 self._refuse(self._recording(message))
             case Hello():
@@ -471,6 +476,12 @@ class Session:
         reason = f"{self.client.name}: {printable(stop.reason) or 'stop'}"
         self._hub.give_order(Order(kind="emergency", reason=reason))
 
+    def _run_policy(self, name: str) -> str:
+        """Start or end a policy on board. Return the reason for a refusal, or ""."""
+        if self.client.role != "person":
+            return "Only a person can start a policy on this robot, or end it."
+        return self._hub.policies.run(name)
+
     def _recording(self, message: Record | Mark | Undo | Browse | Fetch | Judge) -> str:
         """Handle a request about recordings. Return the reason for a refusal, or ""."""
         if not isinstance(message, Browse | Fetch) and self.client.role != "person":
@@ -520,4 +531,5 @@ class Session:
             clock=plan.clock,
             session=self.client.session,
             can_record=bool(plan.recordings),
+            turning=plan.turning,
         )

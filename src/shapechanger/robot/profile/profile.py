@@ -136,6 +136,8 @@ class Profile(GuardPlan):
             "collision" per collision, "stall" per second of stall, and "collision_ends_episode",
             1 or 0.
         reset: The reset routine; empty for none.
+        turn_deg_per_m: Turn for each metre at full steering, degrees; None if not measured.
+        turn_deg_per_s: Turn for each second at full steering, degrees; None if not measured.
     """
 
     path: Path
@@ -147,6 +149,15 @@ class Profile(GuardPlan):
     arming: Literal["person", "anyone"]
     reward: dict[str, float]
     reset: tuple[ResetStep, ...]
+    turn_deg_per_m: float | None = None
+    turn_deg_per_s: float | None = None
+
+    @property
+    def turning(self) -> tuple[float, float] | None:
+        """Turn at full steering, rad for each metre and for each second; None if not measured."""
+        if self.turn_deg_per_m is None and self.turn_deg_per_s is None:
+            return None
+        return math.radians(self.turn_deg_per_m or 0.0), math.radians(self.turn_deg_per_s or 0.0)
 
     def guard_plan(self) -> GuardPlan:
         """Return only what the guard needs."""

@@ -19,6 +19,7 @@ from shapechanger.robot.profile.pins import HIGHEST_BCM, bcm
 
 _UNITS: Final = {
     "_deg_per_s": "degrees a second",
+    "_deg_per_m": "degrees a metre",
     "_deg": "degrees",
     "_per_s": "per second",
     "_hz": "hertz",
@@ -267,6 +268,10 @@ ROBOT_KEYS: Final = (
     ProfileKey("body", "text"),
     ProfileKey("control_hz", "number", 20.0, low=1.0, high=100.0),
     ProfileKey("calibrated", "date", None),
+    # How fast the robot turns at full steering: by the metre, as with wheels, and by the second, as
+    # with tracks.
+    ProfileKey("turn_deg_per_m", "number", None, low=0.0, high=10_000.0),
+    ProfileKey("turn_deg_per_s", "number", None, low=0.0, high=10_000.0),
 )
 
 ACTION_KEYS: Final = (

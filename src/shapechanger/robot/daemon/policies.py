@@ -1,0 +1,194 @@
+"""Policies on board: each drives from a process of its own, as a client like any other.
+
+The process has no other way to the outputs than the link, so lease, deadline, guard and the person
+who takes over hold for it. A policy that crashes loses its connection, and with it control; one
+that hangs lets the deadline of its last command pass.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import sys
+from asyncio.subprocess import PIPE, Process
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Final, cast
+
+from shapechanger.errors import UnknownName
+from shapechanger.link.address import Address
+from shapechanger.link.authentication import fingerprint_hex
+from shapechanger.link.messages import Policies
+from shapechanger.robot.daemon.plan import DaemonPlan
+
+_log = logging.getLogger(__name__)
+
+ENDING: Final = ".onnx"
+"""Ending of the files of policies that run on board."""
+
+_EVERYWHERE: Final = frozenset({"", "0.0.0.0", "::"})
+_END_S: Final = 2.0  # For a policy to release the robot and exit.
+_MOST_NAMES: Final = 256
+_LONGEST: Final = 1024  # Of a line that a policy's process writes, characters.
+_MODULE: Final = "shapechanger.cli.robot.pilot"
+
+
+def policies_in(folder: Path) -> list[str]:
+    """Return the names of the policies in a folder, in order; none if it cannot be read."""
+    try:
+        files = sorted(path.name for path in folder.iterdir() if path.suffix == ENDING)
+    except OSError:
+        return []
+    return [name.removesuffix(ENDING) for name in files][:_MOST_NAMES]
+
+
+class OnboardPolicies:
+    """Runs at most one policy of a folder.
+
+    Args:
+        plan: Settings of the daemon.
+        post: Sends a message to all clients.
+        command: Command line of a policy's process.
+    """
+
+    def __init__(
+        self,
+        plan: DaemonPlan,
+        post: Callable[[Policies], None],
+        command: Sequence[str] = (sys.executable, "-P", "-m", _MODULE),
+    ) -> None:
+        self._plan = plan
+        self._post = post
+        self._command = command
+        self._robot: dict[str, str] = {}
+        self._running = ""
+        self._text = ""
+        self._task: asyncio.Task[None] | None = None
+
+    def serve(self, port: int, fingerprint: bytes) -> None:
+        """Start the policy that starts with the robot, once the robot can be reached.
+
+        Args:
+            port: Port of the robot.
+            fingerprint: SHA-256 of its certificate; empty without TLS.
+        """
+        host = self._plan.host
+        self._robot = {
+            "name": self._plan.robot,
+            "address": str(Address("127.0.0.1" if host in _EVERYWHERE else host, port)),
+            "key": Path(self._plan.key_file).read_text().strip() if self._plan.key_file else "",
+            "fingerprint": fingerprint_hex(fingerprint) if fingerprint else "insecure",
+        }
+        if self._plan.policy and (refusal := self.run(self._plan.policy)):
+            _log.warning("%s", refusal)
+
+    def state(self) -> Policies:
+        """Return the message that describes the policies."""
+        names = policies_in(Path(self._plan.policies)) if self._plan.policies else []
+        return Policies(names=tuple(names), running=self._running, text=self._text)
+
+    def run(self, name: str) -> str:
+        """Start a policy in place of the one that runs, or end that one.
+
+        Args:
+            name: Name of the policy; "" to end the one that runs.
+
+        Returns:
+            The reason why it is refused, a sentence; "" if it is not.
+        """
+        if not self._plan.policies:
+            return "This robot has no policies on board: serve it with --policy."
+        names = policies_in(Path(self._plan.policies))
+        if name and name not in names:
+            return str(UnknownName("policy on board", name, names))
+        if name and name == self._running:
+            return f"{name} runs already."
+        before = self._task
+        self._task = asyncio.get_running_loop().create_task(self._supervise(before, name))
+        return ""
+
+    async def close(self) -> None:
+        """End the policy that runs."""
+        await self._end(self._task)
+        self._task = None
+
+    async def _end(self, task: asyncio.Task[None] | None) -> None:
+        if task is not None:
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+
+    async def _supervise(self, before: asyncio.Task[None] | None, name: str) -> None:
+        """Run a policy's process, and report what it says."""
+        await self._end(before)
+        if not name:
+            self._report("", "")
+            return
+        self._report(name, "It starts.")
+        process = await asyncio.create_subprocess_exec(
+            *self._command, stdin=PIPE, stdout=PIPE, limit=_LONGEST
+        )
+        try:
+            text = await self._listen(process, name)
+        finally:
+            await _finish(process)
+            self._running = ""
+        _log.warning("%s ended: %s", name, text)
+        self._report("", f"{name} ended: {text}")
+
+    async def _listen(self, process: Process, name: str) -> str:
+        """Tell a policy's process what to do, report its notes, and return why it ended."""
+        task = {"policy": str(Path(self._plan.policies, name + ENDING)), "robot": self._robot}
+        assert process.stdin is not None
+        assert process.stdout is not None
+        failure = ""
+        try:
+            # The key goes through a pipe, because others can read a command line. The pipe stays
+            # open: its end tells the process that this one is gone.
+            process.stdin.write(json.dumps(task).encode() + b"\n")
+            await process.stdin.drain()
+            while line := await process.stdout.readline():
+                said = _decoded(line)
+                if "failed" in said:
+                    failure = str(said["failed"])
+                elif "note" in said:
+                    self._report(name, str(said["note"]))
+        except (ConnectionError, ValueError) as error:  # It is gone, or wrote too long a line.
+            failure = failure or str(error)
+        code = process.returncode if process.returncode is not None else await _exit(process)
+        return failure or f"its process ended with code {code}."
+
+    def _report(self, running: str, text: str) -> None:
+        if (running, text) != (self._running, self._text):
+            self._running, self._text = running, text
+            self._post(self.state())
+
+
+async def _exit(process: Process) -> int | None:
+    """Return the exit code of a process that has closed its output; None if it lives on."""
+    with contextlib.suppress(TimeoutError):
+        return await asyncio.wait_for(process.wait(), _END_S)
+    return None
+
+
+async def _finish(process: Process) -> None:
+    """End a process: by the end of its input, and by force if it does not follow."""
+    if process.stdin is not None:
+        process.stdin.close()
+    try:
+        await asyncio.wait_for(process.wait(), _END_S)
+    except TimeoutError:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
+
+
+def _decoded(line: bytes) -> dict[str, Any]:
+    """Return what a policy's process said; nothing for anything but a JSON object."""
+    try:
+        said = json.loads(line)
+    except ValueError:
+        return {}
+    return cast("dict[str, Any]", said) if isinstance(said, dict) else {}
