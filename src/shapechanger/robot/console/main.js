@@ -12,6 +12,7 @@ import { describeRobot, Link } from "./link.js";
 import { Log } from "./log.js";
 import { ageOnArrivalMs, Picture } from "./picture.js";
 import { Pilot } from "./pilot.js";
+import { Policies } from "./policies.js";
 import { Readings } from "./readings.js";
 import { Recorder } from "./recorder.js";
 import { listen } from "./shortcuts.js";
@@ -28,6 +29,7 @@ const log = new Log(find("log"));
 const picture = new Picture(find("picture"));
 const status = new Status();
 const recorder = new Recorder(link, log);
+const policies = new Policies(link, log);
 const keyForm = new KeyForm(connect);
 
 const changed = () => driver?.changed();
@@ -95,9 +97,12 @@ link.addEventListener("welcome", ({ detail: welcome }) => {
   actions = new Actions(moves, pilot, () => driver?.changed());
   readings = new Readings(features(welcome.state_layout));
   recorder.begin(welcome.can_record);
+  policies.begin();
   episodes.begin(moves.map(({ name }) => name));
   document.title = welcome.robot;
   setText(find("robot"), welcome.robot);
+  const [wide, high] = welcome.image_size ?? [4, 3];
+  find("stage").style.setProperty("--shape", String(wide / high));
   find("tilt").hidden = !(Tilt.isThere && pilot.hasStick);
   find("steer").dataset.stick = String(pilot.hasStick);
   setText(find("picture-state"), welcome.image_size ? "No picture yet." : "This robot has no camera.");

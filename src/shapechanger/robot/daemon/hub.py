@@ -271,7 +271,7 @@ def _state_events(before: GuardState | None, now: GuardState) -> list[tuple[str,
     if now.emergencies > (0 if before is None else before.emergencies):
         events.append(("emergency", now.stop_reason or "Emergency stop."))
     if now.armed and not (before is not None and before.armed):
-        events.append(("armed", "The outputs may move."))
+        events.append(("armed", "Armed."))
     if before is not None and before.armed and not now.armed:
         events.append(("disarmed", now.stop_reason or "Disarmed."))
     if before is not None and now.bumps > before.bumps:
