@@ -144,6 +144,11 @@ class RobotClient:
         """Last reported state of the robot's recorder, or None."""
         return self._inbox.recorder
 
+    @property
+    def policies(self) -> messages.Policies | None:
+        """Last report of the policies on board, or None."""
+        return self._inbox.policies
+
     def take(self) -> None:
         """Take control.
 
@@ -324,6 +329,22 @@ class RobotClient:
             messages.Undo(seconds=seconds),
             messages.RecorderState,
             accepts=lambda state: state.dropped > before,
+        )
+
+    def run_policy(self, name: str) -> messages.Policies:
+        """Start a policy on board in place of the one that runs; only as a person.
+
+        Args:
+            name: Name of the policy; "" to end the one that runs.
+
+        Raises:
+            RobotRefused: If there is no such policy on board, or it runs already.
+            LinkError: If the robot does not answer in time.
+        """
+        return self._ask_disk(
+            messages.RunPolicy(policy=name),
+            messages.Policies,
+            accepts=lambda state: state.running == name,
         )
 
     def browse(self, before: str = "", timeout_s: float = _DISK_S) -> messages.Recordings:

@@ -10,7 +10,14 @@ from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
 from shapechanger.errors import LinkError, RobotRefused, StaleObservation
-from shapechanger.link.messages import Event, Observation, RecorderState, Refused, RobotMessage
+from shapechanger.link.messages import (
+    Event,
+    Observation,
+    Policies,
+    RecorderState,
+    Refused,
+    RobotMessage,
+)
 
 _Answer = TypeVar("_Answer", bound=RobotMessage)
 
@@ -76,12 +83,14 @@ class Inbox:
     Attributes:
         newest: The newest observation of any age; None before the first.
         recorder: Last reported state of the robot's recorder, or None.
+        policies: Last report of the policies on board, or None.
         failure: Why the link is lost; None while it is up.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self.newest: Received | None = None
         self.recorder: RecorderState | None = None
+        self.policies: Policies | None = None
         self.failure: LinkError | None = None
         self._clock = clock
         self._changed = threading.Condition()
@@ -109,6 +118,8 @@ class Inbox:
                 case _:
                     if isinstance(message, RecorderState):
                         self.recorder = message
+                    elif isinstance(message, Policies):
+                        self.policies = message
                     any(request.offer(message) for request in self._requests)  # The oldest one.
             self._changed.notify_all()
 

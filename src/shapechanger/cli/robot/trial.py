@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, Literal, Self
 
-from shapechanger.cli.robot.trial_driver import Driver
+from shapechanger.cli.robot.trial_driver import FAILURES, Driver
 from shapechanger.errors import LinkError, RobotError, RobotRefused, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.link.authentication import new_key
@@ -80,6 +80,7 @@ class Fault:
         harms: Whether it stops the driving. Otherwise the driver is killed, to measure a stop.
         silences: Whether later commands of the driver do not count.
         guards_late: Whether the guard itself fails, which adds its own promised time.
+        by_policy: Whether a policy drives, as on board, and a person armed the robot for it.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Fault:
     harms: bool = True
     silences: bool = False
     guards_late: bool = False
+    by_policy: bool = False
 
     def limit_ms(self, limits: LimitPlan) -> float:
         """Return the promised time to rest for these limits, ms."""
@@ -143,6 +145,10 @@ def _kill_both(scene: Scene) -> int:
     os.kill(guard, signal.SIGKILL)
     scene.robot.supervisor.kill()
     return at_ns
+
+
+def _fail_policy(number: signal.Signals) -> Make:
+    return _at_once(lambda scene: scene.driver.process.send_signal(number))
 
 
 def _restore_network(scene: Scene) -> None:
@@ -212,6 +218,17 @@ def _list_faults() -> list[Fault]:
             _at_once(lambda s: s.driver.process.send_signal(signal.SIGSTOP)),
             20.0,
             "deadline",
+        ),
+        Fault(
+            "policy killed",
+            _at_once(lambda s: s.driver.process.kill()),
+            20.0,
+            "deadline",
+            by_policy=True,
+        ),
+        *(
+            Fault(f"policy {how}", _fail_policy(number), 20.0, "deadline", by_policy=True)
+            for how, number in FAILURES.items()
         ),
         Fault(
             "network silent",
@@ -337,6 +354,7 @@ _ATTEMPTS: Final = 3
 _UNTIMELY_ATTEMPTS: Final = 10
 _COMMANDS: Final = 4
 _DRIVES_S: Final = 5.0
+_STARTS_S: Final = 30.0
 # Time after the promise for which everything must stay at rest.
 _STAYS_S: Final = 0.3
 _LOOK_S: Final = 0.01
@@ -439,7 +457,7 @@ class Trial:
                 with (
                     robot.operator() as operator,
                     BadNetwork(robot.port) as network,
-                    self._driven(robot, operator, network) as driver,
+                    self._driven(robot, operator, network, fault) as driver,
                 ):
                     scene = Scene(robot, driver, network, operator)
                     result = self._tried(fault, scene, began_ns)
@@ -454,17 +472,20 @@ class Trial:
 
     @contextmanager
     def _driven(
-        self, robot: RunningRobot, operator: Operator, network: BadNetwork
+        self, robot: RunningRobot, operator: Operator, network: BadNetwork, fault: Fault
     ) -> Generator[Driver]:
         """Return a driver of the robot."""
         try:
             _calm(robot)
             operator.place(0)
-            driver = Driver(robot.known_at(f"127.0.0.1:{network.port}"))
+            known = robot.known_at(f"127.0.0.1:{network.port}")
+            driver = Driver(known, by_policy=fault.by_policy)
         except ShapechangerError as error:
             raise _NotDriven(str(error)) from error
         with driver:
             try:
+                if fault.by_policy:
+                    _arm_for_program(robot)
                 driver.await_commands(_COMMANDS)
             except ShapechangerError as error:
                 raise _NotDriven(str(error)) from error
@@ -565,6 +586,18 @@ class Trial:
             RobotError: If no robot runs.
         """
         return self._running().ledger_path
+
+
+def _arm_for_program(robot: RunningRobot) -> None:
+    """Arm the robot as a person, once a program has control."""
+    until_s = time.monotonic() + _STARTS_S
+    with robot.client(role="person", frames=False, name="trial") as person:
+        while not person.ask().message.holder:
+            if time.monotonic() > until_s:
+                raise RobotError("The policy did not take control.")
+            time.sleep(_LOOK_S)
+        person.arm()
+        person.ping()
 
 
 def _calm(robot: RunningRobot) -> None:

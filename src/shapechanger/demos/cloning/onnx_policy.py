@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import logging
 import warnings
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -66,8 +65,11 @@ def export_clone(
         MissingExtra: If onnx or onnxscript is not installed.
         OutputError: If the file cannot be written.
     """
-    if find_spec("onnxscript") is None:
-        raise MissingExtra("onnxscript", "onnx")
+    try:
+        from onnxscript import opset18
+    except ImportError as error:
+        raise MissingExtra("onnxscript", "onnx") from error
+    operators: Any = opset18
     import torch
 
     from shapechanger.demos.cloning.batches import scaled
@@ -93,6 +95,10 @@ def export_clone(
             out = self.network.hands(self.network.perceive(seen, named.get(_STATE)))
             return torch.softmax(out, dim=1) if card.classes else torch.tanh(out)
 
+    def hypot(x: Any, y: Any) -> Any:
+        """Translate the length of an edge, which ONNX lacks."""
+        return operators.Sqrt(operators.Add(operators.Mul(x, x), operators.Mul(y, y)))
+
     many = torch.export.Dim("n", min=1)
     # The exporter warns of packages that this network does not need.
     log = logging.getLogger("torch.onnx")
@@ -108,6 +114,7 @@ def export_clone(
                 output_names=[_OUTPUT],
                 dynamic_shapes=(tuple({0: many} for _ in inputs),),
                 opset_version=_OPSET,
+                custom_translation_table={torch.ops.aten.hypot.default: hypot},
                 dynamo=True,
                 verbose=False,
             )

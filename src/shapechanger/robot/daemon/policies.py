@@ -103,8 +103,8 @@ class OnboardPolicies:
         names = policies_in(Path(self._plan.policies))
         if name and name not in names:
             return str(UnknownName("policy on board", name, names))
-        if name and name == self._running:
-            return f"{name} runs already."
+        if name == self._running:
+            return f"{name} runs already." if name else "No policy runs."
         before = self._task
         self._task = asyncio.get_running_loop().create_task(self._supervise(before, name))
         return ""
@@ -155,8 +155,10 @@ class OnboardPolicies:
                     failure = str(said["failed"])
                 elif "note" in said:
                     self._report(name, str(said["note"]))
-        except (ConnectionError, ValueError) as error:  # It is gone, or wrote too long a line.
-            failure = failure or str(error)
+        except ConnectionError:
+            pass  # It is gone, and its exit code says more.
+        except ValueError:
+            failure = failure or f"its process wrote a line of more than {_LONGEST} characters."
         code = process.returncode if process.returncode is not None else await _exit(process)
         return failure or f"its process ended with code {code}."
 

@@ -1,0 +1,145 @@
+"""Cloned policies as ONNX files: equal actions without PyTorch, and rejection of anything else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+
+from shapechanger.demos.cloning.card import CloneCard
+from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
+from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.envs.vehicle.drivers import CLONES
+from shapechanger.layout import Feature, Layout
+
+_FRAMING = Framing(height=24, width=32)
+_STATE = Layout((Feature("speed", "m/s"), Feature("distance", "m"), Feature("bump", "1")))
+_RNG = np.random.default_rng(0)
+_PICTURE = _RNG.integers(0, 256, (60, 80, 3), dtype=np.uint8)
+_CARDS = {
+    "colours": {},
+    "edges": {"eyes": "edges"},
+    "state": {"eyes": "none", "nerves": (8,), "state_layout": _STATE, "unseen": ("bump",)},
+    "both, several": {"nerves": (8, 4), "state_layout": _STATE, "members": 3},
+    "bounded": {"low": (-0.5, 0.0), "high": (0.5, 1.0)},
+    "classes": {
+        "head": "class",
+        "classes": ((-1.0, 0.5), (0.0, 1.0), (1.0, 0.5)),
+        "class_names": ("left", "forward", "right"),
+    },
+}
+
+
+def _policy(**card: Any) -> CameraPolicy:
+    return CameraPolicy.blank(
+        CloneCard(framing=_FRAMING, channels=(4, 6), features=8, **card), seed=1
+    )
+
+
+@pytest.mark.parametrize("kind", _CARDS)
+def test_actions_are_those_of_the_network(kind: str, tmp_path: Path) -> None:
+    """For pictures, states with unknown values, and each kind of output."""
+    policy, file = _policy(**_CARDS[kind]), tmp_path / "policy.onnx"
+    export_clone(policy, file, body="car", control_hz=20.0)
+    exported = OnnxClone(file)
+    assert (exported.card, exported.body, exported.control_hz) == (policy.card, "car", 20.0)
+    state = np.array([1.5, np.nan, 1.0], np.float32) if policy.card.state_size else None
+    picture = None if policy.card.eyes == "none" else _PICTURE
+    np.testing.assert_allclose(
+        exported.predict(picture, state), policy.predict(picture, state), atol=1e-5
+    )
+    assert len(exported.digest) == 12
+
+
+def test_a_shipped_policy_acts_alike(tmp_path: Path) -> None:
+    """A car's clone, on twenty pictures."""
+    policy, file = CameraPolicy.load(CLONES["car"]), tmp_path / "car.onnx"
+    export_clone(policy, file)
+    exported = OnnxClone(file)
+    for picture in _RNG.integers(0, 256, (20, 120, 160, 3), dtype=np.uint8):
+        np.testing.assert_allclose(exported.predict(picture), policy.predict(picture), atol=1e-5)
+
+
+def test_missing_inputs_are_refused(tmp_path: Path) -> None:
+    """As by the policy itself."""
+    file = tmp_path / "policy.onnx"
+    export_clone(_policy(**_CARDS["both, several"]), file)
+    exported = OnnxClone(file)
+    with pytest.raises(CloningError, match="needs a picture"):
+        exported.predict(None, np.zeros(3))
+    with pytest.raises(CloningError, match=r"needs the state speed, distance, bump"):
+        exported.predict(_PICTURE, np.zeros(2))
+
+
+def test_a_change_of_the_file_changes_nothing(tmp_path: Path) -> None:
+    """The file is read once."""
+    file = tmp_path / "policy.onnx"
+    export_clone(_policy(), file)
+    exported = OnnxClone(file)
+    before = exported.predict(_PICTURE)
+    file.write_bytes(b"something else")
+    np.testing.assert_array_equal(exported.predict(_PICTURE), before)
+
+
+def _model(operator: str = "Identity", domain: str = "", card: str = "") -> bytes:
+    make: Any = helper
+    node = make.make_node(operator, ["x"], ["y"], domain=domain)
+    sides = [make.make_tensor_value_info(name, TensorProto.FLOAT, ["n", 2]) for name in "xy"]
+    graph = make.make_graph([node], "other", sides[:1], sides[1:])
+    domains = [make.make_opsetid("", 17), *([make.make_opsetid(domain, 1)] if domain else [])]
+    model = make.make_model(graph, opset_imports=domains, ir_version=8)
+    if card:
+        make.set_model_props(model, {"shapechanger-clone": card})
+    return model.SerializeToString()
+
+
+def _card(**changes: Any) -> str:
+    whole = {"clone": _policy(**changes).card, "body": "", "control_hz": None}
+    return msgspec.json.encode(whole).decode()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "not a cloned policy"),
+        (b"\x08\x08garbage", "not a cloned policy"),
+        (_model(), "no card of Shapechanger"),
+        (_model(card="{}"), "missing required field"),
+        (_model(card=_card()), "its card says"),
+        # An operator that only the provider of somebody's accelerator has.
+        (_model("Turbo", domain="com.accelerator"), "com.accelerator"),
+    ],
+)
+def test_other_files_are_refused(content: bytes, words: str, tmp_path: Path) -> None:
+    """One sentence says why, and how to get a policy."""
+    file = tmp_path / "policy.onnx"
+    file.write_bytes(content)
+    with pytest.raises(PolicyError, match="policies export") as refusal:
+        OnnxClone(file)
+    assert words in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    """The error names it."""
+    with pytest.raises(PolicyError, match="There is no policy file"):
+        OnnxClone(tmp_path / "policy.onnx")
+
+
+def test_a_valid_file_passes_the_checker(tmp_path: Path) -> None:
+    """Other programs can run it."""
+    file = tmp_path / "policy.onnx"
+    export_clone(_policy(), file)
+    model: Any = onnx.load(str(file))
+    checker: Any = onnx
+    checker.checker.check_model(model)
+    assert [side.name for side in (*model.graph.input, *model.graph.output)] == [
+        "picture",
+        "output",
+    ]

@@ -1,0 +1,180 @@
+"""Policies on board: starting, choosing and ending their processes."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+
+from shapechanger.link.messages import Policies, Refused, RunPolicy
+from shapechanger.robot.daemon import policies
+from shapechanger.robot.daemon.policies import OnboardPolicies
+from tests.robot.daemon.plans import car_plan
+from tests.robot.daemon.running import running, until
+
+# Stands for a policy's process: repeats its task, and does what the policy's name says.
+_PROCESS = """
+import json, sys, time
+task = json.loads(sys.stdin.readline())
+name = task["policy"].rsplit("/", 1)[-1].removesuffix(".onnx")
+def tell(**said):
+    print(json.dumps(said), flush=True)
+tell(note=json.dumps(task["robot"]))
+if name == "bad":
+    tell(failed="It gave NaN.")
+elif name == "crash":
+    raise SystemExit(7)
+elif name == "babble":
+    print("x" * 5000, flush=True)
+    sys.stdin.read()
+elif name == "deaf":
+    tell(note="deaf")
+    while True:
+        time.sleep(60)
+else:
+    print("not JSON", flush=True)
+    print("[1]", flush=True)
+    tell(note="it drives")
+    sys.stdin.read()
+"""
+_COMMAND = (sys.executable, "-c", _PROCESS)
+_NAMES = ("babble", "bad", "crash", "deaf", "student", "teacher")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with policies, and something else."""
+    for name in _NAMES:
+        (tmp_path / f"{name}.onnx").write_bytes(b"")
+    (tmp_path / "readme.txt").write_text("")
+    return tmp_path
+
+
+def _play(
+    script: Callable[[OnboardPolicies, list[Policies]], Awaitable[None]], **plan: str
+) -> None:
+    async def run() -> None:
+        said: list[Policies] = []
+        one = OnboardPolicies(car_plan(**plan), said.append, _COMMAND)
+        one.serve(5000, b"\x01" * 32)
+        await script(one, said)
+        await one.close()
+
+    asyncio.run(run())
+
+
+def test_a_policy_starts_with_the_robot(folder: Path) -> None:
+    """It gets the robot's address and fingerprint, and its notes are told to all."""
+
+    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+        await until(lambda: said and said[-1].text == "it drives", "it drives")
+        assert [each.running for each in said] == ["student"] * len(said)
+        assert said[-1].names == _NAMES
+        assert said[0].text == "It starts."
+        robot = json.loads(said[1].text)
+        assert (robot["address"], robot["key"]) == ("127.0.0.1:5000", "")
+        assert robot["fingerprint"] == "01" * 32
+        assert one.run("student") == "student runs already."
+
+    _play(script, policies=str(folder), policy="student")
+
+
+def test_another_policy_takes_the_place(folder: Path) -> None:
+    """The first one ends before the second starts; "" ends that."""
+
+    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+        assert one.run("student") == ""
+        await until(lambda: said and said[-1].text == "it drives", "the first drives")
+        assert one.run("teacher") == ""
+        await until(
+            lambda: (said[-1].running, said[-1].text) == ("teacher", "it drives"), "the second"
+        )
+        assert one.run("") == ""
+        await until(lambda: said[-1] == Policies(names=_NAMES), "none runs")
+
+    _play(script, policies=str(folder))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("bad", "bad ended: It gave NaN."),
+        ("crash", "crash ended: its process ended with code 7."),
+        ("babble", "babble ended: its process wrote a line of more than 1024 characters."),
+    ],
+)
+def test_a_policy_that_ends_is_reported(folder: Path, name: str, words: str) -> None:
+    """With its reason; another one can start."""
+
+    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+        assert one.run(name) == ""
+        await until(lambda: said and said[-1].running == "" and said[-1].text, "it ended")
+        assert said[-1].text.startswith(words)
+        assert one.run("student") == ""
+        await until(lambda: said[-1].text == "it drives", "another drives")
+
+    _play(script, policies=str(folder))
+
+
+def test_a_deaf_policy_is_killed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that does not follow the end of its input."""
+    monkeypatch.setattr(policies, "_END_S", 0.05)
+
+    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+        assert one.run("deaf") == ""
+        await until(lambda: said and said[-1].text == "deaf", "it hears nothing")
+        assert one.run("") == ""
+        await until(lambda: said[-1].running == "", "it is gone")
+
+    _play(script, policies=str(folder))
+
+
+def test_an_unknown_policy_is_refused(folder: Path) -> None:
+    """The nearest name is suggested, and nothing starts."""
+
+    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+        assert "Did you mean 'student'?" in one.run("studnt")
+        assert one.run("../student") != ""
+        assert said == []
+
+    _play(script, policies=str(folder))
+
+
+def test_a_robot_without_policies_refuses() -> None:
+    """The refusal says how to serve it with one."""
+
+    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+        assert "--policy" in one.run("student")
+        assert one.state() == Policies(names=())
+
+    _play(script)
+
+
+def test_a_folder_that_is_gone_has_no_policies(tmp_path: Path) -> None:
+    """The robot is served all the same."""
+
+    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+        assert one.state().names == ()
+
+    _play(script, policies=str(tmp_path / "gone"), policy="student")
+
+
+@pytest.mark.realtime
+def test_only_a_person_starts_a_policy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each new client is told which there are; programs are refused."""
+
+    async def script() -> None:
+        async with running(car_plan(policies=str(folder)), monkeypatch) as robot:
+            async with robot.client(role="program") as program:
+                assert (await program.expect(Policies)).names == _NAMES
+                await program.send(RunPolicy(policy="student"))
+                assert "Only a person" in (await program.expect(Refused)).reason
+            async with robot.client(role="person") as person:
+                await person.send(RunPolicy(policy="studen"))
+                assert "student" in (await person.expect(Refused)).reason
+
+    asyncio.run(script())
