@@ -176,6 +176,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "vehicles-students": vehicles.students,
     "vehicles-expert": vehicles.expert,
     "vehicles-clone": vehicles.clone,
+    "vehicles-on-board": vehicles_twin.on_board,
     "vehicles-twin": vehicles_twin.twin,
     "vehicles-pairs": vehicles_studies.pairs,
     "vehicles-lenses": vehicles_studies.lenses,

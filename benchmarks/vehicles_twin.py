@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import tempfile
+import time
 from collections.abc import Callable
 from contextlib import closing
+from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
@@ -13,9 +18,10 @@ from benchmarks.clones import find_clone, sighted
 from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
+from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
 from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.evaluation import Act, DriveResult, DriveScore, drive
+from shapechanger.envs.vehicle.evaluation import METRES, Act, DriveResult, DriveScore, drive
 from shapechanger.layout import Layout
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import run_robot
@@ -79,6 +85,98 @@ def twin(vehicle: str = "car") -> list[Row]:
         )
         rows += _compared(f"{vehicle}, served, {clock} clock, {pace}", here, there)
     return rows
+
+
+_ON_BOARD_S: Final = 60.0
+_PICTURES: Final = 2000
+_PERIOD_MS: Final = 50.0
+
+
+def on_board(vehicle: str = "car") -> list[Row]:
+    """Measure the exported clone: in process, and on board of a twin in real time, on one core.
+
+    On board a collision ends a course, because a person has to put the vehicle back.
+    """
+    clone = find_clone(vehicle)
+    if clone is None:
+        raise RuntimeError(f"No clone of a {vehicle} is shipped.")
+    with tempfile.TemporaryDirectory() as place:
+        file = Path(place, f"{vehicle}.onnx")
+        export_clone(clone, file, body=vehicle, control_hz=1e3 / _PERIOD_MS)
+        rows = [_inference_row(vehicle, OnnxClone(file))]
+        courses = layouts(LAYOUTS)
+        with closing(VehicleEnv(vehicle, courses="held-out", image=True, put_back=True)) as env:
+            here = DriveScore.of([drive(env, sighted(clone), course=c) for c in courses])
+        drives: list[DriveResult] = []
+        periods: list[float] = []
+        for course in courses:
+            result, ms = _driven_on_board(vehicle, file, course)
+            drives.append(result)
+            periods += ms
+        rows += _compared(f"{vehicle}, policy on board, real clock", here, DriveScore.of(drives))
+    p50, p99 = np.percentile(periods, [50, 99])
+    late = float(np.mean(np.array(periods) > 1.5 * _PERIOD_MS))
+    return [
+        *rows,
+        Row(
+            f"{vehicle}, policy on board: time between two commands, on one core",
+            f"p50 {p50:.1f}, p99 {p99:.1f} ms",
+            f"{len(periods)} commands, {late:.2%} half a period late or more; the twin, its "
+            "renderer and the watching client share the other cores",
+            "p99 < 75 ms",
+            bool(p99 < 1.5 * _PERIOD_MS),
+        ),
+    ]
+
+
+def _inference_row(vehicle: str, policy: OnnxClone) -> Row:
+    pictures = np.random.default_rng(0).integers(0, 256, (20, 120, 160, 3), dtype=np.uint8)
+    times: list[float] = []
+    for i in range(_PICTURES):
+        begins = time.perf_counter()
+        policy.predict(pictures[i % len(pictures)])
+        times.append(1e3 * (time.perf_counter() - begins))
+    p50, p99 = np.percentile(times, [50, 99])
+    return Row(
+        f"{vehicle}, exported clone: time for a picture of 160x120, on one core",
+        f"p50 {p50:.2f}, p99 {p99:.2f} ms",
+        f"{_PICTURES} pictures, reduced and judged by onnxruntime",
+        "p99 < 50 ms",
+        bool(p99 < _PERIOD_MS),
+    )
+
+
+def _driven_on_board(vehicle: str, file: Path, course: int) -> tuple[DriveResult, list[float]]:
+    """Return a drive of a policy on board, and the times between its commands, ms."""
+    profile = find_profile(f"lab-{vehicle}")
+    arguments = ("--policy", str(file))
+    times_ns: list[int] = []
+    with (
+        run_robot(profile, clock="real", seed=course, arguments=arguments) as robot,
+        robot.operator() as operator,
+        robot.client(role="person", frames=False) as person,
+    ):
+        while person.ask().message.holder != file.stem:
+            time.sleep(0.05)
+        words = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "robot.pilot"]
+        pilot = int(subprocess.check_output(words).split()[0])
+        os.sched_setaffinity(pilot, {min(os.sched_getaffinity(0))})
+        operator.place(course)
+        person.arm()
+        where = operator.where()
+        began_ns = where.t
+        while (
+            where.truth["progress_m"] < METRES
+            and where.t - began_ns < 1e9 * _ON_BOARD_S
+            and not where.truth["collisions"]
+        ):
+            seen = person.ask().message
+            if seen.command_ns is not None and seen.command_ns not in times_ns[-1:]:
+                times_ns.append(seen.command_ns)
+            where = operator.where()
+    came, took_s = where.truth["progress_m"], (where.t - began_ns) / 1e9
+    result = DriveResult(course, came, took_s, int(where.truth["collisions"]), came >= METRES)
+    return result, (np.diff(times_ns) / 1e6).tolist()
 
 
 def _compared(name: str, here: DriveScore, there: DriveScore) -> list[Row]:

@@ -13,6 +13,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
+from shapechanger.demos.cloning.card import CloneCard
+from shapechanger.demos.cloning.onnx_policy import export_clone
+from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.remote.client import RobotClient
@@ -155,7 +159,7 @@ def test_a_page_reconnects_after_a_restart_and_moves_nothing(
     arguments = (*IN_A_ROOM, "--port", str(port))
     profile = write_profile(tmp_path, PATIENT_CAR)
     with (
-        run_robot(profile, folder=tmp_path, arguments=arguments) as robot,
+        run_robot(car, folder=tmp_path, arguments=arguments) as robot,
         Console(chromium, robot) as console,
     ):
         console.arm()
@@ -241,3 +245,45 @@ def test_sliders_drive_a_finger(chromium: Browser, tmp_path: Path) -> None:
             lambda: observer.ask().message.action_applied == pytest.approx(wanted, abs=0.01), 60.0
         )
         console.stop()
+
+
+def test_a_policy_on_board_is_chosen_started_and_ended(chromium: Browser, tmp_path: Path) -> None:
+    """The page shows which one runs and what it does; it drives once a person arms the robot."""
+    car = write_profile(tmp_path, PATIENT_CAR)
+    card = CloneCard(
+        framing=Framing(),
+        channels=(1,),
+        features=1,
+        eyes="none",
+        nerves=(1,),
+        action_layout=car.action_layout(),
+        state_layout=car.state_layout(),
+        low=(0.3, 0.3),
+        high=(0.3, 0.3),
+    )
+    folder = tmp_path / "policies"
+    for name in ("novice", "student"):
+        export_clone(CameraPolicy.blank(card, seed=0), folder / f"{name}.onnx")
+    arguments = (*IN_A_ROOM, "--policy", str(folder))
+    with (
+        run_robot(car, folder=tmp_path, arguments=arguments) as robot,
+        Console(chromium, robot) as console,
+    ):
+        pins, page = Pins(robot), console.page
+        console.await_state(link="open", driver="nobody")
+        console.await_words("#policy-state", "None runs.")
+        assert page.locator("#policy-name option").all_inner_texts() == ["novice", "student"]
+        page.select_option("#policy-name", "student")
+        page.click("#policy-run")
+        console.await_state(driver="program", robot="disarmed")
+        console.await_words("#state", "student has control; not armed.")
+        page.click("#arm")
+        pins.await_motion(1.0)
+        console.await_words("#policy-state", "student: it drives")
+        page.click("#policy-run")
+        console.await_state(driver="nobody", robot="disarmed")
+        pins.await_rest()
+        console.await_words("#policy-state", "None runs.")
+        (folder / "student.onnx").write_bytes(b"changed")
+        page.click("#policy-run")
+        console.await_words("#policy-state", "not a cloned policy")

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 _LOOK_EVERY_S: Final = 1.0
 _END_S: Final = 10.0
 _SAME_RATE: Final = 0.01
+_WAITS_ON_BOARD: Final = "It waits until nobody has control and you arm the robot for it."
 
 
 class DrivingPolicy(Protocol):
@@ -175,6 +176,7 @@ class PolicyDriver:
         name: Displayed name.
         robot: The robot.
         on_note: Called with its state whenever that changes.
+        waits: What to say while it waits; "" for what a person at a terminal can do.
 
     Attributes:
         note: Its state, for display.
@@ -186,12 +188,14 @@ class PolicyDriver:
         name: str,
         robot: KnownRobot,
         on_note: Callable[[str], object] = lambda _: None,
+        waits: str = "",
     ) -> None:
         self.note = ""
         self._policy = policy
         self._name = name
         self._robot = robot
         self._on_note = on_note
+        self._waits = waits
         self._ended = threading.Event()
         self._failure: Exception | None = None
         self._why = ""
@@ -287,7 +291,7 @@ class PolicyDriver:
         return (observation, None) if self._sees else (None, observation)
 
     def _wait_for(self, text: str) -> None:
-        self._say(f"{self._why} {text}".strip())
+        self._say(f"{self._why} {self._waits or text}".strip())
 
     def _say(self, note: str) -> None:
         if note != self.note:
@@ -315,7 +319,9 @@ def main() -> int:
         with RobotClient.connect(robot, frames=False) as there:
             facts = RobotFacts.of_welcome(there.welcome)
         require_fit(policy.card, Origin(policy.body, policy.control_hz), facts, measures=False)
-        driver = PolicyDriver(policy, file.stem, robot, lambda note: tell(note=note))
+        driver = PolicyDriver(
+            policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
+        )
         watch = threading.Thread(target=_end_with_input, args=(driver,), daemon=True)
         watch.start()
         driver.run()

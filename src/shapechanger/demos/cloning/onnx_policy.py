@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import PolicyError, prepare
-from shapechanger.demos.episodes.files import write_atomic
+from shapechanger.demos.episodes.files import cannot_write, write_atomic
 from shapechanger.errors import MissingExtra
 
 if TYPE_CHECKING:
@@ -125,6 +125,10 @@ def export_clone(
     entry.key = _CARD
     whole = OnboardCard(clone=card, body=body, control_hz=control_hz)
     entry.value = msgspec.json.encode(whole).decode()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(path, error) from error
     write_atomic(path, model.SerializeToString())
 
 
