@@ -23,6 +23,7 @@ from shapechanger.link.messages import (
     Observation,
     Piece,
     Ping,
+    PolicyState,
     Pong,
     Record,
     RecorderState,
@@ -30,6 +31,7 @@ from shapechanger.link.messages import (
     Refused,
     Release,
     RobotMessage,
+    RunPolicy,
     Suggest,
     Take,
     Undo,
@@ -86,6 +88,7 @@ client_messages: st.SearchStrategy[ClientMessage] = st.one_of(
     st.builds(Browse, before=st.just("") | _episodes),
     st.builds(Fetch, episode=_episodes, first=_counts, count=st.integers(1, 100_000)),
     st.builds(Judge, episode=_episodes, first=_counts, last=_counts, keep=st.booleans()),
+    st.builds(RunPolicy, policy=_texts),
 )
 
 robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
@@ -146,6 +149,12 @@ robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
         dropped=_counts,
         seconds=_numbers,
         marks=_counts,
+        text=_texts,
+    ),
+    st.builds(
+        PolicyState,
+        names=st.lists(_texts, max_size=3).map(tuple),
+        running=_texts,
         text=_texts,
     ),
     st.builds(Recordings, episodes=st.lists(_summaries, max_size=3).map(tuple), more=st.booleans()),

@@ -255,11 +255,11 @@ class Judge(_Message, frozen=True):
 class RunPolicy(_Message, frozen=True):
     """Start of a policy on board, in place of the one that runs; only from a person.
 
-    Answered by `Policies` to all clients, or by `Refused`. The policy is a client of its own, a
+    Answered by `PolicyState` to all clients, or by `Refused`. The policy is a client of its own, a
     program: it waits until nobody has control, takes it, and drives once a person arms the robot.
 
     Attributes:
-        policy: Name of the policy, one of `Policies.names`; "" to end the one that runs.
+        policy: Name of the policy, one of `PolicyState.names`; "" to end the one that runs.
     """
 
     policy: _Name = ""
@@ -535,7 +535,7 @@ class Piece(_Message, frozen=True):
     header: str = ""
 
 
-class Policies(_Message, frozen=True):
+class PolicyState(_Message, frozen=True):
     """The policies on board, sent to a new client and at each change.
 
     Attributes:
@@ -560,7 +560,7 @@ RobotMessage = (
     | RecorderState
     | Recordings
     | Piece
-    | Policies
+    | PolicyState
 )
 
 _ENCODER: Final = msgspec.msgpack.Encoder()

@@ -145,7 +145,7 @@ class RobotClient:
         return self._inbox.recorder
 
     @property
-    def policies(self) -> messages.Policies | None:
+    def policies(self) -> messages.PolicyState | None:
         """Last report of the policies on board, or None."""
         return self._inbox.policies
 
@@ -331,7 +331,7 @@ class RobotClient:
             accepts=lambda state: state.dropped > before,
         )
 
-    def run_policy(self, name: str) -> messages.Policies:
+    def run_policy(self, name: str) -> messages.PolicyState:
         """Start a policy on board in place of the one that runs; only as a person.
 
         Args:
@@ -343,7 +343,7 @@ class RobotClient:
         """
         return self._ask_disk(
             messages.RunPolicy(policy=name),
-            messages.Policies,
+            messages.PolicyState,
             accepts=lambda state: state.running == name,
         )
 

@@ -13,7 +13,7 @@ from shapechanger.errors import LinkError, RobotRefused, StaleObservation
 from shapechanger.link.messages import (
     Event,
     Observation,
-    Policies,
+    PolicyState,
     RecorderState,
     Refused,
     RobotMessage,
@@ -90,7 +90,7 @@ class Inbox:
     def __init__(self, clock: Callable[[], float]) -> None:
         self.newest: Received | None = None
         self.recorder: RecorderState | None = None
-        self.policies: Policies | None = None
+        self.policies: PolicyState | None = None
         self.failure: LinkError | None = None
         self._clock = clock
         self._changed = threading.Condition()
@@ -118,7 +118,7 @@ class Inbox:
                 case _:
                     if isinstance(message, RecorderState):
                         self.recorder = message
-                    elif isinstance(message, Policies):
+                    elif isinstance(message, PolicyState):
                         self.policies = message
                     any(request.offer(message) for request in self._requests)  # The oldest one.
             self._changed.notify_all()

@@ -159,7 +159,7 @@ def test_a_page_reconnects_after_a_restart_and_moves_nothing(
     arguments = (*IN_A_ROOM, "--port", str(port))
     profile = write_profile(tmp_path, PATIENT_CAR)
     with (
-        run_robot(car, folder=tmp_path, arguments=arguments) as robot,
+        run_robot(profile, folder=tmp_path, arguments=arguments) as robot,
         Console(chromium, robot) as console,
     ):
         console.arm()

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.link.messages import Policies, Refused, RunPolicy
+from shapechanger.link.messages import PolicyState, Refused, RunPolicy
 from shapechanger.robot.daemon import policies
-from shapechanger.robot.daemon.policies import OnboardPolicies
+from shapechanger.robot.daemon.policies import PolicyRunner
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import running, until
 
@@ -55,11 +55,11 @@ def folder(tmp_path: Path) -> Path:
 
 
 def _play(
-    script: Callable[[OnboardPolicies, list[Policies]], Awaitable[None]], **plan: str
+    script: Callable[[PolicyRunner, list[PolicyState]], Awaitable[None]], **plan: str
 ) -> None:
     async def run() -> None:
-        said: list[Policies] = []
-        one = OnboardPolicies(car_plan(**plan), said.append, _COMMAND)
+        said: list[PolicyState] = []
+        one = PolicyRunner(car_plan(**plan), said.append, _COMMAND)
         one.serve(5000, b"\x01" * 32)
         await script(one, said)
         await one.close()
@@ -70,7 +70,7 @@ def _play(
 def test_a_policy_starts_with_the_robot(folder: Path) -> None:
     """It gets the robot's address and fingerprint, and its notes are told to all."""
 
-    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         await until(lambda: said and said[-1].text == "it drives", "it drives")
         assert [each.running for each in said] == ["student"] * len(said)
         assert said[-1].names == _NAMES
@@ -86,7 +86,7 @@ def test_a_policy_starts_with_the_robot(folder: Path) -> None:
 def test_another_policy_takes_the_place(folder: Path) -> None:
     """The first one ends before the second starts; "" ends that."""
 
-    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert one.run("student") == ""
         await until(lambda: said and said[-1].text == "it drives", "the first drives")
         assert one.run("teacher") == ""
@@ -94,7 +94,7 @@ def test_another_policy_takes_the_place(folder: Path) -> None:
             lambda: (said[-1].running, said[-1].text) == ("teacher", "it drives"), "the second"
         )
         assert one.run("") == ""
-        await until(lambda: said[-1] == Policies(names=_NAMES), "none runs")
+        await until(lambda: said[-1] == PolicyState(names=_NAMES), "none runs")
 
     _play(script, policies=str(folder))
 
@@ -110,7 +110,7 @@ def test_another_policy_takes_the_place(folder: Path) -> None:
 def test_a_policy_that_ends_is_reported(folder: Path, name: str, words: str) -> None:
     """With its reason; another one can start."""
 
-    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert one.run(name) == ""
         await until(lambda: said and said[-1].running == "" and said[-1].text, "it ended")
         assert said[-1].text.startswith(words)
@@ -124,7 +124,7 @@ def test_a_deaf_policy_is_killed(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     """One that does not follow the end of its input."""
     monkeypatch.setattr(policies, "_END_S", 0.05)
 
-    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert one.run("deaf") == ""
         await until(lambda: said and said[-1].text == "deaf", "it hears nothing")
         assert one.run("") == ""
@@ -136,7 +136,7 @@ def test_a_deaf_policy_is_killed(folder: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_an_unknown_policy_is_refused(folder: Path) -> None:
     """The nearest name is suggested, and nothing starts."""
 
-    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert "Did you mean 'student'?" in one.run("studnt")
         assert one.run("../student") != ""
         assert said == []
@@ -147,9 +147,9 @@ def test_an_unknown_policy_is_refused(folder: Path) -> None:
 def test_a_robot_without_policies_refuses() -> None:
     """The refusal says how to serve it with one."""
 
-    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert "--policy" in one.run("student")
-        assert one.state() == Policies(names=())
+        assert one.state() == PolicyState(names=())
 
     _play(script)
 
@@ -157,7 +157,7 @@ def test_a_robot_without_policies_refuses() -> None:
 def test_a_folder_that_is_gone_has_no_policies(tmp_path: Path) -> None:
     """The robot is served all the same."""
 
-    async def script(one: OnboardPolicies, said: list[Policies]) -> None:
+    async def script(one: PolicyRunner, said: list[PolicyState]) -> None:
         assert one.state().names == ()
 
     _play(script, policies=str(tmp_path / "gone"), policy="student")
@@ -170,7 +170,7 @@ def test_only_a_person_starts_a_policy(folder: Path, monkeypatch: pytest.MonkeyP
     async def script() -> None:
         async with running(car_plan(policies=str(folder)), monkeypatch) as robot:
             async with robot.client(role="program") as program:
-                assert (await program.expect(Policies)).names == _NAMES
+                assert (await program.expect(PolicyState)).names == _NAMES
                 await program.send(RunPolicy(policy="student"))
                 assert "Only a person" in (await program.expect(Refused)).reason
             async with robot.client(role="person") as person:

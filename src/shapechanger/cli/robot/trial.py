@@ -137,6 +137,10 @@ def _signal(program: Literal["guard", "daemon"], number: signal.Signals) -> Make
     return make
 
 
+def _to_driver(number: signal.Signals) -> Make:
+    return _at_once(lambda scene: scene.driver.process.send_signal(number))
+
+
 def _kill_both(scene: Scene) -> int:
     """Kill the supervisor and the guard before either can react."""
     guard = scene.robot.pid_of("guard")
@@ -145,10 +149,6 @@ def _kill_both(scene: Scene) -> int:
     os.kill(guard, signal.SIGKILL)
     scene.robot.supervisor.kill()
     return at_ns
-
-
-def _fail_policy(number: signal.Signals) -> Make:
-    return _at_once(lambda scene: scene.driver.process.send_signal(number))
 
 
 def _restore_network(scene: Scene) -> None:
@@ -212,23 +212,11 @@ def _list_faults() -> list[Fault]:
         "off": "camera off",
     }
     return [
-        Fault("driver killed", _at_once(lambda s: s.driver.process.kill()), 20.0, "deadline"),
-        Fault(
-            "driver stopped",
-            _at_once(lambda s: s.driver.process.send_signal(signal.SIGSTOP)),
-            20.0,
-            "deadline",
-        ),
-        Fault(
-            "policy killed",
-            _at_once(lambda s: s.driver.process.kill()),
-            20.0,
-            "deadline",
-            by_policy=True,
-        ),
+        Fault("driver killed", _to_driver(signal.SIGKILL), 20.0, "deadline"),
+        Fault("driver stopped", _to_driver(signal.SIGSTOP), 20.0, "deadline"),
         *(
-            Fault(f"policy {how}", _fail_policy(number), 20.0, "deadline", by_policy=True)
-            for how, number in FAILURES.items()
+            Fault(f"policy {how}", _to_driver(number), 20.0, "deadline", by_policy=True)
+            for how, number in {"is killed": signal.SIGKILL, **FAILURES}.items()
         ),
         Fault(
             "network silent",
@@ -597,7 +585,6 @@ def _arm_for_program(robot: RunningRobot) -> None:
                 raise RobotError("The policy did not take control.")
             time.sleep(_LOOK_S)
         person.arm()
-        person.ping()
 
 
 def _calm(robot: RunningRobot) -> None:

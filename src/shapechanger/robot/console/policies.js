@@ -11,7 +11,7 @@ export class Policies {
     this.#link = link;
     this.#log = log;
     find("policy-run").addEventListener("click", () => this.#toggle());
-    link.addEventListener("policies", ({ detail }) => this.#show(detail));
+    link.addEventListener("policystate", ({ detail }) => this.#show(detail));
   }
 
   /** Begin a connection; a robot with policies tells them next. */

@@ -17,7 +17,7 @@ from shapechanger.robot.daemon.control import ClientIdentity, ControlLease, Pend
 from shapechanger.robot.daemon.library import RecordingLibrary
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader
 from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.policies import OnboardPolicies
+from shapechanger.robot.daemon.policies import PolicyRunner
 from shapechanger.robot.daemon.recorder import Recorder
 from shapechanger.robot.guard.messages import GuardState, Order
 
@@ -82,7 +82,7 @@ class SessionHub:
         self._suggestion: PendingCommand | None = None
         self.recorder = Recorder(plan, self._broadcast, call)
         self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
-        self.policies = OnboardPolicies(plan, self._broadcast)
+        self.policies = PolicyRunner(plan, self._broadcast)
 
     def join(self, member: Session) -> None:
         """Add the session of an authenticated client.

@@ -20,7 +20,7 @@ from typing import Any, Final, cast
 from shapechanger.errors import UnknownName
 from shapechanger.link.address import Address
 from shapechanger.link.authentication import fingerprint_hex
-from shapechanger.link.messages import Policies
+from shapechanger.link.messages import PolicyState
 from shapechanger.robot.daemon.plan import DaemonPlan
 
 _log = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ def policies_in(folder: Path) -> list[str]:
     return [name.removesuffix(ENDING) for name in files][:_MOST_NAMES]
 
 
-class OnboardPolicies:
+class PolicyRunner:
     """Runs at most one policy of a folder.
 
     Args:
@@ -56,7 +56,7 @@ class OnboardPolicies:
     def __init__(
         self,
         plan: DaemonPlan,
-        post: Callable[[Policies], None],
+        post: Callable[[PolicyState], None],
         command: Sequence[str] = (sys.executable, "-P", "-m", _MODULE),
     ) -> None:
         self._plan = plan
@@ -84,10 +84,10 @@ class OnboardPolicies:
         if self._plan.policy and (refusal := self.run(self._plan.policy)):
             _log.warning("%s", refusal)
 
-    def state(self) -> Policies:
+    def state(self) -> PolicyState:
         """Return the message that describes the policies."""
         names = policies_in(Path(self._plan.policies)) if self._plan.policies else []
-        return Policies(names=tuple(names), running=self._running, text=self._text)
+        return PolicyState(names=tuple(names), running=self._running, text=self._text)
 
     def run(self, name: str) -> str:
         """Start a policy in place of the one that runs, or end that one.
