@@ -18,9 +18,11 @@ from benchmarks.clones import find_clone, sighted
 from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
+from benchmarks.waypoints import taught_source
 from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
-from shapechanger.envs.vehicle import VehicleEnv
+from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
 from shapechanger.envs.vehicle.evaluation import METRES, Act, DriveResult, DriveScore, drive
 from shapechanger.layout import Layout
 from shapechanger.robot.profile.load import find_profile
@@ -93,27 +95,38 @@ _PERIOD_MS: Final = 50.0
 
 
 def on_board(vehicle: str = "car") -> list[Row]:
-    """Measure the exported clone: in process, and on board of a twin in real time, on one core.
+    """Measure policies in process, and on board of a twin in real time, on one core.
 
-    On board a collision ends a course, because a person has to put the vehicle back.
+    One is the shipped clone, the other a clone of a tank's driving that gives waypoints. On board a
+    collision ends a course, because a person has to put the vehicle back.
     """
     clone = find_clone(vehicle)
     if clone is None:
         raise RuntimeError(f"No clone of a {vehicle} is shipped.")
-    with tempfile.TemporaryDirectory() as place:
-        file = Path(place, f"{vehicle}.onnx")
-        export_clone(clone, file, body=vehicle, control_hz=1e3 / _PERIOD_MS)
-        rows = [_inference_row(vehicle, OnnxClone(file))]
-        courses = layouts(LAYOUTS)
-        with closing(VehicleEnv(vehicle, courses="held-out", image=True, put_back=True)) as env:
-            here = DriveScore.of([drive(env, sighted(clone), course=c) for c in courses])
-        drives: list[DriveResult] = []
-        periods: list[float] = []
-        for course in courses:
-            result, ms = _driven_on_board(vehicle, file, course)
-            drives.append(result)
-            periods += ms
-        rows += _compared(f"{vehicle}, policy on board, real clock", here, DriveScore.of(drives))
+    courses = layouts(LAYOUTS)
+    rows: list[Row] = []
+    periods: list[float] = []
+    envs: dict[str, tuple[VehicleEnv | WaypointEnv, CameraPolicy]] = {
+        "clone": (VehicleEnv(vehicle, courses="held-out", image=True, put_back=True), clone),
+        "tank's waypoints": (
+            WaypointEnv(vehicle, courses="held-out", put_back=True),
+            taught_source("tank", 0),
+        ),
+    }
+    for kind, (env, policy) in envs.items():
+        with tempfile.TemporaryDirectory() as place, closing(env):
+            file = Path(place, "policy.onnx")
+            export_clone(policy, file, control_hz=1e3 / _PERIOD_MS)
+            if policy is clone:
+                rows.append(_inference_row(vehicle, OnnxClone(file)))
+            here = DriveScore.of([drive(env, policy.predict, course=c) for c in courses])
+            drives: list[DriveResult] = []
+            for course in courses:
+                result, ms = _driven_on_board(vehicle, file, course)
+                drives.append(result)
+                periods += ms
+            name = f"{vehicle}, {kind} on board, real clock"
+            rows += _compared(name, here, DriveScore.of(drives))
     p50, p99 = np.percentile(periods, [50, 99])
     late = float(np.mean(np.array(periods) > 1.5 * _PERIOD_MS))
     return [

@@ -239,7 +239,7 @@ def whole_robot() -> list[Row]:
 def remote() -> list[Row]:
     """A clone of the tank drives a car behind guard, daemon and link, on the twin's clock."""
     OUT.mkdir(parents=True, exist_ok=True)
-    policy = _source("tank", 0)
+    policy = taught_source("tank", 0)
     drives = [_served("car", policy, course) for course in COURSES[:10]]
     score = DriveScore.of(drives)
     return [
@@ -288,7 +288,7 @@ def _steered(pair: tuple[str, str]) -> list[DriveResult]:
 
 def _train(job: tuple[str, int]) -> None:
     use_one_thread()
-    _source(*job)
+    taught_source(*job)
 
 
 def _driven(job: tuple[str, str, int, bool]) -> list[DriveResult]:
@@ -298,15 +298,20 @@ def _driven(job: tuple[str, str, int, bool]) -> list[DriveResult]:
     kept = OUT / f"{source}-to-{target}-{seed}{'-whole' if whole else ''}.json"
     if kept.exists():
         return [DriveResult(**one) for one in json.loads(kept.read_bytes())]
-    policy = _source(source, seed)
+    policy = taught_source(source, seed)
     with closing(WaypointEnv(target, full_robot=whole, courses="held-out", put_back=True)) as env:
         drives = [drive(env, policy.predict, course=course) for course in COURSES]
     kept.write_text(json.dumps([asdict(one) for one in drives]), encoding="utf-8")
     return drives
 
 
-def _source(name: str, seed: int) -> CameraPolicy:
-    """Clone the demonstrations of a source, of which each of its worlds gives an equal share."""
+def taught_source(name: str, seed: int) -> CameraPolicy:
+    """Clone the demonstrations of a source, of which each of its worlds gives an equal share.
+
+    Args:
+        name: Name of the source in `SOURCES`, or one that steers.
+        seed: Seed of the demonstrations and the training; the policy is kept.
+    """
     path = OUT / f"{name}-{seed}.safetensors"
     if path.exists():
         return CameraPolicy.load(path)

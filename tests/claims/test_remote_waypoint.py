@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -44,11 +45,14 @@ def _lab_car() -> Profile:
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve) -> None:
+def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve, tmp_path: Path) -> None:
     """Its response is that of the same car in simulation; frames and actions are those of all."""
     with closing(WaypointEnv("car")) as simulated:
         expected = simulated.response
-        robot = serve(_lab_car(), "--seed", "3")
+        stated = find_profile("lab-car").read_text(encoding="utf-8")
+        silent = tmp_path / "lab-car.toml"
+        silent.write_text(stated.replace("turn_deg_per_m", "# turn_deg_per_m"), encoding="utf-8")
+        robot = serve(load_profile(silent), "--seed", "3")
         with closing(_env_of(robot)) as env, robot.operator() as operator:
             env.reset(seed=0)
             response = env.unwrapped.response  # pyright: ignore[reportAttributeAccessIssue]
@@ -61,6 +65,18 @@ def test_a_robot_measures_how_it_turns_and_follows_waypoints(serve: Serve) -> No
             assert env.observation_space.contains(seen)
             rewards = [env.step(AHEAD)[1] for _ in range(40)]  # Its reflex ends after 0.75 s.
             assert sum(rewards) > 0.05
+
+
+def test_a_profile_may_state_how_the_robot_turns(serve: Serve) -> None:
+    """The shipped one is that of the simulated car, and the robot need not measure it."""
+    stated = _lab_car().turning
+    assert stated is not None
+    with closing(WaypointEnv("car")) as simulated:
+        expected = simulated.response
+    assert sum(stated) == pytest.approx(expected.per_metre + expected.per_second, rel=0.05)
+    with closing(_env_of(serve(_lab_car(), "--world", "room"))) as env:
+        response = env.unwrapped.response  # pyright: ignore[reportAttributeAccessIssue]
+        assert (response.per_metre, response.per_second) == stated
 
 
 def test_what_a_robot_lacks_is_named(serve: Serve, tmp_path: Any) -> None:
