@@ -133,7 +133,8 @@ def test_a_misspelt_command_has_a_nearest_spelling(
         (["train", "Car", "--teacher"], "error: --teacher needs a value after it"),
         (["train", "Car", "--teacher", "--seed", "1"], "error: --teacher needs a value after it"),
         (["train", "Car", "--teachr", "x"], "matches '--teachr'. Did you mean '--teacher'?"),
-        (["demos", "trian"], "Did you mean 'train'?"),
+        (["demos", "cut", "x", "--frm", "4"], "Did you mean '--from'?"),
+        (["demos", "cut", "x", "--from", "4"], "error: There is no"),
         (["robot", "camera", "--profile", "x"], "No option of `shapechanger robot camera` matches"),
     ],
 )

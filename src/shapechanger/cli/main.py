@@ -134,11 +134,14 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
         StudyError: If its value is missing.
     """
     hints = get_type_hints(kind, include_extras=True)
-    named = {
-        "--" + name.replace("_", "-"): hint
-        for name, hint in hints.items()
-        if tyro.conf.Positional not in getattr(hint, "__metadata__", ())
-    }
+    named: dict[str, Any] = {}
+    for field, hint in hints.items():
+        settings = getattr(hint, "__metadata__", ())
+        if tyro.conf.Positional not in settings:
+            # An option may have another name than its field, such as `from`.
+            other = next((name for one in settings if (name := getattr(one, "name", None))), None)
+            plain = get_args(hint)[0] if settings else hint
+            named["--" + (other or field).replace("_", "-")] = plain
     flags = [name for name, hint in named.items() if hint is bool]
     options = [*named, *(name.replace("--", "--no-", 1) for name in flags), "--help"]
     for word, value in zip(arguments, [*arguments[1:], "--"], strict=True):
