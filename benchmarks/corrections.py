@@ -24,7 +24,6 @@ from benchmarks.vehicles import counted, layouts
 from shapechanger.cli import main
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drivers import ExpertDriver
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 
 LAYOUTS: Final = 100
@@ -143,7 +142,7 @@ def _once(made: Path, command: list[str]) -> None:
 
 def _expert(vehicle: str) -> DriveScore:
     with closing(VehicleEnv(vehicle, courses="held-out", image=False, put_back=True)) as env:
-        act = ExpertDriver(env.world)
+        act = env.expert()
         return DriveScore.of([drive(env, act, course=course) for course in layouts(LAYOUTS)])
 
 

@@ -22,7 +22,6 @@ from shapechanger.bodies.vehicles import VEHICLES
 from shapechanger.cli.train import Train
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.vehicle import RangesEnv, VehicleEnv
-from shapechanger.envs.vehicle.drivers import ExpertDriver
 from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveScore, drive
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 from shapechanger.worlds.course import HELD_OUT
@@ -54,7 +53,7 @@ def _frames_row(vehicle: str) -> Row:
     rates: list[float] = []
     with gym.make(f"shapechanger/{vehicle.capitalize()}-v1", put_back=True) as env:
         inner: Any = env.unwrapped
-        pilot = ExpertDriver(inner.world)
+        pilot = inner.expert()
         # Long drives on one course, so that resets do not count.
         seen, _ = env.reset(seed=0, options={"course": HELD_OUT[0], "start": 0})
         spent = _spent_s(env, pilot, seen)  # The first round warms up.
@@ -129,7 +128,7 @@ def _mujoco_share(env: RangesEnv, start: int) -> float:
 
 def _round_s(env: VehicleEnv | RangesEnv, start: int) -> float:
     env.reset(options={"course": HELD_OUT[0], "start": start})
-    pilot = ExpertDriver(env.world)
+    pilot = env.expert()
     spent = 0.0
     for _ in range(STEPS):
         action = pilot(None)
@@ -243,7 +242,7 @@ def _env(vehicle: str, *, image: bool) -> VehicleEnv:
 
 def _expert_score(vehicle: str, courses: range) -> DriveScore:
     with closing(_env(vehicle, image=False)) as env:
-        return _score(env, ExpertDriver(env.world), courses)
+        return _score(env, env.expert(), courses)
 
 
 def _score(

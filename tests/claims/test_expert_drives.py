@@ -8,7 +8,6 @@ import pytest
 
 from shapechanger.bodies.vehicles import VEHICLES
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drivers import ExpertDriver
 from shapechanger.envs.vehicle.evaluation import DriveScore, drive
 from shapechanger.worlds.course import HELD_OUT
 
@@ -17,7 +16,7 @@ from shapechanger.worlds.course import HELD_OUT
 def test_the_expert_is_fast_and_safe(vehicle: str) -> None:
     """The mean speed from rest is at least 60 % of the top speed."""
     with closing(VehicleEnv(vehicle, image=False, put_back=True)) as env:
-        pilot = ExpertDriver(env.world)
+        pilot = env.expert()
         score = DriveScore.of([drive(env, pilot, course=c, metres=15.0) for c in HELD_OUT[:2]])
     assert score.reached == 1.0
     assert score.collisions == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import suppress
 
 import pytest
 
@@ -124,6 +125,44 @@ def test_a_misspelt_command_has_a_nearest_spelling(
         main(arguments)
     assert stopped.value.code == 2
     assert hint in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["train", "Car", "--teacher"], "error: --teacher needs a value after it"),
+        (["train", "Car", "--teacher", "--seed", "1"], "error: --teacher needs a value after it"),
+        (["train", "Car", "--teachr", "x"], "matches '--teachr'. Did you mean '--teacher'?"),
+        (["demos", "cut", "x", "--frm", "4"], "Did you mean '--from'?"),
+        (["demos", "cut", "x", "--from", "4"], "error: There is no"),
+        (["robot", "camera", "--profile", "x"], "No option of `shapechanger robot camera` matches"),
+    ],
+)
+def test_an_option_that_is_unknown_or_lacks_its_value_is_one_sentence(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    """The parser's own answer is a box."""
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["policies", "list", "--no-references"], ["suite", "list"], ["methods"], ["train", "--help"]],
+)
+def test_flags_and_help_are_options(
+    capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    """They take no value, and flags have a form with `no`."""
+    with suppress(SystemExit):  # Help exits.
+        main(arguments)
+    said = capsys.readouterr()
+    assert said.out
+    assert not said.err
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Here no disk is always full.")

@@ -7,7 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Any, Final, NoReturn, get_args, get_type_hints
+from typing import Annotated, Any, Final, NoReturn, get_args, get_origin, get_type_hints
 
 from shapechanger.errors import MissingExtra, ShapechangerError, StudyError, UnknownName
 
@@ -70,7 +70,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             stream.reconfigure(errors="replace")
     try:
         given = sys.argv[1:] if arguments is None else arguments
-        _require_commands(given)
+        said, leaf_class = _require_commands(given)
+        if leaf_class is not None:
+            _require_options(given, said, leaf_class)
         _require_single(given)
         command = tyro.cli(
             _Command,
@@ -104,16 +106,54 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _stop(f"error: Not everything could be printed: {error.strerror}.", _WRONG_USAGE)
 
 
-def _require_commands(arguments: Sequence[str]) -> None:
-    """Raise UnknownName, with the nearest spelling, for a command that does not exist."""
+def _require_commands(arguments: Sequence[str]) -> tuple[str, type | None]:
+    """Return the words of the command and its class; None if it has no subcommand yet.
+
+    Raises:
+        UnknownName: If there is no such command.
+    """
     said, kinds = "shapechanger", _commands(_Command)
     for word in arguments:
         name = word.replace("_", "-")  # As tyro.
-        if not kinds or word.startswith("-"):
-            return
+        if word.startswith("-"):
+            break
         if name not in kinds:
             raise UnknownName(f"command of `{said}`", word, kinds)
-        said, kinds = f"{said} {name}", _commands(kinds[name])
+        said, kind = f"{said} {name}", kinds[name]
+        kinds = _commands(kind)
+        if not kinds:
+            return said, kind
+    return said, None
+
+
+def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
+    """Raise an error of one sentence for an option that no parser can read.
+
+    Raises:
+        UnknownName: If the command has no such option.
+        StudyError: If its value is missing.
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    named: dict[str, Any] = {}
+    for field, hint in hints.items():
+        settings = getattr(hint, "__metadata__", ())
+        if tyro.conf.Positional not in settings:
+            # An option may have another name than its field, such as `from`.
+            other = next((name for one in settings if (name := getattr(one, "name", None))), None)
+            plain = get_args(hint)[0] if settings else hint
+            named["--" + (other or field).replace("_", "-")] = plain
+    flags = [name for name, hint in named.items() if hint is bool]
+    options = [*named, *(name.replace("--", "--no-", 1) for name in flags), "--help"]
+    for word, value in zip(arguments, [*arguments[1:], "--"], strict=True):
+        if not word.startswith("--"):
+            continue
+        given, equals, _ = word.partition("=")
+        option = given.replace("_", "-")  # As tyro.
+        if option not in options:
+            raise UnknownName(f"option of `{said}`", given, sorted(options))
+        takes = option in named and option not in flags and get_origin(named[option]) is not tuple
+        if takes and not equals and value.startswith("--"):
+            raise StudyError(f"{given} needs a value after it: see `{said} --help`.")
 
 
 def _require_single(arguments: Sequence[str]) -> None:

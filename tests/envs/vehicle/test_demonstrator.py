@@ -93,6 +93,8 @@ def test_another_control_rate_is_refused(tmp_path: Path) -> None:
     with closing(VehicleEnv("car", robot=slow, image=False)) as env:
         with pytest.raises(ProfileError, match=r"control_hz = 10.*20 actions a second"):
             env.demonstrator(1)
+        with pytest.raises(ProfileError, match=r"control_hz = 10.*20 actions a second"):
+            env.expert()
         with pytest.raises(ProfileError, match=r"set control_hz = 20"):
             env.taught_by(lambda seen: seen[:, :2], 1)
     with closing(WaypointEnv("car", robot=slow)) as env, pytest.raises(ProfileError, match="20"):

@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 
 from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.drivers import ExpertDriver
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive, poisson_interval
 from shapechanger.errors import WorldError
 from shapechanger.worlds.course import HELD_OUT
@@ -81,7 +80,7 @@ def test_a_score_needs_a_drive() -> None:
 
 def test_the_expert_reaches_the_distance(car: VehicleEnv) -> None:
     """The drive ends there, without collisions."""
-    done = drive(car, ExpertDriver(car.world), course=HELD_OUT[0], metres=5.0)
+    done = drive(car, car.expert(), course=HELD_OUT[0], metres=5.0)
     assert done.reached
     assert 5.0 <= done.metres < 5.2
     assert done.collisions == 0
@@ -92,7 +91,7 @@ def test_the_expert_reaches_the_distance(car: VehicleEnv) -> None:
 
 def test_a_drive_continues_after_a_collision(car: VehicleEnv) -> None:
     """The collision counts once."""
-    pilot = ExpertDriver(car.world)
+    pilot = car.expert()
 
     def blind_at_first(observation: Any) -> NDArray[np.float32]:
         return pilot(observation) if car.world.collisions else _STRAIGHT

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from shapechanger.envs.vehicle import RangesEnv, VehicleEnv
-from shapechanger.envs.vehicle.drivers import BEARINGS_DEG, FARTHEST_M, ExpertDriver
+from shapechanger.envs.vehicle.drivers import BEARINGS_DEG, FARTHEST_M
 from shapechanger.envs.vehicle.ranges import OutputShaper
 from shapechanger.errors import SpaceMismatch, UnknownName, WorldError
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
@@ -30,7 +30,7 @@ def test_the_fast_env_matches_the_full_robot(vehicle: str) -> None:
     ):
         robot.reset(options=_COURSE)
         fast.reset(options=_COURSE)
-        expert = ExpertDriver(robot.world)
+        expert = robot.expert()
         info: dict[str, Any] = {}
         other: dict[str, Any] = {}
         for _ in range(_STEPS):

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.envs.vehicle import VehicleEnv
+from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
 from shapechanger.errors import EmptyShift, MorphologyError
 
 
@@ -25,8 +25,26 @@ def test_another_vehicle_is_a_shift(blind: dict[str, bool]) -> None:
     assert "length: 0.4 m -> 0.32 m" in text
     assert "driven by: steering and wheels -> left track and right track" in text
     assert "turns on the spot" in text
+    assert "camera's angle below the horizon: 0 degrees -> 3 degrees" in text
     assert "straight ahead at a throttle of 0.5 for 20 steps:" in text
+    assert "then a steering of -0.5" in text
+    assert "waypoints" not in text
     assert "place" not in text  # Both have the corridor as their default world.
+
+
+@pytest.mark.gl
+def test_the_map_of_waypoints_to_each_body_is_shown() -> None:
+    """It is how each body turns at full steering; its actions are a bearing and a speed."""
+    with closing(WaypointEnv("car")) as car, closing(WaypointEnv("tank")) as tank:
+        text = str(WaypointEnv.certify_shift(car, tank))
+        maps = [
+            f"{body.response.per_metre:.2f} rad/m and {body.response.per_second:.2f} rad/s"
+            for body in (car, tank)
+        ]
+    assert f"the map of waypoints to this body: {maps[0]} -> {maps[1]}" in text
+    assert maps[0] != maps[1]
+    assert "straight ahead at a speed of 0.5" in text
+    assert "then a bearing of -0.5" in text
 
 
 def test_the_same_vehicle_is_no_shift(blind: dict[str, bool]) -> None:

@@ -16,7 +16,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.bodies.vehicles import require_fit, vehicle_model
-from shapechanger.envs.vehicle.drivers import Demonstrator, VehicleDemonstrator
+from shapechanger.envs.vehicle.drivers import Demonstrator, ExpertDriver, VehicleDemonstrator
 from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -215,6 +215,15 @@ class DrivingEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def hold_out(self) -> None:
         """Sample held-out courses from the next reset on."""
         self._draw.hold_out()
+
+    def expert(self) -> ExpertDriver:
+        """Return the expert that knows the whole course, without mistakes.
+
+        Raises:
+            ProfileError: If the robot has another control rate than the expert.
+        """
+        self._require_rate_of_expert()
+        return ExpertDriver(self._world)
 
     def demonstrator(self, seed: int) -> Demonstrator:
         """Return an expert that knows the whole course and recovers from its own mistakes.

@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.envs.waypoints import SteeringResponse
 from shapechanger.errors import EmptyShift, MorphologyError
 from shapechanger.worlds.simulation import MujocoWorld
 
@@ -78,7 +79,7 @@ def certify_vehicles(
         changes=tuple(
             f"{what}: {old[what]} -> {new[what]}" for what in old if old[what] != new[what]
         ),
-        answers=_answers(one, two),
+        answers=_answers(one, two, _commands(source)),
         is_empty=one.same_as(two),
     )
     if shift.is_empty and not allow_empty:
@@ -140,11 +141,17 @@ def _drive(env: gym.Env[Any, Any], seed: int) -> _Driven:
     )
 
 
-def _answers(one: _Driven, two: _Driven) -> tuple[str, ...]:
+def _commands(env: gym.Env[Any, Any]) -> tuple[str, str]:
+    """Return what the two numbers of an action are called: sideways and forward."""
+    return ("bearing", "speed") if hasattr(env.unwrapped, "response") else ("steering", "throttle")
+
+
+def _answers(one: _Driven, two: _Driven, commands: tuple[str, str]) -> tuple[str, ...]:
+    aside, forward = commands
     sentences = [
-        f"straight ahead at a throttle of {_THROTTLE:g} for {_STEPS // 2} steps: "
+        f"straight ahead at a {forward} of {_THROTTLE:g} for {_STEPS // 2} steps: "
         f"{one.straight_m:.2f} m -> {two.straight_m:.2f} m",
-        f"then steering {_STEERING:g} for as many: turned by {one.turned_deg:.0f} -> "
+        f"then a {aside} of {_STEERING:g} for as many: turned by {one.turned_deg:.0f} -> "
         f"{two.turned_deg:.0f} degrees",
     ]
     if one.seen[0].shape == two.seen[0].shape:
@@ -162,7 +169,17 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
     world: MujocoWorld = inner.world
     model = world.vehicle
     turning = model.turning_radius_m
-    return {
+    response: SteeringResponse | None = getattr(inner, "response", None)
+    mapped = (
+        {}
+        if response is None
+        else {
+            "turn at full steering, the map of waypoints to this body": (
+                f"{response.per_metre:.2f} rad/m and {response.per_second:.2f} rad/s"
+            )
+        }
+    )
+    return mapped | {
         "vehicle": model.name,
         "moves": "on water" if model.floats else "on land",
         "driven by": " and ".join(sorted(inner.parts)),
@@ -171,6 +188,7 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
         "top speed": f"{model.top_speed_mps:g} m/s",
         "smallest turning radius": f"{turning:.2f} m" if turning else "0, it turns on the spot",
         "camera above the ground": f"{model.camera.z:g} m",
+        "camera's angle below the horizon": f"{math.degrees(model.camera.pitch_rad):.3g} degrees",
         "camera's angle of view": f"{model.camera.fovy_deg:g} degrees",
         "place": world.course.world,
         "lenses": " and ".join(world.lenses) or "none",
