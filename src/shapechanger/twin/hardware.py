@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from shapechanger.robot.drivers.dynamixel.protocol import ServoReply
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+from shapechanger.robot.drivers.servos.registers import ServoReply
+from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.hardware import Clock
 from shapechanger.twin.board_client import BoardClient, GrantedClock, SteadyClock
 from shapechanger.twin.messages import (

@@ -48,7 +48,7 @@ def test_layouts_are_in_newtons_and_metres() -> None:
     ("text", "words"),
     [
         (_TEXT.replace(_BUS, ""), r"\[output.FDP\] is on a bus: add \[servo_bus\]"),
-        (_TEXT.replace(_SENSOR, ""), "servos need one sensor with the driver dynamixel"),
+        (_TEXT.replace(_SENSOR, ""), "servos need one sensor with the driver bus_servo"),
         (_TEXT + _SENSOR.replace("tendons", "others"), "servos need one sensor"),
         (changed('then = "release"', 'then = "hold"', _TEXT), 'must be "release"'),
         (
@@ -63,11 +63,11 @@ def test_layouts_are_in_newtons_and_metres() -> None:
         (_TEXT.replace("XL330-M077", "XL330-M078", 1), "did you mean 'XL330-M077'"),
         (
             shipped_profiles()["car"].read_text() + "\n[servo_bus]\n",
-            "needs an output with the driver dynamixel",
+            "needs an output with the driver bus_servo",
         ),
         (
             shipped_profiles()["car"].read_text() + "\n" + _SENSOR,
-            r"\[sensor.tendons\] needs outputs with the driver dynamixel",
+            r"\[sensor.tendons\] needs outputs with the driver bus_servo",
         ),
     ],
 )

@@ -3,7 +3,7 @@
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.dynamixel.protocol import ServoReply
+from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.servo import ServoPlan
 
@@ -36,14 +36,17 @@ def _pull(line: SimulatedBus, counts: int = 200) -> None:
     assert errors == [0, 0, 0]
 
 
-def test_a_ping_is_answered_with_model_and_firmware() -> None:
-    """A ping returns the model number and firmware version of the addressed servo."""
-    assert _line(3).execute(2, 1, b"") == {2: ServoReply(0, b"\xa6\x04\x34")}
+def test_a_read_is_answered_by_the_addressed_servo() -> None:
+    """A read of model number and firmware returns those of the addressed servo."""
+    line = _line(3)
+    assert line.execute(2, 2, b"\x00\x00\x02\x00") == {2: ServoReply(0, b"\xa6\x04")}
+    assert line.execute(2, 2, b"\x06\x00\x01\x00") == {2: ServoReply(0, b"\x34")}
 
 
-def test_a_ping_to_an_unknown_id_gets_no_reply() -> None:
-    """No servo replies to an id that is not on the bus."""
-    assert _line().execute(9, 1, b"") == {}
+def test_an_unknown_id_or_instruction() -> None:
+    """No servo replies to an id that is not on the bus; an unknown instruction is refused."""
+    assert _line().execute(9, 2, b"\x00\x00\x02\x00") == {}
+    assert _line().execute(1, 6, b"") == {1: ServoReply(2, b"")}
 
 
 def test_a_mute_servo_silences_those_after_it_in_a_sync_read() -> None:
@@ -119,7 +122,7 @@ def test_any_instruction_feeds_the_watchdog() -> None:
     assert _write(line, 98, 5) == 0
     for _ in range(5):
         line.advance(80 * MS)
-        _ask(line, 2, 1)
+        _ask(line, 2, 2, b"\x06\x00\x01\x00")
     assert line.servos[1].pulls_a > 0.0
     line.advance(110 * MS)
     assert line.servos[1].pulls_a == 0.0
@@ -141,13 +144,12 @@ def test_a_hardware_error_disables_torque_until_a_reboot() -> None:
     line = _line()
     _pull(line)
     line.servos[1].overload()
-    assert _ask(line, 1, 1) == (0x80, b"\xa6\x04\x34")
     assert _read(line, 70, 1) == (0x80, b"\x20")
     assert _read(line, 64, 1) == (0x80, b"\x00")
     assert _write(line, 64, 1) == 0x84
-    assert _ask(line, 1, 8) == (0, b"")
+    line.servos[1].lose_power()
     line.advance(299 * MS)
-    assert _ask(line, 1, 1) is None  # Still booting.
+    assert _read(line, 70, 1) is None  # Still booting.
     line.advance(2 * MS)
     assert _read(line, 70, 1) == (0, b"\x00")
     assert _write(line, 64, 1) == 0

@@ -129,15 +129,20 @@ class Guard:
             self._sense(now_ns)
         now_ns = self._clock.now_ns()  # Reading orders and sensors took time.
         decision = self._apply(now_ns)
-        if is_tick and self._healthy:
-            self._switches.toggle()
+        if is_tick:
+            self._feed()
         self._report(decision, now_ns)
         return min(self._next_tick_ns, self._rules.next_wake_ns(now_ns))
+
+    def _feed(self) -> None:
+        """Feed the enable line while all outputs obey."""
+        if self._healthy:
+            self._switches.toggle()
 
     def _process_orders(self) -> None:
         orders, malformed = self._daemon.orders()
         for order in orders:
-            if order.kind == "arm" and (why := self._outputs.ready()):
+            if order.kind == "arm" and (why := self._outputs.ready(self._feed)):
                 self._refused = (f"Not armed: {why}", None)
                 continue
             if refusal := self._rules.offer(order, self._clock.now_ns()):

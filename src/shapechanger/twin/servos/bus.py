@@ -1,4 +1,4 @@
-"""A simulated bus of Dynamixel servos: executes instructions, and advances when asked to."""
+"""A simulated bus of servos: executes instructions, and advances when asked to."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.protocol import (
+from shapechanger.robot.drivers.servos.registers import (
     READ,
     SYNC_READ,
     SYNC_WRITE,
@@ -31,6 +31,7 @@ class SimulatedBus:
     Attributes:
         servos: Servos by id.
         now_ns: Time of the bus.
+        has_power: Whether the servos have power.
 
     Raises:
         RobotError: If two servos have the same id.
@@ -40,9 +41,11 @@ class SimulatedBus:
         self.servos = {plan.id: SimulatedServo(plan) for plan in plans}
         if len(self.servos) != len(plans):
             raise RobotError("Two servos on a bus cannot have the same id.")
+        self._address_size = next(iter(self.servos.values())).family.address_size
         self._load = EndStops(len(plans)) if load is None else load
         self._travels = [0.0] * len(plans)
         self.now_ns = 0
+        self.has_power = True
 
     def execute(self, servo_id: int, instruction: int, parameters: bytes) -> dict[int, ServoReply]:
         """Execute an instruction and return the replies, by id.
@@ -55,21 +58,30 @@ class SimulatedBus:
         for servo in self.servos.values():
             if servo.is_awake:
                 servo.feed_watchdog()
-        if instruction == SYNC_WRITE:
-            step = 1 + int.from_bytes(parameters[2:4], "little")
-            for start in range(4, len(parameters), step):
-                one, *data = parameters[start : start + step]
-                self._execute(one, WRITE, parameters[:2] + bytes(data))
-            return {}
-        if instruction != SYNC_READ:
+        if instruction not in (SYNC_READ, SYNC_WRITE):
             reply = self._execute(servo_id, instruction, parameters)
             return {} if reply is None else {servo_id: reply}
+        size = self._address_size
+        span, rest = parameters[: 2 * size], parameters[2 * size :]
+        if instruction == SYNC_WRITE:
+            step = 1 + int.from_bytes(span[size:], "little")
+            for start in range(0, len(rest), step):
+                one, *data = rest[start : start + step]
+                self._execute(one, WRITE, span[:size] + bytes(data))
+            return {}
         replies: dict[int, ServoReply] = {}
-        for one in parameters[4:]:
-            if (reply := self._execute(one, READ, parameters[:4])) is None:
+        for one in rest:
+            if (reply := self._execute(one, READ, span)) is None:
                 break
             replies[one] = reply
         return replies
+
+    def set_power(self, *, on: bool) -> None:
+        """Switch the supply of all servos."""
+        if on != self.has_power:
+            self.has_power = on
+            for servo in self.servos.values():
+                servo.set_power(on=on)
 
     def advance(self, ns: int) -> None:
         """Advance time by `ns`."""

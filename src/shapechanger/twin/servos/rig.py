@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
 from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.servos.family import COUNTS_PER_TURN
+from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.motor import EndStops, Load, Tendon
@@ -21,7 +23,7 @@ off. "snapped": its tendon is torn for good. "power": its power fails for a mome
 "mute", "deaf" and "hot".
 """
 
-_COUNTS_PER_RAD: Final = 4096 / (2.0 * math.pi)
+_COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
 _HOT_C: Final = 75.0
 _WELL_C: Final = 30.0
 
@@ -59,19 +61,21 @@ class Rig:
     """Servos on a bus, by the names of their tendons.
 
     Args:
-        plan: The robot, which has outputs with the driver "dynamixel".
+        plan: The robot as it is wired, which has servos on a bus.
         world: World of the robot; in a world without tendons the servos pull springs.
 
     Attributes:
         bus: The bus.
+        is_switched: Whether its power comes from the enable line.
 
     Raises:
         RobotError: If the world has other tendons.
     """
 
     def __init__(self, plan: GuardPlan, world: World) -> None:
-        outputs = [output for output in plan.outputs if output.driver == "dynamixel"]
+        outputs = [output for output in plan.outputs if output.driver == DRIVER]
         settings = [output.settings for output in outputs]
+        self.is_switched = not all(map(stops_itself, outputs))
         self._device = settings[0]["device"]
         self._names = tuple(output.name for output in outputs)
         self._world = world if isinstance(world, TendonWorld) else None
@@ -91,21 +95,8 @@ class Rig:
             load = self._world.connect(self._names, self)
         self.bus = SimulatedBus(plans, load)
         self._servos = dict(zip(self._names, self.bus.servos.values(), strict=True))
+        self.bus.set_power(on=not self.is_switched)
         self.settle()
-
-    @classmethod
-    def of(cls, plan: GuardPlan, world: World) -> Rig | None:
-        """Return the rig of a robot; None for one without a servo bus.
-
-        Args:
-            plan: The robot as it is wired.
-            world: World of the robot.
-
-        Raises:
-            RobotError: If the world has other tendons.
-        """
-        has_bus = any(output.driver == "dynamixel" for output in plan.outputs)
-        return cls(plan, world) if has_bus else None
 
     def require(self, device: str) -> None:
         """Raise RobotError if the bus is at another device."""

@@ -6,13 +6,13 @@ import pytest
 from dynamixel_sdk import PacketHandler, PortHandler
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-from shapechanger.robot.drivers.dynamixel.serial_port import PromptPort, open_serial_port
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+from shapechanger.robot.drivers.servos.bus import ServoBus
+from shapechanger.robot.drivers.servos.serial_port import PromptPort, open_serial_port
+from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.servo import ServoPlan
-from tests.robot.drivers.dynamixel.pty import ServoPty
-from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, settings
+from tests.robot.drivers.servos.pty import ServoPty
+from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, settings
 
 # Long enough that a busy machine does not look like a mute servo.
 _PATIENT_MS = 20_000.0
@@ -34,13 +34,13 @@ def _open(bus: BusSettings) -> ServoBus:
     return ServoBus(bus, open_serial_port(bus))
 
 
-def test_the_plain_sdk_pings_and_reads(pty: ServoPty) -> None:
+def test_the_plain_sdk_reads_and_writes(pty: ServoPty) -> None:
     """The unmodified SDK talks to the simulated servos."""
     port, sdk = PortHandler(pty.device), PacketHandler(2.0)
     assert port.setBaudRate(1_000_000)
     # Its own 34 ms would be too short on a busy machine.
     port.setPacketTimeout = lambda _: port.setPacketTimeoutMillis(_PATIENT_MS)
-    assert sdk.ping(port, 5) == (1190, 0, 0)
+    assert sdk.readTxRx(port, 5, 0, 2) == ([0xA6, 4], 0, 0)
     assert sdk.readTxRx(port, 5, 6, 1) == ([52], 0, 0)
     assert sdk.writeTxRx(port, 5, 64, 1, [1]) == (0, 0)
     assert sdk.writeTxRx(port, 5, 11, 1, [0]) == (0, 7)  # Locked while it has torque.

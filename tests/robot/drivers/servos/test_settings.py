@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
-from tests.robot.drivers.dynamixel.rigs import servo, settings
+from shapechanger.robot.drivers.servos.settings import BusSettings
+from tests.robot.drivers.servos.rigs import servo, settings
 
 _NAN = float("nan")
 

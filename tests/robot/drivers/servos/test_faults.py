@@ -6,10 +6,10 @@ from typing import Literal
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.health import BusState
-from shapechanger.robot.drivers.dynamixel.protocol import ServoReply
+from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.twin.servos.servo import ServoPlan
-from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, settings
+from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, settings
 
 
 def _hot(rig: Rig) -> None:
@@ -174,25 +174,17 @@ def test_hold_after_a_fault_requires_setup() -> None:
 
 
 def test_a_servo_with_a_hardware_error_needs_a_reboot() -> None:
-    """`set_up` reports the error, and `reboot` clears it."""
+    """`set_up` reports the error until the servo has been without power."""
     rig = Rig().start()
     rig.twin("EIP").overload()
     _until(rig, lambda s: s.mode == "off")
     with pytest.raises(RobotError, match=r"EIP .* it is overloaded. Only a reboot"):
         rig.bus.set_up()
-    rig.bus.reboot("EIP")
-    assert "EIP" not in rig.bus.zeros
+    rig.twin("EIP").lose_power()
     rig.line.advance(400_000_000)
     rig.bus.set_up()
     rig.bus.hold()
     assert rig.run(4.0, 10).reason == ""
-
-
-def test_reboot_is_refused_while_held() -> None:
-    """A reboot would release one tendon while the others pull."""
-    rig = Rig().start()
-    with pytest.raises(RobotError, match="cannot be rebooted while the bus is held"):
-        rig.bus.reboot("EIP")
 
 
 @pytest.mark.parametrize("on_trip", ["coast", "release"])

@@ -6,7 +6,7 @@ import pytest
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.twin.servos.servo import ServoPlan
-from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, servo, settings
+from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, servo, settings
 
 
 def test_all_missing_servos_are_named() -> None:

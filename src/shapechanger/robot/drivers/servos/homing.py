@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.health import BusState
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
+from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
 
 # Chosen: half a percent of the longest excursion of a finger's tendon.
 _STILL_M: Final = 0.2e-3
@@ -46,8 +46,8 @@ class Homing:
         failure: Reason why there are no zeros, as a sentence; empty without one.
 
     Raises:
-        RobotError: If the gears' friction of a servo is above its homing tension: it would stand
-            still at once, with its tendon slack.
+        RobotError: If the gears' measured friction of a servo is above its homing tension: it would
+            stand still at once, with its tendon slack.
     """
 
     def __init__(
@@ -59,8 +59,9 @@ class Homing:
         travel_m: float = 0.06,
     ) -> None:
         for servo in settings.servos:
-            friction, pull = servo.friction_n, servo.homing_n
-            if friction is not None and pull <= friction:
+            gears, pull = servo.known.gears, servo.homing_n
+            friction = gears.friction_nm / servo.spool_radius_m
+            if gears.is_measured and pull <= friction:
                 raise RobotError(
                     f"{servo.words} cannot find its zero with {pull:g} N: its gears hold against "
                     f"about {friction:.1f} N. Set homing_n, to {1.5 * friction:.1f} N for example."

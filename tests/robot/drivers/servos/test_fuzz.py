@@ -7,8 +7,8 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from tests.robot.drivers.dynamixel.rigs import Rig
-from tests.robot.drivers.dynamixel.wire import pack, status
+from tests.robot.drivers.servos.rigs import Rig
+from tests.robot.drivers.servos.wire import pack, status
 
 _ids = st.integers(0, 255)
 # Random bytes rarely form a packet, so include valid packets with random content and cut ones.

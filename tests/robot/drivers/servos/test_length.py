@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.dynamixel.homing import Homing
-from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, NAMES, Rig, servo, settings
+from shapechanger.robot.drivers.servos.homing import Homing
+from tests.robot.drivers.servos.rigs import CYCLE_NS, NAMES, Rig, servo, settings
 
 _MOST = dict.fromkeys(NAMES, 20.0)
 
@@ -112,8 +112,9 @@ def test_lengths_without_meaning_are_refused() -> None:
         rig.bus.send(_MOST, {"FDP": math.nan})
     with pytest.raises(UnknownName, match="Did you mean 'FDP'"):
         rig.bus.send(_MOST, {"FDPP": 0.0})
-    rig.bus.release()
-    rig.bus.reboot("FDP")
+    rig.twin("FDP").lose_power()
+    rig.line.advance(400_000_000)
+    rig.run(None, 4)
     with pytest.raises(RobotError, match=r"FDP .* cannot go to a length: it has no zero"):
         rig.bus.send(_MOST, {"FDP": 0.0})
     with pytest.raises(RobotError, match="has control of its tension"):
