@@ -24,12 +24,11 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from shapechanger.robot.drivers.servos.family import COUNTS_PER_TURN, Register
-from shapechanger.robot.drivers.servos.registers import READ, WRITE, ServoReply
+from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import model_named
 from shapechanger.twin.servos.motor import SimulatedMotor, Tendon
 
 # Reasons of refusals.
-_UNKNOWN_INSTRUCTION: Final = 2
 _RANGE: Final = 4
 _LENGTH: Final = 5
 _LIMIT: Final = 6
@@ -139,28 +138,30 @@ class SimulatedServo:
         """Notice a valid instruction on the bus."""
         self._fed_ns = self._now_ns
 
-    def execute(self, instruction: int, parameters: bytes) -> ServoReply:
-        """Execute an instruction and return the reply.
+    def read(self, at: int, size: int) -> ServoReply:
+        """Reply with bytes of the registers.
 
         Args:
-            instruction: Code of the instruction.
-            parameters: Its parameters.
+            at: Address of the first.
+            size: Number of bytes.
         """
-        size, family = self.family.address_size, self.family
-        at = int.from_bytes(parameters[:size], "little")
-        error, data = 0, b""
         try:
-            if instruction == READ:
-                data = self._read(at, int.from_bytes(parameters[size:], "little"))
-            elif instruction == WRITE:
-                self._write(at, parameters[size:])
-            else:
-                raise _Refusal(_UNKNOWN_INSTRUCTION)
+            return self._reply(0, self._read(at, size))
         except _Refusal as refusal:
-            error = refusal.args[0] & family.refused
-        failed = self._values[family.hardware_error.address]
-        # A family that tells no reasons tells the bits of its error.
-        return ServoReply(error | (family.alert if family.refused else failed) * bool(failed), data)
+            return self._reply(refusal.args[0])
+
+    def write(self, at: int, data: bytes) -> ServoReply:
+        """Write one register and reply.
+
+        Args:
+            at: Its address.
+            data: Its bytes.
+        """
+        try:
+            self._write(at, data)
+        except _Refusal as refusal:
+            return self._reply(refusal.args[0])
+        return self._reply(0)
 
     def overload(self) -> None:
         """Set the overload error."""
@@ -197,6 +198,12 @@ class SimulatedServo:
             self._fail(_HOT)
         if self.volts and not self._model.least_v <= self.volts <= self._model.most_v:
             self._fail(_VOLTAGE)
+
+    def _reply(self, refusal: int, data: bytes = b"") -> ServoReply:
+        failed = self._values[self.family.hardware_error.address]
+        if self.family.refused:
+            return ServoReply(refusal | (self.family.alert if failed else 0), data)
+        return ServoReply(failed, data)
 
     def _controlled_a(self) -> float:
         """Return the current that its controller asks for, A."""

@@ -234,12 +234,11 @@ def test_a_goal_that_was_not_applied_is_reported() -> None:
     rig = Rig().start()
     rig.run(4.0, 4)
     servo = rig.twin("PI")
-    taken = servo.execute
+    taken = servo.write
 
-    def deaf_for_goals(instruction: int, parameters: bytes) -> ServoReply:
-        is_goal = (instruction, parameters[0]) == (3, 102)
-        return ServoReply(0, b"") if is_goal else taken(instruction, parameters)
+    def deaf_for_goals(at: int, data: bytes) -> ServoReply:
+        return ServoReply(0, b"") if at == 102 else taken(at, data)
 
-    servo.execute = deaf_for_goals  # type: ignore[method-assign]
+    servo.write = deaf_for_goals  # type: ignore[method-assign]
     state = rig.run(8.0, 8)
     assert "Servo PI (id 7) has a goal of 136 counts, and was sent 273" in state.reason

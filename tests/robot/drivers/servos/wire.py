@@ -5,6 +5,7 @@ from __future__ import annotations
 from dynamixel_sdk import PacketHandler
 
 from shapechanger.robot.drivers.servos.family import DYNAMIXEL, ServoFamily
+from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.twin.servos.bus import SimulatedBus
 
 _SDK = PacketHandler(2.0)
@@ -41,6 +42,28 @@ def size_of(data: bytes | bytearray, family: ServoFamily = DYNAMIXEL) -> int:
     return 7 + int.from_bytes(data[5:7], "little")
 
 
+def instruct(
+    bus: SimulatedBus, servo_id: int, code: int, body: bytes = b""
+) -> dict[int, ServoReply]:
+    """Execute an instruction on the bus and return the replies by servo id."""
+    size = family_of(bus).address_size
+    at, rest = int.from_bytes(body[:size], "little"), body[size:]
+    length, content = int.from_bytes(rest[:size], "little"), rest[size:]
+    match code:
+        case 0x02:
+            return bus.read([servo_id], at, length)
+        case 0x03:
+            return bus.write({servo_id: rest}, at)
+        case 0x82:
+            return bus.read(content, at, length)
+        case 0x83:
+            step = range(0, len(content), length + 1)
+            bus.write({content[i]: content[i + 1 : i + 1 + length] for i in step}, at)
+            return {}
+        case _:
+            return {}
+
+
 def execute(bus: SimulatedBus, packet: bytes) -> dict[int, bytes]:
     """Execute a packet on the bus and return the status packets by servo id.
 
@@ -55,5 +78,5 @@ def execute(bus: SimulatedBus, packet: bytes) -> dict[int, bytes]:
         plain = _SDK.removeStuffing(list(packet))
         end = size_of(bytes(plain[:7])) - 2
         servo_id, code, body = plain[4], plain[7], bytes(plain[8:end])
-    replies = bus.execute(servo_id, code, body)
+    replies = instruct(bus, servo_id, code, body)
     return {one: status(one, reply.error, reply.data, family) for one, reply in replies.items()}

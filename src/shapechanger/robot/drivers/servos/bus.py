@@ -85,7 +85,7 @@ class ServoBus:
         """
         self._mode, self._is_ready = "off", False
         self._goals = dict.fromkeys(self._ids, 0)
-        self._registers.sync_write(self._family.torque_enable, dict.fromkeys(self._ids, 0))
+        self._registers.write_all(self._family.torque_enable, dict.fromkeys(self._ids, 0))
         self._check_servos(alive)
         for servo in self._settings.servos:
             alive()
@@ -219,7 +219,7 @@ class ServoBus:
         enable, holding = self._family.torque_enable, set(self._ids)
         try:
             for _ in range(2):
-                self._registers.sync_write(enable, dict.fromkeys(self._ids, 0))
+                self._registers.write_all(enable, dict.fromkeys(self._ids, 0))
                 torques = self._registers.read_each(enable)
                 holding -= {one for one, torque in torques.items() if torque == 0}
                 if not holding:
@@ -334,8 +334,8 @@ class ServoBus:
                 pull = end + self._ramp_left(now_ns) * (start - end)
             self._goals[servo.id] = servo.goal_count(pull)
         if positions := self._goal_positions():
-            self._registers.sync_write(self._family.goal_position, positions)
-        self._registers.sync_write(self._family.goal, self._goals)
+            self._registers.write_all(self._family.goal_position, positions)
+        self._registers.write_all(self._family.goal, self._goals)
 
     def _goal_positions(self) -> dict[int, int]:
         """Return the goals of the servos with control of the length, in counts, by id."""
@@ -370,7 +370,7 @@ class ServoBus:
 
     def _audit_register(self, register: Register, ids: list[int]) -> set[int]:
         """Evaluate a register of some servos; return those that answered."""
-        answers = self._registers.sync_read(register, ids)
+        answers = self._registers.read_several(register, ids)
         for one, answer in answers.items():
             pulls, goal = self._mode != "off", self._goals[one]
             self._health[one].audit(register, register.decode(answer.data), pulls=pulls, goal=goal)

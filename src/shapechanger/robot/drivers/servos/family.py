@@ -79,7 +79,7 @@ class ServoFamily:
         name: Name of the family.
         protocol: Version of the packets in `dynamixel_sdk`; Feetech's are those of 1.0, with the
             instructions for several servos of 2.0.
-        address_size: Bytes of an address or a length in an instruction.
+        address_size: Bytes of an address, a length or a checksum in a packet.
         most_id: Highest id.
         baud_rates: Baud rates of servos and SDK.
         has_watchdog: Whether a servo stops by itself when its bus is silent. Without, a power

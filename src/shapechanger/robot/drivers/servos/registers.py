@@ -1,4 +1,4 @@
-"""Instructions that read and write registers, independent of how packets travel."""
+"""Reading and writing of registers of servos, independent of how packets travel."""
 
 from __future__ import annotations
 
@@ -7,14 +7,6 @@ from typing import Final, NamedTuple, Protocol
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.family import Register, ServoFamily
-
-BROADCAST: Final = 0xFE
-"""Id that addresses all servos."""
-
-READ: Final = 0x02
-WRITE: Final = 0x03
-SYNC_READ: Final = 0x82
-SYNC_WRITE: Final = 0x83
 
 # A single lost packet must not keep a rig from starting. Cycles never retry.
 _TRIES: Final = 3
@@ -51,25 +43,31 @@ class ServoPort(Protocol):
 
     has_stray: bool
 
-    def exchange(
-        self,
-        servo_id: int,
-        instruction: int,
-        parameters: bytes,
-        ids: Sequence[int],
-        length: int,
-    ) -> dict[int, ServoReply]:
-        """Send an instruction and wait for the replies.
+    def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
+        """Read bytes of several servos and wait for the replies.
 
         Args:
-            servo_id: Id of the addressed servo, or `BROADCAST`.
-            instruction: Code of the instruction.
-            parameters: Its parameters.
-            ids: Servos that reply; empty for an instruction without a reply.
-            length: Bytes of data in each reply; a refusal may have fewer.
+            ids: Ids of the servos, which reply in this order.
+            at: Address of the first byte.
+            size: Number of bytes; a refusal may have fewer.
 
         Returns:
             The replies by id, without servos that did not answer.
+
+        Raises:
+            RobotError: If the bus is gone.
+        """
+        ...
+
+    def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
+        """Write bytes of several servos without a reply, or of one and wait for its reply.
+
+        Args:
+            data: The bytes, equally many for each servo, by id.
+            at: Address of the first byte.
+
+        Returns:
+            The reply of a single servo by its id, if it answered.
 
         Raises:
             RobotError: If the bus is gone.
@@ -84,8 +82,8 @@ class ServoPort(Protocol):
 class RegisterBus:
     """Reads and writes registers of the servos on a bus.
 
-    `poll` reads a register of all servos in each cycle, although some may not answer. In a sync
-    read each servo waits for the one before it, so a silent one may silence those behind it. The
+    `poll` reads a register of all servos in each cycle, although some may not answer. In one packet
+    each servo waits for the one before it, so a silent one may silence those behind it. The
     first missing servo becomes a suspect, and the others are read once more without it. Suspects
     are read alone, one per cycle. So a cycle waits for at most two timeouts, whatever is missing.
 
@@ -105,12 +103,12 @@ class RegisterBus:
     ) -> None:
         self.port = port
         self._device = device
-        self._family = family
+        self._refused = family.refused
         self._ids = tuple(ids)
         self.suspects: list[int] = []
 
     def find(self, servo_id: int, register: Register) -> int | None:
-        """Read a register of one servo; None if it does not answer.
+        """Read a register of one servo; None if it does not answer, even when asked again.
 
         Args:
             servo_id: Id of the servo.
@@ -119,10 +117,11 @@ class RegisterBus:
         Raises:
             RobotError: If it refuses, or the bus is gone.
         """
-        size = register.size
-        parameters = self._number(register.address) + self._number(size)
-        data = self._ask(f"read its {register.name}", servo_id, READ, parameters, size)
-        return None if data is None else register.decode(data)
+        for _ in range(_TRIES):
+            if reply := self.port.read([servo_id], register.address, register.size).get(servo_id):
+                self._check(reply, servo_id, f"read its {register.name}")
+                return register.decode(reply.data)
+        return None
 
     def read(self, servo_id: int, register: Register) -> int:
         """Read a register of one servo.
@@ -136,7 +135,7 @@ class RegisterBus:
         """
         value = self.find(servo_id, register)
         if value is None:
-            raise self._no_answer(servo_id)
+            raise RobotError(f"Servo {servo_id} at {self._device} does not answer.")
         return value
 
     def write(self, servo_id: int, register: Register, value: int) -> None:
@@ -150,13 +149,15 @@ class RegisterBus:
         Raises:
             RobotError: If it does not answer or refuses.
         """
-        what = f"set its {register.name} to {value}"
-        parameters = self._number(register.address) + register.encode(value)
-        if self._ask(what, servo_id, WRITE, parameters, 0) is None:
-            raise self._no_answer(servo_id)
+        for _ in range(_TRIES):
+            heard = self.port.write({servo_id: register.encode(value)}, register.address)
+            if reply := heard.get(servo_id):
+                self._check(reply, servo_id, f"set its {register.name} to {value}")
+                return
+        raise RobotError(f"Servo {servo_id} at {self._device} does not answer.")
 
-    def sync_write(self, register: Register, values: Mapping[int, int]) -> None:
-        """Write a register of several servos with one packet, which has no reply.
+    def write_all(self, register: Register, values: Mapping[int, int]) -> None:
+        """Write a register of all servos with one packet, which has no reply.
 
         Args:
             register: The register.
@@ -165,11 +166,10 @@ class RegisterBus:
         Raises:
             RobotError: If the bus is gone.
         """
-        items = (bytes([one]) + register.encode(value) for one, value in values.items())
-        parameters = self._number(register.address) + self._number(register.size) + b"".join(items)
-        self.port.exchange(BROADCAST, SYNC_WRITE, parameters, (), 0)
+        data = {one: register.encode(value) for one, value in values.items()}
+        self.port.write(data, register.address)
 
-    def sync_read(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
+    def read_several(self, register: Register, ids: Sequence[int]) -> dict[int, ServoReply]:
         """Read a register of several servos with one packet.
 
         Args:
@@ -182,12 +182,8 @@ class RegisterBus:
         Raises:
             RobotError: If the bus is gone.
         """
-        if not ids:
-            return {}
-        size = register.size
-        parameters = self._number(register.address) + self._number(size) + bytes(ids)
-        heard = self.port.exchange(BROADCAST, SYNC_READ, parameters, ids, size)
-        return {one: reply for one, reply in heard.items() if len(reply.data) == size}
+        heard = self.port.read(ids, register.address, register.size) if ids else {}
+        return {one: reply for one, reply in heard.items() if len(reply.data) == register.size}
 
     def poll(self, register: Register) -> dict[int, ServoReply]:
         """Read a register of all servos; those that did not answer are missing.
@@ -196,16 +192,16 @@ class RegisterBus:
             RobotError: If the bus is gone.
         """
         asked = self._trusted()
-        heard = self.sync_read(register, asked)
+        heard = self.read_several(register, asked)
         missing = [one for one in asked if one not in heard]
         if missing:
             first, *behind = missing
             self.suspects.append(first)
-            heard |= self.sync_read(register, behind)
+            heard |= self.read_several(register, behind)
             self.suspects += [one for one in behind if one not in heard][:1]
         elif self.suspects:
             suspect = self.suspects.pop(0)
-            heard |= (answer := self.sync_read(register, [suspect]))
+            heard |= (answer := self.read_several(register, [suspect]))
             if not answer:
                 self.suspects.append(suspect)
         return heard
@@ -220,28 +216,14 @@ class RegisterBus:
         return {
             one: register.decode(reply.data)
             for group in groups
-            for one, reply in self.sync_read(register, group).items()
+            for one, reply in self.read_several(register, group).items()
         }
 
     def _trusted(self) -> list[int]:
         return [one for one in self._ids if one not in self.suspects]
 
-    def _number(self, value: int) -> bytes:
-        return value.to_bytes(self._family.address_size, "little")
-
-    def _ask(
-        self, what: str, servo_id: int, instruction: int, parameters: bytes, length: int
-    ) -> bytes | None:
-        """Return the data of a servo's reply; None if it does not reply, even when asked again."""
-        for _ in range(_TRIES):
-            heard = self.port.exchange(servo_id, instruction, parameters, (servo_id,), length)
-            if (reply := heard.get(servo_id)) is None:
-                continue
-            if number := reply.error & self._family.refused:
-                why = _REFUSALS.get(number, f"it gives the unknown reason {number}")
-                raise RobotError(f"Servo {servo_id} at {self._device} refuses to {what}: {why}.")
-            return reply.data
-        return None
-
-    def _no_answer(self, servo_id: int) -> RobotError:
-        return RobotError(f"Servo {servo_id} at {self._device} does not answer.")
+    def _check(self, reply: ServoReply, servo_id: int, what: str) -> None:
+        """Raise RobotError if a servo refuses to do something."""
+        if number := reply.error & self._refused:
+            why = _REFUSALS.get(number, f"it gives the unknown reason {number}")
+            raise RobotError(f"Servo {servo_id} at {self._device} refuses to {what}: {why}.")

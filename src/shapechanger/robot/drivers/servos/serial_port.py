@@ -6,7 +6,7 @@ import contextlib
 import select
 import termios
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from shapechanger.errors import MissingExtra, RobotError
@@ -25,6 +25,11 @@ _MAX_LATE_BYTES: Final = 1024
 # Damaged packets to skip while waiting for valid ones.
 _MAX_DAMAGED: Final = 8
 _STATUS_BYTES: Final = 11  # Of a status packet without data, at most.
+
+_BROADCAST: Final = 0xFE
+_WRITE: Final = 0x03
+_SYNC_READ: Final = 0x82
+_SYNC_WRITE: Final = 0x83
 
 # Results of the SDK (robotis_def.py).
 _SUCCESS: Final = 0
@@ -96,7 +101,30 @@ class SerialServoPort:
         self._receive_options = (False,) if family.protocol == 2.0 else ()
         self.has_stray = False
 
-    def exchange(
+    def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
+        """Read bytes of several servos; see `ServoPort.read`."""
+        parameters = self._number(at) + self._number(size) + bytes(ids)
+        return self._exchange(_BROADCAST, _SYNC_READ, parameters, ids, size)
+
+    def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
+        """Write bytes of several servos, or of one; see `ServoPort.write`."""
+        if len(data) == 1:
+            ((servo_id, content),) = data.items()
+            return self._exchange(servo_id, _WRITE, self._number(at) + content, (servo_id,), 0)
+        size = len(next(iter(data.values())))
+        items = b"".join(bytes([one]) + content for one, content in data.items())
+        parameters = self._number(at) + self._number(size) + items
+        return self._exchange(_BROADCAST, _SYNC_WRITE, parameters, (), 0)
+
+    def close(self) -> None:
+        """Close the port."""
+        with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
+            self._port.closePort()
+
+    def _number(self, value: int) -> bytes:
+        return value.to_bytes(self._length_size, "little")
+
+    def _exchange(
         self,
         servo_id: int,
         instruction: int,
@@ -104,10 +132,10 @@ class SerialServoPort:
         ids: Sequence[int],
         length: int,
     ) -> dict[int, ServoReply]:
-        """Send an instruction and return the replies; see `ServoPort.exchange`."""
+        """Send an instruction and return the replies of `ids`, each with `length` bytes of data."""
         size = len(parameters) + 1 + self._length_size
         # The SDK fills in header and checksum, which is as long as the length.
-        packet = [0] * self._id_at + [servo_id, *size.to_bytes(self._length_size, "little")]
+        packet = [0] * self._id_at + [servo_id, *self._number(size)]
         packet += [instruction, *parameters] + [0] * self._length_size
         self._port.is_using = False  # The SDK leaves it set after an exception.
         try:
@@ -120,11 +148,6 @@ class SerialServoPort:
             return self._replies(ids, length)
         except (OSError, termios.error) as error:
             raise RobotError(f"The bus at {self._device} is gone: {error}.") from error
-
-    def close(self) -> None:
-        """Close the port."""
-        with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
-            self._port.closePort()
 
     def _replies(self, ids: Sequence[int], length: int) -> dict[int, ServoReply]:
         # The SDK's GroupSyncRead stops at the first missing servo, drops the other answers and
