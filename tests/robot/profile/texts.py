@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shapechanger.robot.profile import Profile, read_profile
+from shapechanger.robot.profile import Profile, read_profile, shipped_profiles
 
 PATH = Path("rover.toml")
 
@@ -186,3 +186,28 @@ def changed(old: str, new: str, text: str = EVERYTHING) -> str:
 def read(text: str = EVERYTHING) -> Profile:
     """Parse the text of a profile."""
     return read_profile(text, PATH)
+
+
+_LENGTH = 'control = "length"\nlongest_m = 0.012\nshortest_m = -0.03\n'
+
+
+def finger_text(family: str) -> str:
+    """Return the shipped finger with control of the lengths.
+
+    Args:
+        family: "Dynamixel", or "Feetech" with the lines that differ, as the guide has them.
+    """
+    text = shipped_profiles()["finger"].read_text()
+    text = text.replace('model = "XL330-M077"\n', _LENGTH + 'model = "XL330-M077"\n')
+    if family == "Dynamixel":
+        return text
+    for before, after in (
+        ("XL330-M077", "STS3215"),
+        ("pretension_n = 1.0", "pretension_n = 6.0"),
+        ("homing_n = 3.0", "homing_n = 8.0"),
+        ("watchdog_ms = 100                 # The servos let go by themselves after so much", "#"),
+    ):
+        text = text.replace(before, after)
+    for most in ("6.4", "7.0"):
+        text = text.replace(f"most_tension_n = {most}", "most_tension_n = 15.0")
+    return text + "\n[enable]\npin = 19\n"

@@ -175,3 +175,48 @@ def test_an_invalid_bus_is_refused() -> None:
         SimulatedBus([ServoPlan(1), ServoPlan(1)])
     with pytest.raises(UnknownName, match="Did you mean 'XL330-M288'"):
         SimulatedBus([ServoPlan(1, "XL330-M28")])
+
+
+def _feetech(line: SimulatedBus, at: int, value: int, size: int = 1) -> int:
+    """Write a register of the first Feetech servo, and return what it holds then."""
+    line.write({1: value.to_bytes(size, "little")}, at)
+    return line.servos[1].register(at)
+
+
+def test_a_feetech_servo_keeps_its_eeprom_locked() -> None:
+    """Without a reason, it ignores writes until the lock is 0."""
+    line = SimulatedBus([ServoPlan(1, "STS3215")])
+    assert _feetech(line, 16, 100, 2) == 1000
+    assert _feetech(line, 55, 0) == 0
+    assert _feetech(line, 16, 100, 2) == 100
+    assert _feetech(line, 48, 101, 2) == 1000  # Beyond the maximum torque.
+    assert _feetech(line, 48, 100, 2) == 100
+
+
+def test_a_feetech_servo_pulls_without_a_host_until_its_power_is_cut() -> None:
+    """It has no watchdog; after the power is back it has no torque and one turn."""
+    line = SimulatedBus([ServoPlan(1, "STS3215", angle=10.0)])
+    before = line.servos[1].register(56)
+    _feetech(line, 42, before + 1000, 2)
+    _feetech(line, 40, 1)
+    line.advance(500 * MS)
+    assert line.servos[1].pulls_a == pytest.approx(2.44)
+    assert line.servos[1].register(56) > before + 50
+    line.set_power(on=False)
+    line.advance(10 * MS)
+    assert (line.servos[1].pulls_a, line.read([1], 40, 1)) == (0.0, {})
+    line.set_power(on=True)
+    line.advance(299 * MS)
+    assert line.read([1], 40, 1) == {}
+    line.advance(1 * MS)
+    assert line.read([1], 40, 1) == {1: ServoReply(0, b"\0")}
+    assert 0 <= line.servos[1].register(56) < 4096
+
+
+def test_a_feetech_servo_reports_its_errors_in_each_reply() -> None:
+    """The error byte is its status, and an overload takes its torque."""
+    line = SimulatedBus([ServoPlan(1, "STS3215")])
+    assert _feetech(line, 40, 1) == 1
+    line.servos[1].overload()
+    assert line.read([1], 40, 1) == {1: ServoReply(0x20, b"\0")}
+    assert _feetech(line, 40, 1) == 0

@@ -460,7 +460,7 @@ SERVO_BUS_KEYS: Final = (
     ProfileKey("watchdog_ms", "whole", 100, low=20, high=2540),
     ProfileKey("ramp_ms", "whole", 300, low=0, high=10_000),
     # One silent servo must delay the guard by less than the limit for sensors.
-    ProfileKey("answer_ms", "number", 3.0, low=0.0, high=100.0, above=True),
+    ProfileKey("answer_ms", "number", 3.0, low=0.1, high=100.0),
 )
 """Keys of the bus of the outputs with the driver bus_servo."""
 

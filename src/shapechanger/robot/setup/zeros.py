@@ -86,7 +86,8 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
             bus.hold()
             while homing.zeros is None and not homing.failure:
                 switches.toggle()
-                homing.see(bus.cycle(homing.tensions, hardware.clock.now_ns()))
+                bus.send(homing.tensions)
+                homing.see(bus.cycle(hardware.clock.now_ns()))
                 wait()
         finally:
             bus.close()

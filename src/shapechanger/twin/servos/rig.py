@@ -11,7 +11,7 @@ from shapechanger.robot.drivers.servos.family import COUNTS_PER_TURN
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.servos.bus import SimulatedBus
-from shapechanger.twin.servos.motor import EndStops, Load, Tendon
+from shapechanger.twin.servos.motor import Load, Tendon
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 from shapechanger.worlds.world import World
 
@@ -29,23 +29,20 @@ _WELL_C: Final = 30.0
 
 
 @runtime_checkable
-class TendonWorld(Protocol):
-    """A world that tendons pull at."""
+class TendonWorld(Load, Protocol):
+    """A world that tendons pull at, as their load."""
 
     @property
     def cable_stiffness(self) -> float:
         """Stiffness of the tendons, N/m."""
         ...
 
-    def connect(self, tendons: Sequence[str], rig: Rig) -> Load:
+    def connect(self, tendons: Sequence[str], rig: Rig) -> None:
         """Attach the tendons of a rig.
 
         Args:
             tendons: Names, in the order of the servos.
             rig: The rig; its `settle` is to be called after each change of posture.
-
-        Returns:
-            The load of the tendons.
 
         Raises:
             RobotError: If the world has other tendons.
@@ -90,10 +87,9 @@ class Rig:
             )
             for one in settings
         ]
-        load: Load = EndStops(len(plans))
         if self._world is not None:
-            load = self._world.connect(self._names, self)
-        self.bus = SimulatedBus(plans, load)
+            self._world.connect(self._names, self)
+        self.bus = SimulatedBus(plans, self._world)
         self._servos = dict(zip(self._names, self.bus.servos.values(), strict=True))
         self.bus.set_power(on=not self.is_switched)
         self.settle()

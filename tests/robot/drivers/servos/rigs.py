@@ -51,6 +51,12 @@ def settings(**changes: Any) -> BusSettings:
     return replace(BusSettings("the twin", tuple(servo(name) for name in NAMES)), **changes)
 
 
+def of(family: str, **changes: Any) -> BusSettings:
+    """Return the settings of a bus of a family, "Dynamixel" or "Feetech"."""
+    make = feetech if family == "Feetech" else servo
+    return settings(servos=tuple(make(name) for name in NAMES), **changes)
+
+
 class FaultyPort(PortHandler):
     """A port of the SDK at a simulated bus, without real time.
 
@@ -168,8 +174,9 @@ class Rig:
         """Command one tension for all tendons, except `others`, and return the last state."""
         assert cycles > 0
         for _ in range(cycles):
-            tensions = None if tension is None else dict.fromkeys(NAMES, tension) | others
-            state = self.bus.cycle(tensions, self.line.now_ns)
+            if tension is not None:
+                self.bus.send(dict.fromkeys(NAMES, tension) | others)
+            state = self.bus.cycle(self.line.now_ns)
             self.line.advance(CYCLE_NS)
         return state
 

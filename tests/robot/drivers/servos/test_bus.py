@@ -125,7 +125,7 @@ def test_missing_and_unknown_tendons_are_refused() -> None:
     """A missing and an unknown tendon raise errors."""
     rig = Rig().start()
     with pytest.raises(RobotError, match="no tension for EIP, EDC"):
-        rig.bus.cycle(dict.fromkeys(("FDP", "FDS", "LUM", "DI", "PI"), 3.0), 0)
+        rig.bus.send(dict.fromkeys(("FDP", "FDS", "LUM", "DI", "PI"), 3.0))
     with pytest.raises(UnknownName, match="Did you mean 'EDC'"):
         rig.run(3.0, EDX=3.0)
 
@@ -226,4 +226,4 @@ def test_send_writes_goals_without_a_cycle() -> None:
     assert rig.pulls() == pytest.approx([0.205] * 7, abs=0.001)
     rig.port.is_gone = True
     rig.bus.send(dict.fromkeys(NAMES, 7.0))
-    assert "is gone" in rig.bus.cycle(None, rig.line.now_ns).reason
+    assert "is gone" in rig.bus.cycle(rig.line.now_ns).reason

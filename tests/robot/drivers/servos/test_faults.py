@@ -9,7 +9,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.health import BusState
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.twin.servos.servo import ServoPlan
-from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, settings
+from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, of, settings
 
 
 def _hot(rig: Rig) -> None:
@@ -63,10 +63,15 @@ def _snapped(rig: Rig) -> None:
         (_snapped, "has lost its tendon: it winds in at"),
     ],
 )
-def test_a_fault_of_one_servo_stops_all(fault: Callable[[Rig], None], words: str) -> None:
+@pytest.mark.parametrize("family", ["Dynamixel", "Feetech"])
+def test_a_fault_of_one_servo_stops_all(
+    fault: Callable[[Rig], None], words: str, family: str
+) -> None:
     """A fault is reported, the other servos ramp down, and finally no servo pulls."""
-    rig = Rig(settings(most_missed=5)).start()
-    rig.run(10.0, 20)
+    if family == "Feetech" and fault is _snapped:
+        pytest.skip("its speed without load falls with its limit, and shows no lost tendon")
+    rig = Rig(of(family, most_missed=5)).start()
+    rig.run(14.0, 20)
     fault(rig)
     state = _until(rig, lambda s: s.mode != "held")
     assert list(state.faults) == ["EIP"]
@@ -76,9 +81,12 @@ def test_a_fault_of_one_servo_stops_all(fault: Callable[[Rig], None], words: str
     # The faulty servo has released; the others have begun to ramp down.
     if not rig.twin("EIP").deaf:
         assert rig.twin("EIP").pulls_a == 0.0
-    assert rig.twin("FDP").pulls_a > 0.3
+    assert rig.twin("FDP").pulls_a > 0.05
     _until(rig, lambda s: s.mode in ("off", "silent"))
     rig.line.advance(100_000_000)  # The watchdogs of unreachable servos expire.
+    if family == "Feetech" and rig.twin("EIP").deaf:
+        assert rig.twin("EIP").pulls_a > 0.0
+        rig.line.set_power(on=False)
     assert rig.pulls() == [0.0] * 7
 
 
@@ -214,18 +222,32 @@ def test_a_cut_cable_trips_the_watchdogs() -> None:
     assert rig.pulls() == [0.0] * 7
 
 
+def test_without_watchdogs_an_unplugged_adapter_ends_in_silence_at_once() -> None:
+    """Feetech servos would ignore a ramp, so the power switch has to act at once."""
+    rig = Rig(of("Feetech")).start()
+    rig.run(20.0, 20)
+    rig.port.is_gone = True
+    state = rig.run(20.0)
+    assert state.mode == "silent"
+    assert "did not confirm to let go, so nothing is sent any more: [enable] stops" in state.reason
+    rig.line.advance(10 * CYCLE_NS)
+    assert min(rig.pulls()) > 0.0
+    rig.line.set_power(on=False)
+    assert rig.pulls() == [0.0] * 7
+
+
 def test_an_unplugged_adapter_is_reported_and_trips_the_watchdogs() -> None:
     """When the serial device raises on every call, the cycle reports it and does not raise."""
     rig = Rig().start()
     rig.run(10.0, 20)
     rig.port.is_gone = True
-    state = rig.bus.cycle(dict.fromkeys(NAMES, 10.0), rig.line.now_ns)
+    state = rig.run(10.0)
     assert state.faults[""].startswith("The bus at the twin is gone: ")
     assert state.mode == "stopping"
     rig.line.advance(10 * CYCLE_NS)
     assert rig.pulls() == [0.0] * 7
     for i in range(40):
-        state = rig.bus.cycle(None, rig.line.now_ns + i * CYCLE_NS)
+        state = rig.bus.cycle(rig.line.now_ns + i * CYCLE_NS)
     assert state.mode == "silent"
 
 

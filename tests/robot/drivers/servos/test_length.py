@@ -24,7 +24,7 @@ def _rig(direction: int = 1) -> Rig:
 def _go(rig: Rig, length: float, cycles: int) -> None:
     for _ in range(cycles):
         rig.bus.send(_MOST, dict.fromkeys(NAMES, length))
-        state = rig.bus.cycle(None, rig.line.now_ns)
+        state = rig.bus.cycle(rig.line.now_ns)
         assert state.reason == ""
         rig.line.advance(CYCLE_NS)
 
@@ -55,7 +55,7 @@ def test_the_tension_of_a_blocked_tendon_is_limited() -> None:
     rig = _rig()
     for _ in range(300):
         rig.bus.send(dict.fromkeys(NAMES, 8.0), dict.fromkeys(NAMES, -0.03))
-        rig.bus.cycle(None, rig.line.now_ns)
+        rig.bus.cycle(rig.line.now_ns)
         rig.line.advance(CYCLE_NS)
     assert rig.twin("EDC").motor.current == pytest.approx(8.0 / 29.3, rel=0.01)
     assert rig.twin("EDC").motor.tension < 8.0 + 1.05  # And the friction of the gears.

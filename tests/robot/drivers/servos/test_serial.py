@@ -12,10 +12,17 @@ from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.servo import ServoPlan
 from tests.robot.drivers.servos.pty import ServoPty
-from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, settings
+from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, of, settings
 
 # Long enough that a busy machine does not look like a mute servo.
 _PATIENT_MS = 20_000.0
+
+
+@pytest.fixture
+def feetech_pty() -> Iterator[ServoPty]:
+    """Seven Feetech servos behind a terminal."""
+    with ServoPty(SimulatedBus([ServoPlan(i, "STS3215", angle=2.0 * i) for i in range(1, 8)])) as p:
+        yield p
 
 
 @pytest.fixture
@@ -63,12 +70,30 @@ def test_the_driver_works_over_a_real_serial_port(pty: ServoPty) -> None:
     bus.set_up()
     bus.hold()
     for i in range(20):
-        state = bus.cycle(dict.fromkeys(NAMES, 5.0), i * CYCLE_NS)
+        bus.send(dict.fromkeys(NAMES, 5.0))
+        state = bus.cycle(i * CYCLE_NS)
         assert set(state.servos) == set(NAMES)
         pty.advance(CYCLE_NS)
     assert state.reason == ""
     assert state.servos["PI"].tension_n == pytest.approx(5.0, abs=0.03)
     bus.close()
+
+
+def test_feetech_servos_work_over_a_real_serial_port(feetech_pty: ServoPty) -> None:
+    """Set up, hold, cycle and close with the packets of protocol 1.0."""
+    bus = _open(of("Feetech", device=feetech_pty.device, answer_ms=_PATIENT_MS))
+    bus.set_up()
+    bus.hold()
+    for i in range(20):
+        bus.send(dict.fromkeys(NAMES, 20.0))
+        state = bus.cycle(i * CYCLE_NS)
+        assert set(state.servos) == set(NAMES)
+        feetech_pty.advance(CYCLE_NS)
+    assert state.reason == ""
+    assert state.servos["PI"].goal_n == pytest.approx(20.0, abs=0.4)
+    assert state.servos["PI"].tension_n > 5.0
+    bus.close()
+    assert not any(servo.has_torque for servo in feetech_pty.bus.servos.values())
 
 
 def test_a_mute_servo_is_named_over_a_real_serial_port(pty: ServoPty) -> None:
@@ -91,12 +116,13 @@ class _Noise:
         return b"\xff" * length
 
 
-def test_endless_noise_does_not_block_the_driver() -> None:
+@pytest.mark.parametrize("options", [(2.0, False), (1.0,)])
+def test_endless_noise_does_not_block_the_driver(options: tuple[float, ...]) -> None:
     """The SDK checks its timeout only when no byte is available; `PromptPort` bounds the read."""
     port = PromptPort("noise", 0.0)
     port.ser = noise = _Noise()
     port.setPacketTimeoutMillis(0.0)
-    _, result = PacketHandler(2.0).rxPacket(port, False)
+    _, result = PacketHandler(options[0]).rxPacket(port, *options[1:])
     assert result == -3002  # Corrupt.
     assert noise.taken == 1024
 

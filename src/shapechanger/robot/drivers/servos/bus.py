@@ -27,6 +27,11 @@ class ServoBus:
     Args:
         settings: The bus and its servos.
         port: Port of the bus, which `close` closes.
+
+    Attributes:
+        mode: Mode of the bus.
+        is_ready: Whether `set_up` has succeeded.
+        zeros: Position of each servo at the zero of its tendon, in counts, for those with a zero.
     """
 
     def __init__(self, settings: BusSettings, port: ServoPort) -> None:
@@ -38,27 +43,17 @@ class ServoBus:
         # One of them is read in each cycle, so a trip is detected within four.
         self._audited = (family.mark, family.torque_enable, family.goal, family.hardware_error)
         self._health = {servo.id: ServoHealth(servo, settings) for servo in settings.servos}
-        self._zeros: dict[str, int] = {}
-        self._mode: Mode = "off"
+        self.zeros: dict[str, int] = {}
+        self.mode: Mode = "off"
         self._stopped_at: dict[str, float] = {}  # N, when the stop began.
         self._stopped_ns = 0
         self._goals = dict.fromkeys(self._ids, 0)  # Counts, as last sent.
-        self._requested = dict.fromkeys(self._servos, 0.0)  # N, as last requested.
+        self._pulls: dict[str, float] = {}  # N, as last requested.
         self._lengths: dict[str, float] = {}  # m, of tendons that are to have a length.
         self._positions: dict[int, int] = {}  # Counts, as last read.
         self._cycles = 0
         self._gone = ""
-        self._is_ready = False
-
-    @property
-    def mode(self) -> Mode:
-        """Mode of the bus."""
-        return self._mode
-
-    @property
-    def zeros(self) -> dict[str, int]:
-        """Position of each servo at the zero of its tendon, in counts, for those with a zero."""
-        return dict(self._zeros)
+        self.is_ready = False
 
     @property
     def faults(self) -> dict[str, str]:
@@ -69,11 +64,6 @@ class ServoBus:
                 faults[servo.name] = fault
         return faults
 
-    @property
-    def is_ready(self) -> bool:
-        """True if `set_up` has succeeded."""
-        return self._is_ready
-
     def set_up(self, alive: Callable[[], object] = lambda: None) -> None:
         """Check and prepare all servos, without torque, and clear all faults.
 
@@ -83,7 +73,7 @@ class ServoBus:
         Raises:
             RobotError: If a servo is missing, is of another model, refuses, or has shut itself off.
         """
-        self._mode, self._is_ready = "off", False
+        self.mode, self.is_ready = "off", False
         self._goals = dict.fromkeys(self._ids, 0)
         self._registers.write_all(self._family.torque_enable, dict.fromkeys(self._ids, 0))
         self._check_servos(alive)
@@ -93,7 +83,7 @@ class ServoBus:
         self._registers.suspects.clear()
         for health in self._health.values():
             health.clear()
-        self._gone, self._is_ready = "", True
+        self._gone, self.is_ready = "", True
 
     def hold(self) -> None:
         """Enable the torque of all servos, which pull nothing until the first cycle.
@@ -101,9 +91,9 @@ class ServoBus:
         Raises:
             RobotError: If there is a fault, or a servo refuses; then all have let go.
         """
-        if self._mode != "off" or self.faults or not self._is_ready:
+        if self.mode != "off" or self.faults or not self.is_ready:
             why = " ".join(self.faults.values())
-            why = why or ("they are not set up." if not self._is_ready else "they are already.")
+            why = why or ("they are not set up." if not self.is_ready else "they are already.")
             raise RobotError(f"The servos at {self._settings.device} are not held: {why}")
         family = self._family
         self._goals = dict.fromkeys(self._ids, 0)
@@ -120,7 +110,7 @@ class ServoBus:
         except RobotError:
             self.release()
             raise
-        self._mode = "held"
+        self.mode = "held"
 
     def set_zeros(self, zeros: Mapping[str, int], *, knows_turns: bool = True) -> None:
         """Set the zeros of tendons, as `Homing` finds them.
@@ -139,53 +129,46 @@ class ServoBus:
             if not knows_turns:
                 at = self._registers.read(servo.id, self._family.position)
                 position += round((at - position) / COUNTS_PER_TURN) * COUNTS_PER_TURN
-            self._zeros[name] = position
+            self.zeros[name] = position
             self._health[servo.id].was_reset = False
 
-    def cycle(self, tensions: Mapping[str, float] | None, now_ns: int) -> BusState:
-        """Send the goals of all servos and read their state.
+    def cycle(self, now_ns: int) -> BusState:
+        """Read the state of all servos, and go on with a stop.
 
         Args:
-            tensions: Tension of each tendon, N, by name, clipped to its range. It takes effect only
-                while the bus is "held". None keeps the last request.
             now_ns: Time, ns.
-
-        Raises:
-            RobotError: If a tension is missing or not finite. Then nothing is sent.
-            UnknownName: If there is no such tendon.
         """
-        if tensions is not None:
-            self._request(tensions, {})
-        if self._mode == "silent" or not self._is_ready:
-            return BusState(now_ns, self._mode, {}, self.faults)
+        if self.mode == "silent" or not self.is_ready:
+            return BusState(now_ns, self.mode, {}, self.faults)
         heard: dict[int, ServoReply] = {}
-        self._registers.port.has_stray = False
         try:
-            self._send_goals(now_ns)
+            if self.mode == "stopping":
+                self._send_goals(now_ns)
             heard = self._registers.poll(self._family.present)
             self._audit(heard)
         except RobotError as error:
             self._gone = self._gone or str(error)
         servos = self._evaluate(heard, now_ns, late=self._registers.port.has_stray)
-        if self.faults and self._mode == "held":
+        self._registers.port.has_stray = False
+        if self.faults and self.mode == "held":
             self.stop(now_ns)
         # Servos that cannot be reached would ignore the ramp until their power is cut.
         unreachable = self._gone and not self._family.has_watchdog
-        if self._mode == "stopping" and (unreachable or self._ramp_left(now_ns) == 0.0):
+        if self.mode == "stopping" and (unreachable or self._ramp_left(now_ns) == 0.0):
             self.release()
         self._cycles += 1
-        return BusState(now_ns, self._mode, servos, self.faults)
+        return BusState(now_ns, self.mode, servos, self.faults)
 
     def send(
         self, tensions: Mapping[str, float], lengths: Mapping[str, float] | None = None
     ) -> None:
-        """Send tensions at once, without reading anything.
+        """Send tensions, which take effect only while the bus is "held".
 
-        As with `cycle`, they take effect only while the bus is "held". If the bus is gone, the next
-        cycle reports it.
+        If the bus is gone, the next cycle reports it.
 
         Args:
-            tensions: Tension of each tendon, N, by name; the limit for one with a length.
+            tensions: Tension of each tendon, N, by name, clipped to its range; the limit for one
+                with a length.
             lengths: Length beyond the zero, m, by name, of tendons with control of the length.
                 Without one, such a tendon is pulled with its tension, as all others.
 
@@ -194,20 +177,34 @@ class ServoBus:
                 nothing is sent.
             UnknownName: If there is no such tendon.
         """
-        self._request(tensions, lengths or {})
-        if self._mode != "held":
-            return
-        try:
-            self._send_goals(0)  # The time matters only to a ramp.
-        except RobotError as error:
-            self._gone = self._gone or str(error)
+        lengths = lengths or {}
+        for name in tensions:
+            self._servo(name)
+        if missing := [name for name in self._servos if name not in tensions]:
+            raise RobotError(f"There is no tension for {', '.join(missing)}.")
+        # Check all before using any.
+        pulls = {name: servo.clip(tensions[name]) for name, servo in self._servos.items()}
+        for name, length in lengths.items():
+            servo = self._servo(name)
+            if servo.control != "length" or name not in self.zeros:
+                lacks = (
+                    "no zero" if servo.control == "length" else f"control of its {servo.control}"
+                )
+                raise RobotError(f"{servo.words} cannot go to a length: it has {lacks}.")
+            servo.position_at(length, self.zeros[name])
+        if self.mode == "held":
+            self._pulls, self._lengths = pulls, dict(lengths)
+            try:
+                self._send_goals(0)  # The time matters only to a ramp.
+            except RobotError as error:
+                self._gone = self._gone or str(error)
 
     def stop(self, now_ns: int) -> None:
         """Start to ramp the tensions down in the coming cycles, and then to let go."""
-        if self._mode == "held":
+        if self.mode == "held":
             self._stopped_at = {one.name: self._goal_n(one) for one in self._settings.servos}
             self._stopped_ns = now_ns
-            self._mode = "stopping"
+            self.mode = "stopping"
 
     def release(self) -> None:
         """Disable the torque of all servos at once.
@@ -223,7 +220,7 @@ class ServoBus:
                 torques = self._registers.read_each(enable)
                 holding -= {one for one, torque in torques.items() if torque == 0}
                 if not holding:
-                    self._mode = "off"
+                    self.mode = "off"
                     return
         except RobotError as error:
             self._gone = self._gone or str(error)
@@ -231,11 +228,11 @@ class ServoBus:
         words = f"{names} did not confirm to let go, so nothing is sent any more"
         what = "the servos' own watchdogs stop" if self._family.has_watchdog else "[enable] stops"
         self._gone = f"{self._gone} {words}: {what} them.".lstrip()
-        self._mode = "silent"
+        self.mode = "silent"
 
     def close(self) -> None:
         """Let go of all tendons and close the port."""
-        if self._mode != "silent" and (self._is_ready or self._family.has_watchdog):
+        if self.mode != "silent" and (self.is_ready or self._family.has_watchdog):
             self.release()
         self._registers.port.close()
 
@@ -302,36 +299,15 @@ class ServoBus:
         self._registers.write(servo.id, self._family.goal, 0)
         self._registers.write(servo.id, self._family.mark, self._settings.mark)
 
-    def _request(self, tensions: Mapping[str, float], lengths: Mapping[str, float]) -> None:
-        for name in tensions:
-            self._servo(name)
-        if missing := [name for name in self._servos if name not in tensions]:
-            raise RobotError(f"There is no tension for {', '.join(missing)}.")
-        for name, servo in self._servos.items():
-            servo.clip(tensions[name])  # Check all before using any.
-        for name, length in lengths.items():
-            servo = self._servo(name)
-            if servo.control != "length" or name not in self._zeros:
-                lacks = (
-                    "no zero" if servo.control == "length" else f"control of its {servo.control}"
-                )
-                raise RobotError(f"{servo.words} cannot go to a length: it has {lacks}.")
-            servo.position_at(length, self._zeros[name])
-        self._requested = {name: tensions[name] for name in self._servos}
-        self._lengths = dict(lengths)
-
     def _send_goals(self, now_ns: int) -> None:
-        if self._mode == "off":
-            return
         for name, servo in self._servos.items():
-            if self._mode == "held":
-                pull = servo.clip(self._requested[name])
-            elif self._health[servo.id].fault:
-                pull = 0.0  # A servo with a fault lets go at once, while the others ramp down.
-            else:
+            pull = self._pulls.get(name, 0.0)
+            if self.mode == "stopping":
                 start = self._stopped_at[name]
                 end = min(servo.pretension_n, start)  # A tendon that was not pulled yet stays so.
                 pull = end + self._ramp_left(now_ns) * (start - end)
+                if self._health[servo.id].fault:
+                    pull = 0.0  # Such a servo lets go at once, while the others ramp down.
             self._goals[servo.id] = servo.goal_count(pull)
         if positions := self._goal_positions():
             self._registers.write_all(self._family.goal_position, positions)
@@ -343,8 +319,8 @@ class ServoBus:
         for name, servo in self._servos.items():
             if servo.control != "length":
                 continue
-            if name in self._lengths and name in self._zeros:
-                goals[servo.id] = servo.position_at(self._lengths[name], self._zeros[name])
+            if name in self._lengths and name in self.zeros:
+                goals[servo.id] = servo.position_at(self._lengths[name], self.zeros[name])
             else:
                 goals[servo.id] = self._positions[servo.id] + servo.direction * _AHEAD
         return goals
@@ -372,7 +348,7 @@ class ServoBus:
         """Evaluate a register of some servos; return those that answered."""
         answers = self._registers.read_several(register, ids)
         for one, answer in answers.items():
-            pulls, goal = self._mode != "off", self._goals[one]
+            pulls, goal = self.mode != "off", self._goals[one]
             self._health[one].audit(register, register.decode(answer.data), pulls=pulls, goal=goal)
         return set(answers)
 
@@ -383,15 +359,15 @@ class ServoBus:
         for servo_id, servo in self._ids.items():
             health = self._health[servo_id]
             if health.was_reset:
-                self._zeros.pop(servo.name, None)
+                self.zeros.pop(servo.name, None)
             if servo_id not in heard:
                 health.miss(late=late)
                 continue
             present = self._family.decode(heard[servo_id].data)
             self._positions[servo_id] = present.position
-            zero = self._zeros.get(servo.name)
+            zero = self.zeros.get(servo.name)
             length = None if zero is None else servo.length_m(present.position, zero)
-            health.see(present, length, now_ns, pulls=self._mode != "off")
+            health.see(present, length, now_ns, pulls=self.mode != "off")
             states[servo.name] = ServoState(
                 position=present.position,
                 length_m=length,

@@ -42,10 +42,8 @@ class SharedBus:
         """Add a servo.
 
         Raises:
-            RobotError: If a setting is out of range, or the bus is already in use.
+            RobotError: If a setting is out of range.
         """
-        if self._bus is not None:
-            raise RobotError(f"The bus at {self.device} is in use: {plan.name} comes too late.")
         servo = servo_settings(plan)
         self._plans[plan.name] = plan
         self._tensions[plan.name] = servo.pretension_n
@@ -123,7 +121,7 @@ class SharedBus:
         Raises:
             RobotError: If the bus is not in use.
         """
-        return self._open_bus().cycle(None, now_ns)
+        return self._open_bus().cycle(now_ns)
 
     def leave(self, name: str) -> None:
         """Remove a servo; the last one closes the bus."""

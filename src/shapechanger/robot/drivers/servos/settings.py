@@ -311,7 +311,7 @@ class ServoSettings:
 
 @dataclass(frozen=True, slots=True)
 class BusSettings:
-    """A bus and its servos.
+    """A bus and its servos, as a profile has checked it.
 
     Attributes:
         device: Serial device, such as "/dev/ttyUSB0".
@@ -357,13 +357,6 @@ class BusSettings:
                 f"watchdog_ms must be 20 to {_MOST_WATCHDOG_MS} in steps of 20, "
                 f"not {self.watchdog_ms}."
             )
-        for label, value, least in (
-            ("answer_ms", self.answer_ms, 0.1),
-            ("most_missed", self.most_missed, 1),
-            ("ramp_ms", self.ramp_ms, 0),
-        ):
-            if not least <= value < math.inf:
-                raise RobotError(f"{label} must be {least:g} or more, not {value:g}.")
 
     @property
     def family(self) -> ServoFamily:
