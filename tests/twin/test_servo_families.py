@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,17 +18,24 @@ from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
 from shapechanger.errors import ProfileError, RobotError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
-from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.guard import start
+from shapechanger.robot.guard.messages import GuardState, Order, decode_state, encode
+from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.setup.zeros import find_zeros
 from shapechanger.twin.in_process import InProcessRobot, LocalBoard
+from shapechanger.twin.robot import Operator
 from shapechanger.twin.servos.rig import Rig
+from shapechanger.twin.start import start_board
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.finger import FingerWorld
+from shapechanger.twin.world.place import Place
 from tests.robot.profile.texts import finger_text, read
+from tests.twin.robots import until
 
 _REST = (0.0,) * 7
 _FLEX = (0.65, 0.65, 0.2, 0.2, 0.2, 0.2, 0.2)
+_ALL = (1.0,) * 7
 _TICK_NS = 10_000_000
 
 
@@ -232,3 +244,52 @@ def test_feetech_servos_find_their_turns_again() -> None:
     np.testing.assert_allclose(got, expected, atol=4e-3)
     assert min(got) < -0.008
     bench.robot.close()
+
+
+@pytest.mark.realtime
+def test_a_killed_guard_leaves_limp_servos(family: str, tmp_path: Path) -> None:
+    """The guard's process is killed while it pulls; a second later only friction holds the tendons."""
+    plan = read(finger_text(family)).guard_plan()
+    daemon, its_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    heartbeat, its_heartbeat = socket.socketpair()
+    place = Place(finger=NOMINAL.to_json())
+    with (
+        start_board(plan, "twin", tmp_path, place=place) as board,
+        Operator(board.socket_path) as operator,
+        daemon,
+        heartbeat,
+        its_end,
+        its_heartbeat,
+    ):
+        fd = plan_fd(ServePlan(guard=plan, daemon={}, hardware=board.hardware))
+        command = [sys.executable, "-I", str(start.__file__), "guard", "--plan-fd", str(fd)]
+        command += ["--daemon-fd", str(its_end.fileno())]
+        command += ["--heartbeat-fd", str(its_heartbeat.fileno())]
+        fds = (fd, its_end.fileno(), its_heartbeat.fileno())
+        with subprocess.Popen(command, pass_fds=fds) as guard:
+            daemon.setblocking(False)
+            until(lambda: operator.advance(0.01) > 0 and _states(daemon) != [])
+            now_ns = operator.advance(0.5)  # The servos start.
+            daemon.send(encode(Order("arm", session=1, issued_ns=now_ns, person=True)))
+            now_ns = operator.advance(0.05)
+            assert any(state.armed for state in _states(daemon))
+            for seq in range(1, 41):
+                order = Order("command", 1, seq, issued_ns=now_ns, ttl_ms=1000, values=_ALL)
+                daemon.send(encode(order))
+                now_ns = operator.advance(0.02)
+            pulled = operator.tensions()["FDP"]
+            guard.kill()
+            guard.wait()
+            operator.advance(1.0)
+            left = operator.tensions()
+    friction_n = 0.5 if family == "Dynamixel" else 5.2
+    assert pulled > 1.6 * friction_n
+    assert max(left.values()) < 1.1 * friction_n
+
+
+def _states(daemon: socket.socket) -> list[GuardState]:
+    states: list[GuardState] = []
+    with contextlib.suppress(BlockingIOError):
+        while data := daemon.recv(65536):
+            states.append(decode_state(data))
+    return states

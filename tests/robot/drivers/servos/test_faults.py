@@ -49,27 +49,31 @@ def _snapped(rig: Rig) -> None:
     rig.twin("EIP").plan.tendon.snapped = True
 
 
+_FAULTS: list[tuple[Callable[[Rig], None], str]] = [
+    (_hot, "has 68 C, more than 65 C"),
+    (_switched_off_by_heat, "switched itself off: it is overheated. Only a reboot"),
+    (_low, "switched itself off: its voltage is out of range"),
+    (_overloaded, "switched itself off: it is overloaded"),
+    (_mute, "does not answer, 5 cycles in a row"),
+    (_deaf, "does not answer, 5 cycles in a row"),
+    (_late, "answers too late, 5 cycles in a row"),
+    (_damaged, "does not answer, 5 cycles in a row"),
+    # Without load a Feetech servo with a low limit is slow, so its speed does not show this.
+    (_snapped, "has lost its tendon: it winds in at"),
+]
+
+
 @pytest.mark.parametrize(
-    ("fault", "words"),
+    ("family", "fault", "words"),
     [
-        (_hot, "has 68 C, more than 65 C"),
-        (_switched_off_by_heat, "switched itself off: it is overheated. Only a reboot"),
-        (_low, "switched itself off: its voltage is out of range"),
-        (_overloaded, "switched itself off: it is overloaded"),
-        (_mute, "does not answer, 5 cycles in a row"),
-        (_deaf, "does not answer, 5 cycles in a row"),
-        (_late, "answers too late, 5 cycles in a row"),
-        (_damaged, "does not answer, 5 cycles in a row"),
-        (_snapped, "has lost its tendon: it winds in at"),
+        *(("Dynamixel", fault, words) for fault, words in _FAULTS),
+        *(("Feetech", fault, words) for fault, words in _FAULTS if fault is not _snapped),
     ],
 )
-@pytest.mark.parametrize("family", ["Dynamixel", "Feetech"])
 def test_a_fault_of_one_servo_stops_all(
-    fault: Callable[[Rig], None], words: str, family: str
+    family: str, fault: Callable[[Rig], None], words: str
 ) -> None:
     """A fault is reported, the other servos ramp down, and finally no servo pulls."""
-    if family == "Feetech" and fault is _snapped:
-        pytest.skip("its speed without load falls with its limit, and shows no lost tendon")
     rig = Rig(of(family, most_missed=5)).start()
     rig.run(14.0, 20)
     fault(rig)
