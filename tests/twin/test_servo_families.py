@@ -20,6 +20,7 @@ from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.messages import GuardState, Order, decode_state, encode
+from shapechanger.robot.guard.outputs import Switches, make_safe
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from shapechanger.robot.profile import Profile
 from shapechanger.robot.setup.zeros import find_zeros
@@ -99,7 +100,8 @@ def test_commands_move_the_finger(bench: _Bench) -> None:
     assert bench.length("FDS") < -0.005
     assert bench.seen.action_applied == pytest.approx(_FLEX)
     friction = bench.rig.servo("FDP").motor._model.gears.friction_nm / 0.010
-    assert max(bench.rig.tensions().values()) < 15.0 + 2.0 * friction
+    most = 15.0 if bench.family == "Dynamixel" else 25.0
+    assert max(bench.rig.tensions().values()) < most + 2.0 * friction
 
 
 def test_rest_is_the_pretension(bench: _Bench) -> None:
@@ -222,6 +224,24 @@ def test_zeros_are_found_and_kept(family: str) -> None:
     assert rig.bus.has_power == (family == "Dynamixel")
 
 
+def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
+    """After a crash the enable line falls, whatever the servos do; nothing is sent to them."""
+    plan = read(finger_text("Feetech")).guard_plan()
+    board = LocalBoard(TwinWiring(plan), FingerWorld(NOMINAL, seed=3))
+    switches = Switches(plan, board.hardware)
+    bus = board.pins.require_rig().bus
+    for _ in range(50):
+        switches.toggle()
+        board.advance(board.now_ns() + _TICK_NS)
+    bus.write({1: b"\1"}, 40)
+    assert bus.servos[1].has_torque
+    switches.close()
+    assert make_safe(plan, board.hardware) == []
+    board.advance(board.now_ns() + 11 * _TICK_NS)
+    assert not bus.has_power
+    assert not bus.servos[1].has_torque
+
+
 def test_a_feetech_rig_needs_a_power_switch() -> None:
     """Without [enable] the profile says what to add."""
     text = finger_text("Feetech")
@@ -248,7 +268,7 @@ def test_feetech_servos_find_their_turns_again() -> None:
 
 @pytest.mark.realtime
 def test_a_killed_guard_leaves_limp_servos(family: str, tmp_path: Path) -> None:
-    """The guard's process is killed while it pulls; a second later only friction holds the tendons."""
+    """The guard is killed while it pulls; a second later only friction holds the tendons."""
     plan = read(finger_text(family)).guard_plan()
     daemon, its_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     heartbeat, its_heartbeat = socket.socketpair()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from shapechanger.robot.profile import Profile, read_profile, shipped_profiles
@@ -189,6 +190,7 @@ def read(text: str = EVERYTHING) -> Profile:
 
 
 _LENGTH = 'control = "length"\nlongest_m = 0.012\nshortest_m = -0.03\n'
+_GUIDE = Path(__file__).parents[3] / "docs" / "finger.md"
 
 
 def finger_text(family: str) -> str:
@@ -198,16 +200,10 @@ def finger_text(family: str) -> str:
         family: "Dynamixel", or "Feetech" with the lines that differ, as the guide has them.
     """
     text = shipped_profiles()["finger"].read_text()
-    text = text.replace('model = "XL330-M077"\n', _LENGTH + 'model = "XL330-M077"\n')
-    if family == "Dynamixel":
-        return text
-    for before, after in (
-        ("XL330-M077", "STS3215"),
-        ("pretension_n = 1.0", "pretension_n = 6.0"),
-        ("homing_n = 3.0", "homing_n = 8.0"),
-        ("watchdog_ms = 100                 # The servos let go by themselves after so much", "#"),
-    ):
-        text = text.replace(before, after)
-    for most in ("6.4", "7.0"):
-        text = text.replace(f"most_tension_n = {most}", "most_tension_n = 15.0")
-    return text + "\n[enable]\npin = 19\n"
+    lines, enable = _LENGTH, ""
+    if family == "Feetech":
+        (block,) = re.findall(r"```toml\n\[output.FDP\]\n(.*?)```", _GUIDE.read_text(), re.DOTALL)
+        lines, enable = block.split("\n\n")
+        for key in re.findall(r"^(\w+) =", lines, re.MULTILINE):
+            text = re.sub(rf"^{key} = .*\n", "", text, flags=re.MULTILINE)
+    return text.replace('part = "tendon"\n', f'part = "tendon"\n{lines}\n') + "\n" + enable

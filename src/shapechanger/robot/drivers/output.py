@@ -61,7 +61,7 @@ class SharedDevice(Protocol):
         """Clear faults before the robot is armed, without moving anything.
 
         Args:
-            alive: Feeds the enable line, and is called at least every 30 ms.
+            alive: Feeds the enable line and the supervisor; called at least every 50 ms.
 
         Raises:
             RobotError: If a fault persists.

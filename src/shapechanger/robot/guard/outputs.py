@@ -210,7 +210,7 @@ class OutputBank:
         """Reset outputs that had a fault.
 
         Args:
-            alive: Feeds the enable line meanwhile.
+            alive: Feeds the enable line and the supervisor meanwhile.
 
         Returns:
             Why an output cannot be reset; empty if all can move.
