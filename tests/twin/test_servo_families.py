@@ -173,6 +173,24 @@ def test_a_failed_servo_stops_all(bench: _Bench, how: str, words: str) -> None:
         assert min(bench.pulls()) > 0.0
 
 
+def test_arming_does_not_keep_a_deaf_servo_pulling(bench: _Bench) -> None:
+    """Whoever insists on arming while a servo hears nothing does not keep its power on."""
+    bench.drive(_FLEX, 25)
+    bench.rig.break_servo("FDS", "deaf")
+    for _ in range(10):
+        bench.drive(_FLEX, 1)
+        with contextlib.suppress(RobotError):
+            bench.robot.arm()
+    assert bench.pulls() == [0.0] * 7
+    with pytest.raises(RobotError, match="FDS"):
+        bench.robot.arm()
+    bench.rig.break_servo("FDS", "")
+    bench.drive(_FLEX, 40)
+    bench.robot.arm()
+    bench.drive(_FLEX, 5)
+    assert bench.seen.stop_reason == ""
+
+
 def test_a_servo_that_is_missing_is_named(bench: _Bench) -> None:
     """A rig with a servo of a wrong id, or without one, is not armed."""
     bench.drive(_FLEX, 10)
@@ -245,7 +263,7 @@ def test_safe_pins_cut_the_power_of_feetech_servos() -> None:
 def test_a_feetech_rig_needs_a_power_switch() -> None:
     """Without [enable] the profile says what to add."""
     text = finger_text("Feetech")
-    words = r"FDP\] is a STS3215, which does not stop when its bus is silent: add \[enable\] with"
+    words = r"FDP\] is an STS3215, which does not stop when its bus is silent: add \[enable\] with"
     with pytest.raises(ProfileError, match=words):
         read(text[: text.index("[enable]")])
 

@@ -218,7 +218,7 @@ def with_servo_bus(
     if limp is not None:
         if enable_hold_ms is None:
             words = (
-                f"{called(('output', limp.name))} is a {limp.settings['model']}, which does not "
+                f"{called(('output', limp.name))} is an {limp.settings['model']}, which does not "
                 "stop when its bus is silent: add [enable] with the pin that keeps its power on"
             )
             raise source.mistake(("output", limp.name), words)

@@ -73,7 +73,9 @@ class ServoBus:
         Raises:
             RobotError: If a servo is missing, is of another model, refuses, or has shut itself off.
         """
-        self.mode, self.is_ready = "off", False
+        self.is_ready = False
+        if self.mode != "silent":  # A servo may still pull, until all have been set up.
+            self.mode = "off"
         self._goals = dict.fromkeys(self._ids, 0)
         self._registers.write_all(self._family.torque_enable, dict.fromkeys(self._ids, 0))
         self._check_servos(alive)
@@ -83,7 +85,7 @@ class ServoBus:
         self._registers.suspects.clear()
         for health in self._health.values():
             health.clear()
-        self._gone, self.is_ready = "", True
+        self.mode, self._gone, self.is_ready = "off", "", True
 
     def hold(self) -> None:
         """Enable the torque of all servos, which pull nothing until the first cycle.

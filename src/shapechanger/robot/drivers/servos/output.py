@@ -70,6 +70,7 @@ class SharedBus:
         if bus.faults or not bus.is_ready:
             if bus.mode not in ("off", "silent"):
                 bus.release()
+            self._require_release(bus)
             bus.set_up(alive)
             self._silent_since_ns = None
             if not self._has_watchdog:
