@@ -291,6 +291,8 @@ class ServoBus:
             found = registers.read(servo.id, register)
             if (wanted := found & kept_bits | value) != found:
                 registers.write(servo.id, register, wanted)
+                if registers.read(servo.id, register) != wanted:  # Not every family refuses.
+                    raise RobotError(f"{servo.words} does not keep {wanted} as {register.name}.")
         if family.lock is not None:
             registers.write(servo.id, family.lock, 1)
         self._set_mark(servo)
