@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.servos.family import COUNTS_PER_TURN
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.motor import Load, Tendon
-from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
+from shapechanger.twin.servos.servo import COUNTS_PER_RAD, ServoPlan, SimulatedServo
 from shapechanger.worlds.world import World
 
 ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
@@ -23,7 +21,6 @@ off. "snapped": its tendon is torn for good. "power": its power fails for a mome
 "mute", "deaf" and "hot".
 """
 
-_COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
 _HOT_C: Final = 75.0
 _WELL_C: Final = 30.0
 
@@ -83,7 +80,7 @@ class Rig:
                 model=one["model"],
                 tendon=Tendon(one["spool_radius_m"], one["direction"], stiffness),
                 # In the middle of a count, as it stands while the finger is straight.
-                angle=(one["zero"] + 0.5) / _COUNTS_PER_RAD,
+                angle=(one["zero"] + 0.5) / COUNTS_PER_RAD,
             )
             for one in settings
         ]

@@ -23,7 +23,12 @@ import math
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
-from shapechanger.robot.drivers.servos.family import COUNTS_PER_TURN, Register
+from shapechanger.robot.drivers.servos.family import (
+    COUNTS_PER_TURN,
+    TRIPPED,
+    WATCHDOG_STEP_MS,
+    Register,
+)
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.drivers.servos.settings import model_named
 from shapechanger.twin.servos.motor import SimulatedMotor, Tendon
@@ -39,9 +44,8 @@ _VOLTAGE: Final = 0x01
 _HOT: Final = 0x04
 _OVERLOAD: Final = 0x20
 
-_TRIPPED: Final = 0xFF
-_WATCHDOG_STEP_NS: Final = 20_000_000
-_COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
+COUNTS_PER_RAD: Final = COUNTS_PER_TURN / (2.0 * math.pi)
+"""Counts of position per rad."""
 _START_NS: Final = 300_000_000
 _STALL_AT: Final = 2.0 * math.pi / 32.0  # rad.
 
@@ -220,18 +224,18 @@ class SimulatedServo:
         """Cache what each step needs of the registers."""
         values, family = self._values, self.family
         steps = values[family.mark.address] if family.has_watchdog else 0
-        counts = self.has_torque and 0 < steps < _TRIPPED
-        self._watchdog_ns = steps * _WATCHDOG_STEP_NS if counts else None
+        counts = self.has_torque and 0 < steps < TRIPPED
+        self._watchdog_ns = steps * WATCHDOG_STEP_MS * 1_000_000 if counts else None
         mode = values[family.mode.address]
-        pulls = self.has_torque and steps != _TRIPPED and mode in family.modes.values()
+        pulls = self.has_torque and steps != TRIPPED and mode in family.modes.values()
         counts_ahead = values[family.goal_position.address] + self._turns + 0.5
         has_length = mode == family.modes["length"]
-        self._goal_angle = counts_ahead / _COUNTS_PER_RAD if has_length else None
+        self._goal_angle = counts_ahead / COUNTS_PER_RAD if has_length else None
         goal = values[family.goal.address]
         self._goal_a = goal * self._model.ampere_per_goal if pulls else 0.0
 
     def _trip(self) -> None:
-        self._values[self.family.mark.address] = _TRIPPED
+        self._values[self.family.mark.address] = TRIPPED
         self._values[self.family.goal.address] = 0
         if self.plan.on_trip == "release":
             self._values[self.family.torque_enable.address] = 0
@@ -285,7 +289,7 @@ class SimulatedServo:
         if allowed is None or value not in allowed:
             raise _Refusal(_RANGE)
         if register == family.goal:
-            if family.has_watchdog and values[family.mark.address] == _TRIPPED:
+            if family.has_watchdog and values[family.mark.address] == TRIPPED:
                 raise _Refusal(_RANGE)
             if abs(value) > values[family.most.address]:
                 raise _Refusal(_LIMIT)
@@ -298,6 +302,6 @@ class SimulatedServo:
         motor, values, family = self.motor, self._values, self.family
         values[family.current.address] = round(motor.current / self._model.ampere_per_count)
         values[family.speed.address] = round(motor.speed / family.rad_per_s)
-        values[family.position.address] = math.floor(motor.angle * _COUNTS_PER_RAD) - self._turns
+        values[family.position.address] = math.floor(motor.angle * COUNTS_PER_RAD) - self._turns
         values[family.voltage.address] = round(10 * self.volts)
         values[family.temperature.address] = round(motor.temperature)

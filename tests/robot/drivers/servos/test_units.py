@@ -73,6 +73,16 @@ def test_a_known_spool_of_a_feetech_servo() -> None:
     assert one.tension_n(10) == pytest.approx(10.18, abs=0.01)
 
 
+def test_the_numbers_of_the_guide() -> None:
+    """docs/finger.md states these of an STS3215 on a spool of 10 mm."""
+    one, radius = feetech("FDP", spool_radius_m=0.010), 0.010
+    assert one.newton_per_goal == pytest.approx(0.19, abs=5e-3)
+    assert one.tension_n(1) == pytest.approx(0.5, abs=0.05)
+    assert one.known.gears.friction_nm / radius == pytest.approx(5.0, abs=0.5)
+    assert one.known.gears.inertia / radius**2 == pytest.approx(260.0, abs=5.0)
+    assert math.pi * radius == pytest.approx(0.031, abs=5e-4)
+
+
 @pytest.mark.parametrize("direction", [1, -1])
 def test_winding_in_shortens_the_tendon(direction: int) -> None:
     """One turn changes the length by the circumference of the spool, in either direction."""

@@ -15,6 +15,11 @@ from typing import Final, Literal, NamedTuple
 COUNTS_PER_TURN: Final = 4096
 """Counts of position per turn."""
 
+TRIPPED: Final = 0xFF
+"""Value of a bus watchdog after it has stopped the servo."""
+WATCHDOG_STEP_MS: Final = 20
+"""Unit of a bus watchdog, ms."""
+
 Control = Literal["tension", "length"]
 """Control of a tendon: by its tension, or by its length with a limit of the tension."""
 

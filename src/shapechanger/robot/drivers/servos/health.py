@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from shapechanger.robot.drivers.servos.family import Present, Register
+from shapechanger.robot.drivers.servos.family import TRIPPED, Present, Register
 from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
 
 Mode = Literal["off", "held", "stopping", "silent"]
@@ -72,10 +72,6 @@ _SHORTEST_M: Final = -0.06
 # Share of the speed without load, and time at it, with which a tendon counts as lost.
 _SLACK_SHARE: Final = 0.7
 _SLACK_NS: Final = 100_000_000
-
-
-_TRIPPED: Final = 0xFF
-"""Value of a bus watchdog after it has stopped the servo."""
 
 
 class ServoHealth:
@@ -158,7 +154,7 @@ class ServoHealth:
         if register == family.hardware_error and value:
             words = family.error_words(value)
             self._fail(f"has switched itself off: {words}. Only a reboot gives it torque again")
-        elif register == family.mark and family.has_watchdog and value == _TRIPPED:
+        elif register == family.mark and family.has_watchdog and value == TRIPPED:
             words = f"it received nothing for {self._bus.watchdog_ms} ms"
             self._fail(f"was stopped by its own watchdog: {words}")
         elif register == family.mark and value == 0:

@@ -14,6 +14,7 @@ from shapechanger.robot.drivers.servos.family import (
     COUNTS_PER_TURN,
     DYNAMIXEL,
     FEETECH,
+    WATCHDOG_STEP_MS,
     Control,
     ServoFamily,
 )
@@ -145,8 +146,7 @@ def stops_itself(output: OutputPlan) -> bool:
     return output.driver == DRIVER and MODELS[output.settings["model"]].family.has_watchdog
 
 
-_WATCHDOG_STEP_MS: Final = 20
-_MOST_WATCHDOG_MS: Final = 127 * _WATCHDOG_STEP_MS
+_MOST_WATCHDOG_MS: Final = 127 * WATCHDOG_STEP_MS
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,7 +352,7 @@ class BusSettings:
         if self.baud not in rates:
             words = ", ".join(map(str, rates))
             raise RobotError(f"No servo has {self.baud} baud; the baud rates are {words}.")
-        if not 20 <= self.watchdog_ms <= _MOST_WATCHDOG_MS or self.watchdog_ms % _WATCHDOG_STEP_MS:
+        if not 20 <= self.watchdog_ms <= _MOST_WATCHDOG_MS or self.watchdog_ms % WATCHDOG_STEP_MS:
             raise RobotError(
                 f"watchdog_ms must be 20 to {_MOST_WATCHDOG_MS} in steps of 20, "
                 f"not {self.watchdog_ms}."
@@ -367,7 +367,7 @@ class BusSettings:
     def mark(self) -> int:
         """Value of `ServoFamily.mark` while a servo has not restarted."""
         family = self.family
-        return self.watchdog_ms // _WATCHDOG_STEP_MS if family.has_watchdog else 254
+        return self.watchdog_ms // WATCHDOG_STEP_MS if family.has_watchdog else 254
 
 
 def servo_settings(plan: OutputPlan) -> ServoSettings:
