@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from shapechanger.errors import RobotError
 
 if TYPE_CHECKING:  # Only a rig needs them.
-    from shapechanger.robot.drivers.dynamixel.protocol import ServoPort
-    from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+    from shapechanger.robot.drivers.servos.registers import ServoPort
+    from shapechanger.robot.drivers.servos.settings import BusSettings
 
 REAL: Final = "shapechanger.robot.hardware:real"
 """Default source of the hardware."""
@@ -199,7 +199,7 @@ class RealHardware:
 
     def servo_port(self, settings: BusSettings) -> ServoPort:
         """Open a serial port with `dynamixel_sdk`."""
-        from shapechanger.robot.drivers.dynamixel.serial_port import open_serial_port
+        from shapechanger.robot.drivers.servos.serial_port import open_serial_port
 
         return open_serial_port(settings)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from shapechanger.robot.drivers.dynamixel.protocol import ServoReply
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+from shapechanger.robot.drivers.servos.registers import ServoReply
+from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.hardware import Clock
 from shapechanger.twin.board_client import BoardClient, GrantedClock, SteadyClock
 from shapechanger.twin.messages import (
@@ -117,17 +117,15 @@ class TwinServoPort:
         self._device = device
         self.has_stray = False
 
-    def exchange(
-        self,
-        servo_id: int,
-        instruction: int,
-        parameters: bytes,
-        ids: Sequence[int],
-        length: int,
-    ) -> dict[int, ServoReply]:
-        """Send an instruction and return the replies; see `ServoPort.exchange`."""
+    def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
+        """Read bytes of several servos; see `ServoPort.read`."""
+        request = InstructServos(device=self._device, at=at, ids=list(ids), size=size)
+        return self._board.ask(request, dict[int, ServoReply])
+
+    def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
+        """Write bytes of several servos, or of one; see `ServoPort.write`."""
         request = InstructServos(
-            device=self._device, servo_id=servo_id, instruction=instruction, parameters=parameters
+            device=self._device, at=at, ids=list(data), data=list(data.values())
         )
         return self._board.ask(request, dict[int, ServoReply])
 

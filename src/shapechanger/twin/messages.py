@@ -133,12 +133,13 @@ class WriteChip(_HardwareRequest):
 
 
 class InstructServos(_HardwareRequest):
-    """Send an instruction to the servo bus, answered by the replies of the servos, by id."""
+    """Read `size` bytes of servos, or write `data`, answered by their replies by id."""
 
     device: str
-    servo_id: int
-    instruction: int
-    parameters: bytes
+    at: int
+    ids: list[int]
+    size: int = 0
+    data: list[bytes] = []
 
 
 class WaitForGrant(_Request):

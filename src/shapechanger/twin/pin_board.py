@@ -124,7 +124,9 @@ class PinBoard:
             case InstructServos():
                 rig = self.require_rig()
                 rig.require(request.device)
-                return rig.bus.execute(request.servo_id, request.instruction, request.parameters)
+                if request.size:
+                    return rig.bus.read(request.ids, request.at, request.size)
+                return rig.bus.write(dict(zip(request.ids, request.data, strict=True)), request.at)
             case ClaimPin():
                 return self._claim(owner, request)
         return None

@@ -6,6 +6,7 @@ import heapq
 import math
 from typing import Final
 
+from shapechanger.robot.drivers.servos.settings import DRIVER
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.twin.messages import Edge
 from shapechanger.twin.servos.rig import Rig
@@ -263,7 +264,8 @@ class Surroundings:
         self._wiring = wiring
         self._world = world
         self.sensors = PinSensors(wiring.plan, world)
-        self.rig = Rig.of(wiring.plan, world)
+        has_bus = any(output.driver == DRIVER for output in wiring.plan.outputs)
+        self.rig = Rig(wiring.plan, world) if has_bus else None
         self.now_ns = now_ns
         self._controllers = {
             name: SpeedController(plan)
@@ -281,6 +283,9 @@ class Surroundings:
         start_ns = self.now_ns
         if now_ns > start_ns:
             if self.rig is not None:
+                if self.rig.is_switched:
+                    ends_ns = self._wiring.power_ends_ns(levels)
+                    self.rig.bus.set_power(on=ends_ns is None or now_ns < ends_ns)
                 self.rig.bus.advance(min(now_ns - start_ns, _MAX_SERVO_STEP_NS))
             self._world.advance((now_ns - start_ns) / 1e9, self.parts(levels))
             self.now_ns = now_ns

@@ -119,7 +119,7 @@ class TwinWiring:
                 return _servo(plan, rest, self._pulse(plan))
             case "esc":
                 return _esc(plan, self._pulse(plan))
-            case "dynamixel":  # On a bus: no level of a pin determines its state.
+            case "bus_servo":  # On a bus: no level of a pin determines its state.
                 return lambda levels: WiredOutput(None, True)
             case driver:
                 raise RobotError(f"The twin does not support the output driver {driver!r}.")

@@ -109,8 +109,8 @@ def _state_after(bench: Bench, *values: float) -> dict[str, Any]:
     return sound.state()
 
 
-# `dynamixel/test_faults.py` covers these.
-_ON_A_BUS = {"dynamixel"}
+# `servos/test_faults.py` covers these.
+_ON_A_BUS = {"bus_servo"}
 
 
 def test_every_driver_is_covered() -> None:

@@ -615,7 +615,7 @@ def test_a_failed_thermometer_stops() -> None:
 @pytest.mark.parametrize(("slow", "armed"), [(False, False), (True, True)])
 def test_servos_that_fail_disarm_and_slow_ones_only_stop(slow: bool, armed: bool) -> None:
     """Failed servos have released their tendons, so a person must rearm; slow ones need not."""
-    plan = replace(quick_car(), sensors=(SensorPlan("spools", "dynamixel", "tendons"),))
+    plan = replace(quick_car(), sensors=(SensorPlan("spools", "bus_servo", "tendons"),))
     rules = _driving(plan)
     late = frozenset({"spools"}) if slow else frozenset[str]()
     rules.sense(Sensing(failures={"spools": "Overload."}, slow=late), _T0)

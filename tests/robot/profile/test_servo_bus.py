@@ -9,7 +9,7 @@ import pytest
 from shapechanger.errors import ProfileError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile import load_profile, shipped_profiles
-from tests.robot.profile.texts import changed, read
+from tests.robot.profile.texts import changed, finger_text, read
 
 _TEXT = shipped_profiles()["finger"].read_text()
 _SENSOR = _TEXT[_TEXT.index("[sensor.tendons]") : _TEXT.index("[sensor.joints]")]
@@ -48,7 +48,7 @@ def test_layouts_are_in_newtons_and_metres() -> None:
     ("text", "words"),
     [
         (_TEXT.replace(_BUS, ""), r"\[output.FDP\] is on a bus: add \[servo_bus\]"),
-        (_TEXT.replace(_SENSOR, ""), "servos need one sensor with the driver dynamixel"),
+        (_TEXT.replace(_SENSOR, ""), "servos need one sensor with the driver bus_servo"),
         (_TEXT + _SENSOR.replace("tendons", "others"), "servos need one sensor"),
         (changed('then = "release"', 'then = "hold"', _TEXT), 'must be "release"'),
         (
@@ -63,11 +63,11 @@ def test_layouts_are_in_newtons_and_metres() -> None:
         (_TEXT.replace("XL330-M077", "XL330-M078", 1), "did you mean 'XL330-M077'"),
         (
             shipped_profiles()["car"].read_text() + "\n[servo_bus]\n",
-            "needs an output with the driver dynamixel",
+            "needs an output with the driver bus_servo",
         ),
         (
             shipped_profiles()["car"].read_text() + "\n" + _SENSOR,
-            r"\[sensor.tendons\] needs outputs with the driver dynamixel",
+            r"\[sensor.tendons\] needs outputs with the driver bus_servo",
         ),
     ],
 )
@@ -99,3 +99,33 @@ def test_invalid_control_is_refused_with_its_line(keys: str, words: str) -> None
     """A misspelt control and a missing range of lengths name the problem and its line."""
     with pytest.raises(ProfileError, match=r"line \d+: .*" + words):
         read(_TEXT.replace("id = 1\n", "id = 1\n" + keys, 1))
+
+
+def test_a_feetech_rig_has_the_settings_of_its_power_switch() -> None:
+    """Its outputs know how long the enable line holds, and how long the servos start."""
+    profile = read(finger_text("Feetech") + "hold_ms = 50\n")
+    settings = [output.settings for output in profile.outputs]
+    assert {(one["model"], one["cut_ms"], one["arm_s"]) for one in settings} == {
+        ("STS3215", 100, 0.5)
+    }
+    assert profile.action_layout()["FDP"].gain == pytest.approx(0.042)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('control = "length"', 'control = "tension"', "must be 'length', not 'tension', because a"),
+        ("shortest_m = -0.03 ", "shortest_m = -0.04 ", "within 0.0314 m of the zero, half a turn"),
+        ("[enable]\npin = 19", "", r"\[output.FDP\] is an STS3215.*: add \[enable\] with the pin"),
+        (
+            "baud = 1_000_000",
+            "baud = 2_000_000",
+            "No servo has 2000000 baud; the baud rates are 3",
+        ),
+        ('model = "STS3215"', 'model = "XL330-M077"', "cannot have Dynamixel and Feetech servos"),
+    ],
+)
+def test_what_feetech_servos_cannot_do_is_refused(old: str, new: str, words: str) -> None:
+    """One sentence names the line and the reason."""
+    with pytest.raises(ProfileError, match=r"line \d+: .*" + words):
+        read(finger_text("Feetech").replace(old, new, 1))

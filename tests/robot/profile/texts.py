@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
-from shapechanger.robot.profile import Profile, read_profile
+from shapechanger.robot.profile import Profile, read_profile, shipped_profiles
 
 PATH = Path("rover.toml")
 
@@ -186,3 +187,23 @@ def changed(old: str, new: str, text: str = EVERYTHING) -> str:
 def read(text: str = EVERYTHING) -> Profile:
     """Parse the text of a profile."""
     return read_profile(text, PATH)
+
+
+_LENGTH = 'control = "length"\nlongest_m = 0.012\nshortest_m = -0.03\n'
+_GUIDE = Path(__file__).parents[3] / "docs" / "finger.md"
+
+
+def finger_text(family: str) -> str:
+    """Return the shipped finger with control of the lengths.
+
+    Args:
+        family: "Dynamixel", or "Feetech" with the lines that differ, as the guide has them.
+    """
+    text = shipped_profiles()["finger"].read_text()
+    lines, enable = _LENGTH, ""
+    if family == "Feetech":
+        (block,) = re.findall(r"```toml\n\[output.FDP\]\n(.*?)```", _GUIDE.read_text(), re.DOTALL)
+        lines, enable = block.split("\n\n")
+        for key in re.findall(r"^(\w+) =", lines, re.MULTILINE):
+            text = re.sub(rf"^{key} = .*\n", "", text, flags=re.MULTILINE)
+    return text.replace('part = "tendon"\n', f'part = "tendon"\n{lines}\n') + "\n" + enable

@@ -13,6 +13,7 @@ from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.doctor import Finding, examine_robot
 from shapechanger.robot.setup.systemd import unit_name
+from tests.robot.profile.texts import finger_text, read
 
 _CAMERA = CameraPlan("pattern")
 _MOTOR = OutputPlan("drive", "hbridge", "wheels", {"throttle": 1.0}, settings={"forward": 22})
@@ -164,3 +165,18 @@ def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
     _write(tmp_path, timer, "1\n")
     assert _found(tmp_path, rig)["latency timer"].level == "good"
     assert _found(tmp_path, rig)["enable line"].level == "good"
+
+
+def test_servos_without_a_watchdog_need_a_power_switch(tmp_path: Path) -> None:
+    """The doctor requires the one-shot, and the pins that feed it."""
+    rig = read(finger_text("Feetech")).guard_plan()
+    _write(tmp_path, "dev/ttyUSB0", "")
+    found = _found(tmp_path, rig)
+    assert found["enable line"].level == "good"
+    assert "as servos without a watchdog must" in found["enable line"].sentence
+    pins = [f.sentence for f in examine_robot(rig, None, 0, tmp_path) if "gpiochip0" in f.sentence]
+    assert len(pins) == 1
+    assert "does not exist" in pins[0]
+    bare = _found(tmp_path, replace(rig, enable_pin=None))["enable line"]
+    assert bare.level == "missing"
+    assert "Fit the one-shot" in bare.sentence

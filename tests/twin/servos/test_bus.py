@@ -3,9 +3,10 @@
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.dynamixel.protocol import ServoReply
+from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.servo import ServoPlan
+from tests.robot.drivers.servos.wire import instruct
 
 MS = 1_000_000
 
@@ -15,7 +16,7 @@ def _line(count: int = 1) -> SimulatedBus:
 
 
 def _ask(line: SimulatedBus, servo_id: int, code: int, body: bytes = b"") -> ServoReply | None:
-    return line.execute(servo_id, code, body).get(servo_id)
+    return instruct(line, servo_id, code, body).get(servo_id)
 
 
 def _write(line: SimulatedBus, at: int, value: int, size: int = 1) -> int | None:
@@ -36,21 +37,23 @@ def _pull(line: SimulatedBus, counts: int = 200) -> None:
     assert errors == [0, 0, 0]
 
 
-def test_a_ping_is_answered_with_model_and_firmware() -> None:
-    """A ping returns the model number and firmware version of the addressed servo."""
-    assert _line(3).execute(2, 1, b"") == {2: ServoReply(0, b"\xa6\x04\x34")}
+def test_a_read_is_answered_by_the_addressed_servo() -> None:
+    """A read of model number and firmware returns those of the addressed servo."""
+    line = _line(3)
+    assert instruct(line, 2, 2, b"\x00\x00\x02\x00") == {2: ServoReply(0, b"\xa6\x04")}
+    assert instruct(line, 2, 2, b"\x06\x00\x01\x00") == {2: ServoReply(0, b"\x34")}
 
 
-def test_a_ping_to_an_unknown_id_gets_no_reply() -> None:
+def test_an_unknown_id_gets_no_reply() -> None:
     """No servo replies to an id that is not on the bus."""
-    assert _line().execute(9, 1, b"") == {}
+    assert instruct(_line(), 9, 2, b"\x00\x00\x02\x00") == {}
 
 
 def test_a_mute_servo_silences_those_after_it_in_a_sync_read() -> None:
     """In a sync read, each servo waits for the reply of the one before it."""
     line = _line(3)
     line.servos[2].mute = True
-    assert line.execute(0xFE, 0x82, b"\x40\x00\x01\x00\x01\x02\x03") == {1: ServoReply(0, b"\0")}
+    assert instruct(line, 0xFE, 0x82, b"\x40\x00\x01\x00\x01\x02\x03") == {1: ServoReply(0, b"\0")}
 
 
 @pytest.mark.parametrize(
@@ -119,7 +122,7 @@ def test_any_instruction_feeds_the_watchdog() -> None:
     assert _write(line, 98, 5) == 0
     for _ in range(5):
         line.advance(80 * MS)
-        _ask(line, 2, 1)
+        _ask(line, 2, 2, b"\x06\x00\x01\x00")
     assert line.servos[1].pulls_a > 0.0
     line.advance(110 * MS)
     assert line.servos[1].pulls_a == 0.0
@@ -141,13 +144,12 @@ def test_a_hardware_error_disables_torque_until_a_reboot() -> None:
     line = _line()
     _pull(line)
     line.servos[1].overload()
-    assert _ask(line, 1, 1) == (0x80, b"\xa6\x04\x34")
     assert _read(line, 70, 1) == (0x80, b"\x20")
     assert _read(line, 64, 1) == (0x80, b"\x00")
     assert _write(line, 64, 1) == 0x84
-    assert _ask(line, 1, 8) == (0, b"")
+    line.servos[1].lose_power()
     line.advance(299 * MS)
-    assert _ask(line, 1, 1) is None  # Still booting.
+    assert _read(line, 70, 1) is None  # Still booting.
     line.advance(2 * MS)
     assert _read(line, 70, 1) == (0, b"\x00")
     assert _write(line, 64, 1) == 0
@@ -173,3 +175,48 @@ def test_an_invalid_bus_is_refused() -> None:
         SimulatedBus([ServoPlan(1), ServoPlan(1)])
     with pytest.raises(UnknownName, match="Did you mean 'XL330-M288'"):
         SimulatedBus([ServoPlan(1, "XL330-M28")])
+
+
+def _feetech(line: SimulatedBus, at: int, value: int, size: int = 1) -> int:
+    """Write a register of the first Feetech servo, and return what it holds then."""
+    line.write({1: value.to_bytes(size, "little")}, at)
+    return line.servos[1].register(at)
+
+
+def test_a_feetech_servo_keeps_its_eeprom_locked() -> None:
+    """Without a reason, it ignores writes until the lock is 0."""
+    line = SimulatedBus([ServoPlan(1, "STS3215")])
+    assert _feetech(line, 16, 100, 2) == 1000
+    assert _feetech(line, 55, 0) == 0
+    assert _feetech(line, 16, 100, 2) == 100
+    assert _feetech(line, 48, 101, 2) == 1000  # Beyond the maximum torque.
+    assert _feetech(line, 48, 100, 2) == 100
+
+
+def test_a_feetech_servo_pulls_without_a_host_until_its_power_is_cut() -> None:
+    """It has no watchdog; after the power is back it has no torque and one turn."""
+    line = SimulatedBus([ServoPlan(1, "STS3215", angle=10.0)])
+    before = line.servos[1].register(56)
+    _feetech(line, 42, before + 1000, 2)
+    _feetech(line, 40, 1)
+    line.advance(500 * MS)
+    assert line.servos[1].pulls_a == pytest.approx(2.44)
+    assert line.servos[1].register(56) > before + 50
+    line.set_power(on=False)
+    line.advance(10 * MS)
+    assert (line.servos[1].pulls_a, line.read([1], 40, 1)) == (0.0, {})
+    line.set_power(on=True)
+    line.advance(299 * MS)
+    assert line.read([1], 40, 1) == {}
+    line.advance(1 * MS)
+    assert line.read([1], 40, 1) == {1: ServoReply(0, b"\0")}
+    assert 0 <= line.servos[1].register(56) < 4096
+
+
+def test_a_feetech_servo_reports_its_errors_in_each_reply() -> None:
+    """The error byte is its status, and an overload takes its torque."""
+    line = SimulatedBus([ServoPlan(1, "STS3215")])
+    assert _feetech(line, 40, 1) == 1
+    line.servos[1].overload()
+    assert line.read([1], 40, 1) == {1: ServoReply(0x20, b"\0")}
+    assert _feetech(line, 40, 1) == 0

@@ -318,7 +318,7 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
         UnknownName: If the gap is unknown.
         MissingExtra: If a gap is given and MuJoCo is not installed.
     """
-    tendons = {output.name for output in profile.outputs if output.driver == "dynamixel"}
+    tendons = {output.name for output in profile.outputs if output.driver == "bus_servo"}
     if find_spec("mujoco") is None:
         if gap:
             raise MissingExtra("mujoco", "sim")

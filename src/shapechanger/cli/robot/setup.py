@@ -29,7 +29,7 @@ from shapechanger.robot.profile.load import (
     starter_text,
     write_profile,
 )
-from shapechanger.robot.setup.doctor import Finding, examine_robot, uses_pins
+from shapechanger.robot.setup.doctor import Finding, examine_robot, needs_pins
 from shapechanger.robot.setup.systemd import write_unit
 from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
 
@@ -212,7 +212,7 @@ def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
     Raises:
         RobotError: If an output needs a pin and the machine has none.
     """
-    if any(map(uses_pins, plan.outputs)) and not any((root / "dev").glob("gpiochip*")):
+    if needs_pins(plan) and not any((root / "dev").glob("gpiochip*")):
         raise RobotError(
             f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
             "`shapechanger robot serve --twin` runs it on simulated ones."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final, Protocol
 
 from shapechanger.robot.guard.plan import OutputPlan
@@ -13,7 +14,7 @@ OUTPUT_DRIVERS: Final = {
     "phase_enable": "shapechanger.robot.drivers.motors:PhaseEnable",
     "servo": "shapechanger.robot.drivers.servo:ServoDriver",
     "esc": "shapechanger.robot.drivers.esc:Esc",
-    "dynamixel": "shapechanger.robot.drivers.dynamixel.output:open_driver",
+    "bus_servo": "shapechanger.robot.drivers.servos.output:TendonOutput",
 }
 """MODULE:NAME of each output driver, by its name in a profile; called with plan and hardware."""
 
@@ -56,8 +57,11 @@ class SharedDevice(Protocol):
         """
         ...
 
-    def ready(self) -> None:
+    def ready(self, alive: Callable[[], object]) -> None:
         """Clear faults before the robot is armed, without moving anything.
+
+        Args:
+            alive: Feeds the enable line and the supervisor; called at least every 50 ms.
 
         Raises:
             RobotError: If a fault persists.

@@ -15,7 +15,7 @@ SENSOR_DRIVERS: Final = {
     "ina219": "shapechanger.robot.drivers.ina219:Ina219",
     "as5600": "shapechanger.robot.drivers.as5600:open_driver",
     "cpu_temperature": "shapechanger.robot.drivers.cpu_temperature:CpuTemperature",
-    "dynamixel": "shapechanger.robot.drivers.dynamixel.sensor:open_driver",
+    "bus_servo": "shapechanger.robot.drivers.servos.output:TendonSensor",
 }
 """MODULE:NAME of each sensor driver, by its name in a profile; called with plan and hardware."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
@@ -81,7 +81,7 @@ _STEP: Final = 0.06
 
 _WHY: Final = {
     "esc": "its controller waits, brakes or changes direction",
-    "dynamixel": "its bus has a fault and released it",
+    "bus_servo": "its bus has a fault and released it",
     "servo": "it turns no faster than its profile allows",
 }
 
@@ -206,15 +206,18 @@ class OutputBank:
         self.released = False
         return self._estimator.estimate(actions, values, tuple(self.values.values()))
 
-    def ready(self) -> str:
+    def ready(self, alive: Callable[[], object]) -> str:
         """Reset outputs that had a fault.
+
+        Args:
+            alive: Feeds the enable line and the supervisor meanwhile.
 
         Returns:
             Why an output cannot be reset; empty if all can move.
         """
         try:
             for device in self._devices:
-                device.ready()
+                device.ready(alive)
         except RobotError as error:
             return str(error)
         return ""
@@ -285,9 +288,9 @@ def errors_noted(failures: list[str], what: str = "") -> Generator[None]:
         failures.append(f"{what}: {words}" if what else words)
 
 
-# Servos with a watchdog of their own release when the bus is silent; talking to them now would only
-# keep them energised.
-_STOPS_ITSELF: Final = ("dynamixel",)
+# Servos on a bus release by their own watchdog when it is silent, or lose their power by the enable
+# pin; talking to them now would only keep them energised.
+_STOPS_ITSELF: Final = ("bus_servo",)
 
 
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:

@@ -79,6 +79,7 @@ class Guard:
             self._rules.stop("the robot's processes failed and started afresh.")
         self._next_tick_ns = now_ns
         self._healthy = True
+        self._heartbeat: Heartbeat | None = None
         self._failures: dict[str, str] = {}
         self._malformed = 0
         self._refused: tuple[str, int | None] = ("", None)
@@ -93,6 +94,7 @@ class Guard:
 
     def run(self, heartbeat: Heartbeat) -> None:
         """Run until asked to end, with a heartbeat to the supervisor."""
+        self._heartbeat = heartbeat
         until_ns = self._clock.now_ns()
         while not self.ended:
             fds = [heartbeat.fileno()]
@@ -129,15 +131,26 @@ class Guard:
             self._sense(now_ns)
         now_ns = self._clock.now_ns()  # Reading orders and sensors took time.
         decision = self._apply(now_ns)
-        if is_tick and self._healthy:
-            self._switches.toggle()
+        if is_tick:
+            self._feed()
         self._report(decision, now_ns)
         return min(self._next_tick_ns, self._rules.next_wake_ns(now_ns))
+
+    def _feed(self) -> None:
+        """Feed the enable line while all outputs obey."""
+        if self._healthy:
+            self._switches.toggle()
+
+    def _stay_alive(self) -> None:
+        """Feed the enable line and the supervisor within a round that takes long."""
+        self._feed()
+        if self._heartbeat is not None:
+            self._heartbeat.beat()
 
     def _process_orders(self) -> None:
         orders, malformed = self._daemon.orders()
         for order in orders:
-            if order.kind == "arm" and (why := self._outputs.ready()):
+            if order.kind == "arm" and (why := self._outputs.ready(self._stay_alive)):
                 self._refused = (f"Not armed: {why}", None)
                 continue
             if refusal := self._rules.offer(order, self._clock.now_ns()):

@@ -92,7 +92,7 @@ def _tendon_spans(outputs: Sequence[OutputPlan]) -> dict[str, tuple[float, str]]
     moved = [name for output in outputs for name in output.mix]
     spans: dict[str, tuple[float, str]] = {}
     for output in outputs:
-        if output.driver != "dynamixel" or output.offset or len(output.mix) != 1:
+        if output.driver != "bus_servo" or output.offset or len(output.mix) != 1:
             continue
         ((name, weight),) = output.mix.items()
         if weight == 1.0 and moved.count(name) == 1:

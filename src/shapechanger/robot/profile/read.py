@@ -63,8 +63,6 @@ def read_profile(text: str, path: Path) -> Profile:
     stop = StopPlan(**root.section("stop").read(schema.STOP_KEYS))
     _check_stop(source, stop, actions, outputs)
     bus = root.section("servo_bus").read(schema.SERVO_BUS_KEYS) if "servo_bus" in root else None
-    outputs, sensors = with_servo_bus(source, bus, outputs, sensors, stop)
-    limits = _read_limits(root.section("limits"), robot["control_hz"], camera, sensors)
     pins: dict[str, Any] = {}
     if "enable" in root:
         enable = root.section("enable").read(schema.ENABLE_KEYS)
@@ -75,6 +73,9 @@ def read_profile(text: str, path: Path) -> Profile:
             "pin"
         ]
         wiring.take_pin(pins["stop_pin"], ("emergency_button", "pin"))
+    hold_ms: int | None = pins.get("enable_hold_ms")
+    outputs, sensors = with_servo_bus(source, bus, outputs, sensors, stop, hold_ms)
+    limits = _read_limits(root.section("limits"), robot["control_hz"], camera, sensors)
     reward = root.section("reward").read(schema.REWARD_KEYS)
     return Profile(
         path=path,

@@ -11,9 +11,9 @@ from typing import Any, Final, Literal, cast
 
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CAMERA_DRIVERS
-from shapechanger.robot.drivers.dynamixel.settings import MODELS
 from shapechanger.robot.drivers.output import OUTPUT_DRIVERS
 from shapechanger.robot.drivers.sensor import SENSOR_DRIVERS
+from shapechanger.robot.drivers.servos.settings import MODELS
 from shapechanger.robot.profile.mistakes import Place, Source, called, choice, nearest, shown
 from shapechanger.robot.profile.pins import HIGHEST_BCM, bcm
 
@@ -258,7 +258,7 @@ MEASURES: Final = {
     "mpu6050": "imu",
     "ina219": "battery",
     "cpu_temperature": "temperature",
-    "dynamixel": "tendons",
+    "bus_servo": "tendons",
     "as5600": "joints",
 }
 """Measurement of each sensor driver, as in `SensorPlan.measures`."""
@@ -334,8 +334,8 @@ OUTPUT_SETTINGS: Final = {
         ProfileKey("reverse", "choice", "direct", names=("direct", "double", "none")),
         ProfileKey("brake_ms", "whole", 200, low=0, high=2000),
     ),
-    "dynamixel": (
-        ProfileKey("id", "whole", low=0, high=252),
+    "bus_servo": (
+        ProfileKey("id", "whole", low=0, high=253),
         ProfileKey("model", "choice", names=tuple(MODELS)),
         ProfileKey("spool_radius_m", "number", low=0.0, high=0.1, above=True),
         ProfileKey("direction", "whole", 1, low=-1, high=1),
@@ -389,7 +389,7 @@ SENSOR_SETTINGS: Final = {
     "cpu_temperature": (
         ProfileKey("path", "text", "/sys/class/thermal/thermal_zone0/temp", longest=4096),
     ),
-    "dynamixel": (),
+    "bus_servo": (),
     "as5600": (_BUS, ProfileKey("mux", "whole", 0x70, low=0x70, high=0x77)),
 }
 """Keys of each sensor driver."""
@@ -461,13 +461,13 @@ ENABLE_KEYS: Final = (
 SERVO_BUS_KEYS: Final = (
     ProfileKey("device", "text", "/dev/ttyUSB0", longest=4096),
     ProfileKey("baud", "whole", 1_000_000, low=9600, high=4_500_000),
-    # The servos' watchdog has steps of 20 ms.
+    # The watchdog of Dynamixel servos has steps of 20 ms; others have none.
     ProfileKey("watchdog_ms", "whole", 100, low=20, high=2540),
     ProfileKey("ramp_ms", "whole", 300, low=0, high=10_000),
     # One silent servo must delay the guard by less than the limit for sensors.
-    ProfileKey("answer_ms", "number", 3.0, low=0.0, high=100.0, above=True),
+    ProfileKey("answer_ms", "number", 3.0, low=0.1, high=100.0),
 )
-"""Keys of the bus of the outputs with the driver dynamixel."""
+"""Keys of the bus of the outputs with the driver bus_servo."""
 
 EMERGENCY_BUTTON_KEYS: Final = (ProfileKey("pin", "pin"),)
 

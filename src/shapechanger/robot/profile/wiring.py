@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.dynamixel.settings import (
-    ServoSettings,
+from shapechanger.robot.drivers.servos.settings import (
+    DRIVER,
     bus_settings,
     servo_settings,
+    stops_itself,
 )
 from shapechanger.robot.guard.plan import OutputPlan, SensorPlan, StopPlan
 from shapechanger.robot.profile.mistakes import Place, Source, called
@@ -164,7 +165,8 @@ def _chip_of(settings: _Settings) -> str:
     return f"the PCA9685 at {settings['address']:#x} of I2C bus {settings['bus']}"
 
 
-_DYNAMIXEL: Final = "dynamixel"
+# Time in which servos start whose power comes with the guard, s.
+_START_S: Final = 0.5
 
 
 def with_servo_bus(
@@ -173,6 +175,7 @@ def with_servo_bus(
     outputs: tuple[OutputPlan, ...],
     sensors: tuple[SensorPlan, ...],
     stop: StopPlan,
+    enable_hold_ms: int | None,
 ) -> tuple[tuple[OutputPlan, ...], tuple[SensorPlan, ...]]:
     """Add the settings of the servo bus to its outputs and sensors.
 
@@ -182,21 +185,21 @@ def with_servo_bus(
         outputs: All outputs.
         sensors: All sensors.
         stop: How the robot stops.
+        enable_hold_ms: How long the enable line stays on without the guard, ms; None without one.
 
     Raises:
         ProfileError: If outputs lack a bus, or a bus lacks outputs or a sensor; if two servos share
-            an id, a servo cannot do what it is set to, or a stop would not release it.
+            an id, a servo cannot do what it is set to, or a stop or the end of the guard would not
+            release it.
     """
-    on_bus = [output for output in outputs if output.driver == _DYNAMIXEL]
-    sensing = [sensor for sensor in sensors if sensor.driver == _DYNAMIXEL]
+    on_bus = [output for output in outputs if output.driver == DRIVER]
+    sensing = [sensor for sensor in sensors if sensor.driver == DRIVER]
     if not on_bus:
         if bus is not None:
-            words = f"[servo_bus] needs an output with the driver {_DYNAMIXEL}"
+            words = f"[servo_bus] needs an output with the driver {DRIVER}"
             raise source.mistake(("servo_bus",), words)
         if sensing:
-            words = (
-                f"{called(('sensor', sensing[0].name))} needs outputs with the driver {_DYNAMIXEL}"
-            )
+            words = f"{called(('sensor', sensing[0].name))} needs outputs with the driver {DRIVER}"
             raise source.mistake(("sensor", sensing[0].name), words)
         return outputs, sensors
     first = ("output", on_bus[0].name)
@@ -204,15 +207,26 @@ def with_servo_bus(
         raise source.mistake(first, f"{called(first)} is on a bus: add [servo_bus]")
     if len(sensing) != 1:
         words = (
-            f"servos need one sensor with the driver {_DYNAMIXEL}, such as [sensor.tendons], which "
+            f"servos need one sensor with the driver {DRIVER}, such as [sensor.tendons], which "
             "reports their failures"
         )
         raise source.mistake(("sensor",) if not sensing else ("sensor", sensing[1].name), words)
     if stop.then != "release":
         words = 'then of [stop] must be "release", so that no servo pulls while nobody commands'
         raise source.mistake(("stop", "then"), words)
+    limp = next((output for output in on_bus if not stops_itself(output)), None)
+    if limp is not None:
+        if enable_hold_ms is None:
+            words = (
+                f"{called(('output', limp.name))} is an {limp.settings['model']}, which does not "
+                "stop when its bus is silent: add [enable] with the pin that keeps its power on"
+            )
+            raise source.mistake(("output", limp.name), words)
+        bus = {**bus, "cut_ms": 2 * enable_hold_ms, "arm_s": _START_S}
     whole = [replace(output, settings={**output.settings, **bus}) for output in on_bus]
-    _check_servos(source, whole, bus)
+    for output in whole:
+        _report(source, ("output", output.name), lambda output=output: servo_settings(output))
+    _report(source, ("servo_bus",), lambda: bus_settings(whole))
     tendons: dict[str, Any] = {
         "device": bus["device"],
         "tendons": [output.name for output in on_bus],
@@ -237,16 +251,9 @@ def with_servo_bus(
     )
 
 
-def _check_servos(source: Source, outputs: list[OutputPlan], bus: Mapping[str, Any]) -> None:
+def _report(source: Source, place: Place, check: Callable[[], object]) -> None:
     """Report, with its line, what the driver would refuse."""
-    servos: list[ServoSettings] = []
-    for output in outputs:
-        try:
-            servos.append(servo_settings(output))
-        except (RobotError, UnknownName) as error:
-            words = str(error).rstrip(".")
-            raise source.mistake(("output", output.name), words) from error
     try:
-        bus_settings({**outputs[0].settings, **bus}, tuple(servos))
-    except RobotError as error:
-        raise source.mistake(("servo_bus",), str(error).rstrip(".")) from error
+        check()
+    except (RobotError, UnknownName) as error:
+        raise source.mistake(place, str(error).rstrip(".")) from error

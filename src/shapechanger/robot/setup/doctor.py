@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
-from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
+from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.setup.systemd import unit_name
 
@@ -92,9 +93,12 @@ def examine_robot(
     yield Finding("port", "good" if is_free else "missing", port_words)
 
 
-def uses_pins(output: OutputPlan) -> bool:
-    """Return True if an output is on the computer's own pins, and not on a bus."""
-    return output.driver in {"hbridge", "phase_enable"} or output.settings.get("over") == "lgpio"
+def needs_pins(guard: GuardPlan) -> bool:
+    """Return True if a robot needs its computer's own pins, to move or to stop."""
+    return guard.enable_pin is not None or any(
+        output.driver in {"hbridge", "phase_enable"} or output.settings.get("over") == "lgpio"
+        for output in guard.outputs
+    )
 
 
 def _computer(root: Path) -> _Results:
@@ -157,7 +161,7 @@ def _unit(robot: str, profile: Path | None, root: Path) -> _Results:
 
 
 def _one_shot(guard: GuardPlan) -> _Results:
-    if all(output.driver == "dynamixel" for output in guard.outputs):
+    if all(map(stops_itself, guard.outputs)):
         yield "good", "Each servo has its own watchdog, and releases when its bus is silent."
     elif guard.enable_pin is None:
         yield (
@@ -169,7 +173,8 @@ def _one_shot(guard: GuardPlan) -> _Results:
         yield (
             "good",
             f"The guard feeds a one-shot on pin {guard.enable_pin}; without edges the motors lose "
-            "power. Measure that once, because it cannot be checked here.",
+            "power, as servos without a watchdog must. Measure that once, because it cannot be "
+            "checked here.",
         )
 
 
@@ -186,7 +191,7 @@ def _output_enable(guard: GuardPlan) -> _Results:
 
 def _latency_timers(guard: GuardPlan, root: Path) -> _Results:
     """Check that the adapters pass on the servos' answers at once."""
-    for device in {o.settings["device"] for o in guard.outputs if o.driver == "dynamixel"}:
+    for device in {o.settings["device"] for o in guard.outputs if o.driver == DRIVER}:
         path = root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
         if not path.exists():
             yield "unknown", f"{device} reports no latency timer; if it has one, it must be 1 ms."
@@ -203,13 +208,13 @@ def _latency_timers(guard: GuardPlan, root: Path) -> _Results:
 def _devices(guard: GuardPlan, root: Path) -> _Results:
     """Check that this user can open the device files."""
     groups: dict[str, str] = {}
-    if any(uses_pins(output) for output in guard.outputs):
+    if needs_pins(guard):
         groups["dev/gpiochip0"] = "gpio"
     for plan in (*guard.outputs, *guard.sensors):
         if "bus" in plan.settings and plan.settings.get("over", "pca9685") == "pca9685":
             groups[f"dev/i2c-{plan.settings['bus']}"] = "i2c"
     for plan in guard.outputs:
-        if plan.driver == "dynamixel":
+        if plan.driver == DRIVER:
             groups[plan.settings["device"].lstrip("/")] = "dialout"
     for name, group in groups.items():
         path = root / name
@@ -230,7 +235,7 @@ def _packages(guard: GuardPlan, camera: CameraPlan | None) -> _Results:
     remedies["lgpio"] = "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"
     if any("bus" in plan.settings for plan in (*guard.outputs, *guard.sensors)):
         remedies["smbus2"] = "pip install 'shapechanger[robot]'"
-    if any(output.driver == "dynamixel" for output in guard.outputs):
+    if any(output.driver == DRIVER for output in guard.outputs):
         remedies["dynamixel_sdk"] = "pip install 'shapechanger[robot,finger]'"
     if camera is not None and camera.driver == "picamera2":
         remedies["picamera2"] = (

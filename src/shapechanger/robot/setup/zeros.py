@@ -8,12 +8,14 @@ from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, connect_encoders
-from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-from shapechanger.robot.drivers.dynamixel.homing import Homing
-from shapechanger.robot.drivers.dynamixel.settings import bus_settings, servo_settings
+from shapechanger.robot.drivers.servos.bus import ServoBus
+from shapechanger.robot.drivers.servos.homing import Homing
+from shapechanger.robot.drivers.servos.settings import DRIVER, bus_settings
+from shapechanger.robot.guard.outputs import Switches
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
+_START_TICKS: Final = 50  # Half a second, in which servos start that get their power now.
 _READINGS: Final = 50  # Half a second; single readings differ by a count or two.
 
 
@@ -68,20 +70,29 @@ def find_zeros(plan: GuardPlan, hardware: Hardware, wait: Callable[[], object]) 
     Raises:
         RobotError: If the robot has no servo bus, a servo fails, or a tendon never gets taut.
     """
-    outputs = [output for output in plan.outputs if output.driver == "dynamixel"]
+    outputs = [output for output in plan.outputs if output.driver == DRIVER]
     if not outputs:
         raise RobotError(f"{plan.name} has no tendons on a servo bus.")
-    settings = bus_settings(outputs[0].settings, tuple(map(servo_settings, outputs)))
+    settings = bus_settings(outputs)
     homing = Homing(settings)
-    bus = ServoBus(settings, hardware.servo_port(settings))
+    switches = Switches(plan, hardware)
     try:
-        bus.set_up()
-        bus.hold()
-        while homing.zeros is None and not homing.failure:
-            homing.see(bus.cycle(homing.tensions, hardware.clock.now_ns()))
-            wait()
+        bus = ServoBus(settings, hardware.servo_port(settings))
+        try:
+            for _ in range(_START_TICKS if plan.enable_pin is not None else 0):
+                switches.toggle()
+                wait()
+            bus.set_up(switches.toggle)
+            bus.hold()
+            while homing.zeros is None and not homing.failure:
+                switches.toggle()
+                bus.send(homing.tensions)
+                homing.see(bus.cycle(hardware.clock.now_ns()))
+                wait()
+        finally:
+            bus.close()
     finally:
-        bus.close()
+        switches.close()
     if homing.zeros is None:
         raise RobotError(homing.failure)
     return homing.zeros

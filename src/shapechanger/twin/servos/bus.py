@@ -1,18 +1,12 @@
-"""A simulated bus of Dynamixel servos: executes instructions, and advances when asked to."""
+"""A simulated bus of servos: answers, and advances when asked to."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.protocol import (
-    READ,
-    SYNC_READ,
-    SYNC_WRITE,
-    WRITE,
-    ServoReply,
-)
+from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.twin.servos.motor import EndStops, Load
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
 
@@ -31,6 +25,7 @@ class SimulatedBus:
     Attributes:
         servos: Servos by id.
         now_ns: Time of the bus.
+        has_power: Whether the servos have power.
 
     Raises:
         RobotError: If two servos have the same id.
@@ -43,33 +38,33 @@ class SimulatedBus:
         self._load = EndStops(len(plans)) if load is None else load
         self._travels = [0.0] * len(plans)
         self.now_ns = 0
+        self.has_power = True
 
-    def execute(self, servo_id: int, instruction: int, parameters: bytes) -> dict[int, ServoReply]:
-        """Execute an instruction and return the replies, by id.
-
-        Args:
-            servo_id: Id of the addressed servo; sync instructions name theirs in `parameters`.
-            instruction: Code of the instruction.
-            parameters: Its parameters.
-        """
-        for servo in self.servos.values():
-            if servo.is_awake:
-                servo.feed_watchdog()
-        if instruction == SYNC_WRITE:
-            step = 1 + int.from_bytes(parameters[2:4], "little")
-            for start in range(4, len(parameters), step):
-                one, *data = parameters[start : start + step]
-                self._execute(one, WRITE, parameters[:2] + bytes(data))
-            return {}
-        if instruction != SYNC_READ:
-            reply = self._execute(servo_id, instruction, parameters)
-            return {} if reply is None else {servo_id: reply}
+    def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
+        """Let servos answer what they are asked for; see `ServoPort.read`."""
         replies: dict[int, ServoReply] = {}
-        for one in parameters[4:]:
-            if (reply := self._execute(one, READ, parameters[:4])) is None:
+        for servo in self._addressed(ids):
+            if servo is None or servo.mute:
                 break
-            replies[one] = reply
+            replies[servo.plan.id] = servo.read(at, size)
         return replies
+
+    def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
+        """Let servos obey; see `ServoPort.write`."""
+        replies: dict[int, ServoReply] = {}
+        for servo in self._addressed(list(data)):
+            if servo is not None:
+                reply = servo.write(at, data[servo.plan.id])
+                if not servo.mute:
+                    replies[servo.plan.id] = reply
+        return replies
+
+    def set_power(self, *, on: bool) -> None:
+        """Switch the supply of all servos."""
+        if on != self.has_power:
+            self.has_power = on
+            for servo in self.servos.values():
+                servo.set_power(on=on)
 
     def advance(self, ns: int) -> None:
         """Advance time by `ns`."""
@@ -86,10 +81,9 @@ class SimulatedBus:
         """Set where the ends of the tendons are, m, after the load was moved from outside."""
         self._travels = list(travels_m)
 
-    def _execute(self, servo_id: int, instruction: int, parameters: bytes) -> ServoReply | None:
-        """Let one servo execute an instruction; None if it does not reply."""
-        servo = self.servos.get(servo_id)
-        if servo is None or not servo.is_awake:
-            return None
-        reply = servo.execute(instruction, parameters)
-        return None if servo.mute else reply
+    def _addressed(self, ids: Sequence[int]) -> list[SimulatedServo | None]:
+        """Return servos by id, None for those that hear nothing, and feed all watchdogs."""
+        awake = {one: servo for one, servo in self.servos.items() if servo.is_awake}
+        for servo in awake.values():
+            servo.feed_watchdog()
+        return [awake.get(one) for one in ids]

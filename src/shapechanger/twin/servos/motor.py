@@ -7,56 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from shapechanger.robot.drivers.dynamixel.settings import ServoModel, model_named
-
-
-@dataclass(frozen=True, slots=True)
-class MotorModel:
-    """Motor and gears of a servo model, beyond what its driver knows.
-
-    Attributes:
-        servo: The model, with its electrical numbers.
-        shutdown: Hardware errors that shut it off, as bits.
-        inertia: Inertia of motor and gears at the output, kg·m2.
-        friction_nm: Coulomb friction at the output, N·m.
-        viscous: Viscous friction at the output, N·m·s/rad.
-    """
-
-    servo: ServoModel
-    shutdown: int
-    inertia: float
-    friction_nm: float
-    viscous: float
-
-    @property
-    def electric_rad_per_s(self) -> float:
-        """Speed at which no current flows, above that without load, where friction takes some."""
-        no_load = self.servo.no_load_rad_per_s
-        lost = (self.friction_nm + self.viscous * no_load) / self.servo.stall_nm
-        return no_load / (1.0 - lost)
-
-
-# Shutdown: ROBOTIS e-manual. Inertia and friction of the XL330-M288: identified by Rhoban's `bam`
-# (xl330/m1); of the M077: the same, scaled by the square of the gear ratio; of the XC330-M288: fits
-# on joints of a LEAP hand, with the viscous part of the XL330 assumed; of the XM430: chosen for
-# want of a source.
-_MODELS: Final = {
-    "XL330-M288": (53, 0.00199, 0.018, 0.0059),
-    "XL330-M077": (53, 0.000144, 0.005, 0.00043),
-    "XC330-M288": (52, 0.00141, 0.029, 0.0059),
-    "XM430-W210": (52, 0.003, 0.09, 0.02),
-    "XM430-W350": (52, 0.008, 0.12, 0.05),
-}
-
-
-def motor_model(name: str) -> MotorModel:
-    """Return the motor of a servo model.
-
-    Raises:
-        UnknownName: If there is no such model.
-    """
-    return MotorModel(model_named(name), *_MODELS[name])
-
+from shapechanger.robot.drivers.servos.settings import ServoModel
 
 # Heat, all chosen for want of a source: a servo that stalls with half its current gets some 55
 # degrees warmer, with a time constant of two minutes.
@@ -87,7 +38,7 @@ class SimulatedMotor:
     """A motor with its gears, its spool and its end of a tendon.
 
     Args:
-        model: Motor and gears.
+        model: Model of the servo.
         tendon: Its tendon.
         angle: Angle of the spool while the tendon is just taut and its far end at 0, rad.
 
@@ -99,15 +50,23 @@ class SimulatedMotor:
         temperature: Temperature, degrees Celsius.
     """
 
-    def __init__(self, model: MotorModel, tendon: Tendon, angle: float = 0.0) -> None:
+    def __init__(self, model: ServoModel, tendon: Tendon, angle: float = 0.0) -> None:
         self._model = model
         self._tendon = tendon
+        no_load, gears = model.no_load_rad_per_s, model.gears
+        lost = (gears.friction_nm + gears.viscous * no_load) / model.stall_nm
+        self._electric_rad_per_s = no_load / (1.0 - lost)  # No current: friction takes some speed.
         self._taut_at = angle
         self.angle = angle
         self.speed = 0.0
         self.current = 0.0
         self.tension = 0.0
         self.temperature = _ROOM_C
+
+    def current_at(self, volts: float) -> float:
+        """Return the current at a voltage and the present speed, A."""
+        share = volts / self._model.volts - self.speed / self._electric_rad_per_s
+        return self._model.stall_a * share
 
     def advance(self, goal_a: float, volts: float, travel_m: float, dt_s: float) -> None:
         """Turn for one short step.
@@ -118,24 +77,21 @@ class SimulatedMotor:
             travel_m: How far the tendon's far end is towards the spool, m.
             dt_s: Length of the step, s.
         """
-        model, servo, tendon = self._model, self._model.servo, self._tendon
+        model, gears, tendon = self._model, self._model.gears, self._tendon
         # The faster it turns, the less current the voltage can still drive.
-        share = volts / servo.volts
-        free = model.electric_rad_per_s
-        most = servo.stall_a * (share - self.speed / free)
-        least = servo.stall_a * (-share - self.speed / free)
-        self.current = 0.0 if goal_a == 0.0 else min(max(goal_a, min(least, 0.0)), max(most, 0.0))
+        least, most = min(self.current_at(-volts), 0.0), max(self.current_at(volts), 0.0)
+        self.current = 0.0 if goal_a == 0.0 else min(max(goal_a, least), most)
         lever = tendon.direction * tendon.spool_radius_m
         # Friction and cable use the speed at the end of the step, so that a stiff cable does not
         # need a tiny step.
-        inertia = model.inertia + dt_s * model.viscous
-        torque = servo.torque_constant * self.current
+        inertia = gears.inertia + dt_s * gears.viscous
+        torque = model.torque_constant * self.current
         if self._pull(travel_m) > 0.0:
             stretch = lever * (self.angle - self._taut_at) - travel_m
             torque -= lever * tendon.stiffness * stretch
             inertia += (dt_s * lever) ** 2 * tendon.stiffness
-        speed = (model.inertia * self.speed + dt_s * torque) / inertia
-        held = dt_s * model.friction_nm / inertia
+        speed = (gears.inertia * self.speed + dt_s * torque) / inertia
+        held = dt_s * gears.friction_nm / inertia
         self.speed = math.copysign(max(abs(speed) - held, 0.0), speed)
         self.angle += dt_s * self.speed
         self.tension = self._pull(travel_m)
@@ -150,7 +106,7 @@ class SimulatedMotor:
         return max(0.0, tendon.stiffness * stretch)
 
     def _warm(self, dt_s: float) -> None:
-        ohm = self._model.servo.volts / self._model.servo.stall_a
+        ohm = self._model.volts / self._model.stall_a
         warm = _ROOM_C + _KELVIN_PER_WATT * ohm * self.current**2
         self.temperature += (warm - self.temperature) * -math.expm1(-dt_s / _HEAT_S)
 

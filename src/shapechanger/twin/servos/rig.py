@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
 from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.servos.bus import SimulatedBus
-from shapechanger.twin.servos.motor import EndStops, Load, Tendon
-from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
+from shapechanger.twin.servos.motor import Load, Tendon
+from shapechanger.twin.servos.servo import COUNTS_PER_RAD, ServoPlan, SimulatedServo
 from shapechanger.worlds.world import World
 
 ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
@@ -21,29 +21,25 @@ off. "snapped": its tendon is torn for good. "power": its power fails for a mome
 "mute", "deaf" and "hot".
 """
 
-_COUNTS_PER_RAD: Final = 4096 / (2.0 * math.pi)
 _HOT_C: Final = 75.0
 _WELL_C: Final = 30.0
 
 
 @runtime_checkable
-class TendonWorld(Protocol):
-    """A world that tendons pull at."""
+class TendonWorld(Load, Protocol):
+    """A world that tendons pull at, as their load."""
 
     @property
     def cable_stiffness(self) -> float:
         """Stiffness of the tendons, N/m."""
         ...
 
-    def connect(self, tendons: Sequence[str], rig: Rig) -> Load:
+    def connect(self, tendons: Sequence[str], rig: Rig) -> None:
         """Attach the tendons of a rig.
 
         Args:
             tendons: Names, in the order of the servos.
             rig: The rig; its `settle` is to be called after each change of posture.
-
-        Returns:
-            The load of the tendons.
 
         Raises:
             RobotError: If the world has other tendons.
@@ -59,19 +55,21 @@ class Rig:
     """Servos on a bus, by the names of their tendons.
 
     Args:
-        plan: The robot, which has outputs with the driver "dynamixel".
+        plan: The robot as it is wired, which has servos on a bus.
         world: World of the robot; in a world without tendons the servos pull springs.
 
     Attributes:
         bus: The bus.
+        is_switched: Whether its power comes from the enable line.
 
     Raises:
         RobotError: If the world has other tendons.
     """
 
     def __init__(self, plan: GuardPlan, world: World) -> None:
-        outputs = [output for output in plan.outputs if output.driver == "dynamixel"]
+        outputs = [output for output in plan.outputs if output.driver == DRIVER]
         settings = [output.settings for output in outputs]
+        self.is_switched = not all(map(stops_itself, outputs))
         self._device = settings[0]["device"]
         self._names = tuple(output.name for output in outputs)
         self._world = world if isinstance(world, TendonWorld) else None
@@ -82,30 +80,16 @@ class Rig:
                 model=one["model"],
                 tendon=Tendon(one["spool_radius_m"], one["direction"], stiffness),
                 # In the middle of a count, as it stands while the finger is straight.
-                angle=(one["zero"] + 0.5) / _COUNTS_PER_RAD,
+                angle=(one["zero"] + 0.5) / COUNTS_PER_RAD,
             )
             for one in settings
         ]
-        load: Load = EndStops(len(plans))
         if self._world is not None:
-            load = self._world.connect(self._names, self)
-        self.bus = SimulatedBus(plans, load)
+            self._world.connect(self._names, self)
+        self.bus = SimulatedBus(plans, self._world)
         self._servos = dict(zip(self._names, self.bus.servos.values(), strict=True))
+        self.bus.set_power(on=not self.is_switched)
         self.settle()
-
-    @classmethod
-    def of(cls, plan: GuardPlan, world: World) -> Rig | None:
-        """Return the rig of a robot; None for one without a servo bus.
-
-        Args:
-            plan: The robot as it is wired.
-            world: World of the robot.
-
-        Raises:
-            RobotError: If the world has other tendons.
-        """
-        has_bus = any(output.driver == "dynamixel" for output in plan.outputs)
-        return cls(plan, world) if has_bus else None
 
     def require(self, device: str) -> None:
         """Raise RobotError if the bus is at another device."""

@@ -76,7 +76,7 @@ class FingerWorld:
         """Stiffness of the tendons, N/m."""
         return self._stiffness
 
-    def connect(self, tendons: Sequence[str], rig: Rig) -> FingerWorld:
+    def connect(self, tendons: Sequence[str], rig: Rig) -> None:
         """Attach the tendons of a rig; see `TendonWorld.connect`."""
         if sorted(tendons) != sorted(TENDONS):
             raise RobotError(
@@ -85,7 +85,6 @@ class FingerWorld:
             )
         self._order = np.array([TENDONS.index(name) for name in tendons])
         self._rig = rig
-        return self
 
     def travels(self) -> Sequence[float]:
         """Return how far each tendon's end is towards its spool, m; 0 for the straight finger."""

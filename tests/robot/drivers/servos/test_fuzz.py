@@ -2,13 +2,20 @@
 
 import math
 
+import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
-from tests.robot.drivers.dynamixel.rigs import Rig
-from tests.robot.drivers.dynamixel.wire import pack, status
+from shapechanger.robot.drivers.servos.family import FEETECH
+from tests.robot.drivers.servos.rigs import Rig, of
+from tests.robot.drivers.servos.wire import pack, status
+
+
+def _feetech(servo_id: int, error: int, data: bytes = b"") -> bytes:
+    return status(servo_id, error, data, FEETECH)
+
 
 _ids = st.integers(0, 255)
 # Random bytes rarely form a packet, so include valid packets with random content and cut ones.
@@ -18,16 +25,23 @@ _noise = st.one_of(
     st.builds(status, _ids, st.integers(0, 255), st.binary(max_size=40)),
     st.builds(lambda p, n: p[:n], st.builds(status, _ids, st.just(0)), st.integers(0, 11)),
     st.binary(min_size=3, max_size=9).map(lambda tail: b"\xff\xff\xfd\x00" + tail),
+    st.builds(_feetech, _ids, st.integers(0, 255), st.binary(max_size=40)),
+    st.builds(lambda p, n: p[:n], st.builds(_feetech, _ids, st.just(0)), st.integers(0, 6)),
+    st.binary(min_size=1, max_size=9).map(lambda tail: b"\xff\xff" + tail),
 )
 _slow = examples(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 
 
+@pytest.mark.parametrize("family", ["Dynamixel", "Feetech"])
 @_slow
 @given(noise=st.lists(_noise, max_size=5), tension=st.floats(-50, 50))
-def test_noise_never_breaks_the_driver_or_its_caps(noise: list[bytes], tension: float) -> None:
+def test_noise_never_breaks_the_driver_or_its_caps(
+    family: str, noise: list[bytes], tension: float
+) -> None:
     """With noise on the bus, cycles do not raise and no goal exceeds its cap."""
-    rig = Rig().start()
-    cap = 683e-3
+    rig = Rig(of(family)).start()
+    first = rig.settings.servos[0]
+    cap = first.most_counts * first.known.ampere_per_goal
     for data in noise:
         rig.port.inject(data)
         state = rig.run(tension)
@@ -37,11 +51,12 @@ def test_noise_never_breaks_the_driver_or_its_caps(noise: list[bytes], tension: 
     rig.bus.close()
 
 
+@pytest.mark.parametrize("family", ["Dynamixel", "Feetech"])
 @_slow
 @given(noise=st.lists(_noise, max_size=2))
-def test_setup_with_noise_succeeds_or_raises(noise: list[bytes]) -> None:
+def test_setup_with_noise_succeeds_or_raises(family: str, noise: list[bytes]) -> None:
     """`set_up` succeeds or raises RobotError, and succeeds once the noise ends."""
-    rig = Rig()
+    rig = Rig(of(family))
     errors: list[str] = []
     for data in noise:
         rig.port.inject(data)

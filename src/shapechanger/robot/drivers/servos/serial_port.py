@@ -6,12 +6,13 @@ import contextlib
 import select
 import termios
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from shapechanger.errors import MissingExtra, RobotError
-from shapechanger.robot.drivers.dynamixel.protocol import REFUSED, ServoReply
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+from shapechanger.robot.drivers.servos.family import ServoFamily
+from shapechanger.robot.drivers.servos.registers import ServoReply
+from shapechanger.robot.drivers.servos.settings import BusSettings
 
 try:
     from dynamixel_sdk import PacketHandler, PortHandler
@@ -23,12 +24,16 @@ except ImportError as error:
 _MAX_LATE_BYTES: Final = 1024
 # Damaged packets to skip while waiting for valid ones.
 _MAX_DAMAGED: Final = 8
-_STATUS_BYTES: Final = 11  # Of a status packet without data.
+_STATUS_BYTES: Final = 11  # Of a status packet without data, at most.
+
+_BROADCAST: Final = 0xFE
+_WRITE: Final = 0x03
+_SYNC_READ: Final = 0x82
+_SYNC_WRITE: Final = 0x83
 
 # Results of the SDK (robotis_def.py).
 _SUCCESS: Final = 0
 _RX_TIMEOUT: Final = -3001
-_RX_CORRUPT: Final = -3002
 
 
 class PromptPort(PortHandler):
@@ -79,18 +84,47 @@ class SerialServoPort:
     Args:
         port: Port of the SDK.
         device: Name of the bus in messages.
+        family: Family of the servos, which determines the packets.
 
     Attributes:
         has_stray: Whether a late answer was found before a request; the reader resets it.
     """
 
-    def __init__(self, port: PortHandler, device: str) -> None:
+    def __init__(self, port: PortHandler, device: str, family: ServoFamily) -> None:
         self._port = port
         self._device = device
-        self._sdk = PacketHandler(2.0)
+        self._refused = family.refused
+        # Each has its id and then the length of the rest, of `address_size` bytes.
+        self._sdk = PacketHandler(family.protocol)
+        self._id_at = 4 if family.protocol == 2.0 else 2
+        self._length_size = family.address_size
+        self._receive_options = (False,) if family.protocol == 2.0 else ()
         self.has_stray = False
 
-    def exchange(
+    def read(self, ids: Sequence[int], at: int, size: int) -> dict[int, ServoReply]:
+        """Read bytes of several servos; see `ServoPort.read`."""
+        parameters = self._number(at) + self._number(size) + bytes(ids)
+        return self._exchange(_BROADCAST, _SYNC_READ, parameters, ids, size)
+
+    def write(self, data: Mapping[int, bytes], at: int) -> dict[int, ServoReply]:
+        """Write bytes of several servos, or of one; see `ServoPort.write`."""
+        if len(data) == 1:
+            ((servo_id, content),) = data.items()
+            return self._exchange(servo_id, _WRITE, self._number(at) + content, (servo_id,), 0)
+        size = len(next(iter(data.values())))
+        items = b"".join(bytes([one]) + content for one, content in data.items())
+        parameters = self._number(at) + self._number(size) + items
+        return self._exchange(_BROADCAST, _SYNC_WRITE, parameters, (), 0)
+
+    def close(self) -> None:
+        """Close the port."""
+        with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
+            self._port.closePort()
+
+    def _number(self, value: int) -> bytes:
+        return value.to_bytes(self._length_size, "little")
+
+    def _exchange(
         self,
         servo_id: int,
         instruction: int,
@@ -98,10 +132,11 @@ class SerialServoPort:
         ids: Sequence[int],
         length: int,
     ) -> dict[int, ServoReply]:
-        """Send an instruction and return the replies; see `ServoPort.exchange`."""
-        size = (len(parameters) + 3).to_bytes(2, "little")
-        # The SDK fills in header and CRC.
-        packet = [0, 0, 0, 0, servo_id, *size, instruction, *parameters, 0, 0]
+        """Send an instruction and return the replies of `ids`, each with `length` bytes of data."""
+        size = len(parameters) + 1 + self._length_size
+        # The SDK fills in header and checksum, which is as long as the length.
+        packet = [0] * self._id_at + [servo_id, *self._number(size)]
+        packet += [instruction, *parameters] + [0] * self._length_size
         self._port.is_using = False  # The SDK leaves it set after an exception.
         try:
             self.has_stray |= self._port.getBytesAvailable() > 0
@@ -114,34 +149,31 @@ class SerialServoPort:
         except (OSError, termios.error) as error:
             raise RobotError(f"The bus at {self._device} is gone: {error}.") from error
 
-    def close(self) -> None:
-        """Close the port."""
-        with contextlib.suppress(OSError, termios.error):  # A device that is gone counts as closed.
-            self._port.closePort()
-
     def _replies(self, ids: Sequence[int], length: int) -> dict[int, ServoReply]:
         # The SDK's GroupSyncRead stops at the first missing servo, drops the other answers and
         # keeps no error byte; so the packets are received one by one here.
         heard: dict[int, ServoReply] = {}
         for _ in range(len(ids) + _MAX_DAMAGED):
-            packet, result = self._receive()
+            try:
+                packet, result = self._sdk.rxPacket(self._port, *self._receive_options)
+            except IndexError:  # The SDK trusts the length in a packet.
+                continue
             if result == _RX_TIMEOUT:
                 break
             if result != _SUCCESS:
                 continue
-            end = 5 + int.from_bytes(bytes(packet[5:7]), "little")
-            servo_id, reply = packet[4], ServoReply(packet[8], bytes(packet[9:end]))
-            if servo_id in ids and (len(reply.data) == length or reply.error & REFUSED):
+            length_at = self._id_at + 1
+            rest = length_at + self._length_size
+            end = rest + int.from_bytes(bytes(packet[length_at:rest]), "little") - self._length_size
+            # Packets of 2.0 repeat that they are a status; the error byte is the last before data.
+            data_at = rest + self._length_size
+            servo_id = packet[self._id_at]
+            reply = ServoReply(packet[data_at - 1], bytes(packet[data_at:end]))
+            if servo_id in ids and (len(reply.data) == length or reply.error & self._refused):
                 heard[servo_id] = reply
             if len(heard) == len(ids):
                 break
         return heard
-
-    def _receive(self) -> tuple[list[int], int]:
-        try:
-            return self._sdk.rxPacket(self._port, False)
-        except IndexError:  # The SDK trusts the length in a packet.
-            return [], _RX_CORRUPT
 
 
 def open_serial_port(settings: BusSettings) -> SerialServoPort:
@@ -160,4 +192,4 @@ def open_serial_port(settings: BusSettings) -> SerialServoPort:
             f"The bus at {settings.device} cannot have {settings.baud} baud; "
             "57600, 115200, 1000000, 2000000, 3000000 and 4000000 are usual."
         )
-    return SerialServoPort(port, settings.device)
+    return SerialServoPort(port, settings.device, settings.family)

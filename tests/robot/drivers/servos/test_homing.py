@@ -3,8 +3,8 @@
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.homing import Homing
-from tests.robot.drivers.dynamixel.rigs import NAMES, Rig, servo, settings
+from shapechanger.robot.drivers.servos.homing import Homing
+from tests.robot.drivers.servos.rigs import NAMES, Rig, servo, settings
 
 
 def _home(rig: Rig, homing: Homing, cycles: int = 400) -> None:

@@ -6,10 +6,10 @@ from typing import Literal
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.health import BusState
-from shapechanger.robot.drivers.dynamixel.protocol import ServoReply
+from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.twin.servos.servo import ServoPlan
-from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, settings
+from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, of, settings
 
 
 def _hot(rig: Rig) -> None:
@@ -49,24 +49,33 @@ def _snapped(rig: Rig) -> None:
     rig.twin("EIP").plan.tendon.snapped = True
 
 
+_FAULTS: list[tuple[Callable[[Rig], None], str]] = [
+    (_hot, "has 68 C, more than 65 C"),
+    (_switched_off_by_heat, "switched itself off: it is overheated. Only a reboot"),
+    (_low, "switched itself off: its voltage is out of range"),
+    (_overloaded, "switched itself off: it is overloaded"),
+    (_mute, "does not answer, 5 cycles in a row"),
+    (_deaf, "does not answer, 5 cycles in a row"),
+    (_late, "answers too late, 5 cycles in a row"),
+    (_damaged, "does not answer, 5 cycles in a row"),
+    # Without load a Feetech servo with a low limit is slow, so its speed does not show this.
+    (_snapped, "has lost its tendon: it winds in at"),
+]
+
+
 @pytest.mark.parametrize(
-    ("fault", "words"),
+    ("family", "fault", "words"),
     [
-        (_hot, "has 68 C, more than 65 C"),
-        (_switched_off_by_heat, "switched itself off: it is overheated. Only a reboot"),
-        (_low, "switched itself off: its voltage is out of range"),
-        (_overloaded, "switched itself off: it is overloaded"),
-        (_mute, "does not answer, 5 cycles in a row"),
-        (_deaf, "does not answer, 5 cycles in a row"),
-        (_late, "answers too late, 5 cycles in a row"),
-        (_damaged, "does not answer, 5 cycles in a row"),
-        (_snapped, "has lost its tendon: it winds in at"),
+        *(("Dynamixel", fault, words) for fault, words in _FAULTS),
+        *(("Feetech", fault, words) for fault, words in _FAULTS if fault is not _snapped),
     ],
 )
-def test_a_fault_of_one_servo_stops_all(fault: Callable[[Rig], None], words: str) -> None:
+def test_a_fault_of_one_servo_stops_all(
+    family: str, fault: Callable[[Rig], None], words: str
+) -> None:
     """A fault is reported, the other servos ramp down, and finally no servo pulls."""
-    rig = Rig(settings(most_missed=5)).start()
-    rig.run(10.0, 20)
+    rig = Rig(of(family, most_missed=5)).start()
+    rig.run(14.0, 20)
     fault(rig)
     state = _until(rig, lambda s: s.mode != "held")
     assert list(state.faults) == ["EIP"]
@@ -76,9 +85,12 @@ def test_a_fault_of_one_servo_stops_all(fault: Callable[[Rig], None], words: str
     # The faulty servo has released; the others have begun to ramp down.
     if not rig.twin("EIP").deaf:
         assert rig.twin("EIP").pulls_a == 0.0
-    assert rig.twin("FDP").pulls_a > 0.3
+    assert rig.twin("FDP").pulls_a > 0.05
     _until(rig, lambda s: s.mode in ("off", "silent"))
     rig.line.advance(100_000_000)  # The watchdogs of unreachable servos expire.
+    if family == "Feetech" and rig.twin("EIP").deaf:
+        assert rig.twin("EIP").pulls_a > 0.0
+        rig.line.set_power(on=False)
     assert rig.pulls() == [0.0] * 7
 
 
@@ -174,25 +186,17 @@ def test_hold_after_a_fault_requires_setup() -> None:
 
 
 def test_a_servo_with_a_hardware_error_needs_a_reboot() -> None:
-    """`set_up` reports the error, and `reboot` clears it."""
+    """`set_up` reports the error until the servo has been without power."""
     rig = Rig().start()
     rig.twin("EIP").overload()
     _until(rig, lambda s: s.mode == "off")
     with pytest.raises(RobotError, match=r"EIP .* it is overloaded. Only a reboot"):
         rig.bus.set_up()
-    rig.bus.reboot("EIP")
-    assert "EIP" not in rig.bus.zeros
+    rig.twin("EIP").lose_power()
     rig.line.advance(400_000_000)
     rig.bus.set_up()
     rig.bus.hold()
     assert rig.run(4.0, 10).reason == ""
-
-
-def test_reboot_is_refused_while_held() -> None:
-    """A reboot would release one tendon while the others pull."""
-    rig = Rig().start()
-    with pytest.raises(RobotError, match="cannot be rebooted while the bus is held"):
-        rig.bus.reboot("EIP")
 
 
 @pytest.mark.parametrize("on_trip", ["coast", "release"])
@@ -222,18 +226,32 @@ def test_a_cut_cable_trips_the_watchdogs() -> None:
     assert rig.pulls() == [0.0] * 7
 
 
+def test_without_watchdogs_an_unplugged_adapter_ends_in_silence_at_once() -> None:
+    """Feetech servos would ignore a ramp, so the power switch has to act at once."""
+    rig = Rig(of("Feetech")).start()
+    rig.run(20.0, 20)
+    rig.port.is_gone = True
+    state = rig.run(20.0)
+    assert state.mode == "silent"
+    assert "did not confirm to let go, so nothing is sent any more: [enable] stops" in state.reason
+    rig.line.advance(10 * CYCLE_NS)
+    assert min(rig.pulls()) > 0.0
+    rig.line.set_power(on=False)
+    assert rig.pulls() == [0.0] * 7
+
+
 def test_an_unplugged_adapter_is_reported_and_trips_the_watchdogs() -> None:
     """When the serial device raises on every call, the cycle reports it and does not raise."""
     rig = Rig().start()
     rig.run(10.0, 20)
     rig.port.is_gone = True
-    state = rig.bus.cycle(dict.fromkeys(NAMES, 10.0), rig.line.now_ns)
+    state = rig.run(10.0)
     assert state.faults[""].startswith("The bus at the twin is gone: ")
     assert state.mode == "stopping"
     rig.line.advance(10 * CYCLE_NS)
     assert rig.pulls() == [0.0] * 7
     for i in range(40):
-        state = rig.bus.cycle(None, rig.line.now_ns + i * CYCLE_NS)
+        state = rig.bus.cycle(rig.line.now_ns + i * CYCLE_NS)
     assert state.mode == "silent"
 
 
@@ -242,12 +260,11 @@ def test_a_goal_that_was_not_applied_is_reported() -> None:
     rig = Rig().start()
     rig.run(4.0, 4)
     servo = rig.twin("PI")
-    taken = servo.execute
+    taken = servo.write
 
-    def deaf_for_goals(instruction: int, parameters: bytes) -> ServoReply:
-        is_goal = (instruction, parameters[0]) == (3, 102)
-        return ServoReply(0, b"") if is_goal else taken(instruction, parameters)
+    def deaf_for_goals(at: int, data: bytes) -> ServoReply:
+        return ServoReply(0, b"") if at == 102 else taken(at, data)
 
-    servo.execute = deaf_for_goals  # type: ignore[method-assign]
+    servo.write = deaf_for_goals  # type: ignore[method-assign]
     state = rig.run(8.0, 8)
     assert "Servo PI (id 7) has a goal of 136 counts, and was sent 273" in state.reason

@@ -6,16 +6,23 @@ import pytest
 from dynamixel_sdk import PacketHandler, PortHandler
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-from shapechanger.robot.drivers.dynamixel.serial_port import PromptPort, open_serial_port
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
+from shapechanger.robot.drivers.servos.bus import ServoBus
+from shapechanger.robot.drivers.servos.serial_port import PromptPort, open_serial_port
+from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.servo import ServoPlan
-from tests.robot.drivers.dynamixel.pty import ServoPty
-from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, settings
+from tests.robot.drivers.servos.pty import ServoPty
+from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, of, settings
 
 # Long enough that a busy machine does not look like a mute servo.
 _PATIENT_MS = 20_000.0
+
+
+@pytest.fixture
+def feetech_pty() -> Iterator[ServoPty]:
+    """Seven Feetech servos behind a terminal."""
+    with ServoPty(SimulatedBus([ServoPlan(i, "STS3215", angle=2.0 * i) for i in range(1, 8)])) as p:
+        yield p
 
 
 @pytest.fixture
@@ -34,13 +41,13 @@ def _open(bus: BusSettings) -> ServoBus:
     return ServoBus(bus, open_serial_port(bus))
 
 
-def test_the_plain_sdk_pings_and_reads(pty: ServoPty) -> None:
+def test_the_plain_sdk_reads_and_writes(pty: ServoPty) -> None:
     """The unmodified SDK talks to the simulated servos."""
     port, sdk = PortHandler(pty.device), PacketHandler(2.0)
     assert port.setBaudRate(1_000_000)
     # Its own 34 ms would be too short on a busy machine.
     port.setPacketTimeout = lambda _: port.setPacketTimeoutMillis(_PATIENT_MS)
-    assert sdk.ping(port, 5) == (1190, 0, 0)
+    assert sdk.readTxRx(port, 5, 0, 2) == ([0xA6, 4], 0, 0)
     assert sdk.readTxRx(port, 5, 6, 1) == ([52], 0, 0)
     assert sdk.writeTxRx(port, 5, 64, 1, [1]) == (0, 0)
     assert sdk.writeTxRx(port, 5, 11, 1, [0]) == (0, 7)  # Locked while it has torque.
@@ -63,12 +70,30 @@ def test_the_driver_works_over_a_real_serial_port(pty: ServoPty) -> None:
     bus.set_up()
     bus.hold()
     for i in range(20):
-        state = bus.cycle(dict.fromkeys(NAMES, 5.0), i * CYCLE_NS)
+        bus.send(dict.fromkeys(NAMES, 5.0))
+        state = bus.cycle(i * CYCLE_NS)
         assert set(state.servos) == set(NAMES)
         pty.advance(CYCLE_NS)
     assert state.reason == ""
     assert state.servos["PI"].tension_n == pytest.approx(5.0, abs=0.03)
     bus.close()
+
+
+def test_feetech_servos_work_over_a_real_serial_port(feetech_pty: ServoPty) -> None:
+    """Set up, hold, cycle and close with the packets of protocol 1.0."""
+    bus = _open(of("Feetech", device=feetech_pty.device, answer_ms=_PATIENT_MS))
+    bus.set_up()
+    bus.hold()
+    for i in range(20):
+        bus.send(dict.fromkeys(NAMES, 20.0))
+        state = bus.cycle(i * CYCLE_NS)
+        assert set(state.servos) == set(NAMES)
+        feetech_pty.advance(CYCLE_NS)
+    assert state.reason == ""
+    assert state.servos["PI"].goal_n == pytest.approx(20.0, abs=0.4)
+    assert state.servos["PI"].tension_n > 5.0
+    bus.close()
+    assert not any(servo.has_torque for servo in feetech_pty.bus.servos.values())
 
 
 def test_a_mute_servo_is_named_over_a_real_serial_port(pty: ServoPty) -> None:
@@ -91,12 +116,13 @@ class _Noise:
         return b"\xff" * length
 
 
-def test_endless_noise_does_not_block_the_driver() -> None:
+@pytest.mark.parametrize("options", [(2.0, False), (1.0,)])
+def test_endless_noise_does_not_block_the_driver(options: tuple[float, ...]) -> None:
     """The SDK checks its timeout only when no byte is available; `PromptPort` bounds the read."""
     port = PromptPort("noise", 0.0)
     port.ser = noise = _Noise()
     port.setPacketTimeoutMillis(0.0)
-    _, result = PacketHandler(2.0).rxPacket(port, False)
+    _, result = PacketHandler(options[0]).rxPacket(port, *options[1:])
     assert result == -3002  # Corrupt.
     assert noise.taken == 1024
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.dynamixel.homing import Homing
-from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, NAMES, Rig, servo, settings
+from shapechanger.robot.drivers.servos.homing import Homing
+from tests.robot.drivers.servos.rigs import CYCLE_NS, NAMES, Rig, servo, settings
 
 _MOST = dict.fromkeys(NAMES, 20.0)
 
@@ -24,7 +24,7 @@ def _rig(direction: int = 1) -> Rig:
 def _go(rig: Rig, length: float, cycles: int) -> None:
     for _ in range(cycles):
         rig.bus.send(_MOST, dict.fromkeys(NAMES, length))
-        state = rig.bus.cycle(None, rig.line.now_ns)
+        state = rig.bus.cycle(rig.line.now_ns)
         assert state.reason == ""
         rig.line.advance(CYCLE_NS)
 
@@ -55,7 +55,7 @@ def test_the_tension_of_a_blocked_tendon_is_limited() -> None:
     rig = _rig()
     for _ in range(300):
         rig.bus.send(dict.fromkeys(NAMES, 8.0), dict.fromkeys(NAMES, -0.03))
-        rig.bus.cycle(None, rig.line.now_ns)
+        rig.bus.cycle(rig.line.now_ns)
         rig.line.advance(CYCLE_NS)
     assert rig.twin("EDC").motor.current == pytest.approx(8.0 / 29.3, rel=0.01)
     assert rig.twin("EDC").motor.tension < 8.0 + 1.05  # And the friction of the gears.
@@ -112,8 +112,9 @@ def test_lengths_without_meaning_are_refused() -> None:
         rig.bus.send(_MOST, {"FDP": math.nan})
     with pytest.raises(UnknownName, match="Did you mean 'FDP'"):
         rig.bus.send(_MOST, {"FDPP": 0.0})
-    rig.bus.release()
-    rig.bus.reboot("FDP")
+    rig.twin("FDP").lose_power()
+    rig.line.advance(400_000_000)
+    rig.run(None, 4)
     with pytest.raises(RobotError, match=r"FDP .* cannot go to a length: it has no zero"):
         rig.bus.send(_MOST, {"FDP": 0.0})
     with pytest.raises(RobotError, match="has control of its tension"):

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.health import BusState
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
+from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.settings import BusSettings
 
 # Chosen: half a percent of the longest excursion of a finger's tendon.
 _STILL_M: Final = 0.2e-3
 
 
+@dataclass(slots=True)
 class _Tendon:
-    def __init__(self, servo: ServoSettings, position: int, now_ns: int) -> None:
-        self.servo = servo
-        self.start = self.position = self._reference = position
-        self.still_since_ns = now_ns
+    """Positions of a servo: first, present, and where it was when it last moved, in counts."""
 
-    def see(self, position: int, now_ns: int) -> None:
-        self.position = position
-        step = abs(self.servo.metre_per_count)
-        if abs(position - self._reference) * step > _STILL_M:
-            self._reference, self.still_since_ns = position, now_ns
-
-    @property
-    def wound_m(self) -> float:
-        return -(self.position - self.start) * self.servo.metre_per_count
+    start: int
+    position: int
+    reference: int
+    still_since_ns: int
 
 
 class Homing:
@@ -46,8 +40,8 @@ class Homing:
         failure: Reason why there are no zeros, as a sentence; empty without one.
 
     Raises:
-        RobotError: If the gears' friction of a servo is above its homing tension: it would stand
-            still at once, with its tendon slack.
+        RobotError: If the gears' measured friction of a servo is above its homing tension: it would
+            stand still at once, with its tendon slack.
     """
 
     def __init__(
@@ -59,8 +53,9 @@ class Homing:
         travel_m: float = 0.06,
     ) -> None:
         for servo in settings.servos:
-            friction, pull = servo.friction_n, servo.homing_n
-            if friction is not None and pull <= friction:
+            gears, pull = servo.known.gears, servo.homing_n
+            friction = gears.friction_nm / servo.spool_radius_m
+            if gears.is_measured and pull <= friction:
                 raise RobotError(
                     f"{servo.words} cannot find its zero with {pull:g} N: its gears hold against "
                     f"about {friction:.1f} N. Set homing_n, to {1.5 * friction:.1f} N for example."
@@ -77,9 +72,8 @@ class Homing:
     @property
     def tensions(self) -> dict[str, float]:
         """Tension to send for each tendon, N."""
-        if self.failure:
-            return {name: servo.pretension_n for name, servo in self._servos.items()}
-        return {name: servo.homing_n for name, servo in self._servos.items()}
+        failed, servos = bool(self.failure), self._servos.items()
+        return {name: one.pretension_n if failed else one.homing_n for name, one in servos}
 
     def see(self, state: BusState) -> None:
         """Evaluate the state of the bus after a cycle."""
@@ -89,32 +83,34 @@ class Homing:
         if self._since_ns is None:
             self._since_ns = now_ns
         for name, reading in state.servos.items():
-            if name not in self._tendons:
-                self._tendons[name] = _Tendon(self._servos[name], reading.position, now_ns)
-            self._tendons[name].see(reading.position, now_ns)
+            at, step = reading.position, abs(self._servos[name].metre_per_count)
+            one = self._tendons.setdefault(name, _Tendon(at, at, at, now_ns))
+            one.position = at
+            if abs(at - one.reference) * step > _STILL_M:
+                one.reference, one.still_since_ns = at, now_ns
         self.failure = self._find_failure(state)
-        if not self.failure and self._is_still(now_ns):
+        if not self.failure and not self._moving(now_ns):
             self.zeros = {name: one.position for name, one in self._tendons.items()}
 
-    def _is_still(self, now_ns: int) -> bool:
-        return len(self._tendons) == len(self._servos) and all(
-            now_ns - one.still_since_ns >= self._still_ns for one in self._tendons.values()
-        )
+    def _moving(self, now_ns: int) -> list[str]:
+        """Return the tendons that have not been still for long enough."""
+        return [
+            name
+            for name in self._servos
+            if name not in self._tendons
+            or now_ns - self._tendons[name].still_since_ns < self._still_ns
+        ]
 
     def _find_failure(self, state: BusState) -> str:
         if state.faults:
             return f"No zero: {state.reason}"
-        for one in self._tendons.values():
-            if one.wound_m > self._travel_m:
-                words = f"it was wound in by {1e3 * one.wound_m:.0f} mm and met nothing"
-                return f"{one.servo.words} has no zero: {words}. Its tendon has come off."
+        for name, one in self._tendons.items():
+            servo = self._servos[name]
+            wound_m = (one.start - one.position) * servo.metre_per_count
+            if wound_m > self._travel_m:
+                words = f"it was wound in by {1e3 * wound_m:.0f} mm and met nothing"
+                return f"{servo.words} has no zero: {words}. Its tendon has come off."
         if self._since_ns is not None and state.at_ns - self._since_ns > self._within_ns:
-            moving = [
-                servo.name
-                for name, servo in self._servos.items()
-                if name not in self._tendons
-                or state.at_ns - self._tendons[name].still_since_ns < self._still_ns
-            ]
-            seconds = self._within_ns / 1e9
+            moving, seconds = self._moving(state.at_ns), self._within_ns / 1e9
             return f"No zero: {', '.join(moving)} still moved after {seconds:g} s."
         return ""

@@ -6,7 +6,7 @@ import pytest
 
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.twin.servos.servo import ServoPlan
-from tests.robot.drivers.dynamixel.rigs import CYCLE_NS, MODEL, NAMES, Rig, servo, settings
+from tests.robot.drivers.servos.rigs import CYCLE_NS, MODEL, NAMES, Rig, of, servo, settings
 
 
 def test_all_missing_servos_are_named() -> None:
@@ -43,6 +43,29 @@ def test_setup_configures_servos_without_torque() -> None:
     rig.bus.hold()
     assert all(one.has_torque for one in rig.line.servos.values())
     assert rig.pulls() == [0.0] * 7
+
+
+def test_setup_configures_feetech_servos_without_torque() -> None:
+    """Positions over many turns, all other bits of the phase kept, and the EEPROM locked again."""
+    rig = Rig(of("Feetech"))
+    rig.bus.set_up()
+    for one in rig.line.servos.values():
+        assert not one.has_torque
+        registers = [one.register(at) for at in (7, 8, 9, 11, 18, 33, 16, 41, 48, 55)]
+        assert registers == [0, 1, 0, 0, 28, 0, 157, 254, 0, 1]
+    rig.bus.hold()
+    assert all(one.has_torque for one in rig.line.servos.values())
+    assert rig.pulls() == [0.0] * 7
+
+
+def test_a_setting_that_is_not_kept_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Feetech servo does not say that it refuses a mode, so what it has is read again."""
+    rig = Rig(of("Feetech"))
+    servo = rig.twin("EDC")
+    taken = servo.write
+    monkeypatch.setattr(servo, "write", lambda at, data: taken(at, data if at != 16 else b"\7\7"))
+    with pytest.raises(RobotError, match=r"EDC \(id 4\) does not keep 157 as maximum torque"):
+        rig.bus.set_up()
 
 
 def test_torque_is_enabled_last() -> None:
@@ -125,7 +148,7 @@ def test_missing_and_unknown_tendons_are_refused() -> None:
     """A missing and an unknown tendon raise errors."""
     rig = Rig().start()
     with pytest.raises(RobotError, match="no tension for EIP, EDC"):
-        rig.bus.cycle(dict.fromkeys(("FDP", "FDS", "LUM", "DI", "PI"), 3.0), 0)
+        rig.bus.send(dict.fromkeys(("FDP", "FDS", "LUM", "DI", "PI"), 3.0))
     with pytest.raises(UnknownName, match="Did you mean 'EDC'"):
         rig.run(3.0, EDX=3.0)
 
@@ -226,4 +249,4 @@ def test_send_writes_goals_without_a_cycle() -> None:
     assert rig.pulls() == pytest.approx([0.205] * 7, abs=0.001)
     rig.port.is_gone = True
     rig.bus.send(dict.fromkeys(NAMES, 7.0))
-    assert "is gone" in rig.bus.cycle(None, rig.line.now_ns).reason
+    assert "is gone" in rig.bus.cycle(rig.line.now_ns).reason

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings
-from tests.robot.drivers.dynamixel.rigs import servo, settings
+from shapechanger.robot.drivers.servos.settings import BusSettings
+from tests.robot.drivers.servos.rigs import feetech, servo, settings
 
 _NAN = float("nan")
 
@@ -46,8 +46,12 @@ def test_an_unknown_model_suggests_the_nearest() -> None:
         ({"baud": 12345}, "No servo has 12345 baud; the baud rates are 9600, 57600"),
         ({"watchdog_ms": 0}, "watchdog_ms must be 20 to 2540 in steps of 20, not 0"),
         ({"watchdog_ms": 50}, "watchdog_ms must be 20 to 2540 in steps of 20, not 50"),
-        ({"most_missed": 0}, "most_missed must be 1 or more, not 0"),
-        ({"answer_ms": _NAN}, "answer_ms must be 0.1 or more, not nan"),
+        ({"baud": 250_000}, "No servo has 250000 baud"),
+        (
+            {"servos": (servo("FDP"), feetech("FDS"))},
+            "cannot have Dynamixel and Feetech servos",
+        ),
+        ({"servos": (feetech("FDP"),), "baud": 4_000_000}, "No servo has 4000000 baud; .* 38400"),
     ],
 )
 def test_an_invalid_bus_is_refused(changes: dict[str, Any], words: str) -> None:
@@ -59,3 +63,22 @@ def test_an_invalid_bus_is_refused(changes: dict[str, Any], words: str) -> None:
 def test_the_watchdog_is_on_by_default() -> None:
     """The default watchdog is 100 ms."""
     assert BusSettings("x", (servo("FDP"),)).watchdog_ms == 100
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"control": "tension"},
+            "must be 'length', not 'tension', because a Feetech servo has no control of its curren",
+        ),
+        ({"shortest_m": -0.016}, "its lengths must be within 0.0157 m of the zero, half a turn"),
+        ({"longest_m": 0.016}, "its lengths must be within 0.0157 m of the zero, half a turn"),
+        ({"id": 254}, "its id must be 0 to 253, not 254"),
+        ({"most_tension_n": 400.0}, "its most tension must be 0.38 to 382 N with this spool"),
+    ],
+)
+def test_an_invalid_feetech_servo_is_refused(changes: dict[str, Any], words: str) -> None:
+    """What a Feetech servo cannot do is refused in one sentence that says why."""
+    with pytest.raises(RobotError, match=words):
+        feetech("FDP", **changes)

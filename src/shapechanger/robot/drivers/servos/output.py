@@ -1,4 +1,4 @@
-"""Driver of a tendon as an output, and the servo bus that all tendons of a robot share.
+"""Drivers of the tendons of a servo bus: outputs, their sensor, and the bus that they share.
 
 The sensor runs the one cycle of each tick, which reads all servos. The outputs only stage their
 tensions, which are sent in one packet when all of them are staged.
@@ -6,73 +6,76 @@ tensions, which are sent in one packet when all of them are staged.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-from shapechanger.robot.drivers.dynamixel.health import BusState
-from shapechanger.robot.drivers.dynamixel.settings import (
-    ServoSettings,
-    bus_settings,
-    servo_settings,
-)
-from shapechanger.robot.guard.plan import OutputPlan
+from shapechanger.robot.drivers.servos.bus import ServoBus
+from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.settings import ServoSettings, bus_settings, servo_settings
+from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware
 
 
 class SharedBus:
     """All servos at one device; see `SharedDevice`.
 
+    Servos without a watchdog get their power from a switch that the guard feeds while it runs, so
+    they are only set up when the robot is armed. Where one of them cannot be released, `flush` and
+    `let_go` raise errors, so that the guard stops to feed the switch, until that has cut the power.
+
     Args:
         hardware: Hardware of the bus.
-        settings: Settings of any output on it, which include those of the bus.
+        device: Its device.
     """
 
-    def __init__(self, hardware: Hardware, settings: Mapping[str, Any]) -> None:
-        self.device: str = settings["device"]
+    def __init__(self, hardware: Hardware, device: str) -> None:
+        self.device = device
         self._hardware = hardware
-        self._settings = settings
-        self._servos: dict[str, ServoSettings] = {}
-        self._zeros: dict[str, int] = {}
+        self._plans: dict[str, OutputPlan] = {}
         self._tensions: dict[str, float] = {}
         self._lengths: dict[str, float] = {}
         self._bus: ServoBus | None = None
+        self._silent_since_ns: int | None = None
 
     def add(self, plan: OutputPlan) -> ServoSettings:
         """Add a servo.
 
         Raises:
-            RobotError: If a setting is out of range, or the bus is already in use.
+            RobotError: If a setting is out of range.
         """
-        if self._bus is not None:
-            raise RobotError(f"The bus at {self.device} is in use: {plan.name} comes too late.")
         servo = servo_settings(plan)
-        self._servos[plan.name] = servo
-        self._zeros[plan.name] = plan.settings["zero"]
+        self._plans[plan.name] = plan
         self._tensions[plan.name] = servo.pretension_n
         return servo
 
     def begin(self) -> None:
-        """Set up all servos, without torque; see `SharedDevice.begin`."""
-        settings = bus_settings(self._settings, tuple(self._servos.values()))
+        """Set up all servos that have power, without torque; see `SharedDevice.begin`."""
+        self._settings = settings = bus_settings([*self._plans.values()])
+        self._zeros: dict[str, int] = {n: p.settings["zero"] for n, p in self._plans.items()}
+        self._has_watchdog = settings.family.has_watchdog
         bus = ServoBus(settings, self._hardware.servo_port(settings))
-        try:
-            bus.set_up()
-        except BaseException:
-            bus.close()
-            raise
-        bus.set_zeros(self._zeros)
+        if self._has_watchdog:
+            try:
+                bus.set_up()
+            except BaseException:
+                bus.close()
+                raise
+            bus.set_zeros(self._zeros)
         self._bus = bus
 
-    def ready(self) -> None:
+    def ready(self, alive: Callable[[], object] = lambda: None) -> None:
         """Clear all faults; see `SharedDevice.ready`."""
         bus = self._open_bus()
         if bus.faults or not bus.is_ready:
             if bus.mode not in ("off", "silent"):
                 bus.release()
-            bus.set_up()
-        if lost := [name for name in self._servos if name not in bus.zeros]:
+            self._require_release(bus)
+            bus.set_up(alive)
+            self._silent_since_ns = None
+            if not self._has_watchdog:
+                bus.set_zeros(self._zeros, knows_turns=False)
+        if lost := [name for name in self._plans if name not in bus.zeros]:
             raise RobotError(
                 f"{', '.join(lost)} lost the power, and so the zero of its tendon: find the zeros "
                 "with `shapechanger robot home`, and serve the robot afresh."
@@ -98,6 +101,7 @@ class SharedBus:
     def flush(self, *, grip: bool) -> None:
         """Send the tensions of all servos; see `SharedDevice.flush`."""
         bus = self._open_bus()
+        self._require_release(bus)
         if bus.faults:
             return  # The bus is stopping, which its cycles complete.
         if bus.mode == "off" and grip:
@@ -110,6 +114,7 @@ class SharedBus:
         bus = self._open_bus()
         if bus.mode not in ("off", "silent"):
             bus.release()
+        self._require_release(bus)
 
     def cycle(self, now_ns: int) -> BusState:
         """Run a cycle of the bus.
@@ -117,16 +122,26 @@ class SharedBus:
         Raises:
             RobotError: If the bus is not in use.
         """
-        return self._open_bus().cycle(None, now_ns)
+        return self._open_bus().cycle(now_ns)
 
     def leave(self, name: str) -> None:
         """Remove a servo; the last one closes the bus."""
-        self._servos.pop(name, None)
-        if not self._servos:
+        self._plans.pop(name, None)
+        if not self._plans:
             _OPEN.pop((id(self._hardware), self.device), None)
             if self._bus is not None:
                 self._bus.close()
                 self._bus = None
+
+    def _require_release(self, bus: ServoBus) -> None:
+        """Raise RobotError while a servo pulls that only the power switch can stop."""
+        if bus.mode != "silent" or self._has_watchdog:
+            return
+        now_ns = self._hardware.clock.now_ns()
+        if self._silent_since_ns is None:
+            self._silent_since_ns = now_ns
+        if now_ns - self._silent_since_ns < self._settings.cut_ms * 1_000_000:
+            raise RobotError(" ".join(bus.faults.values()))
 
     def _open_bus(self) -> ServoBus:
         if self._bus is None:
@@ -135,39 +150,7 @@ class SharedBus:
 
 
 # Open buses of this process, by hardware and device.
-_OPEN: Final[dict[tuple[int, str], tuple[Hardware, SharedBus]]] = {}
-
-
-def _join_bus(plan: OutputPlan, hardware: Hardware) -> tuple[SharedBus, ServoSettings]:
-    """Add the servo of an output to its bus, and return both.
-
-    Raises:
-        RobotError: If a setting is out of range.
-    """
-    device: str = plan.settings["device"]
-    key = (id(hardware), device)
-    _, bus = _OPEN.get(key, (hardware, None))
-    if bus is None:
-        bus = SharedBus(hardware, plan.settings)
-    servo = bus.add(plan)
-    _OPEN[key] = (hardware, bus)
-    return bus, servo
-
-
-def bus_at(device: str, hardware: Hardware) -> SharedBus:
-    """Return the bus at a device.
-
-    Args:
-        device: Serial device.
-        hardware: Hardware of the bus.
-
-    Raises:
-        RobotError: If no output is on it.
-    """
-    _, bus = _OPEN.get((id(hardware), device), (hardware, None))
-    if bus is None:
-        raise RobotError(f"No output is on the servo bus at {device}.")
-    return bus
+_OPEN: Final[dict[tuple[int, str], SharedBus]] = {}
 
 
 class TendonOutput:
@@ -188,10 +171,11 @@ class TendonOutput:
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
-        self.device: SharedBus
-        self.device, servo = _join_bus(plan, hardware)
+        key = (id(hardware), plan.settings["device"])
+        self.device = _OPEN.get(key) or SharedBus(hardware, plan.settings["device"])
         self._name = plan.name
-        self._servo = servo
+        self._servo = self.device.add(plan)
+        _OPEN[key] = self.device
 
     def write(self, value: float, now_ns: int) -> float:
         """Set the value from the next flush on.
@@ -222,11 +206,47 @@ class TendonOutput:
         self.device.leave(self._name)
 
 
-def open_driver(plan: OutputPlan, hardware: Hardware) -> TendonOutput:
-    """Join the bus, without sending anything yet.
+class TendonSensor:
+    """Runs one cycle of the bus per reading; see `SensorDriver`.
 
     Args:
-        plan: The output; outputs with the same device share a bus.
-        hardware: Hardware of the bus.
+        plan: The sensor.
+        hardware: Hardware of the bus, the same as that of the outputs, which are open.
+
+    Raises:
+        RobotError: If no output is on that bus.
     """
-    return TendonOutput(plan, hardware)
+
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        device: str = plan.settings["device"]
+        if (id(hardware), device) not in _OPEN:
+            raise RobotError(f"No output is on the servo bus at {device}.")
+        self._bus = _OPEN[id(hardware), device]
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """Run a cycle and return its readings, without servos that did not answer.
+
+        Args:
+            now_ns: Time, ns.
+            direction: Not used.
+
+        Returns:
+            For each tendon, such as FDP, `FDP/length`, its length beyond its zero, m, if it has
+            one; `FDP/speed`, m/s, positive while it gets longer; and `FDP/tension`, N, at least 0.
+
+        Raises:
+            RobotError: If there is a fault.
+        """
+        state = self._bus.cycle(now_ns)
+        if state.reason:
+            raise RobotError(state.reason)
+        readings: dict[str, float] = {}
+        for name, servo in state.servos.items():
+            if servo.length_m is not None:
+                readings[f"{name}/length"] = servo.length_m
+            readings[f"{name}/speed"] = servo.lengthening_m_per_s
+            readings[f"{name}/tension"] = max(servo.tension_n, 0.0)
+        return readings
+
+    def close(self) -> None:
+        """Do nothing: the bus belongs to the outputs."""

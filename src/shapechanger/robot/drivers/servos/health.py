@@ -6,24 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from shapechanger.robot.drivers.dynamixel.protocol import (
-    BUS_WATCHDOG,
-    GOAL_CURRENT,
-    HARDWARE_ERROR,
-    TORQUE_ENABLE,
-    TRIPPED,
-    Present,
-    Register,
-    hardware_errors,
-)
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
+from shapechanger.robot.drivers.servos.family import TRIPPED, Present, Register
+from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
 
 Mode = Literal["off", "held", "stopping", "silent"]
 """Mode of the bus.
 
 "off": no servo has torque. "held": servos pull the requested tensions. "stopping": tensions ramp
 down, then the servos let go. "silent": nothing is sent any more, so that the servos' own watchdogs
-stop them.
+stop them, or without any the power switch.
 """
 
 
@@ -36,7 +27,7 @@ class ServoState:
         length_m: Length of the tendon beyond its zero, m; None without a zero.
         lengthening_m_per_s: Rate of change of that length, m/s.
         tension_n: Tension of its present current, N, without the gears' friction.
-        goal_n: Tension of its goal current, N: limited and in whole counts.
+        goal_n: Tension of its goal, N: limited and in whole counts.
     """
 
     position: int
@@ -83,47 +74,14 @@ _SLACK_SHARE: Final = 0.7
 _SLACK_NS: Final = 100_000_000
 
 
-class SlackDetector:
-    """Detects a tendon that has snapped or come off.
-
-    There are two signs. A tendon that is wound in further than the finger allows is lost for
-    certain, at any tension, but this needs a zero. A servo that winds in nearly as fast as without
-    load shows it earlier, but only if its current overcomes the gears by far. A tendon that snaps
-    while its servo stands still at the pretension is detected with the next pull.
-
-    Args:
-        no_load_m_per_s: Speed of winding in of a servo without load, m/s.
-    """
-
-    def __init__(self, no_load_m_per_s: float) -> None:
-        self._most_m_per_s = _SLACK_SHARE * no_load_m_per_s
-        self._since_ns: int | None = None
-
-    def see(self, length: float | None, lengthening: float, now_ns: int) -> str:
-        """Evaluate one reading.
-
-        Args:
-            length: Length beyond the zero, m; None without a zero.
-            lengthening: Rate of change of the length, m/s; negative while winding in.
-            now_ns: Time, ns.
-
-        Returns:
-            Reason why the tendon is lost; empty if it is not.
-        """
-        if length is not None and length < _SHORTEST_M:
-            return f"it is wound in by {-1e3 * length:.0f} mm, further than the finger lets it"
-        if -lengthening < self._most_m_per_s:
-            self._since_ns = None
-            return ""
-        if self._since_ns is None:
-            self._since_ns = now_ns
-        if now_ns - self._since_ns >= _SLACK_NS:
-            return f"it winds in at {-1e3 * lengthening:.0f} mm/s, as without any load"
-        return ""
-
-
 class ServoHealth:
     """Fault detection of one servo.
+
+    There are two signs of a tendon that has snapped or come off. One that is wound in further than
+    the finger allows is lost for certain, at any tension, but this needs a zero. A servo that winds
+    in nearly as fast as without load shows it earlier, but only if its current overcomes the gears
+    by far. A tendon that snaps while its servo stands still at the pretension is detected with the
+    next pull.
 
     Args:
         servo: The servo.
@@ -143,8 +101,7 @@ class ServoHealth:
 
     def clear(self) -> None:
         """Clear the fault."""
-        no_load = self._servo.known.no_load_rad_per_s
-        self._slack = SlackDetector(no_load * self._servo.spool_radius_m)
+        self._slack_since_ns: int | None = None
         self._wrong_volts = self._hot = self._refused = 0
         self._was_late = False
         self.fault = ""
@@ -182,9 +139,7 @@ class ServoHealth:
         if self._hot >= _BELIEVED_CYCLES:
             self._fail(f"has {degrees:.0f} C, more than {most_c:g} C")
         if pulls:
-            speed = self._servo.lengthening(present.speed)
-            if words := self._slack.see(length, speed, now_ns):
-                self._fail(f"has lost its tendon: {words}")
+            self._see_tendon(length, self._servo.lengthening(present.speed), now_ns)
 
     def audit(self, register: Register, value: int, *, pulls: bool, goal: int) -> None:
         """Evaluate a register that shows whether the servo still obeys.
@@ -193,23 +148,38 @@ class ServoHealth:
             register: The register.
             value: Its value.
             pulls: Whether the servo should have torque.
-            goal: Goal current that was last sent, in counts.
+            goal: Goal that was last sent, in counts; see `ServoFamily.goal`.
         """
-        if register == HARDWARE_ERROR and value:
-            words = ", ".join(hardware_errors(value)) or f"it gives the unknown code {value}"
+        family = self._bus.family
+        if register == family.hardware_error and value:
+            words = family.error_words(value)
             self._fail(f"has switched itself off: {words}. Only a reboot gives it torque again")
-        elif register == BUS_WATCHDOG and value == TRIPPED:
+        elif register == family.mark and family.has_watchdog and value == TRIPPED:
             words = f"it received nothing for {self._bus.watchdog_ms} ms"
             self._fail(f"was stopped by its own watchdog: {words}")
-        elif register == BUS_WATCHDOG and value == 0:
+        elif register == family.mark and value == 0:
             self.was_reset = True
             self._fail("has restarted, for example after a dip of its power, and lost its zero")
-        elif register == TORQUE_ENABLE and pulls and value == 0:
+        elif register == family.torque_enable and pulls and value == 0:
             self._fail("has let go by itself")
-        elif register == GOAL_CURRENT and pulls:
+        elif register == family.goal and pulls:
             self._refused = 0 if value == goal else self._refused + 1
             if self._refused >= _MAX_WRONG_GOALS:
                 self._fail(f"has a goal of {value} counts, and was sent {goal}")
+
+    def _see_tendon(self, length: float | None, lengthening: float, now_ns: int) -> None:
+        """Detect a lost tendon by its length, m, and the rate of change of that, m/s."""
+        if length is not None and length < _SHORTEST_M:
+            words = f"it is wound in by {-1e3 * length:.0f} mm, further than the finger lets it"
+            self._fail(f"has lost its tendon: {words}")
+        no_load = self._servo.known.no_load_rad_per_s * self._servo.spool_radius_m
+        if -lengthening < _SLACK_SHARE * no_load:
+            self._slack_since_ns = None
+        elif self._slack_since_ns is None:
+            self._slack_since_ns = now_ns
+        elif now_ns - self._slack_since_ns >= _SLACK_NS:
+            words = f"it winds in at {-1e3 * lengthening:.0f} mm/s, as without any load"
+            self._fail(f"has lost its tendon: {words}")
 
     def _fail(self, what: str) -> None:
         self.fault = self.fault or f"{self._servo.words} {what}."

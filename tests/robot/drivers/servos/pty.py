@@ -11,10 +11,10 @@ from types import TracebackType
 from typing import Final, Self
 
 from shapechanger.twin.servos.bus import SimulatedBus
-from tests.robot.drivers.dynamixel import wire
+from tests.robot.drivers.servos import wire
 
 _CHUNK: Final = 4096
-_HEADER: Final = 7
+_HEADER: Final = 6  # No packet is shorter, and its size is known by then or soon.
 
 
 class ServoPty:
@@ -74,7 +74,8 @@ class ServoPty:
             if self._wake_in in ready:
                 return
             data += os.read(self._host, _CHUNK)
-            while len(data) >= _HEADER and len(data) >= (size := wire.size_of(data)):
+            family = wire.family_of(self.bus)
+            while len(data) >= _HEADER and len(data) >= (size := wire.size_of(data, family)):
                 with self.lock:
                     answers = wire.execute(self.bus, data[:size])
                 self._send(b"".join(answers.values()))

@@ -8,13 +8,13 @@ from typing import Any
 
 from dynamixel_sdk import PortHandler
 
-from shapechanger.robot.drivers.dynamixel.bus import ServoBus
-from shapechanger.robot.drivers.dynamixel.health import BusState
-from shapechanger.robot.drivers.dynamixel.serial_port import SerialServoPort
-from shapechanger.robot.drivers.dynamixel.settings import BusSettings, ServoSettings
+from shapechanger.robot.drivers.servos.bus import ServoBus
+from shapechanger.robot.drivers.servos.health import BusState
+from shapechanger.robot.drivers.servos.serial_port import SerialServoPort
+from shapechanger.robot.drivers.servos.settings import BusSettings, ServoSettings
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.servo import ServoPlan, SimulatedServo
-from tests.robot.drivers.dynamixel import wire
+from tests.robot.drivers.servos import wire
 
 NAMES = ("FDP", "FDS", "EIP", "EDC", "LUM", "DI", "PI")
 """The tendons; their servos have the ids 1 to 7."""
@@ -39,9 +39,22 @@ def servo(name: str, **changes: Any) -> ServoSettings:
     return replace(plain, **changes)
 
 
+def feetech(name: str, **changes: Any) -> ServoSettings:
+    """Return the settings of one Feetech servo, which controls lengths of 0 to -15 mm."""
+    plain: dict[str, Any] = {"model": "STS3215", "control": "length", "shortest_m": -0.015}
+    tensions = {"most_tension_n": 60.0, "pretension_n": 12.0, "homing_n": 16.0}
+    return servo(name, **(plain | tensions | changes))
+
+
 def settings(**changes: Any) -> BusSettings:
     """Return the settings of the bus."""
     return replace(BusSettings("the twin", tuple(servo(name) for name in NAMES)), **changes)
+
+
+def of(family: str, **changes: Any) -> BusSettings:
+    """Return the settings of a bus of a family, "Dynamixel" or "Feetech"."""
+    make = feetech if family == "Feetech" else servo
+    return settings(servos=tuple(make(name) for name in NAMES), **changes)
 
 
 class FaultyPort(PortHandler):
@@ -134,15 +147,22 @@ class Rig:
     ) -> None:
         self.settings = settings() if bus is None else bus
         if plans is None:
-            plans = [ServoPlan(one.id, MODEL, angle=2.0 * one.id) for one in self.settings.servos]
+            plans = [ServoPlan(s.id, s.model, angle=2.0 * s.id) for s in self.settings.servos]
         self.line = SimulatedBus(plans)
         self.port = FaultyPort(self.line)
-        self.bus = ServoBus(self.settings, SerialServoPort(self.port, self.settings.device))
+        self.bus = ServoBus(self.settings, self._open())
+
+    def _open(self) -> SerialServoPort:
+        return SerialServoPort(self.port, self.settings.device, self.settings.family)
+
+    def position(self, name: str) -> int:
+        """Return the present position in the registers of a servo, counts."""
+        return self.twin(name).register(self.settings.family.position.address)
 
     def start(self) -> Rig:
         """Set up and hold the bus, with zeros at the present positions."""
         self.bus.set_up()
-        self.bus.set_zeros({name: self.twin(name).register(132) for name in NAMES})
+        self.bus.set_zeros({name: self.position(name) for name in NAMES})
         self.bus.hold()
         return self
 
@@ -154,8 +174,9 @@ class Rig:
         """Command one tension for all tendons, except `others`, and return the last state."""
         assert cycles > 0
         for _ in range(cycles):
-            tensions = None if tension is None else dict.fromkeys(NAMES, tension) | others
-            state = self.bus.cycle(tensions, self.line.now_ns)
+            if tension is not None:
+                self.bus.send(dict.fromkeys(NAMES, tension) | others)
+            state = self.bus.cycle(self.line.now_ns)
             self.line.advance(CYCLE_NS)
         return state
 

@@ -4,19 +4,56 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import Any, Final, Literal, get_args
+from typing import Final, NamedTuple
 
 from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.servos.family import (
+    COUNTS_PER_TURN,
+    DYNAMIXEL,
+    FEETECH,
+    WATCHDOG_STEP_MS,
+    Control,
+    ServoFamily,
+)
 from shapechanger.robot.guard.plan import OutputPlan
 
-COUNTS_PER_TURN: Final = 4096
-"""Counts of position per turn."""
+DRIVER: Final = "bus_servo"
+"""Driver of the outputs and of the sensor of a servo bus, in a profile."""
 
 _ROUNDING: Final = 1e-9
 """Added to a quotient before rounding down: 3 may come out as 2.9999999999."""
+
+
+class Gears(NamedTuple):
+    """Motor and gears of a servo, at the output.
+
+    Attributes:
+        inertia: Inertia, kg·m2.
+        friction_nm: Coulomb friction, N·m.
+        viscous: Viscous friction, N·m·s/rad.
+        is_measured: Whether the friction was measured.
+    """
+
+    inertia: float
+    friction_nm: float
+    viscous: float
+    is_measured: bool
+
+
+# XL330-M288 and STS3215: identified by Rhoban's `bam` (m1). M077: those of the M288, scaled by the
+# square of the gear ratio. XC330-M288: fits on joints of a LEAP hand, with the viscous part of the
+# XL330 assumed. XM430: chosen for want of a source.
+_GEARS: Final = {
+    "XL330-M288": Gears(0.00199, 0.018, 0.0059, True),
+    "XL330-M077": Gears(0.000144, 0.005, 0.00043, False),
+    "XC330-M288": Gears(0.00141, 0.029, 0.0059, True),
+    "XM430-W210": Gears(0.003, 0.09, 0.02, False),
+    "XM430-W350": Gears(0.008, 0.12, 0.05, False),
+    "STS3215": Gears(0.0261, 0.0515, 0.0599, True),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +62,9 @@ class ServoModel:
 
     Attributes:
         name: Name of the model.
-        number: Model number, its answer to a ping.
-        ampere_per_count: Unit of its currents, A.
-        most_counts: Largest value of its current limit, in that unit.
+        number: Model number.
+        ampere_per_count: Unit of its present current, A.
+        most_counts: Largest value of its goal, see `ServoFamily.goal`.
         stall_nm: Stall torque at `volts`, N·m.
         stall_a: Stall current at `volts`, A.
         no_load_rpm: Speed without load at `volts`, turns per minute.
@@ -35,8 +72,9 @@ class ServoModel:
         least_v: Lowest operating voltage, V.
         most_v: Highest operating voltage, V.
         most_c: Temperature at which it shuts itself off, degrees Celsius.
+        shutdown: Hardware errors that shut it off, as bits.
         least_firmware: First version with a reliable bus watchdog.
-        friction_nm: Friction of its gears at the output, N·m; None where it was not measured.
+        family: Family of the servo.
     """
 
     name: str
@@ -50,8 +88,14 @@ class ServoModel:
     least_v: float
     most_v: float
     most_c: int
+    shutdown: int
     least_firmware: int = 0
-    friction_nm: float | None = None
+    family: ServoFamily = DYNAMIXEL
+
+    @property
+    def gears(self) -> Gears:
+        """Motor and gears."""
+        return _GEARS[self.name]
 
     @property
     def torque_constant(self) -> float:
@@ -63,16 +107,23 @@ class ServoModel:
         """Speed without load, rad/s."""
         return self.no_load_rpm * 2.0 * math.pi / 60.0
 
+    @property
+    def ampere_per_goal(self) -> float:
+        """Unit of its goal, A; where that is a share of the stall torque, for a motor at rest."""
+        is_current = "tension" in self.family.modes
+        return self.ampere_per_count if is_current else self.stall_a / self.most_counts
 
-# Source: ROBOTIS e-manual. Friction: XL330-M288 identified by Rhoban's `bam` (xl330/m1),
-# XC330-M288 fitted on joints of a LEAP hand. The bus watchdog of the X430 needs firmware 38
-# (e-manual, Bus Watchdog). The numbers are in the order of the attributes.
+
+# Dynamixel: ROBOTIS e-manual; the bus watchdog of the X430 needs firmware 38 (Bus Watchdog).
+# Feetech: makers' memory table, data sheet of the version for 7.4 V (19.5 kg·cm, 52 turns per
+# minute) and its 8 kg·cm/A as in `bam`. The numbers are in the order of the attributes.
 _MODELS: Final = (
-    ServoModel("XL330-M288", 1200, 1e-3, 1750, 0.52, 1.47, 103.0, 5.0, 3.5, 7.0, 70, 0, 0.018),
-    ServoModel("XL330-M077", 1190, 1e-3, 1750, 0.215, 1.47, 383.0, 5.0, 3.5, 7.0, 70),
-    ServoModel("XC330-M288", 1240, 1e-3, 2352, 0.93, 1.80, 81.0, 5.0, 3.5, 7.0, 70, 0, 0.029),
-    ServoModel("XM430-W210", 1030, 2.69e-3, 1193, 3.0, 2.3, 77.0, 12.0, 9.5, 16.0, 80, 38),
-    ServoModel("XM430-W350", 1020, 2.69e-3, 1193, 4.1, 2.3, 46.0, 12.0, 9.5, 16.0, 80, 38),
+    ServoModel("XL330-M288", 1200, 1e-3, 1750, 0.52, 1.47, 103.0, 5.0, 3.5, 7.0, 70, 53),
+    ServoModel("XL330-M077", 1190, 1e-3, 1750, 0.215, 1.47, 383.0, 5.0, 3.5, 7.0, 70, 53),
+    ServoModel("XC330-M288", 1240, 1e-3, 2352, 0.93, 1.80, 81.0, 5.0, 3.5, 7.0, 70, 52),
+    ServoModel("XM430-W210", 1030, 2.69e-3, 1193, 3.0, 2.3, 77.0, 12.0, 9.5, 16.0, 80, 52, 38),
+    ServoModel("XM430-W350", 1020, 2.69e-3, 1193, 4.1, 2.3, 46.0, 12.0, 9.5, 16.0, 80, 52, 38),
+    ServoModel("STS3215", 777, 6.5e-3, 1000, 1.91, 2.44, 52.0, 7.4, 4.0, 8.0, 70, 44, 0, FEETECH),
 )
 
 MODELS: Final[Mapping[str, ServoModel]] = MappingProxyType({one.name: one for one in _MODELS})
@@ -90,27 +141,27 @@ def model_named(name: str) -> ServoModel:
     return MODELS[name]
 
 
-Control = Literal["tension", "length"]
-"""Control of a tendon: by its tension, or by its length with a limit of the tension."""
+def stops_itself(output: OutputPlan) -> bool:
+    """Return whether an output is a servo that stops by itself when its bus is silent."""
+    return output.driver == DRIVER and MODELS[output.settings["model"]].family.has_watchdog
 
-_MOST_ID: Final = 252  # Protocol 2.0: 253 to 255 are reserved, 254 is broadcast.
-_MOST_WATCHDOG_MS: Final = 127 * 20
-_BAUD_RATES: Final = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
+
+_MOST_WATCHDOG_MS: Final = 127 * WATCHDOG_STEP_MS
 
 
 @dataclass(frozen=True, slots=True)
 class ServoSettings:
-    """A servo and its tendon.
+    """A servo and its tendon, as a profile has checked it.
 
     A tension is that of the current without friction. The gears take some newtons of it when the
-    spool winds in, and add as much when the tendon pulls it out; see `ServoModel.friction_nm`.
+    spool winds in, and add as much when the tendon pulls it out; see `Gears.friction_nm`.
 
     Attributes:
         name: Name of the tendon, such as "FDP".
-        id: Id on the bus, 0 to 252.
+        id: Id on the bus.
         model: Name of its model; see `MODELS`.
         spool_radius_m: Radius at which the tendon leaves the spool, half its thickness included, m.
-        most_tension_n: Largest tension, N. The servo's own current limit is set to it.
+        most_tension_n: Largest tension, N. The servo's own limit is set to it.
         pretension_n: Smallest tension while it holds the tendon, N.
         homing_n: Tension for finding the zero, N.
         direction: 1 if rising positions wind the tendon in, -1 if they let it out.
@@ -132,68 +183,74 @@ class ServoSettings:
     shortest_m: float = 0.0
 
     def __post_init__(self) -> None:
-        known = model_named(self.model)
-        if not 0 <= self.id <= _MOST_ID:
-            self._refuse(f"its id must be 0 to {_MOST_ID}, not {self.id}")
+        family = model_named(self.model).family
+        if not 0 <= self.id <= family.most_id:
+            self._refuse(f"its id must be 0 to {family.most_id}, not {self.id}")
         if self.direction not in (1, -1):
             self._refuse(f"its direction must be 1 or -1, not {self.direction}")
-        if self.control not in get_args(Control):
-            raise UnknownName("control of a tendon", self.control, get_args(Control))
+        if self.control == "tension" and "tension" not in family.modes:
+            why = f"a {family.name} servo has no control of its current"
+            self._refuse(f"its control must be 'length', not 'tension', because {why}")
+        if self.control not in family.modes:
+            raise UnknownName("control of a tendon", self.control, family.modes)
         if self.control == "length" and not -math.inf < self.shortest_m < self.longest_m < math.inf:
             words = f"{self.shortest_m:g} and {self.longest_m:g} m"
             self._refuse(f"control of its length needs shortest_m below longest_m, not {words}")
         if not 0.0 < self.spool_radius_m < math.inf:  # Also refuses NaN.
             self._refuse(f"its spool radius must be above 0, not {self.spool_radius_m:g}")
-        least, most = self.newton_per_count, known.most_counts * self.newton_per_count
-        if not least <= self.most_tension_n <= most:
-            words = f"{least:.2g} to {most:.0f} N with this spool, not {self.most_tension_n:g} N"
-            self._refuse(f"its most tension must be {words}")
+        half = math.pi * self.spool_radius_m
+        if not family.has_watchdog and max(-self.shortest_m, self.longest_m) >= half:
+            self._refuse(
+                f"its lengths must be within {half:.4f} m of the zero, half a turn of the spool, "
+                "because it forgets its turns with its power"
+            )
+        least, most = self.newton_per_goal, self.known.most_counts * self.newton_per_goal
         for label, value in (
+            ("most tension", self.most_tension_n),
             ("pretension", self.pretension_n),
             ("tension for homing", self.homing_n),
         ):
-            if not least <= value <= self.most_tension_n:
-                words = f"{least:.2g} to {self.most_tension_n:g} N, not {value:g} N"
-                self._refuse(f"its {label} must be {words}")
+            if not least <= value <= most:
+                end = f"{most:.0f} N with this spool" if label == "most tension" else f"{most:g} N"
+                self._refuse(f"its {label} must be {least:.2g} to {end}, not {value:g} N")
+            most = self.most_tension_n  # Of the others.
 
     @property
     def known(self) -> ServoModel:
         """Model of the servo."""
-        return model_named(self.model)
+        return MODELS[self.model]
 
     @property
-    def newton_per_count(self) -> float:
-        """Tension per count of current, N."""
-        return self.known.torque_constant * self.known.ampere_per_count / self.spool_radius_m
-
-    @property
-    def friction_n(self) -> float | None:
-        """Friction of the gears at the tendon, N; None where it is unknown."""
-        friction = self.known.friction_nm
-        return None if friction is None else friction / self.spool_radius_m
+    def newton_per_goal(self) -> float:
+        """Tension per count of the goal, N."""
+        return self.known.torque_constant * self.known.ampere_per_goal / self.spool_radius_m
 
     @property
     def most_counts(self) -> int:
-        """Current limit in counts: the largest that pulls at most `most_tension_n`."""
-        return math.floor(self.most_tension_n / self.newton_per_count + _ROUNDING)
+        """Limit of the goal in counts: the largest that pulls at most `most_tension_n`."""
+        return math.floor(self.most_tension_n / self.newton_per_goal + _ROUNDING)
 
     @property
     def metre_per_count(self) -> float:
         """Change of the tendon's length per count of position, m; negative if it winds in."""
         return -self.direction * 2.0 * math.pi * self.spool_radius_m / COUNTS_PER_TURN
 
-    def clip(self, tension: float) -> float:
-        """Clip a tension to the range from pretension to `most_tension_n`, N.
+    def clip(self, tension: float, least: float | None = None) -> float:
+        """Clip a tension to the range of its servo, N.
+
+        Args:
+            tension: Tension, N.
+            least: Lower end of the range, N; None for the pretension.
 
         Raises:
             RobotError: If it is not finite.
         """
         if not math.isfinite(tension):
             raise RobotError(f"{self.words} cannot pull {tension} N.")
-        return min(max(tension, self.pretension_n), self.most_tension_n)
+        return min(max(tension, self.pretension_n if least is None else least), self.most_tension_n)
 
     def goal_count(self, tension: float) -> int:
-        """Return the goal current for a tension, rounded towards slack and at most the limit.
+        """Return the goal for a tension, rounded towards slack and at most the limit.
 
         Args:
             tension: Tension, N; a negative one counts as 0, because a tendon does not push.
@@ -204,13 +261,10 @@ class ServoSettings:
         Raises:
             RobotError: If the tension is not finite.
         """
-        if not math.isfinite(tension):
-            raise RobotError(f"{self.words} cannot pull {tension} N.")
         # Clip first: the quotient of a huge number could overflow to infinity.
-        pulled = min(max(tension, 0.0), self.most_tension_n)
-        counts = math.floor(pulled / self.newton_per_count + _ROUNDING)
+        counts = math.floor(self.clip(tension, 0.0) / self.newton_per_goal + _ROUNDING)
         counts = min(counts, self.most_counts)
-        # With control of the length the goal current is a limit, which has no sign.
+        # With control of the length the goal is a limit, which has no sign.
         return counts if self.control == "length" else self.direction * counts
 
     def position_at(self, length: float, zero: int) -> int:
@@ -230,7 +284,8 @@ class ServoSettings:
 
     def tension_n(self, current: int) -> float:
         """Return the tension of a current in counts, N; negative for one that lets out."""
-        return self.direction * current * self.newton_per_count
+        torque = self.known.torque_constant * self.known.ampere_per_count * current
+        return self.direction * torque / self.spool_radius_m
 
     def length_m(self, position: int, zero: int) -> float:
         """Return the length of the tendon beyond its zero, m, which grows as it is let out.
@@ -256,11 +311,11 @@ class ServoSettings:
 
 @dataclass(frozen=True, slots=True)
 class BusSettings:
-    """A bus and its servos.
+    """A bus and its servos, as a profile has checked it.
 
     Attributes:
         device: Serial device, such as "/dev/ttyUSB0".
-        servos: Servos, in the order in which they are read.
+        servos: Servos of one family, in the order in which they are read.
         baud: Baud rate; one that the SDK supports.
         answer_ms: Time for the servos to start an answer, ms. The latency timer of an FTDI adapter
             must be below: `/sys/bus/usb-serial/devices/ttyUSB0/latency_timer`, by default 16 ms and
@@ -268,6 +323,7 @@ class BusSettings:
         watchdog_ms: Silence after which the servos stop by themselves, ms; a multiple of 20.
         most_missed: Missed cycles in a row that make a fault.
         ramp_ms: Time in which a stop lowers the tensions to the pretension, ms.
+        cut_ms: Time after which a power switch that is not fed has cut the servos' power, ms.
     """
 
     device: str
@@ -277,6 +333,7 @@ class BusSettings:
     watchdog_ms: int = 100
     most_missed: int = 5
     ramp_ms: int = 300
+    cut_ms: int = 200
 
     def __post_init__(self) -> None:
         if not self.servos:
@@ -288,21 +345,29 @@ class BusSettings:
             value, times = Counter[object](values).most_common(1)[0]
             if times > 1:
                 raise RobotError(f"The bus at {self.device} has {times} servos of {label} {value}.")
-        if self.baud not in _BAUD_RATES:
-            rates = ", ".join(map(str, _BAUD_RATES))
-            raise RobotError(f"No servo has {self.baud} baud; the baud rates are {rates}.")
-        if not 20 <= self.watchdog_ms <= _MOST_WATCHDOG_MS or self.watchdog_ms % 20:
+        names = {one.known.family.name: None for one in self.servos}
+        if len(names) > 1:
+            raise RobotError(f"The bus at {self.device} cannot have {' and '.join(names)} servos.")
+        rates = self.family.baud_rates
+        if self.baud not in rates:
+            words = ", ".join(map(str, rates))
+            raise RobotError(f"No servo has {self.baud} baud; the baud rates are {words}.")
+        if not 20 <= self.watchdog_ms <= _MOST_WATCHDOG_MS or self.watchdog_ms % WATCHDOG_STEP_MS:
             raise RobotError(
                 f"watchdog_ms must be 20 to {_MOST_WATCHDOG_MS} in steps of 20, "
                 f"not {self.watchdog_ms}."
             )
-        for label, value, least in (
-            ("answer_ms", self.answer_ms, 0.1),
-            ("most_missed", self.most_missed, 1),
-            ("ramp_ms", self.ramp_ms, 0),
-        ):
-            if not least <= value < math.inf:
-                raise RobotError(f"{label} must be {least:g} or more, not {value:g}.")
+
+    @property
+    def family(self) -> ServoFamily:
+        """Family of the servos."""
+        return self.servos[0].known.family
+
+    @property
+    def mark(self) -> int:
+        """Value of `ServoFamily.mark` while a servo has not restarted."""
+        family = self.family
+        return self.watchdog_ms // WATCHDOG_STEP_MS if family.has_watchdog else 254
 
 
 def servo_settings(plan: OutputPlan) -> ServoSettings:
@@ -316,15 +381,13 @@ def servo_settings(plan: OutputPlan) -> ServoSettings:
     return ServoSettings(plan.name, **{key: plan.settings[key] for key in keys})
 
 
-def bus_settings(settings: Mapping[str, Any], servos: tuple[ServoSettings, ...]) -> BusSettings:
-    """Return a bus with these servos.
-
-    Args:
-        settings: Settings of any of its outputs, which include those of the bus.
-        servos: Its servos.
+def bus_settings(outputs: Sequence[OutputPlan]) -> BusSettings:
+    """Return the bus of outputs, each of which has its settings.
 
     Raises:
         RobotError: If a setting is out of range, or two servos have the same id or name.
     """
+    settings = outputs[0].settings
     keys = [field.name for field in fields(BusSettings) if field.name in settings]
+    servos = tuple(map(servo_settings, outputs))
     return BusSettings(servos=servos, **{key: settings[key] for key in keys})
