@@ -107,6 +107,9 @@ def test_an_option_that_is_given_twice_is_refused(capsys: pytest.CaptureFixture[
     assert capsys.readouterr().err == (
         "error: --set is given twice: give it once, with all its values after it.\n"
     )
+    with pytest.raises(SystemExit):
+        main(["robot", "serve", "car", "--policy", "a.onnx", "--policy=b.onnx"])
+    assert "one policy drives at a time" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -157,14 +157,16 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
 
 
 def _require_single(arguments: Sequence[str]) -> None:
-    """Raise StudyError for an option of several values that is given twice.
+    """Raise StudyError for an option of several values, or a policy, that is given twice.
 
-    Values of the first one would be dropped without a word. For other options the last one counts.
+    The first one would be dropped without a word. For other options the last one counts.
     """
     options = [word.partition("=")[0] for word in arguments]
     for name in _SEVERAL:
         if options.count(name) > 1:
             raise StudyError(f"{name} is given twice: give it once, with all its values after it.")
+    if options.count("--policy") > 1:
+        raise StudyError("--policy is given twice, and one policy drives at a time: give it once.")
 
 
 def _commands(kind: Any) -> dict[str, Any]:
