@@ -40,9 +40,7 @@ class Person:
         self._thread: threading.Thread | None = None
 
     def drive(self, values: Sequence[float]) -> None:
-        """Take control, arm the robot, and hold the stick."""
-        self.client.take()
-        self.client.arm()
+        """Take control from the program that has it or comes, and hold the stick."""
         self._let_go.clear()
         self._thread = threading.Thread(target=self._hold, args=(tuple(values),))
         self._thread.start()
@@ -63,6 +61,10 @@ class Person:
 
     def _hold(self, values: tuple[float, ...]) -> None:
         received = self.client.ask()
+        while not (received.message.holder or self._let_go.is_set()):
+            received = self.client.ask()
+        self.client.take()
+        self.client.arm()
         while not self._let_go.is_set():
             received = self.client.exchange(values, received)
             self.seen.append(received.message)

@@ -24,7 +24,7 @@ from lerobot_robot_shapechanger import (
 )
 from shapechanger.errors import LinkError, RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.link import messages as m
-from shapechanger.remote.known_robots import remember
+from shapechanger.remote.known_robots import forget, remember
 from shapechanger.twin.robot import RunningRobot
 
 AHEAD = {"steering": 0.25, "throttle": 0.5}
@@ -60,6 +60,7 @@ def tin(tmp_path: Path) -> Iterator[Callable[..., Robot]]:
         def start(**what: Any) -> Robot:
             robot = stack.enter_context(Robot(**{"clock": "real", **what}).running(tmp_path))
             remember(robot.known)
+            stack.callback(forget, "tin")
             return robot
 
         yield start
