@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
+from lerobot.scripts.lerobot_record import DatasetRecordConfig, RecordConfig, record
 from lerobot.scripts.lerobot_teleoperate import TeleoperateConfig, teleoperate
 
 from lerobot_robot_shapechanger import ShapechangerConfig, ShapechangerConsoleConfig
@@ -20,7 +21,7 @@ from shapechanger.errors import LinkError
 from shapechanger.twin.robot import RunningRobot
 
 from .conftest import served
-from .stick import StickConfig
+from .stick import Stick, StickConfig
 
 AHEAD = (-1.0, 0.3)  # In a circle.
 PROGRAMS = Path(sys.executable).parent
@@ -140,30 +141,61 @@ def test_a_wrong_name_shows_the_nearest(robot: RunningRobot) -> None:
     )
 
 
-def test_an_unplugged_robot_ends_the_program() -> None:
+def test_an_unplugged_robot_ends_teleoperation(monkeypatch: pytest.MonkeyPatch) -> None:
     """A robot whose processes are killed ends LeRobot's loop with a sentence."""
-    with served() as robot:  # One of its own.
-        killer = threading.Thread(target=_kill_when_driven, args=(robot,))
-        killer.start()
+    config = TeleoperateConfig(teleop=StickConfig(), robot=ShapechangerConfig(id="lab-car"), fps=20)
+    with served() as robot:
+        _kill_at_action(20, robot, monkeypatch)
         with pytest.raises(LinkError) as lost:
-            teleoperate(
-                TeleoperateConfig(
-                    teleop=StickConfig(),
-                    robot=ShapechangerConfig(id="lab-car"),
-                    fps=20,
-                    teleop_time_s=200.0,
-                )
-            )
-        killer.join()
-    assert str(lost.value).startswith("The link to the robot is lost")
-    assert len(str(lost.value).splitlines()) == 1
+            teleoperate(config)
+    _assert_is_a_sentence(lost.value)
 
 
-def _kill_when_driven(robot: RunningRobot) -> None:
-    """Kill the daemon, and the supervisor that would start it again, while the robot moves."""
-    with robot.client(role="person", frames=False) as person:
-        while not any(person.ask().message.action_applied):
-            pass
-        daemon = robot.pid_of("daemon")
-        robot.supervisor.kill()
-        os.kill(daemon, signal.SIGKILL)
+def test_an_unplugged_robot_costs_one_episode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The episodes before it are a dataset."""
+    dataset = DatasetRecordConfig(
+        repo_id="tests/drive",
+        single_task="Drive ahead.",
+        root=tmp_path / "drive",
+        fps=20,
+        episode_time_s=1.0,
+        reset_time_s=0.0,
+        num_episodes=3,
+        push_to_hub=False,
+        vcodec="h264",
+    )
+    config = RecordConfig(
+        teleop=StickConfig(),
+        robot=ShapechangerConfig(id="lab-car"),
+        dataset=dataset,
+        play_sounds=False,
+    )
+    with served() as robot:
+        _kill_at_action(25, robot, monkeypatch)  # Of at most twenty in an episode.
+        with pytest.raises(LinkError) as lost:
+            record(config)
+    _assert_is_a_sentence(lost.value)
+    data = LeRobotDataset("tests/drive", root=tmp_path / "drive", video_backend="pyav")
+    assert 1 <= data.num_episodes <= 2
+    assert data[len(data) - 1]["observation.images.camera"].shape == (3, 120, 160)
+
+
+def _kill_at_action(number: int, robot: RunningRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kill the daemon, and the supervisor that would start it again, at an action of the stick."""
+    ahead, numbers = Stick.get_action, itertools.count(1)
+
+    def get_action(stick: Stick) -> dict[str, float]:
+        if next(numbers) == number:
+            daemon = robot.pid_of("daemon")
+            robot.supervisor.kill()
+            os.kill(daemon, signal.SIGKILL)
+        return ahead(stick)
+
+    monkeypatch.setattr(Stick, "get_action", get_action)
+
+
+def _assert_is_a_sentence(lost: LinkError) -> None:
+    assert str(lost).startswith("The link to the robot is lost")
+    assert len(str(lost).splitlines()) == 1
