@@ -33,6 +33,7 @@ class Link:
         self._frames = frames
         self._client: RobotClient | None = None
         self._spaces: RobotSpaces | None = None
+        self._acknowledged = 0
 
     @property
     def is_open(self) -> bool:
@@ -82,7 +83,7 @@ class Link:
                 "and LeRobot follows the clock: serve it with `--clock real`."
             )
         self._spaces = _spaces_of(client.welcome)
-        self._client = client
+        self._client, self._acknowledged = client, 0
         return client
 
     def latest(self) -> Received:
@@ -96,7 +97,9 @@ class Link:
         period_s = 1.0 / client.welcome.control_hz
         if received is None or time.monotonic() - received.received_at > period_s:
             received = client.ask()
-        client.acknowledge()  # Have the next one under way.
+        if received.message.seq != self._acknowledged:
+            self._acknowledged = received.message.seq
+            client.acknowledge()  # Have the next one under way.
         return received
 
     def close(self) -> None:

@@ -116,6 +116,7 @@ def until() -> Callable[[Callable[[], bool]], None]:
         for _ in range(1_000):
             if is_true():
                 return
+            threading.Event().wait(0.01)
         pytest.fail("The condition did not hold within 1000 attempts.")
 
     return repeat

@@ -121,7 +121,7 @@ def test_an_emergency_stop_is_a_warning(
         until(lambda: bool(car.get_observation() and "Emergency stop" in caplog.text))
         until(lambda: throttle(car) == 0.0)
         assert "Grace: enough" in caplog.text
-    assert person.client.ask().message.emergency
+    until(lambda: person.client.ask().message.emergency)
     person.client.take()
     person.client.arm()
 
@@ -137,9 +137,8 @@ def test_disconnecting_stops_the_robot(robot: RunningRobot, person: Any, until: 
     until(lambda: throttle(car) > 0.0)
     car.disconnect()
     car.disconnect()
-    seen = person.client.ask().message
-    assert not seen.holder
-    assert not seen.armed
+    until(lambda: not person.client.ask().message.holder)
+    until(lambda: not person.client.ask().message.armed)
     until(lambda: not any(person.client.ask().message.action_applied))
 
 
