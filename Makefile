@@ -14,6 +14,10 @@ SYSTEM_JOBS ?= $(shell expr $(JOBS) + 1)
 VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(BIN)/python
+# LeRobot's torch is older than ours, so its tests have an environment of their own.
+LEROBOT := integrations/lerobot_robot_shapechanger
+LEROBOT_VENV := .venv-lerobot
+INSTALLED_LEROBOT := $(LEROBOT_VENV)/.installed
 # Written after a successful installation: for the demo, and for everything else.
 INSTALLED_ALL := $(VENV)/.installed-all
 INSTALLED_DEV := $(VENV)/.installed-dev
@@ -31,7 +35,7 @@ VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # Two installations at once would interfere.
-.PHONY: help setup demo test test-system test-all test-matrix check bench docs clean
+.PHONY: help setup demo test test-system test-all test-matrix test-lerobot check bench docs clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
@@ -57,6 +61,10 @@ test-all: $(INSTALLED_DEV)  ## run all tests, including the slow ones
 test-matrix: $(INSTALLED_DEV)  ## run the fast tests against other versions and installations
 	$(RUN) scripts/test_matrix.py
 
+test-lerobot: $(INSTALLED_LEROBOT)  ## test our robots in LeRobot; installs 6 GB
+	$(RUN) -m pyright -p $(LEROBOT)
+	$(LEROBOT_VENV)/bin/python -m pytest -c $(LEROBOT)/pyproject.toml --rootdir . $(LEROBOT)/tests
+
 check: $(INSTALLED_DEV)  ## check format, lint and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -69,7 +77,7 @@ docs: $(INSTALLED_DEV)  ## run the examples of the documentation and follow its 
 	$(PYTEST) tests/test_docs.py
 
 clean:  ## remove build products and environments; keep results/
-	rm -rf $(VENV) build dist htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \
+	rm -rf $(VENV) $(LEROBOT_VENV) build dist htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \
 		MUJOCO_LOG.TXT
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -88,3 +96,9 @@ $(INSTALLED_DEV): pyproject.toml constraints.txt | $(RUN)
 	@rm -f $@
 	$(RUN) -m pip install --quiet -c constraints.txt -e '.[all,dev]'
 	@touch $(INSTALLED_ALL) $@
+
+$(INSTALLED_LEROBOT): pyproject.toml $(LEROBOT)/pyproject.toml $(LEROBOT)/constraints.txt $(INSTALLED_DEV)
+	$(PYTHON) -m venv $(LEROBOT_VENV)
+	$(RUN) -m uv pip install --quiet --python $(LEROBOT_VENV)/bin/python \
+		-c $(LEROBOT)/constraints.txt -e . -e '$(LEROBOT)[test]'
+	@touch $@

@@ -269,3 +269,15 @@ class Takeover:
     def action(seen: Observation) -> tuple[float, ...] | None:
         """Return the command of a person, or None if no person has control."""
         return seen.commanded if seen.commanded and seen.holder_role == "person" else None
+
+
+def interruption(message: Observation) -> str:
+    """Return the reason why a program does not drive, or ""."""
+    why = f": {message.stop_reason}" if message.stop_reason else "."
+    if not message.mine:
+        return f"{message.holder or 'No client'} has control of the robot now{why}"
+    if message.emergency:
+        return f"Emergency stop{why}"
+    if not message.armed:
+        return f"The robot was disarmed{why}"
+    return ""

@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.envs.remote.operator import Preparation, Takeover
+from shapechanger.envs.remote.operator import Preparation, Takeover, interruption
 from shapechanger.errors import LinkError, RenderError, RobotRefused, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation, Pace, Role, Welcome
@@ -273,7 +273,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         clock = robot.welcome.clock
         info["latency"] = latencies(last.message, seq, sent_at, received, clock)
         is_lent = self._takeover.goes_on(received.message)
-        info["truncated_because"] = "" if is_lent else _interruption(received.message)
+        info["truncated_because"] = "" if is_lent else interruption(received.message)
         self._last, self._last_view = received, view
         truncated = not terminated and bool(info["truncated_because"])
         return view.observation, sum(terms.values()), terminated, truncated, info
@@ -483,15 +483,3 @@ def _resolve(robot: str) -> KnownRobot | str:
     if "." in robot or ":" in robot or robot == "localhost":
         return robot
     raise UnknownName("known robot", robot, known_names())
-
-
-def _interruption(message: Observation) -> str:
-    """Return the reason why an episode cannot go on, or ""."""
-    why = f": {message.stop_reason}" if message.stop_reason else "."
-    if not message.mine:
-        return f"{message.holder or 'No client'} has control of the robot now{why}"
-    if message.emergency:
-        return f"Emergency stop{why}"
-    if not message.armed:
-        return f"The robot was disarmed{why}"
-    return ""

@@ -1,0 +1,36 @@
+"""Configurations of both devices, which LeRobot fills from its command line.
+
+A robot's key is no part of them, because LeRobot logs and saves configurations: `id` is the name
+under which `shapechanger robot remember` stored the robot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lerobot.robots import RobotConfig
+from lerobot.teleoperators import TeleoperatorConfig
+
+
+@RobotConfig.register_subclass("shapechanger")
+@dataclass(kw_only=True)
+class ShapechangerConfig(RobotConfig):
+    """A robot on the network.
+
+    Attributes:
+        id: Name of a known robot.
+        wait_s: Time that `connect` waits for a person who drives the robot or lets a program
+            drive, s.
+    """
+
+    wait_s: float = 60.0
+
+
+@TeleoperatorConfig.register_subclass("shapechanger")
+@dataclass(kw_only=True)
+class ShapechangerConsoleConfig(TeleoperatorConfig):
+    """The person who drives a robot in its console.
+
+    Attributes:
+        id: Name of a known robot.
+    """
