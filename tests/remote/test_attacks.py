@@ -124,7 +124,6 @@ def scene(robot: RunningRobot) -> Iterator[Scene]:
             yield made
             settle(robot, key)
             assert movements(robot) == before
-    settle(robot, key)
     assert [robot.pid_of("guard"), robot.pid_of("daemon")] == pids
 
 
