@@ -16,6 +16,8 @@ MAX_PIXELS: Final = 1 << 24
 """Limit of decoded pixels, about sixteen million. The header of a JPEG of a few hundred bytes can
 claim four thousand million."""
 
+_SCAN: Final = b"\xff\xda"  # Start of a scan (ITU-T T.81); in the scans 0xff is followed by 0.
+_MAX_SCANS: Final = 64  # Progressive JPEGs have about ten.
 _GREY: Final = "Gray"
 _REMEDY: Final = "replace it with an intact copy, or remove it and its entry"
 
@@ -70,6 +72,11 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
         DemosError: If the data is not a JPEG, or claims more than `MAX_PIXELS`.
         MissingExtra: If simplejpeg is not installed.
     """
+    if jpeg.count(_SCAN) > _MAX_SCANS:
+        raise DemosError(
+            f"The picture {name} has more than {_MAX_SCANS} scans, each of which takes the time of "
+            f"a picture: {_REMEDY}."
+        )
     height, width, _ = _header(jpeg, name)
     if height * width > MAX_PIXELS:
         raise DemosError(

@@ -39,7 +39,8 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
         out: Folder of the target recording; created if missing.
 
     Raises:
-        DemosError: If there are no episodes, or one is still being recorded or already in `out`.
+        DemosError: If there are no episodes, or one is still being recorded, already in `out`, or
+            has links.
         BrokenEpisode: If an episode is damaged.
         OutputError: If an episode cannot be copied; those copied before are complete.
     """
@@ -58,6 +59,7 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
         if identity in known:
             raise DemosError(f"{episode.path} and {known[identity]} are the same episode.")
         known[identity] = episode.path
+        _require_no_links(episode.path)
     layouts = {_layouts(episode) for episode in [*there, *episodes]}
     pairs: list[tuple[Path, Path]] = []
     copied = 0
@@ -83,6 +85,14 @@ def _identity(episode: Episode) -> tuple[object, ...]:
     first = episode.steps[0] if episode.steps else None
     seen = (first.wall_ns, first.captured_ns, first.frame_crc, first.action) if first else ()
     return (episode.header.created, len(episode.steps), *seen)
+
+
+def _require_no_links(folder: Path) -> None:
+    """Refuse links, which would copy a file or a folder of another place into the recording."""
+    for parent, folders, files in os.walk(folder):
+        for path in (Path(parent, name) for name in (*folders, *files)):
+            if path.is_symlink():
+                raise DemosError(f"{path} is a link, but an episode has only files: remove it.")
 
 
 def _layouts(episode: Episode) -> tuple[str, str]:

@@ -8,7 +8,7 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import msgspec
 import numpy as np
@@ -33,6 +33,7 @@ _LONGEST_STEP: Final = 1.5
 _WHOLE: Final = 1e-6
 _FORMAT: Final = "shapechanger finger log"
 _VERSION: Final = 1
+_MAX_BYTES: Final = 256 << 20  # An hour at 50 Hz has about 30 MB.
 # Shortest log, s. The intervals rest on how errors repeat within half a second.
 _SHORTEST_S: Final = 4.0
 # Smallest range of each joint, rad, from the 5th to the 95th percentile. An arm of 9 mm winds
@@ -209,10 +210,18 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
             loaded: Any = np.load(raw, allow_pickle=False)
             if not isinstance(loaded, NpzFile):
                 raise ValueError("one array, not an archive of arrays")
+            archive = cast("zipfile.ZipFile", loaded.zip)
+            claimed = sum(info.file_size for info in archive.infolist())
+            if claimed > _MAX_BYTES:  # A few bytes of an archive can unpack to any size.
+                raise FingerError(
+                    f"{name} unpacks to {claimed} bytes, more than the limit of {_MAX_BYTES}."
+                )
             read: dict[str, Any] = {key: loaded[key] for key in loaded.files}
     except FileNotFoundError as error:
         raise FingerError(f"There is no file {path}.") from error
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except FingerError:  # A ValueError, too.
+        raise
+    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
         raise FingerError(_unreadable(Path(path))) from error
     header = _read_header(name, read)
     missing = [key for key in SIGNALS if key not in read]

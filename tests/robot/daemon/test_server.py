@@ -242,7 +242,10 @@ def test_a_client_without_a_hello_is_disconnected(
 
 
 def test_connections_are_limited_before_and_after_authentication(play: Any) -> None:
-    """16 per address before authentication; 6 programs and 8 clients in total after it."""
+    """16 per address before authentication; 6 programs and 8 clients in total after it.
+
+    A ninth person takes the place of the oldest client, or of the next if that one has control.
+    """
 
     async def script(robot: Running) -> None:
         strangers = [robot.connect() for _ in range(17)]
@@ -254,9 +257,18 @@ def test_connections_are_limited_before_and_after_authentication(play: Any) -> N
         await clients[6].send(Hello(version=VERSION, proof=b"", role="program"))
         assert "only a person can still connect" in await clients[6].closed_with()
         await clients[7].greet(role="person")
-        async with robot.client(role="person"), robot.connect() as ninth:
-            await ninth.send(Hello(version=VERSION, proof=b"", role="person"))
-            assert "8 clients are connected" in await ninth.closed_with()
+        await clients[0].obtain()
+        async with robot.client(role="person"), robot.client(role="person", name="ninth") as ninth:
+            assert await clients[1].closed_with() == (
+                "ninth connected, and 8 clients are the limit."
+            )
+            await ninth.send(EmergencyStop(reason="a dog"))
+            await until(lambda: robot.guard.state.emergency, "it has stopped")
+            assert (await clients[0].observe()).mine
+            await clients[8].greet(role="person", name="tenth")
+            assert "tenth connected" in await clients[2].closed_with()
+            await clients[9].send(Hello(version=VERSION, proof=b"", role="program"))
+            assert "8 clients are connected" in await clients[9].closed_with()
         for stranger in strangers:
             await stranger.__aexit__(None, None, None)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
+import stat
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,12 +17,41 @@ STEPS: Final = "steps.jsonl"
 FRAMES: Final = "frames"
 LOST: Final = "lost"
 
+MAX_TEXT_BYTES: Final = 256 << 20
+"""Largest text file to read, bytes; an hour of a car's steps has about 30 MB."""
+
+MAX_PICTURE_BYTES: Final = 16 << 20
+"""Largest picture to write or read, bytes."""
+
 _MOST_OF_A_NAME: Final = 9999
 
 
 def is_episode(folder: Path) -> bool:
     """Return whether `folder` contains an episode."""
     return (folder / HEADER).is_file() or (folder / STEPS).is_file()
+
+
+def read_file(path: Path, most: int) -> bytes:
+    """Return the content of a regular file, which may come from a stranger.
+
+    Args:
+        path: The file; a pipe or a device, which may never end, is refused unread.
+        most: Largest size to read, bytes.
+
+    Raises:
+        OSError: If it cannot be read, is not a regular file, or is larger.
+    """
+    # Not blocking, because a pipe without a writer would otherwise block before it can be examined.
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    with open(fd, "rb") as file:
+        found = os.fstat(fd)
+        if not stat.S_ISREG(found.st_mode):
+            raise OSError(errno.EINVAL, "it is not a regular file")
+        if found.st_size > most:
+            raise OSError(
+                errno.EFBIG, f"it has {found.st_size} bytes, more than the limit of {most}"
+            )
+        return file.read(found.st_size)
 
 
 def free_path(folder: Path, stem: str, ending: str = "") -> Path:

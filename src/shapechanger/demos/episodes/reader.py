@@ -6,6 +6,7 @@ import binascii
 import json
 import os
 import re
+import stat
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,11 +16,14 @@ from shapechanger.demos.episodes.files import (
     FRAMES,
     HEADER,
     LOST,
+    MAX_PICTURE_BYTES,
+    MAX_TEXT_BYTES,
     STEPS,
     cannot_write,
     free_path,
     is_episode,
     lock,
+    read_file,
     write_all,
     write_atomic,
     write_header,
@@ -63,7 +67,7 @@ def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine
         thorough: Whether to verify the checksum of each picture, not only its size.
     """
     try:
-        content = (path / STEPS).read_bytes()
+        content = read_file(path / STEPS, MAX_TEXT_BYTES)
     except OSError as error:
         raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
     sizes = header.action_size, header.state_size
@@ -97,10 +101,18 @@ def _wrong_with(frames: Path, step: Step, *, thorough: bool) -> str:
     if not _FRAME_NAME.fullmatch(step.frame):
         return f"its picture has the invalid name {step.frame!r}"
     try:
-        size = (frames / step.frame).stat().st_size
+        found = (frames / step.frame).stat()
+        size = found.st_size
+        if not stat.S_ISREG(found.st_mode):
+            return f"its picture {step.frame} is not a regular file"
+        if size > MAX_PICTURE_BYTES:
+            return f"its picture {step.frame} has more than {MAX_PICTURE_BYTES} bytes"
         if size != step.frame_bytes:
             return f"its picture {step.frame} has {size} bytes instead of {step.frame_bytes}"
-        if thorough and binascii.crc32((frames / step.frame).read_bytes()) != step.frame_crc:
+        if (
+            thorough
+            and binascii.crc32(read_file(frames / step.frame, MAX_PICTURE_BYTES)) != step.frame_crc
+        ):
             return f"its picture {step.frame} was changed"
     except FileNotFoundError:
         return f"its picture {step.frame} is missing"
@@ -185,7 +197,7 @@ class Episode:
         if not step.frame:
             return None
         try:
-            data = (self.path / FRAMES / step.frame).read_bytes()
+            data = read_file(self.path / FRAMES / step.frame, MAX_PICTURE_BYTES)
         except OSError as error:
             raise _broken(self.path, f"the picture {step.frame} cannot be read") from error
         if binascii.crc32(data) != step.frame_crc:
@@ -216,10 +228,12 @@ def read_header(path: Path) -> tuple[EpisodeHeader, dict[str, Any] | None]:
     """
     file = path / HEADER
     try:
-        plain = json.loads(file.read_text(encoding="utf-8"))
+        plain = json.loads(read_file(file, MAX_TEXT_BYTES).decode())
     except FileNotFoundError:
         raise DemosError(f"{path} is not an episode: it has no {HEADER}.") from None
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise DemosError(f"{file} cannot be read: {error.strerror or error}.") from error
+    except (ValueError, RecursionError) as error:
         raise DemosError(f"{file} cannot be read: {error}.") from error
     if not isinstance(plain, dict):
         raise DemosError(f"{file} is not a JSON object.")
@@ -271,7 +285,7 @@ def _assemble(
                     )
                 case _:  # A step, or a kind that a later version added.
                     pass
-        except (LookupError, TypeError, ValueError) as error:
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
             raise _broken(path, f"it has the invalid line {fields}") from error
     return Episode(
         path=path,

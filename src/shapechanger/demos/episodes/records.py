@@ -18,6 +18,11 @@ Clock = Literal["real", "twin", "none"]
 
 _CLOCKS: Final = ("real", "twin", "none")
 _IMAGE_SIZE: Final = 2
+_SLOWEST_HZ: Final = 1e-3
+_FASTEST_HZ: Final = 1e6
+# A stack of four grey pictures of 84 x 84, as state, is 28 224 values.
+_MAX_VALUES: Final = 1 << 17
+_MAX_INTEGER: Final = 1 << 62  # Sums of two fit into the 64 bits of NumPy and of other formats.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,8 +74,11 @@ class EpisodeHeader:
     format: int = _FORMAT
 
     def __post_init__(self) -> None:
-        if not (self.control_hz > 0.0 and math.isfinite(self.control_hz)):
-            raise DemosError(f"control_hz must be positive and finite, got {self.control_hz}.")
+        if not _SLOWEST_HZ <= self.control_hz <= _FASTEST_HZ:
+            raise DemosError(
+                f"control_hz must be from {_SLOWEST_HZ:g} to {_FASTEST_HZ:g}, got "
+                f"{self.control_hz}."
+            )
         if self.clock not in _CLOCKS:
             raise DemosError(f"clock must be one of {', '.join(_CLOCKS)}, got {self.clock!r}.")
         if self.image_size is not None and (
@@ -79,9 +87,12 @@ class EpisodeHeader:
             raise DemosError(
                 f"image_size must be a width and a height in pixels, got {self.image_size}."
             )
-        if self.action_size < 1:
-            raise DemosError("action_layout must have at least one value.")
-        _ = self.state_size  # Raises if the layout is invalid.
+        # A few bytes can describe more values than any memory holds.
+        if not (1 <= self.action_size <= _MAX_VALUES and 0 <= self.state_size <= _MAX_VALUES):
+            raise DemosError(
+                "action_layout must have at least one value, and each layout at most "
+                f"{_MAX_VALUES}."
+            )
 
     @property
     def action_size(self) -> int:
@@ -212,6 +223,9 @@ class Step:
             values = getattr(self, name)
             if values is not None and len(values) != size:
                 return f"its {name} has {len(values)} values, but the layout has {size}"
+        for name in ("index", *_NS):
+            if abs(getattr(self, name) or 0) > _MAX_INTEGER:
+                return f"its {name} is too large"
         if not all(math.isfinite(value) for value in self.action):
             return f"its action is {list(self.action)}"
         if self.driver not in DRIVERS:
@@ -270,7 +284,7 @@ class Step:
                 frame_bytes=int(size),
                 frame_crc=int(crc, 16),
             )
-        except (LookupError, TypeError, AttributeError) as error:
+        except (LookupError, TypeError, AttributeError, OverflowError) as error:
             raise ValueError(f"it is not a valid step ({error})") from error
 
 
@@ -316,7 +330,10 @@ def decode_line(line: bytes) -> dict[str, Any]:
     body, check = line[:-_CHECK_SIZE], line[-_CHECK_SIZE:]
     if not body or check != _CHECK % binascii.crc32(body):
         raise ValueError("it is cut off or was changed")
-    fields = json.loads(body + b"}")
+    try:
+        fields = json.loads(body + b"}")
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
     if not isinstance(fields, dict):
         raise ValueError("it is not a JSON object")
     return cast("dict[str, Any]", fields)

@@ -15,6 +15,7 @@ from typing import Final, Self
 
 from shapechanger.demos.episodes.files import (
     FRAMES,
+    MAX_PICTURE_BYTES,
     STEPS,
     cannot_write,
     free_path,
@@ -81,7 +82,6 @@ SPARE_BYTES: Final = 64 << 20
 
 _LOCK: Final = ".recording"
 _JPEG: Final = b"\xff\xd8"
-_MAX_PICTURE_BYTES: Final = 16 << 20
 _SPACE_CHECK_STEPS: Final = 20  # Free space changes slowly.
 _NS_PER_S: Final = 1e9
 
@@ -184,9 +184,9 @@ class EpisodeWriter:
         """
         self._require_open()
         refusal = step.refusal(*self._sizes) or self._disorder(step)
-        if jpeg is not None and len(jpeg) > _MAX_PICTURE_BYTES:
+        if jpeg is not None and len(jpeg) > MAX_PICTURE_BYTES:
             refusal = (
-                f"its picture has {len(jpeg)} bytes, more than the limit of {_MAX_PICTURE_BYTES}"
+                f"its picture has {len(jpeg)} bytes, more than the limit of {MAX_PICTURE_BYTES}"
             )
         elif jpeg is not None and not jpeg.startswith(_JPEG):
             refusal = "its picture is not a JPEG"

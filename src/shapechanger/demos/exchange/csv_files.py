@@ -179,6 +179,7 @@ def _rows(
     reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
     names = list(chain.from_iterable(columns.values()))
     shown, before = "", -1
+    frames: set[str] = set()
     try:
         _require_columns(next(reader, list[str]()), names, str(path))
         for cells in reader:
@@ -197,6 +198,11 @@ def _rows(
                 if header.image_size is None:
                     raise DemosError(f"{where} has a picture, but {_HEADER} has no image_size.")
                 shown = frame
+                if frame in frames:
+                    raise DemosError(
+                        f"{where} returns to the picture {frame!r} of an earlier step."
+                    )
+                frames.add(frame)
                 jpeg = pictures.read(resolve_file(folder / _FRAMES, frame, where))
             marks = tuple(map(str, row.json("marks", list) or ()))
             yield ExchangeStep(step=step, jpeg=jpeg, marks=marks, dropped=row.json("dropped", str))

@@ -9,14 +9,16 @@ import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, cast
 
-from shapechanger.demos.episodes.files import cannot_write
+from shapechanger.demos.episodes.files import (
+    MAX_PICTURE_BYTES,
+    MAX_TEXT_BYTES,
+    cannot_write,
+    read_file,
+)
 from shapechanger.demos.jpeg import decode_picture, picture_size
 from shapechanger.errors import DemosError, OutputError
-
-_MAX_TEXT_BYTES: Final = 1 << 30
-_MAX_PICTURE_BYTES: Final = 16 << 20  # As the writer of episodes.
 
 
 @contextmanager
@@ -103,10 +105,7 @@ def read_text(path: Path) -> str:
         DemosError: If the file cannot be read, is too large, or is not UTF-8.
     """
     try:
-        size = path.stat().st_size
-        if size > _MAX_TEXT_BYTES:
-            raise DemosError(f"{path} has {size} bytes, more than the limit of {_MAX_TEXT_BYTES}.")
-        return path.read_bytes().decode("utf-8-sig")
+        return read_file(path, MAX_TEXT_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DemosError(
             f"{path} is not text in UTF-8 (byte {error.start}): save it as UTF-8."
@@ -178,12 +177,7 @@ class Pictures:
             DemosError: If it cannot be read or decoded, is too large, or has another size.
         """
         try:
-            if path.stat().st_size > _MAX_PICTURE_BYTES:
-                raise DemosError(
-                    f"The picture {path} has {path.stat().st_size} bytes, more than the limit of "
-                    f"{_MAX_PICTURE_BYTES}: make it smaller."
-                )
-            jpeg = path.read_bytes()
+            jpeg = read_file(path, MAX_PICTURE_BYTES)
         except OSError as error:
             raise cannot_read(path, error) from error
         self.check(jpeg, str(path))

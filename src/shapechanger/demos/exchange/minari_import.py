@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,6 +27,7 @@ from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.exchange import minari_export as names
 from shapechanger.demos.exchange.files import (
     Pictures,
+    parse_json,
     parse_json_object,
     read_text,
     resolve_file,
@@ -54,6 +55,7 @@ _OWN_COLUMNS: Final = (
     "infos/stop_reason",
     "infos/more",
 )
+_MAX_UNPACKED: Final = 64 << 20  # Bytes. A picture of `MAX_PIXELS` has 48 MiB.
 _UNIT_UNKNOWN: Final = "?"
 _MAX_FEATURES: Final = 512  # A larger space becomes one array feature.
 _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not a picture.
@@ -81,10 +83,29 @@ def read_minari(folder: Path) -> Iterator[ExchangeEpisode]:
     count = metadata.get("total_episodes")
     if not isinstance(count, int) or isinstance(count, bool) or count < 1:
         raise DemosError(f"{path}: total_episodes must be a positive integer, got {count!r}.")
+    _require_stored(main, count)
     if names.HEADERS in metadata:
         yield from _read_own(main, path, metadata[names.HEADERS], count)
     else:
         yield from _read_foreign(main, path, metadata, count)
+
+
+def _require_stored(main: Path, count: int) -> None:
+    """Refuse a file that claims more steps than it has bytes.
+
+    HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
+
+    Args:
+        main: The HDF5 file.
+        count: Number of episodes.
+    """
+    size = main.stat().st_size
+    claimed = 0
+    with _open_hdf5(main) as file:
+        for number in range(count):
+            claimed += int(_column(file, f"episode_{number}/rewards", main, 0).shape[0])
+            if claimed > size:
+                raise DemosError(f"{main} claims at least {claimed} steps, but has {size} bytes.")
 
 
 def _read_own(main: Path, path: Path, section: object, count: int) -> Iterator[ExchangeEpisode]:
@@ -132,9 +153,10 @@ def _own_rows(main: Path, group: str, header: EpisodeHeader) -> Iterator[Exchang
             name: _column(file, f"{group}/{place}", main, steps) for name, place in places.items()
         }
         cut_off = bool(_column(file, f"{group}/infos/cut_off", main, 1)[0])
-        for start in range(0, steps, _OWN_CHUNK):
-            chunk = {name: values[start : start + _OWN_CHUNK] for name, values in columns.items()}
-            for place in range(min(_OWN_CHUNK, steps - start)):
+        count = _chunk(columns.values(), _OWN_CHUNK)
+        for start in range(0, steps, count):
+            chunk = {name: values[start : start + count] for name, values in columns.items()}
+            for place in range(min(count, steps - start)):
                 at = {name: values[place] for name, values in chunk.items()}
                 where = f"{main}, step {start + place} of {group}"
                 row = _own_step(at, where)
@@ -267,12 +289,26 @@ def _space(metadata: dict[str, Any], name: str, path: Path) -> spaces.Space[Any]
             f"{path} has no {name}, so its values cannot be interpreted: create the dataset again "
             "with this space."
         )
+    if _largest(parse_json(text, f"The {name} in {path}")) > _MAX_UNPACKED:
+        raise DemosError(f"The {name} in {path} claims more than {_MAX_UNPACKED} values.")
     try:
         return library("minari.serialization").deserialize_space(text)
     except MissingExtra:
         raise
     except Exception as error:  # Its errors for invalid text are not documented.
         raise DemosError(f"The {name} in {path} cannot be read: {error}.") from error
+
+
+def _largest(space: Any) -> int:
+    """Return the number of values that the shapes in the JSON of a space claim."""
+    if isinstance(space, list):
+        return sum(map(_largest, cast("list[Any]", space)))
+    if not isinstance(space, dict):
+        return 0
+    fields = cast("dict[str, Any]", space)
+    shape = cast("list[Any]", s) if isinstance(s := fields.get("shape"), list) else []
+    own = math.prod(n for n in shape if isinstance(n, int))
+    return own + sum(_largest(value) for key, value in fields.items() if key != "shape")
 
 
 def _leaves_of(space: spaces.Space[Any], path: tuple[str, ...] = ()) -> Iterator[_Leaf]:
@@ -384,8 +420,9 @@ def _foreign_rows(
         action, state = columns(acted, "actions"), columns(sensed, "observations")
         frames = columns(pictured, "observations")
         ends = [_column(file, f"{group}/{n}", main, steps) for n in ("terminations", "truncations")]
-        for start in range(0, steps, _FOREIGN_CHUNK):
-            part = slice(start, min(start + _FOREIGN_CHUNK, steps))
+        count = _chunk((*action, *state, *frames, *ends), _FOREIGN_CHUNK)
+        for start in range(0, steps, count):
+            part = slice(start, min(start + count, steps))
             actions, states = _flat(action, acted, part, main), _flat(state, sensed, part, main)
             worth, over, cut = rewards[part], ends[0][part], ends[1][part]
             seen = frames[0][part] if frames else None
@@ -459,6 +496,21 @@ def _open_hdf5(path: Path) -> Generator[Any]:
         file.close()
 
 
+def _row_bytes(column: Any) -> int:
+    """Return the memory of one entry of a dataset, bytes."""
+    return math.prod(column.shape[1:]) * column.dtype.itemsize
+
+
+def _chunk(columns: Iterable[Any], most: int) -> int:
+    """Return how many steps to read at once, so that they fit into `_MAX_UNPACKED` or are one.
+
+    Args:
+        columns: The datasets to read from.
+        most: Largest number of steps.
+    """
+    return max(1, min(most, _MAX_UNPACKED // max(1, sum(map(_row_bytes, columns)))))
+
+
 def _column(file: Any, name: str, where: Path, length: int | None = None) -> Any:
     """Return a dataset in an HDF5 file.
 
@@ -474,12 +526,21 @@ def _column(file: Any, name: str, where: Path, length: int | None = None) -> Any
         link = found.get(part, getlink=True) if isinstance(found, h5py.Group) else None
         if isinstance(link, h5py.ExternalLink):
             raise DemosError(f"{where} has {name!r} in another file, which is not opened.")
+        if isinstance(link, h5py.SoftLink):  # It may lead through a link to another file.
+            raise DemosError(f"{where} has a link for {name!r}, and links are not followed.")
         if link is None or (found := found.get(part)) is None:
             raise DemosError(f"{where} has no {name!r}, so the dataset is incomplete.")
     if not isinstance(found, h5py.Dataset):
         raise DemosError(f"{where}: {name!r} is not an array.")
     if found.external or found.is_virtual:
         raise DemosError(f"{where} has {name!r} in another file, which is not opened.")
+    # HDF5 unpacks whole chunks, and a step may claim any shape.
+    unpacked = max(_row_bytes(found), math.prod(found.chunks or ()) * found.dtype.itemsize)
+    if unpacked > _MAX_UNPACKED:
+        raise DemosError(
+            f"{where}: {name!r} unpacks to {unpacked} bytes at once, more than the limit of "
+            f"{_MAX_UNPACKED}."
+        )
     if length is not None and (not found.shape or found.shape[0] < length):
         have = found.shape[0] if found.shape else 0
         raise DemosError(f"{where}: {name!r} has {have} entries, but {length} are needed.")

@@ -122,6 +122,9 @@ def read_tub(folder: Path) -> Iterator[ExchangeEpisode]:
     images = folder / _IMAGES if newer else folder
     if not records:
         raise DemosError(f"The tub {folder} has no records that are not deleted.")
+    shown = [record.fields[_IMAGE] for record in records if _IMAGE in record.fields]
+    if len(set(map(str, shown))) < len(shown):
+        raise DemosError(f"Two records of the tub {folder} name one picture: delete one of them.")
     state = _state_layout(inputs)
     pictures = Pictures()
     if _IMAGE in records[0].fields:
@@ -231,11 +234,15 @@ def _read_v2(folder: Path) -> tuple[dict[str, str], list[_Record]]:
         parse_json(line, f"{path}, line {n}") for n, line in enumerate(lines[:4], 1)
     )
     catalogs = parse_json_object(lines[4], f"{path}, line {_MANIFEST_LINES}")
-    deleted = set(_list(catalogs.get("deleted_indexes", []), f"deleted_indexes in {path}"))
+    gone = _list(catalogs.get("deleted_indexes", []), f"deleted_indexes in {path}")
+    deleted = {index for index in gone if isinstance(index, int)}
     records: list[_Record] = []
     index = 0
-    for name in _list(catalogs.get("paths"), f"paths in {path}"):
-        catalog = resolve_file(folder, str(name), str(path))
+    names = [str(name) for name in _list(catalogs.get("paths"), f"paths in {path}")]
+    if len(set(names)) < len(names):
+        raise DemosError(f"{path} names a catalog twice in its paths: remove one of the two.")
+    for name in names:
+        catalog = resolve_file(folder, name, str(path))
         for number, line in enumerate(read_text(catalog).splitlines(), 1):
             if not line.strip():
                 continue

@@ -269,6 +269,8 @@ class ClientConnection:
                 await self._send(message)
             if session.outbox.is_full:
                 raise LinkError(NOT_READING)
+            if session.expelled:
+                raise LinkError(session.expelled)
 
     async def _observe(self) -> None:
         while True:

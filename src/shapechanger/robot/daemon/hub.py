@@ -28,7 +28,7 @@ _MAX_CLIENTS: Final = 8
 """Most clients connected at the same time."""
 
 _MAX_PROGRAMS: Final = 6
-"""Most programs among them, so that a person can always connect and stop the robot."""
+"""Most programs among them, so that two people can connect without displacing anyone."""
 
 _NS_PER_MS: Final = 1_000_000
 _ARRIVALS: Final = 64  # Arrival times to remember; more than commands can be under way.
@@ -87,18 +87,27 @@ class SessionHub:
     def join(self, member: Session) -> None:
         """Add the session of an authenticated client.
 
+        A person always fits: where the limit is reached, the oldest client without control leaves.
+
         Raises:
-            RobotRefused: If too many clients are connected.
+            RobotRefused: If a program connects and too many clients are connected.
         """
+        is_program = member.client.role == "program"
         programs = sum(other.client.role == "program" for other in self._clients.values())
-        if len(self._clients) >= _MAX_CLIENTS:
-            raise RobotRefused(f"{_MAX_CLIENTS} clients are connected, which is the limit.")
-        if member.client.role == "program" and programs >= _MAX_PROGRAMS:
+        is_full = len(self._clients) >= _MAX_CLIENTS
+        if is_program and (is_full or programs >= _MAX_PROGRAMS):
+            count = f"{len(self._clients)} clients" if is_full else f"{programs} programs"
             raise RobotRefused(
-                f"{_MAX_PROGRAMS} programs are connected, which is the limit; only a person can "
-                "still connect."
+                f"{count} are connected, which is the limit; only a person can still connect."
             )
         self._clients[member.client.session] = member
+        if is_full:
+            # The person may want to stop the robot, and the others may be of somebody who does not.
+            oldest = next(n for n in self._clients if not self.lease.holds(n))
+            self._clients[oldest].expel(
+                f"{member.client.name} connected, and {_MAX_CLIENTS} clients are the limit."
+            )
+            self.leave(oldest)
 
     def leave(self, session: int) -> None:
         """Remove a client; if it had control, the robot stops and is disarmed."""

@@ -234,6 +234,7 @@ class Session:
         credit: True while the client waits for an observation.
         client: Identity of the client; its name is empty before its hello.
         pace: Whether the robot's clock or the client sets the pace.
+        expelled: Reason why the connection must end; "" if it may go on.
     """
 
     def __init__(
@@ -249,6 +250,7 @@ class Session:
         self.credit = False
         self.client = ClientIdentity(number, "", "program")
         self.pace: Pace = "realtime"
+        self.expelled = ""
         self._hub = hub
         self._authenticator = authenticator
         self._rate = MessageRate() if rate is None else rate
@@ -310,6 +312,8 @@ class Session:
         """
         if not self._is_known:
             raise LinkError("The first message must be a hello.")
+        if self.expelled:
+            raise LinkError(self.expelled)
         self.count()
         message = decode_client_message(data)
         match message:
@@ -348,6 +352,11 @@ class Session:
         """
         if not self._rate.spend():
             raise RobotRefused(f"Too many messages: {MESSAGES_PER_S:.0f} per second are allowed.")
+
+    def expel(self, reason: str) -> None:
+        """End the connection, with a reason for the client."""
+        self.expelled = reason
+        self.posted.set()
 
     def close(self) -> None:
         """End the session."""

@@ -1,0 +1,259 @@
+"""A client written from docs/remote.md alone: sockets, TLS, WebSocket frames and plain msgpack.
+
+It shares no code with Shapechanger, so that it can also send what a right client never would.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import hashlib
+import hmac
+import os
+import socket
+import ssl
+import struct
+from typing import Any, Self
+
+import msgspec.msgpack
+
+PATIENCE_S = 20.0
+TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
+PURPOSE = b"shapechanger link 1"
+
+
+def key_bytes(text: str) -> bytes:
+    """Return the 16 bytes of a key."""
+    return base64.b32decode(text.strip().replace("-", "") + "======")
+
+
+def proof(key: bytes, nonce: bytes, certificate: bytes, role: str) -> bytes:
+    """Return the answer to a challenge."""
+    parts = (PURPOSE, nonce, certificate, role.encode())
+    text = b"".join(struct.pack(">I", len(part)) + part for part in parts)
+    return hmac.digest(key, text, "sha256")
+
+
+def frame(
+    data: bytes, opcode: int = BINARY, *, end: bool = True, flags: int = 0, mask: bool = True
+) -> bytes:
+    """Return a WebSocket frame (RFC 6455)."""
+    return header(len(data), opcode, end=end, flags=flags, mask=mask) + data  # The mask is 0.
+
+
+def header(
+    length: int, opcode: int = BINARY, *, end: bool = True, flags: int = 0, mask: bool = True
+) -> bytes:
+    """Return the header of a frame that claims `length` bytes."""
+    if length < 126:
+        size = bytes([length | mask << 7])
+    elif length < 2**16:
+        size = struct.pack(">BH", 126 | mask << 7, length)
+    else:
+        size = struct.pack(">BQ", 127 | mask << 7, length)
+    return bytes([end << 7 | flags | opcode]) + size + bytes(4 * mask)
+
+
+class Stranger:
+    """A TCP connection to a robot.
+
+    Args:
+        port: Port of the robot on 127.0.0.1.
+        source: Address of the client, in 127.0.0.0/8.
+        version: Newest version of TLS that the client offers; None for plain TCP.
+    """
+
+    def __init__(
+        self,
+        port: int,
+        *,
+        source: str = "127.0.0.1",
+        version: ssl.TLSVersion | None = ssl.TLSVersion.TLSv1_3,
+    ) -> None:
+        self.port = port
+        self.certificate = b""
+        self.nonce = b""
+        self.proof = b""
+        self.seen: dict[str, Any] = {}
+        self._received = b""
+        self._socket = socket.create_connection(
+            ("127.0.0.1", port), PATIENCE_S, source_address=(source, 0)
+        )
+        if version is not None:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+            context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+            context.maximum_version = version
+            try:
+                self._socket = context.wrap_socket(self._socket)
+            except BaseException:
+                self._socket.close()
+                raise
+            certificate = self._socket.getpeercert(binary_form=True)
+            self.certificate = hashlib.sha256(certificate or b"").digest()
+
+    def __enter__(self) -> Self:
+        """Return the connection itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the connection without a word."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection without a word."""
+        self._socket.close()
+
+    # Bytes.
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; a robot that has closed the connection does not read them."""
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError, ssl.SSLError):
+            self._socket.sendall(data)
+
+    def read(self, count: int) -> bytes:
+        """Return `count` bytes, fewer at the end of the stream."""
+        while len(self._received) < count and (data := self._some()):
+            self._received += data
+        data, self._received = self._received[:count], self._received[count:]
+        return data
+
+    def rest(self) -> str:
+        """Return all that follows until the robot closes the connection."""
+        while data := self._some():
+            self._received += data
+        return self._received.decode("latin-1")
+
+    @property
+    def unread(self) -> bytes:
+        """Bytes that have arrived and were not read yet."""
+        self.is_open(0.001)
+        return self._received
+
+    def _some(self) -> bytes:
+        try:
+            return self._socket.recv(65536)
+        except (ConnectionResetError, ssl.SSLError):
+            return b""
+
+    def is_open(self, wait_s: float = 0.05) -> bool:
+        """Read what arrives, and return whether the robot keeps the connection."""
+        self._socket.settimeout(wait_s)
+        try:
+            while data := self._some():
+                self._received += data
+            return False
+        except TimeoutError:
+            return True
+        finally:
+            self._socket.settimeout(PATIENCE_S)
+
+    # HTTP and WebSocket.
+
+    def request(self, text: str, **headers: str) -> str:
+        """Send a request line with headers, and return the status line of the answer."""
+        lines = {"Host": f"127.0.0.1:{self.port}"} | headers
+        lines = {name.replace("_", "-"): value for name, value in lines.items()}
+        request = "".join(f"{name}: {value}\r\n" for name, value in lines.items())
+        self.write(f"{text}\r\n{request}\r\n".encode("latin-1"))
+        return self.answer().partition("\r\n")[0]
+
+    def answer(self) -> str:
+        """Return the status line and the headers of an answer; "" if there is none."""
+        answer = b""
+        while not answer.endswith(b"\r\n\r\n") and (byte := self.read(1)):
+            answer += byte
+        return answer.decode("latin-1")
+
+    def upgrade(self, path: str = "/link", **headers: str) -> str:
+        """Ask for a WebSocket, and return the status line."""
+        wanted = {
+            "Upgrade": "websocket",
+            "Connection": "Upgrade",
+            "Sec_WebSocket_Version": "13",
+            "Sec_WebSocket_Key": base64.b64encode(os.urandom(16)).decode(),
+        }
+        return self.request(f"GET {path} HTTP/1.1", **(wanted | headers))
+
+    def receive(self) -> dict[str, Any]:
+        """Return the next message of the robot; {} after the connection has closed."""
+        while head := self.read(2):
+            length = head[-1] & 127
+            if length > 125:
+                size = 2 if length == 126 else 8
+                length = int.from_bytes(self.read(size), "big")
+            data = self.read(length)
+            opcode = head[0] & 15
+            if opcode == PING:
+                self.write(frame(data, PONG))
+            elif opcode == BINARY:
+                return msgspec.msgpack.decode(data)
+            elif opcode == CLOSE:
+                return {}
+        return {}
+
+    def send(self, kind: str, **fields: Any) -> None:
+        """Send a message."""
+        self.write(frame(msgspec.msgpack.encode({"kind": kind, **fields})))
+
+    def expect(self, kind: str) -> dict[str, Any]:
+        """Return the next message of a kind, and skip others."""
+        while message := self.receive():
+            if message["kind"] == kind:
+                return message
+        raise AssertionError(f"The robot closed the connection without {kind!r}.")
+
+    # The link.
+
+    def challenge(self) -> bytes:
+        """Open the link, and return the nonce of the robot's challenge."""
+        status = self.upgrade()
+        assert "101" in status, status
+        self.nonce = self.expect("challenge")["nonce"]
+        return self.nonce
+
+    def hello(self, key: bytes, role: str = "program", **fields: Any) -> None:
+        """Open the link, and prove to hold a key."""
+        nonce = self.challenge()
+        self.proof = proof(key, nonce, self.certificate, role)
+        self.send("hello", **{"version": 1, "proof": self.proof, "role": role, **fields})
+
+    def enter(self, key: bytes, role: str = "program", **fields: Any) -> dict[str, Any]:
+        """Say hello, and return the robot's welcome."""
+        self.hello(key, role, **fields)
+        return self.expect("welcome")
+
+    def observe(self, after: int = 0) -> dict[str, Any]:
+        """Return a new observation."""
+        self.send("acknowledge", seq=after)
+        self.seen = self.expect("observation")
+        return self.seen
+
+    def take(self) -> dict[str, Any]:
+        """Ask for control, and return the answer."""
+        self.send("take")
+        return self.expect("lease")
+
+    def arm(self) -> None:
+        """Ask to arm until it is done; a busy guard may say so late."""
+        seen = self.observe()
+        self.send("arm", answers=seen["seq"], emergency=seen["emergencies"])
+        while not seen["armed"]:
+            seen = self.observe()
+
+    def drive(self, seq: int, *values: float, **fields: Any) -> None:
+        """Command in answer to a new observation."""
+        self.send(
+            "command", **({"seq": seq, "answers": self.observe()["seq"]} | fields), values=values
+        )
+
+    def refusal(self) -> str:
+        """Return the reason of the next refusal; "closed" if the connection ends without one."""
+        while message := self.receive():
+            if message["kind"] == "refused":
+                return message["reason"]
+        return "closed"
+
+    def now_ns(self) -> int:
+        """Return the robot's time."""
+        self.send("ping", token=1)
+        return self.expect("pong")["now_ns"]
