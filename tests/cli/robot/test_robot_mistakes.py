@@ -81,6 +81,7 @@ def write_ready_profile(home: Path, text: str = CAR) -> str:
     "command",
     [
         "init",
+        "install",
         "doctor",
         "calibrate",
         "serve",
@@ -136,6 +137,7 @@ def test_help(run: Run, command: str) -> None:
         ("serve finger --twin --port 0 --gap real-lik", "Did you mean 'real-like'?"),
         ("serve finger --twin --port 0 --gap wide --world room", "give only one of them"),
         ("serve test-car.toml --twin --port 0 --gap wide", "A --gap is between fingers"),
+        ("install car", "`shapechanger robot init car` writes one of your own"),
         ("home finger", "`shapechanger robot init finger` writes one of your own"),
         ("home test-car.toml --straight", "no tendons on a servo bus"),
         ("serve test-car.toml --seed 4", "--seed needs --twin"),

@@ -1,7 +1,8 @@
-"""`shapechanger robot init | doctor | home | safe-pins`: set up a robot."""
+"""`shapechanger robot init | install | doctor | home | safe-pins`: set up a robot."""
 
 from __future__ import annotations
 
+import getpass
 import sys
 import time
 from dataclasses import dataclass
@@ -29,8 +30,18 @@ from shapechanger.robot.profile.load import (
     starter_text,
     write_profile,
 )
+from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.doctor import Finding, examine_robot, uses_pins
-from shapechanger.robot.setup.systemd import write_unit
+from shapechanger.robot.setup.install import (
+    Machine,
+    Outcome,
+    changes_to_install,
+    changes_to_remove,
+    make_changes,
+    require_pi,
+    require_systemd,
+)
+from shapechanger.robot.setup.systemd import unit_name, write_unit
 from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
 
 
@@ -139,6 +150,86 @@ class Home:
         found = {f"output.{name}.zero": zero for name, zero in zeros.items()}
         found |= {f"sensor.{name}.zero": zero for name, zero in joints.items()}
         change_profile(path, found)
+
+
+_OUTCOMES = {"did": "did    ", "already": "already", "would": "would  ", "failed": "FAILED "}
+_AFTERWARDS = {
+    "restart": "Restart the computer, so that its pins and buses are set up: sudo reboot",
+    "log in": "Log out and in again, so that this user has the new groups.",
+}
+
+
+@dataclass(frozen=True)
+class Install:
+    """Put a robot's service, groups, buses and camera in place on a Raspberry Pi."""
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """The robot's profile, which `init` wrote."""
+    dry_run: bool = False
+    """Print what would be done, with its commands, and do nothing."""
+    remove: bool = False
+    """Remove the service again; groups and settings of the computer stay."""
+    credentials: Path | None = None
+    """Folder of its key and certificate, if not the one that `init` made."""
+
+    def run(self) -> None:
+        """Make each change that is not made yet, and exit with 1 if one could not be made."""
+        path = own_profile(self.profile)
+        self.install(load_profile(path), Machine(getpass.getuser()))
+
+    def install(self, profile: Profile, machine: Machine) -> None:
+        """Make the changes on a machine.
+
+        Args:
+            profile: The robot.
+            machine: The computer.
+
+        Raises:
+            RobotError: If it is no Raspberry Pi with systemd, or the wrong user asks.
+        """
+        if self.remove:
+            require_systemd(machine.root)
+            changes = changes_to_remove(unit_name(profile.name), machine.root)
+        else:
+            require_pi(machine.root)
+            if machine.user == "root":
+                raise RobotError(
+                    "Install it as the user that is to run the robot, without sudo, which is "
+                    "called where it is needed."
+                )
+            folder = self.credentials or credentials_folder(profile.name)
+            load_credentials(folder)
+            unit = self._unit(profile)
+            changes = changes_to_install(profile.guard_plan(), profile.camera, unit, machine)
+        outcomes: list[Outcome] = []
+        for outcome in make_changes(changes, machine.run, dry=self.dry_run):
+            say(f"{_OUTCOMES[outcome.level]}  {outcome.change.name}: {outcome.sentence}")
+            outcomes.append(outcome)
+        then = {outcome.change.then for outcome in outcomes if outcome.level in {"did", "would"}}
+        for what in sorted(then - {""}):
+            say(_AFTERWARDS[what])
+        failed = sum(outcome.level == "failed" for outcome in outcomes)
+        if failed:
+            say(f"\n{failed} of {len(outcomes)} could not be done.")
+            sys.exit(1)
+        if not (self.remove or self.dry_run):
+            unit = unit_name(profile.name).removesuffix(".service")
+            say(
+                f"\nNext: shapechanger robot doctor {profile.path}\n"
+                f"      sudo systemctl start {unit}   (restart, if it runs already)"
+            )
+
+    def _unit(self, profile: Profile) -> Path:
+        """Return the unit beside the profile, written now if there is none."""
+        path = profile.path.absolute()
+        unit = path.parent / unit_name(profile.name)
+        if not unit.exists() and self.dry_run:
+            # `init` wrote one, and this run must not.
+            raise RobotError(f"There is no {unit}: it is written without --dry-run.")
+        unit, _ = write_unit(profile.name, path, self.credentials)
+        if str(path) not in unit.read_text():
+            raise RobotError(f"{unit} does not name {path}: remove it, and install again.")
+        return unit
 
 
 _MARKS = {"good": "good   ", "missing": "MISSING", "unknown": "?      "}

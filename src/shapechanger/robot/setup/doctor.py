@@ -10,7 +10,7 @@ import importlib.util
 import os
 import re
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,8 +29,10 @@ Level = Literal["good", "missing", "unknown"]
 _Results = Iterator[tuple[Level, str]]
 _CONFIGS: Final = ("boot/firmware/config.txt", "boot/config.txt")
 _CAMERA_S: Final = 5.0
-_STRICT: Final = re.compile(r"^\s*dtparam\s*=\s*([^#]*,)?strict_gpiod(=(on|1|true))?\s*(,|#|$)")
-_FAST_HZ: Final = 400_000
+_SECTION: Final = re.compile(r"^\s*\[([^\]]*)\]")
+FAST_HZ: Final = 400_000
+"""Speed of the I2C bus that encoders at joints need, bits per second."""
+
 _BAUD: Final = re.compile(r"^\s*dtparam\s*=\s*(?:[^#]*,)?i2c(?:_arm)?_baudrate=(\d+)", re.MULTILINE)
 
 
@@ -85,7 +87,7 @@ def examine_robot(
     plans = [sensor for sensor in guard.sensors if sensor.driver == "as5600"]
     if plans and importlib.util.find_spec("gpiozero") is not None:
         found = _encoders(plans, root, encoders or _real_encoders, served=not is_free)
-        checks += [("I2C speed", _bus_speed(_config(root))), ("encoders", found)]
+        checks += [("I2C speed", _bus_speed(boot_config(root))), ("encoders", found)]
     for check, results in checks:
         for level, sentence in results:
             yield Finding(check, level, sentence)
@@ -106,17 +108,40 @@ def _computer(root: Path) -> _Results:
         yield "unknown", words
 
 
-def _config(root: Path) -> Path | None:
-    """Return the config.txt of a Raspberry Pi."""
+def boot_config(root: Path) -> Path | None:
+    """Return the config.txt of a Raspberry Pi; None on other machines."""
     paths = [root / name for name in _CONFIGS]
     return next((path for path in paths if path.exists()), None)
 
 
+def boot_lines(config: Path) -> list[str]:
+    """Return the lines of a config.txt that apply to every model, without those of a filter."""
+    lines: list[str] = []
+    section = "all"
+    for line in config.read_text(encoding="utf-8", errors="replace").splitlines():
+        if match := _SECTION.match(line):
+            section = match[1]
+        elif section == "all":
+            lines.append(line)
+    return lines
+
+
+def sets_parameter(lines: Iterable[str], name: str) -> bool:
+    """Return whether lines of a config.txt switch a device tree parameter on.
+
+    Args:
+        lines: The lines, of `boot_lines`.
+        name: Name of the parameter, such as "i2c_arm".
+    """
+    pattern = rf"^\s*dtparam\s*=\s*([^#]*,)?{name}(=(on|1|true|yes))?\s*(,|#|$)"
+    return any(re.match(pattern, line) for line in lines)
+
+
 def _strict_gpiod(root: Path) -> _Results:
-    path = _config(root)
+    path = boot_config(root)
     if path is None:
         yield "unknown", "This machine has no Raspberry Pi config.txt."
-    elif any(_STRICT.match(line) for line in path.read_text().splitlines()):
+    elif sets_parameter(boot_lines(path), "strict_gpiod"):
         yield "good", f"{path} sets it: the pins of a process that dies go low."
     else:
         yield (
@@ -139,7 +164,7 @@ def _unit(robot: str, profile: Path | None, root: Path) -> _Results:
         yield (
             "missing",
             f"{path} does not exist, so after a crash nothing restarts the robot or makes its pins "
-            "safe: `shapechanger robot init` writes it beside the profile; copy it there.",
+            f"safe: `shapechanger robot install {profile or 'PROFILE'}` puts it there.",
         )
         return
     text = path.read_text()
@@ -200,19 +225,24 @@ def _latency_timers(guard: GuardPlan, root: Path) -> _Results:
             yield "good", f"The latency timer of {device} is 1 ms."
 
 
-def _devices(guard: GuardPlan, root: Path) -> _Results:
-    """Check that this user can open the device files."""
+def device_groups(guard: GuardPlan) -> dict[str, str]:
+    """Return the group that may open each device file of a robot's outputs and sensors."""
     groups: dict[str, str] = {}
     if any(uses_pins(output) for output in guard.outputs):
-        groups["dev/gpiochip0"] = "gpio"
+        groups["/dev/gpiochip0"] = "gpio"
     for plan in (*guard.outputs, *guard.sensors):
         if "bus" in plan.settings and plan.settings.get("over", "pca9685") == "pca9685":
-            groups[f"dev/i2c-{plan.settings['bus']}"] = "i2c"
+            groups[f"/dev/i2c-{plan.settings['bus']}"] = "i2c"
     for plan in guard.outputs:
         if plan.driver == "dynamixel":
-            groups[plan.settings["device"].lstrip("/")] = "dialout"
-    for name, group in groups.items():
-        path = root / name
+            groups[plan.settings["device"]] = "dialout"
+    return groups
+
+
+def _devices(guard: GuardPlan, root: Path) -> _Results:
+    """Check that this user can open the device files."""
+    for name, group in device_groups(guard).items():
+        path = root / name.lstrip("/")
         if not path.exists():
             remedy = "enable it with `sudo raspi-config` (Interface Options)"
             if group == "dialout":
@@ -276,22 +306,27 @@ def _geometry(plan: CameraPlan) -> _Results:
         )
 
 
+def boot_rates(config: Path) -> list[int]:
+    """Return the speeds of the I2C bus that a config.txt sets, bits per second; the last counts."""
+    return [int(rate) for rate in _BAUD.findall("\n".join(boot_lines(config)))]
+
+
 def _bus_speed(config: Path | None) -> _Results:
     """Check that the I2C bus is fast enough to read the encoders in each tick of the guard."""
     if config is None:
         yield (
             "unknown",
-            f"The bus should have {_FAST_HZ} bits per second, which cannot be read here.",
+            f"The bus should have {FAST_HZ} bits per second, which cannot be read here.",
         )
         return
-    rates = _BAUD.findall(config.read_text())
-    if rates and int(rates[-1]) >= _FAST_HZ:
+    rates = boot_rates(config)
+    if rates and rates[-1] >= FAST_HZ:
         yield "good", f"{config} sets {rates[-1]} bits per second."
     else:
         yield (
             "missing",
             f"Four encoders take 3 of every 10 ms at the default of 100000 bits per second: add "
-            f"`dtparam=i2c_arm_baudrate={_FAST_HZ}` to {config} and restart the computer.",
+            f"`dtparam=i2c_arm_baudrate={FAST_HZ}` to {config} and restart the computer.",
         )
 
 
