@@ -21,7 +21,7 @@ from shapechanger.cli.robot.calibrate import ask_for_wheels_up
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
-from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.guard.plan import GuardPlan, driven_pins
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -359,17 +359,12 @@ def check_jumper(
 
 def _pins(plan: GuardPlan) -> dict[int, str]:
     """Return the robot's pins and their uses."""
-    used: dict[int, str] = {}
-    if plan.enable_pin is not None:
-        used[plan.enable_pin] = "the enable line"
+    used = driven_pins(plan)
     if plan.stop_pin is not None:
         used[plan.stop_pin] = "the emergency button"
-    keys = ("forward", "backward", "enable", "phase", "pin", "output_enable", "a", "b")
     for device in (*plan.outputs, *plan.sensors):
-        for key in (*keys, "trigger", "echo"):
-            pin = device.settings.get(key)
-            if isinstance(pin, int) and pin >= 0:
-                used[pin] = device.name
-        pins: list[int] = device.settings.get("pins", [])
-        used |= dict.fromkeys(pins, device.name)
+        pins = [device.settings.get(key, -1) for key in ("output_enable", "a", "b")]
+        pins += [device.settings.get(key, -1) for key in ("trigger", "echo")]
+        pins += device.settings.get("pins", [])
+        used |= {pin: device.name for pin in pins if pin >= 0}
     return used

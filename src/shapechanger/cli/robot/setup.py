@@ -237,12 +237,14 @@ _MARKS = {"good": "good   ", "missing": "MISSING", "unknown": "?      "}
 
 @dataclass(frozen=True)
 class Doctor:
-    """Check everything that a robot's safety and operation depend on, without moving it."""
+    """Check a robot's computer, wiring and settings, without moving it."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
     port: int = 5000
     """Port that it will be served at."""
+    motors_off: bool = False
+    """The motors' supply is off, so test the resistors that keep their drivers off, too."""
     credentials: Path | None = None
     """Folder of its key and certificate, if not the one that `init` made."""
 
@@ -260,7 +262,11 @@ class Doctor:
             sentence = f"Never calibrated: shapechanger robot calibrate {profile.path}"
             findings.append(Finding("calibration", "unknown", sentence))
         findings += examine_robot(
-            profile.guard_plan(), profile.camera, self.port, profile=profile.path.absolute()
+            profile.guard_plan(),
+            profile.camera,
+            self.port,
+            profile=profile.path.absolute(),
+            motors_off=self.motors_off,
         )
         for finding in findings:
             say(f"{_MARKS[finding.level]}  {finding.check}: {finding.sentence}")

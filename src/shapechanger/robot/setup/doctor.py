@@ -14,19 +14,18 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
-from shapechanger.robot.hardware import RealHardware
+from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.setup.systemd import unit_name
+from shapechanger.robot.setup.wiring import Level, Results, examine_wiring
 
 if TYPE_CHECKING:  # The drivers need gpiozero, which may be missing.
     from shapechanger.robot.drivers.as5600 import As5600, JointEncoder
 
-Level = Literal["good", "missing", "unknown"]
-_Results = Iterator[tuple[Level, str]]
 _CONFIGS: Final = ("boot/firmware/config.txt", "boot/config.txt")
 _CAMERA_S: Final = 5.0
 _SECTION: Final = re.compile(r"^\s*\[([^\]]*)\]")
@@ -58,7 +57,9 @@ def examine_robot(
     root: Path = Path("/"),
     look: Callable[[CameraPlan], Camera] = open_camera,
     profile: Path | None = None,
-    encoders: Callable[[SensorPlan], As5600] | None = None,
+    hardware: Callable[[], Hardware] = RealHardware,
+    *,
+    motors_off: bool = False,
 ) -> Iterator[Finding]:
     """Check all that the robot's safety and function depend on.
 
@@ -69,9 +70,10 @@ def examine_robot(
         root: Root of the file system, for tests.
         look: Opens the camera.
         profile: The robot's profile, which the systemd unit must name; None to skip this check.
-        encoders: Opens the encoders of its joints; None for this machine's bus.
+        hardware: Opens its pins and buses.
+        motors_off: Whether the motors have no supply, so that their resistors can be tested.
     """
-    checks: list[tuple[str, _Results]] = [
+    checks: list[tuple[str, Results]] = [
         ("computer", _computer(root)),
         ("strict_gpiod", _strict_gpiod(root)),
         ("systemd", _unit(guard.name, profile, root)),
@@ -84,13 +86,31 @@ def examine_robot(
     if camera is not None:
         checks += [("camera", _camera(camera, look)), ("camera's geometry", _geometry(camera))]
     is_free, port_words = _port(port)
+    # Where the robot is served, its guard has them to itself.
+    opened = hardware() if is_free and importlib.util.find_spec("gpiozero") is not None else None
     plans = [sensor for sensor in guard.sensors if sensor.driver == "as5600"]
-    if plans and importlib.util.find_spec("gpiozero") is not None:
-        found = _encoders(plans, root, encoders or _real_encoders, served=not is_free)
-        checks += [("I2C speed", _bus_speed(boot_config(root))), ("encoders", found)]
+    if plans:
+        checks += [("I2C speed", _bus_speed(boot_config(root)))]
+    if plans and opened is not None:
+        checks += [("encoders", _encoders(plans, root, opened))]
     for check, results in checks:
         for level, sentence in results:
             yield Finding(check, level, sentence)
+    if opened is not None:
+        try:
+            for check, level, sentence in examine_wiring(
+                guard,
+                opened,
+                motors_off=motors_off,
+                has_pins=any((root / "dev").glob("gpiochip*")),
+                has_bus=lambda bus: _has_bus(bus, root),
+            ):
+                yield Finding(check, level, sentence)
+        finally:
+            opened.close()
+    elif not is_free:
+        words = "The robot may be served now, so its pins and buses were left alone."
+        yield Finding("wiring", "unknown", words)
     yield Finding("port", "good" if is_free else "missing", port_words)
 
 
@@ -99,7 +119,7 @@ def uses_pins(output: OutputPlan) -> bool:
     return output.driver in {"hbridge", "phase_enable"} or output.settings.get("over") == "lgpio"
 
 
-def _computer(root: Path) -> _Results:
+def _computer(root: Path) -> Results:
     path = root / "proc/device-tree/model"
     if path.exists():
         yield "good", path.read_text().strip("\0\n ") + "."
@@ -137,7 +157,7 @@ def sets_parameter(lines: Iterable[str], name: str) -> bool:
     return any(re.match(pattern, line) for line in lines)
 
 
-def _strict_gpiod(root: Path) -> _Results:
+def _strict_gpiod(root: Path) -> Results:
     path = boot_config(root)
     if path is None:
         yield "unknown", "This machine has no Raspberry Pi config.txt."
@@ -158,7 +178,7 @@ _IN_UNIT: Final = {
 """Settings that a unit must have, with their patterns."""
 
 
-def _unit(robot: str, profile: Path | None, root: Path) -> _Results:
+def _unit(robot: str, profile: Path | None, root: Path) -> Results:
     path = root / "etc/systemd/system" / unit_name(robot)
     if not path.exists():
         yield (
@@ -181,7 +201,7 @@ def _unit(robot: str, profile: Path | None, root: Path) -> _Results:
     yield "good", f"{path} restarts the robot and makes its pins safe."
 
 
-def _one_shot(guard: GuardPlan) -> _Results:
+def _one_shot(guard: GuardPlan) -> Results:
     if all(output.driver == "dynamixel" for output in guard.outputs):
         yield "good", "Each servo has its own watchdog, and releases when its bus is silent."
     elif guard.enable_pin is None:
@@ -198,7 +218,7 @@ def _one_shot(guard: GuardPlan) -> _Results:
         )
 
 
-def _output_enable(guard: GuardPlan) -> _Results:
+def _output_enable(guard: GuardPlan) -> Results:
     for output in guard.outputs:
         if output.settings.get("over") == "pca9685" and output.settings.get("output_enable") == -1:
             yield (
@@ -209,7 +229,7 @@ def _output_enable(guard: GuardPlan) -> _Results:
             return
 
 
-def _latency_timers(guard: GuardPlan, root: Path) -> _Results:
+def _latency_timers(guard: GuardPlan, root: Path) -> Results:
     """Check that the adapters pass on the servos' answers at once."""
     for device in {o.settings["device"] for o in guard.outputs if o.driver == "dynamixel"}:
         path = root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
@@ -239,7 +259,7 @@ def device_groups(guard: GuardPlan) -> dict[str, str]:
     return groups
 
 
-def _devices(guard: GuardPlan, root: Path) -> _Results:
+def _devices(guard: GuardPlan, root: Path) -> Results:
     """Check that this user can open the device files."""
     for name, group in device_groups(guard).items():
         path = root / name.lstrip("/")
@@ -255,7 +275,7 @@ def _devices(guard: GuardPlan, root: Path) -> _Results:
             yield "good", f"{path} can be opened."
 
 
-def _packages(guard: GuardPlan, camera: CameraPlan | None) -> _Results:
+def _packages(guard: GuardPlan, camera: CameraPlan | None) -> Results:
     remedies = {"gpiozero": "pip install 'shapechanger[robot]'"}
     remedies["lgpio"] = "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"
     if any("bus" in plan.settings for plan in (*guard.outputs, *guard.sensors)):
@@ -274,7 +294,7 @@ def _packages(guard: GuardPlan, camera: CameraPlan | None) -> _Results:
             yield "good", f"{name} is installed."
 
 
-def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> _Results:
+def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> Results:
     with ThreadPoolExecutor(1) as reader:
         try:
             camera = look(plan)
@@ -290,7 +310,7 @@ def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> _Results:
             yield "good", f"{plan.driver} sent a frame of {len(frame.jpeg)} bytes."
 
 
-def _geometry(plan: CameraPlan) -> _Results:
+def _geometry(plan: CameraPlan) -> Results:
     """Check that policies that drive by waypoints can use the camera."""
     if plan.pitch_deg is None or plan.fovy_deg is None:
         yield (
@@ -311,7 +331,7 @@ def boot_rates(config: Path) -> list[int]:
     return [int(rate) for rate in _BAUD.findall("\n".join(boot_lines(config)))]
 
 
-def _bus_speed(config: Path | None) -> _Results:
+def _bus_speed(config: Path | None) -> Results:
     """Check that the I2C bus is fast enough to read the encoders in each tick of the guard."""
     if config is None:
         yield (
@@ -330,24 +350,20 @@ def _bus_speed(config: Path | None) -> _Results:
         )
 
 
-def _encoders(
-    plans: Sequence[SensorPlan],
-    root: Path,
-    connect: Callable[[SensorPlan], As5600],
-    *,
-    served: bool,
-) -> _Results:
+def _has_bus(bus: int, root: Path) -> bool:
+    """Return whether this user may open an I2C bus."""
+    return os.access(root / f"dev/i2c-{bus}", os.R_OK | os.W_OK)
+
+
+def _encoders(plans: Sequence[SensorPlan], root: Path, hardware: Hardware) -> Results:
     """Check the encoders at the joints, where their bus can be opened."""
+    from shapechanger.robot.drivers.as5600 import connect_encoders
+
     for plan in plans:
-        if not os.access(root / f"dev/i2c-{plan.settings['bus']}", os.R_OK | os.W_OK):
-            continue
-        if served:
-            # The guard then has the multiplexer to itself: a channel opened by another process
-            # would give it the angle of another joint.
-            yield "unknown", "The robot may be served now, and its encoders were left alone."
+        if not _has_bus(plan.settings["bus"], root):
             continue
         try:
-            sensor = connect(plan)
+            sensor = connect_encoders(plan, hardware)
         except RobotError as error:
             yield "missing", str(error)
             continue
@@ -356,12 +372,6 @@ def _encoders(
                 yield _encoder(sensor, encoder)
         finally:
             sensor.close()
-
-
-def _real_encoders(plan: SensorPlan) -> As5600:
-    from shapechanger.robot.drivers.as5600 import connect_encoders
-
-    return connect_encoders(plan, RealHardware())
 
 
 def _encoder(sensor: As5600, encoder: JointEncoder) -> tuple[Level, str]:

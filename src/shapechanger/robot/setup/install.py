@@ -148,7 +148,7 @@ def make_changes(
         elif dry:
             yield Outcome(change, "would", typed)
         else:
-            why = next(filter(None, map(run, change.commands)), "")
+            why = next((why for command in change.commands if (why := run(command))), "")
             if not why and not change.is_made():
                 why = "the command had no effect"
             sentence = f"{why}. By hand: {typed}" if why else change.state
@@ -200,7 +200,7 @@ def changes_to_install(
         unit: Its systemd unit, beside the profile.
         machine: The computer.
     """
-    groups = set(device_groups(guard).values()) | ({"video"} if camera is not None else set())
+    groups = {*device_groups(guard).values(), *(["video"] if camera is not None else [])}
     for group in sorted(groups):
         yield _group(group, machine)
     config = boot_config(machine.root)
