@@ -81,9 +81,9 @@ def lamps_of(plan: GuardPlan) -> list[Lamp]:
         settings, name = output.settings, output.name
         match output.driver:
             case "hbridge":
-                for way, value in (("forward", 1.0), ("backward", -1.0)):
-                    pin = settings[way]
-                    found.append(Lamp(f"{name} {way}", f"GPIO{pin}", output, value, pin))
+                for way, value in (("forward", 1.0), ("backward", -1.0), ("enable", 1.0)):
+                    if (pin := settings[way]) >= 0:
+                        found.append(Lamp(f"{name} {way}", f"GPIO{pin}", output, value, pin))
             case "phase_enable":
                 pin = settings["enable"]
                 found.append(Lamp(f"{name} enable", f"GPIO{pin}", output, 1.0, pin))

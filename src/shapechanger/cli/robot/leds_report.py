@@ -106,7 +106,7 @@ def run_leds(bench: Bench, profile: Profile, report: Path, *, twin: bool) -> boo
                     good = good and (result.level != "bad" or of == "wiring")
             except BaseException as error:
                 # Also after Ctrl-C, a report is worth sending.
-                file.write(anonymous(f"\nIt ended early: {error or type(error).__name__}\n"))
+                file.write(anonymous(f"\nIt ended early: {str(error) or type(error).__name__}\n"))
                 raise
             known, bad, unknown = counts.values()
             _both(file, f"\n{known} good, {bad} bad, {unknown} not measured.")
