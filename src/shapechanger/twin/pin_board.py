@@ -186,7 +186,7 @@ class PinBoard:
             self.levels.release(pin)
             self._record(t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True)
             self.sensors.output_changed(t, pin, float(idle))
-        if request.pull != "floating":
+        if request.pull != "floating" and not self._wiring.has_resistor(pin):
             idle = int(request.pull == "up")
         return self.sensors.levels.get(pin, idle)
 

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.duty import Duty
-from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, driven_pins
 from shapechanger.twin.signals import Levels, Pulse, PwmChannel
 
 ONE_SHOT_MS: Final = 100.0
@@ -66,6 +66,7 @@ class TwinWiring:
         self._one_shot_ns = int((one_shot_ms or 0.0) * 1e6) if has_one_shot else None
         enables = (_output_enable(output) for output in plan.outputs)
         self._high = {pin for pin in enables if pin >= 0}
+        self._low = driven_pins(plan).keys()
         self._actions = {action.name: action for action in plan.actions}
         self._states = {output.name: self._state(output) for output in plan.outputs}
         self.outputs: Mapping[str, OutputPlan] = {output.name: output for output in plan.outputs}
@@ -78,6 +79,10 @@ class TwinWiring:
         enable of a PCA9685, which is active low.
         """
         return int(pin in self._high)
+
+    def has_resistor(self, pin: int) -> bool:
+        """Return whether a resistor outside decides the level of an undriven pin."""
+        return pin in self._high or pin in self._low
 
     def power_ends_ns(self, levels: Levels) -> int | None:
         """Return when the one-shot cuts the motors' power, ns; None without a one-shot."""

@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.errors import OutputError, ProfileError, UnknownName
 from shapechanger.robot.profile import load_profile, shipped_profiles, write_profile
-from shapechanger.robot.profile.edit import rewrite
+from shapechanger.robot.profile.edit import CAMERAS, adapted, rewrite
 from tests.robot.profile.texts import EVERYTHING
 
 
@@ -117,6 +117,30 @@ def test_a_change_that_breaks_the_profile_is_refused(rover: Path) -> None:
         rewrite(rover, {"robot.nam": "x"})
     assert rover.read_text() == EVERYTHING
     assert [path.name for path in rover.parent.iterdir()] == ["rover.toml"]
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("kind", shipped_profiles())
+def test_a_first_profile_takes_another_camera(kind: str, camera: str, tmp_path: Path) -> None:
+    """Size and rate stay; what belongs to the other camera goes."""
+    before = load_profile(shipped_profiles()[kind])
+    path = tmp_path / "mine.toml"
+    path.write_text(adapted(before.path.read_text(), path, camera, "anyone"))
+    profile = load_profile(path)
+    assert profile.arming == "anyone"
+    assert (profile.camera.driver if profile.camera else "") == CAMERAS[camera]
+    if before.camera and profile.camera:
+        assert (profile.camera.size, profile.camera.fps) == (before.camera.size, before.camera.fps)
+    assert profile.outputs == before.outputs
+    assert "# " in path.read_text()
+
+
+def test_an_unknown_camera_is_refused(tmp_path: Path) -> None:
+    """Without any choice the text stays."""
+    text = shipped_profiles()["car"].read_text()
+    assert adapted(text, tmp_path / "car.toml") == text
+    with pytest.raises(UnknownName, match=r"No camera matches 'us'. Did you mean 'usb'\?"):
+        adapted(text, tmp_path / "car.toml", "us")
 
 
 @pytest.mark.parametrize("step", ["fsync", "fchmod", "rename"])

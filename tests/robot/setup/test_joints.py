@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.as5600 import As5600, connect_encoders
-from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.doctor import examine_robot
 from shapechanger.robot.setup.zeros import find_joint_zeros
@@ -63,11 +62,8 @@ def test_a_missing_magnet_is_an_error() -> None:
 
 
 def _found(root: Path, plan: GuardPlan, board: LocalBoard, port: int = 0) -> dict[str, list[str]]:
-    def connect(sensor: SensorPlan) -> As5600:
-        return connect_encoders(sensor, board.hardware)
-
     found: dict[str, list[str]] = {}
-    for one in examine_robot(plan, None, port, root, encoders=connect):
+    for one in examine_robot(plan, None, port, root, hardware=lambda: board.hardware):
         found.setdefault(one.check, []).append(f"{one.level}: {one.sentence}")
     return found
 
@@ -114,8 +110,11 @@ def test_the_doctor_leaves_the_encoders_of_a_served_robot_alone(root: Path) -> N
     with socket.socket() as taken:
         taken.bind(("", 0))
         taken.listen()
-        found = _found(root, _PLAN, _board(), port=taken.getsockname()[1])["encoders"]
-    assert found == ["unknown: The robot may be served now, and its encoders were left alone."]
+        found = _found(root, _PLAN, _board(), port=taken.getsockname()[1])
+    assert "encoders" not in found
+    assert found["wiring"] == [
+        "unknown: The robot may be served now, so its pins and buses were left alone."
+    ]
 
 
 @pytest.mark.parametrize(

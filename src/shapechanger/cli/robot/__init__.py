@@ -15,7 +15,7 @@ from shapechanger.cli.robot.key import Key
 from shapechanger.cli.robot.remote import Find, Forget, Remember, Stop
 from shapechanger.cli.robot.selftest import Selftest
 from shapechanger.cli.robot.serve import Serve
-from shapechanger.cli.robot.setup import Doctor, Home, Init, SafePins
+from shapechanger.cli.robot.setup import Doctor, Home, Init, Install, SafePins
 
 __all__ = ["Robot"]
 
@@ -26,6 +26,7 @@ class Robot:
 
     command: (
         Annotated[Init, tyro.conf.subcommand("init")]
+        | Annotated[Install, tyro.conf.subcommand("install")]
         | Annotated[Doctor, tyro.conf.subcommand("doctor")]
         | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
         | Annotated[CameraView, tyro.conf.subcommand("camera")]

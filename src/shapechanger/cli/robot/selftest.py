@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import tyro
@@ -18,10 +19,11 @@ from rich.table import Table
 
 from shapechanger.cli.console import plain_console, say
 from shapechanger.cli.robot.calibrate import ask_for_wheels_up
+from shapechanger.cli.robot.setup import require_pins
 from shapechanger.errors import RobotError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
-from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.guard.plan import GuardPlan, driven_pins
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -54,6 +56,16 @@ class Selftest:
     """Without --twin: largest throttle, 0 to 1."""
     jumper: tuple[int, int] | None = None
     """Without --twin: two free BCM pins joined by a wire, an output and an input, to try first."""
+    leds: bool = False
+    """Test a bench of one Pi with LEDs in place of motors, light each of them, and write a report
+    to send."""
+    yes: bool = False
+    """With --leds: no motor is connected, and nobody is there to answer, so ask nothing."""
+    probe: int | None = None
+    """With --leds: a free BCM pin, joined by a wire to the pin of the motor that drives forward,
+    which measures when it stops."""
+    report: Path | None = None
+    """With --leds: file of the report; leds-report.txt if not given."""
 
     def run(self) -> None:
         """Run the tests, print the results, and exit with 1 on a failure."""
@@ -64,9 +76,41 @@ class Selftest:
             f"{'twin' if self.twin else 'hardware'}, Python {platform.python_version()}, "
             f"{platform.platform()}"
         )
-        good = self._on_twin(profile) if self.twin else self._on_hardware(profile)
+        for option, given in {
+            "--yes": self.yes,
+            "--probe": self.probe is not None,
+            "--report": self.report is not None,
+        }.items():
+            if given and not self.leds:
+                raise RobotError(f"{option} needs --leds.")
+        if self.leds:
+            good = self._on_leds(profile)
+        else:
+            good = self._on_twin(profile) if self.twin else self._on_hardware(profile)
         if not good:
             sys.exit(1)
+
+    def _on_leds(self, profile: Profile) -> bool:
+        from shapechanger.cli.robot.leds import Bench, ask_nobody, ask_person
+        from shapechanger.cli.robot.leds_report import run_leds
+
+        plan = profile.guard_plan()
+        asks = sys.stdin.isatty() and not (self.yes or self.twin)
+        ask = ask_person if asks else ask_nobody
+        if self.twin and self.probe is not None:
+            raise RobotError("A twin needs no --probe: its ledger has every change of a pin.")
+        bench = Bench(profile, twin=self.twin, probe=self.probe, ask=ask, cap=self.cap)
+        if not self.twin:
+            require_pins(plan)
+            if not (asks or self.yes):
+                raise RobotError(
+                    "All outputs will be driven: put LEDs in place of the motors, and say so with "
+                    "--yes."
+                )
+            if asks and not ask_person("All outputs will be driven. Is every motor taken off?"):
+                raise RobotError("Nothing was lit.")
+        report = self.report or Path("leds-report.txt")
+        return run_leds(bench, profile, report, twin=self.twin)
 
     def _on_twin(self, profile: Profile) -> bool:
         from shapechanger.cli.robot.trial import FAULTS, Trial, has
@@ -333,7 +377,7 @@ def check_jumper(
     """
     from gpiozero import DigitalInputDevice, DigitalOutputDevice
 
-    used = _pins(plan)
+    used = pins_of(plan)
     for pin in (output, sensed):
         if pin in used:
             raise RobotError(f"Pin {pin} is used by {used[pin]}: join two free pins.")
@@ -357,19 +401,14 @@ def check_jumper(
     return f"pin {sensed} followed pin {output} {_TOGGLES} times."
 
 
-def _pins(plan: GuardPlan) -> dict[int, str]:
+def pins_of(plan: GuardPlan) -> dict[int, str]:
     """Return the robot's pins and their uses."""
-    used: dict[int, str] = {}
-    if plan.enable_pin is not None:
-        used[plan.enable_pin] = "the enable line"
+    used = driven_pins(plan)
     if plan.stop_pin is not None:
         used[plan.stop_pin] = "the emergency button"
-    keys = ("forward", "backward", "enable", "phase", "pin", "output_enable", "a", "b")
     for device in (*plan.outputs, *plan.sensors):
-        for key in (*keys, "trigger", "echo"):
-            pin = device.settings.get(key)
-            if isinstance(pin, int) and pin >= 0:
-                used[pin] = device.name
-        pins: list[int] = device.settings.get("pins", [])
-        used |= dict.fromkeys(pins, device.name)
+        pins = [device.settings.get(key, -1) for key in ("output_enable", "a", "b")]
+        pins += [device.settings.get(key, -1) for key in ("trigger", "echo")]
+        pins += device.settings.get("pins", [])
+        used |= {pin: device.name for pin in pins if pin >= 0}
     return used

@@ -1,18 +1,20 @@
-"""`shapechanger robot init | doctor | home | safe-pins`: set up a robot."""
+"""`shapechanger robot init | install | doctor | home | safe-pins`: set up a robot."""
 
 from __future__ import annotations
 
+import getpass
 import sys
 import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.key import how_to_remember, robot_at, shown_credentials
-from shapechanger.errors import RobotError, ShapechangerError
+from shapechanger.errors import RobotError, ShapechangerError, UnknownName
 from shapechanger.remote.known_robots import check_name, remember
 from shapechanger.robot.daemon.credentials import (
     credentials_folder,
@@ -27,19 +29,35 @@ from shapechanger.robot.profile.load import (
     load_profile,
     shipped_profiles,
     starter_text,
-    write_profile,
+    write_text,
 )
+<<<<<<< HEAD
 from shapechanger.robot.setup.doctor import Finding, examine_robot, needs_pins
 from shapechanger.robot.setup.systemd import write_unit
+=======
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.setup.doctor import Finding, examine_robot, uses_pins
+from shapechanger.robot.setup.install import (
+    Machine,
+    Outcome,
+    changes_to_install,
+    changes_to_remove,
+    make_changes,
+    require_pi,
+    require_systemd,
+)
+from shapechanger.robot.setup.systemd import unit_name, write_unit
+>>>>>>> h-install
 from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
 
 
 @dataclass(frozen=True)
 class Init:
-    """Create the profile, key and certificate of a new robot."""
+    """Create the profile, key and certificate of a new robot; at a terminal, by questions."""
 
-    kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="KIND")]
-    """Name of a shipped profile, such as car."""
+    kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[KIND]")] = ""
+    """Name of a shipped profile, such as car. Without any argument, up to five questions are
+    asked."""
     name: str = ""
     """Name of the robot; that of its kind if not given."""
     out: Path | None = None
@@ -47,29 +65,124 @@ class Init:
     credentials: Path | None = None
     """Folder for the key and the certificate, if not the robot's own in the user's
     configuration."""
+    camera: Literal["", "ribbon", "usb", "none"] = ""
+    """Its camera: on the Pi's ribbon cable, a webcam, or none; that of its kind if not given."""
+    arming: Literal["", "person", "anyone"] = ""
+    """Who may arm it: only a person, or programs, too; as its kind has it if not given."""
 
     def run(self) -> None:
         """Write the files and print the next steps."""
+        if self == Init() and sys.stdin.isatty():
+            self._ask()
+            return
+        if not self.kind:
+            raise RobotError(
+                "Name the kind of the new robot, as in `shapechanger robot init car`. There are: "
+                f"{', '.join(shipped_profiles())}."
+            )
+        self._write()
+
+    def _ask(self) -> None:
+        """Ask what is needed, each with a default, write the files, and install them on a Pi."""
+        say("Enter takes the answer in brackets.")
+
+        def of(options: Iterable[str], what: str) -> Callable[[str], object]:
+            def check(answer: str) -> None:
+                if answer not in options:
+                    raise UnknownName(what, answer, options)
+
+            return check
+
+        kinds = shipped_profiles()
+        kind = _answer(f"Kind of robot ({', '.join(kinds)})", "car", of(kinds, "kind of robot"))
+        name = _answer("Its name", kind, lambda name: Init(kind, name)._checked())
+        has = "none" if load_profile(kinds[kind]).camera is None else "ribbon"
+        camera = _answer(
+            "Camera (ribbon: the Pi's own cable, usb: a webcam, none)",
+            has,
+            of(("ribbon", "usb", "none"), "camera"),
+        )
+        ways = ("person", "anyone")
+        arming = _answer("Who may arm it (person, anyone)", "person", of(ways, "answer"))
+        installs = "no"
+        if _is_pi():
+            question = "Start it with the computer, which sets the Pi up with sudo (yes, no)"
+            installs = _answer(question, "yes", of(("yes", "no"), "answer"))
+        chosen: Any = {
+            "camera": "" if camera == has else camera,
+            "arming": "" if arming == "person" else arming,
+        }
+        made = Init(kind, name, **chosen)._write()
+        if installs == "yes":
+            say("")
+            Install(str(made)).run()
+
+    def _checked(self) -> tuple[str, Path, str]:
+        """Return name, file and text of the profile, after all checks."""
         name = self.name or self.kind
         check_name(name)
         out = self.out or Path(f"{name}.toml")
-        starter_text(self.kind, out, name)  # Check everything before creating anything.
+        text = starter_text(self.kind, out, name)
+        if self.camera or self.arming:
+            from shapechanger.robot.profile.edit import adapted
+
+            text = adapted(text, out, self.camera, self.arming)
+        return name, out, text
+
+    def _write(self) -> Path:
+        """Write the files, print the next steps, and return the profile."""
+        name, out, text = self._checked()  # Check everything before creating anything.
         credentials = make_credentials(self.credentials or credentials_folder(name), name)
         # Lets this machine drive it, especially on a twin.
         remember(robot_at("127.0.0.1", name, credentials))
         unit, is_new = write_unit(name, out, self.credentials)
         # Last, because an existing profile is refused: after a failure, such as a full disk, the
         # command can be repeated.
-        profile = write_profile(self.kind, out, name)
+        profile = write_text(out, text)
         say(
             f"wrote {profile}: check its pins before anything moves\n"
-            f"{'wrote' if is_new else 'kept'} {unit}: for systemd, see docs/hardware.md\n"
+            f"{'wrote' if is_new else 'kept'} {unit}: its systemd unit\n"
             f"key and certificate in {credentials.key_file.parent}\n\n"
             f"{shown_credentials(credentials)}\n\n"
-            f"Next: shapechanger robot doctor {profile}\n"
+            f"Next: shapechanger robot install {profile}   (on the Pi: service, groups, buses)\n"
+            f"      shapechanger robot doctor {profile}\n"
             f"      shapechanger robot serve {profile}   (with --twin: without any hardware)\n"
             f"{how_to_remember(name, credentials)}"
         )
+        return profile
+
+
+def _is_pi() -> bool:
+    """Return whether a robot can be installed on this machine."""
+    try:
+        require_pi(Path("/"))
+    except RobotError:
+        return False
+    return True
+
+
+def _answer(question: str, default: str, check: Callable[[str], object]) -> str:
+    """Ask until an answer passes a check.
+
+    Args:
+        question: The question.
+        default: Answer of an empty line.
+        check: Raises a `ShapechangerError` for an answer that is not possible.
+
+    Raises:
+        RobotError: If the input ends.
+    """
+    while True:
+        try:
+            answer = input(f"{question} [{default}]: ").strip() or default
+        except EOFError:
+            raise RobotError("No more answers: nothing was written.") from None
+        try:
+            check(answer)
+        except ShapechangerError as error:
+            say(str(error))
+        else:
+            return answer
 
 
 def own_profile(name: str) -> Path:
@@ -141,17 +254,99 @@ class Home:
         change_profile(path, found)
 
 
+_OUTCOMES = {"did": "did    ", "already": "already", "would": "would  ", "failed": "FAILED "}
+_AFTERWARDS = {
+    "restart": "Restart the computer, so that its pins and buses are set up: sudo reboot",
+    "log in": "Log out and in again, so that this user has the new groups.",
+}
+
+
+@dataclass(frozen=True)
+class Install:
+    """Put a robot's service, groups, buses and camera in place on a Raspberry Pi."""
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """The robot's profile, which `init` wrote."""
+    dry_run: bool = False
+    """Print what would be done, with its commands, and do nothing."""
+    remove: bool = False
+    """Remove the service again; groups and settings of the computer stay."""
+    credentials: Path | None = None
+    """Folder of its key and certificate, if not the one that `init` made."""
+
+    def run(self) -> None:
+        """Make each change that is not made yet, and exit with 1 if one could not be made."""
+        path = own_profile(self.profile)
+        self.install(load_profile(path), Machine(getpass.getuser()))
+
+    def install(self, profile: Profile, machine: Machine) -> None:
+        """Make the changes on a machine.
+
+        Args:
+            profile: The robot.
+            machine: The computer.
+
+        Raises:
+            RobotError: If it is no Raspberry Pi with systemd, or the wrong user asks.
+        """
+        if self.remove:
+            require_systemd(machine.root)
+            changes = changes_to_remove(unit_name(profile.name), machine.root)
+        else:
+            require_pi(machine.root)
+            if machine.user == "root":
+                raise RobotError(
+                    "Install it as the user that is to run the robot, without sudo, which is "
+                    "called where it is needed."
+                )
+            folder = self.credentials or credentials_folder(profile.name)
+            load_credentials(folder)
+            unit = self._unit(profile)
+            changes = changes_to_install(profile.guard_plan(), profile.camera, unit, machine)
+        outcomes: list[Outcome] = []
+        for outcome in make_changes(changes, machine.run, dry=self.dry_run):
+            say(f"{_OUTCOMES[outcome.level]}  {outcome.change.name}: {outcome.sentence}")
+            outcomes.append(outcome)
+        then = {outcome.change.then for outcome in outcomes if outcome.level in {"did", "would"}}
+        for what in sorted(then - {""}):
+            say(_AFTERWARDS[what])
+        failed = sum(outcome.level == "failed" for outcome in outcomes)
+        if failed:
+            say(f"\n{failed} of {len(outcomes)} could not be done.")
+            sys.exit(1)
+        if not (self.remove or self.dry_run):
+            unit = unit_name(profile.name).removesuffix(".service")
+            say(
+                f"\nNext: shapechanger robot doctor {profile.path}\n"
+                f"      sudo systemctl start {unit}   (restart, if it runs already)"
+            )
+
+    def _unit(self, profile: Profile) -> Path:
+        """Return the unit beside the profile, written now if there is none."""
+        path = profile.path.absolute()
+        unit = path.parent / unit_name(profile.name)
+        if not unit.exists() and self.dry_run:
+            # `init` wrote one, and this run must not.
+            raise RobotError(f"There is no {unit}: it is written without --dry-run.")
+        unit, _ = write_unit(profile.name, path, self.credentials)
+        if str(path) not in unit.read_text():
+            raise RobotError(f"{unit} does not name {path}: remove it, and install again.")
+        return unit
+
+
 _MARKS = {"good": "good   ", "missing": "MISSING", "unknown": "?      "}
 
 
 @dataclass(frozen=True)
 class Doctor:
-    """Check everything that a robot's safety and operation depend on, without moving it."""
+    """Check a robot's computer, wiring and settings, without moving it."""
 
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
     port: int = 5000
     """Port that it will be served at."""
+    motors_off: bool = False
+    """The motors' supply is off, so test the resistors that keep their drivers off, too."""
     credentials: Path | None = None
     """Folder of its key and certificate, if not the one that `init` made."""
 
@@ -169,7 +364,11 @@ class Doctor:
             sentence = f"Never calibrated: shapechanger robot calibrate {profile.path}"
             findings.append(Finding("calibration", "unknown", sentence))
         findings += examine_robot(
-            profile.guard_plan(), profile.camera, self.port, profile=profile.path.absolute()
+            profile.guard_plan(),
+            profile.camera,
+            self.port,
+            profile=profile.path.absolute(),
+            motors_off=self.motors_off,
         )
         for finding in findings:
             say(f"{_MARKS[finding.level]}  {finding.check}: {finding.sentence}")

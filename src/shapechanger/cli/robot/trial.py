@@ -464,7 +464,7 @@ class Trial:
     ) -> Generator[Driver]:
         """Return a driver of the robot."""
         try:
-            _calm(robot)
+            calm(robot)
             operator.place(0)
             known = robot.known_at(f"127.0.0.1:{network.port}")
             driver = Driver(known, by_policy=fault.by_policy)
@@ -587,7 +587,7 @@ def _arm_for_program(robot: RunningRobot) -> None:
         person.arm()
 
 
-def _calm(robot: RunningRobot) -> None:
+def calm(robot: RunningRobot) -> None:
     """Clear the state of the last trial: an emergency stop, or being armed."""
     with robot.client(role="person", frames=False, name="trial") as person:
         person.take()

@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,3 +205,19 @@ def output_values(plan: GuardPlan, actions: Sequence[float]) -> tuple[float, ...
         mixed = output.offset + sum([weight * named[a] for a, weight in output.mix.items()])
         values.append(max(-1.0, min(1.0, mixed)))
     return tuple(values)
+
+
+_DRIVEN: Final = ("forward", "backward", "enable", "phase", "pin")
+
+
+def driven_pins(plan: GuardPlan) -> dict[int, str]:
+    """Return the use of each BCM pin that drives an output or the enable line, by its number."""
+    found = {
+        pin: f"{output.name} {key}"
+        for output in plan.outputs
+        for key in _DRIVEN
+        if (pin := output.settings.get(key, -1)) >= 0
+    }
+    if plan.enable_pin is not None:
+        found[plan.enable_pin] = "enable line"
+    return found

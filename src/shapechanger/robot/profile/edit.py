@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import tomlkit
 from tomlkit.items import Item
@@ -52,6 +52,45 @@ def rewrite(path: str | os.PathLike[str], changes: Mapping[str, Any]) -> Profile
     except OSError as error:
         raise OutputError(f"Cannot write {target}: {error.strerror or error}.") from error
     return profile
+
+
+CAMERAS: Final = {"ribbon": "picamera2", "usb": "v4l2", "none": ""}
+"""Driver of each kind of camera that `adapted` fits."""
+
+
+def adapted(text: str, path: Path, camera: str = "", arming: str = "") -> str:
+    """Return the text of a profile with another camera, or another rule of who may arm it.
+
+    Args:
+        text: The profile.
+        path: Its file, for errors.
+        camera: A key of `CAMERAS`; "" for the one that it has.
+        arming: "person" or "anyone"; "" for the rule that it has.
+
+    Raises:
+        UnknownName: If there is no such camera.
+        ProfileError: If the result is not a valid profile.
+    """
+    document: Any = tomlkit.parse(text)
+    if camera:
+        if camera not in CAMERAS:
+            raise UnknownName("camera", camera, CAMERAS)
+        before: Any = document.get("camera", {})
+        if not CAMERAS[camera]:
+            document.pop("camera", None)
+            document.get("limits", {}).pop("camera_stale_ms", None)
+        elif before.get("driver") != CAMERAS[camera]:
+            table: Any = tomlkit.table()
+            table["driver"] = CAMERAS[camera]
+            # Other settings are those of the other camera.
+            table.update({key: before[key] for key in ("size", "fps") if key in before})
+            table.add(tomlkit.nl())
+            document["camera"] = table
+    if arming:
+        document.setdefault("limits", tomlkit.table())["arming"] = arming
+    result: str = tomlkit.dumps(document)
+    read_profile(result, path)
+    return result
 
 
 def _item(value: Any, table: Any, key: str) -> Any:

@@ -139,10 +139,24 @@ def write_profile(kind: str, path: str | os.PathLike[str], robot_name: str) -> P
         ProfileError: If the robot's name is invalid.
         OutputError: If the file exists or cannot be written; no partial file is left.
     """
-    target = Path(path)
-    text = starter_text(kind, target, robot_name)
+    return write_text(Path(path), starter_text(kind, path, robot_name))
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a new profile, creating missing folders.
+
+    Args:
+        path: The new file, which must not exist.
+        text: Its content.
+
+    Returns:
+        The file.
+
+    Raises:
+        OutputError: If the file exists or cannot be written; no partial file is left.
+    """
     try:
-        write_new(target, text.encode())
+        write_new(path, text.encode())
     except OSError as error:
-        raise OutputError(f"Cannot write {target}: {error.strerror or error}.") from error
-    return target
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
+    return path

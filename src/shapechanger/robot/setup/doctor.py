@@ -10,28 +10,34 @@ import importlib.util
 import os
 import re
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
+<<<<<<< HEAD
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.hardware import RealHardware
+=======
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
+from shapechanger.robot.hardware import Hardware, RealHardware
+>>>>>>> h-install
 from shapechanger.robot.setup.systemd import unit_name
+from shapechanger.robot.setup.wiring import Level, Results, examine_wiring
 
 if TYPE_CHECKING:  # The drivers need gpiozero, which may be missing.
     from shapechanger.robot.drivers.as5600 import As5600, JointEncoder
 
-Level = Literal["good", "missing", "unknown"]
-_Results = Iterator[tuple[Level, str]]
 _CONFIGS: Final = ("boot/firmware/config.txt", "boot/config.txt")
 _CAMERA_S: Final = 5.0
-_STRICT: Final = re.compile(r"^\s*dtparam\s*=\s*([^#]*,)?strict_gpiod(=(on|1|true))?\s*(,|#|$)")
-_FAST_HZ: Final = 400_000
+_SECTION: Final = re.compile(r"^\s*\[([^\]]*)\]")
+FAST_HZ: Final = 400_000
+"""Speed of the I2C bus that encoders at joints need, bits per second."""
+
 _BAUD: Final = re.compile(r"^\s*dtparam\s*=\s*(?:[^#]*,)?i2c(?:_arm)?_baudrate=(\d+)", re.MULTILINE)
 
 
@@ -57,7 +63,9 @@ def examine_robot(
     root: Path = Path("/"),
     look: Callable[[CameraPlan], Camera] = open_camera,
     profile: Path | None = None,
-    encoders: Callable[[SensorPlan], As5600] | None = None,
+    hardware: Callable[[], Hardware] = RealHardware,
+    *,
+    motors_off: bool = False,
 ) -> Iterator[Finding]:
     """Check all that the robot's safety and function depend on.
 
@@ -68,9 +76,10 @@ def examine_robot(
         root: Root of the file system, for tests.
         look: Opens the camera.
         profile: The robot's profile, which the systemd unit must name; None to skip this check.
-        encoders: Opens the encoders of its joints; None for this machine's bus.
+        hardware: Opens its pins and buses.
+        motors_off: Whether the motors have no supply, so that their resistors can be tested.
     """
-    checks: list[tuple[str, _Results]] = [
+    checks: list[tuple[str, Results]] = [
         ("computer", _computer(root)),
         ("strict_gpiod", _strict_gpiod(root)),
         ("systemd", _unit(guard.name, profile, root)),
@@ -83,13 +92,31 @@ def examine_robot(
     if camera is not None:
         checks += [("camera", _camera(camera, look)), ("camera's geometry", _geometry(camera))]
     is_free, port_words = _port(port)
+    # Where the robot is served, its guard has them to itself.
+    opened = hardware() if is_free and importlib.util.find_spec("gpiozero") is not None else None
     plans = [sensor for sensor in guard.sensors if sensor.driver == "as5600"]
-    if plans and importlib.util.find_spec("gpiozero") is not None:
-        found = _encoders(plans, root, encoders or _real_encoders, served=not is_free)
-        checks += [("I2C speed", _bus_speed(_config(root))), ("encoders", found)]
+    if plans:
+        checks += [("I2C speed", _bus_speed(boot_config(root)))]
+    if plans and opened is not None:
+        checks += [("encoders", _encoders(plans, root, opened))]
     for check, results in checks:
         for level, sentence in results:
             yield Finding(check, level, sentence)
+    if opened is not None:
+        try:
+            for check, level, sentence in examine_wiring(
+                guard,
+                opened,
+                motors_off=motors_off,
+                has_pins=any((root / "dev").glob("gpiochip*")),
+                has_bus=lambda bus: _has_bus(bus, root),
+            ):
+                yield Finding(check, level, sentence)
+        finally:
+            opened.close()
+    elif not is_free:
+        words = "The robot may be served now, so its pins and buses were left alone."
+        yield Finding("wiring", "unknown", words)
     yield Finding("port", "good" if is_free else "missing", port_words)
 
 
@@ -101,7 +128,7 @@ def needs_pins(guard: GuardPlan) -> bool:
     )
 
 
-def _computer(root: Path) -> _Results:
+def _computer(root: Path) -> Results:
     path = root / "proc/device-tree/model"
     if path.exists():
         yield "good", path.read_text().strip("\0\n ") + "."
@@ -110,17 +137,40 @@ def _computer(root: Path) -> _Results:
         yield "unknown", words
 
 
-def _config(root: Path) -> Path | None:
-    """Return the config.txt of a Raspberry Pi."""
+def boot_config(root: Path) -> Path | None:
+    """Return the config.txt of a Raspberry Pi; None on other machines."""
     paths = [root / name for name in _CONFIGS]
     return next((path for path in paths if path.exists()), None)
 
 
-def _strict_gpiod(root: Path) -> _Results:
-    path = _config(root)
+def boot_lines(config: Path) -> list[str]:
+    """Return the lines of a config.txt that apply to every model, without those of a filter."""
+    lines: list[str] = []
+    section = "all"
+    for line in config.read_text(encoding="utf-8", errors="replace").splitlines():
+        if match := _SECTION.match(line):
+            section = match[1]
+        elif section == "all":
+            lines.append(line)
+    return lines
+
+
+def sets_parameter(lines: Iterable[str], name: str) -> bool:
+    """Return whether lines of a config.txt switch a device tree parameter on.
+
+    Args:
+        lines: The lines, of `boot_lines`.
+        name: Name of the parameter, such as "i2c_arm".
+    """
+    pattern = rf"^\s*dtparam\s*=\s*([^#]*,)?{name}(=(on|1|true|yes))?\s*(,|#|$)"
+    return any(re.match(pattern, line) for line in lines)
+
+
+def _strict_gpiod(root: Path) -> Results:
+    path = boot_config(root)
     if path is None:
         yield "unknown", "This machine has no Raspberry Pi config.txt."
-    elif any(_STRICT.match(line) for line in path.read_text().splitlines()):
+    elif sets_parameter(boot_lines(path), "strict_gpiod"):
         yield "good", f"{path} sets it: the pins of a process that dies go low."
     else:
         yield (
@@ -137,13 +187,13 @@ _IN_UNIT: Final = {
 """Settings that a unit must have, with their patterns."""
 
 
-def _unit(robot: str, profile: Path | None, root: Path) -> _Results:
+def _unit(robot: str, profile: Path | None, root: Path) -> Results:
     path = root / "etc/systemd/system" / unit_name(robot)
     if not path.exists():
         yield (
             "missing",
             f"{path} does not exist, so after a crash nothing restarts the robot or makes its pins "
-            "safe: `shapechanger robot init` writes it beside the profile; copy it there.",
+            f"safe: `shapechanger robot install {profile or 'PROFILE'}` puts it there.",
         )
         return
     text = path.read_text()
@@ -160,8 +210,13 @@ def _unit(robot: str, profile: Path | None, root: Path) -> _Results:
     yield "good", f"{path} restarts the robot and makes its pins safe."
 
 
+<<<<<<< HEAD
 def _one_shot(guard: GuardPlan) -> _Results:
     if all(map(stops_itself, guard.outputs)):
+=======
+def _one_shot(guard: GuardPlan) -> Results:
+    if all(output.driver == "dynamixel" for output in guard.outputs):
+>>>>>>> h-install
         yield "good", "Each servo has its own watchdog, and releases when its bus is silent."
     elif guard.enable_pin is None:
         yield (
@@ -178,7 +233,7 @@ def _one_shot(guard: GuardPlan) -> _Results:
         )
 
 
-def _output_enable(guard: GuardPlan) -> _Results:
+def _output_enable(guard: GuardPlan) -> Results:
     for output in guard.outputs:
         if output.settings.get("over") == "pca9685" and output.settings.get("output_enable") == -1:
             yield (
@@ -189,7 +244,7 @@ def _output_enable(guard: GuardPlan) -> _Results:
             return
 
 
-def _latency_timers(guard: GuardPlan, root: Path) -> _Results:
+def _latency_timers(guard: GuardPlan, root: Path) -> Results:
     """Check that the adapters pass on the servos' answers at once."""
     for device in {o.settings["device"] for o in guard.outputs if o.driver == DRIVER}:
         path = root / "sys/bus/usb-serial/devices" / Path(device).name / "latency_timer"
@@ -205,19 +260,36 @@ def _latency_timers(guard: GuardPlan, root: Path) -> _Results:
             yield "good", f"The latency timer of {device} is 1 ms."
 
 
-def _devices(guard: GuardPlan, root: Path) -> _Results:
-    """Check that this user can open the device files."""
+def device_groups(guard: GuardPlan) -> dict[str, str]:
+    """Return the group that may open each device file of a robot's outputs and sensors."""
     groups: dict[str, str] = {}
+<<<<<<< HEAD
     if needs_pins(guard):
         groups["dev/gpiochip0"] = "gpio"
+=======
+    if any(uses_pins(output) for output in guard.outputs):
+        groups["/dev/gpiochip0"] = "gpio"
+>>>>>>> h-install
     for plan in (*guard.outputs, *guard.sensors):
         if "bus" in plan.settings and plan.settings.get("over", "pca9685") == "pca9685":
-            groups[f"dev/i2c-{plan.settings['bus']}"] = "i2c"
+            groups[f"/dev/i2c-{plan.settings['bus']}"] = "i2c"
     for plan in guard.outputs:
+<<<<<<< HEAD
         if plan.driver == DRIVER:
             groups[plan.settings["device"].lstrip("/")] = "dialout"
     for name, group in groups.items():
         path = root / name
+=======
+        if plan.driver == "dynamixel":
+            groups[plan.settings["device"]] = "dialout"
+    return groups
+
+
+def _devices(guard: GuardPlan, root: Path) -> Results:
+    """Check that this user can open the device files."""
+    for name, group in device_groups(guard).items():
+        path = root / name.lstrip("/")
+>>>>>>> h-install
         if not path.exists():
             remedy = "enable it with `sudo raspi-config` (Interface Options)"
             if group == "dialout":
@@ -230,7 +302,7 @@ def _devices(guard: GuardPlan, root: Path) -> _Results:
             yield "good", f"{path} can be opened."
 
 
-def _packages(guard: GuardPlan, camera: CameraPlan | None) -> _Results:
+def _packages(guard: GuardPlan, camera: CameraPlan | None) -> Results:
     remedies = {"gpiozero": "pip install 'shapechanger[robot]'"}
     remedies["lgpio"] = "pip install lgpio, or for Python 3.13 `sudo apt install python3-lgpio`"
     if any("bus" in plan.settings for plan in (*guard.outputs, *guard.sensors)):
@@ -249,7 +321,7 @@ def _packages(guard: GuardPlan, camera: CameraPlan | None) -> _Results:
             yield "good", f"{name} is installed."
 
 
-def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> _Results:
+def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> Results:
     with ThreadPoolExecutor(1) as reader:
         try:
             camera = look(plan)
@@ -265,7 +337,7 @@ def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> _Results:
             yield "good", f"{plan.driver} sent a frame of {len(frame.jpeg)} bytes."
 
 
-def _geometry(plan: CameraPlan) -> _Results:
+def _geometry(plan: CameraPlan) -> Results:
     """Check that policies that drive by waypoints can use the camera."""
     if plan.pitch_deg is None or plan.fovy_deg is None:
         yield (
@@ -281,43 +353,44 @@ def _geometry(plan: CameraPlan) -> _Results:
         )
 
 
-def _bus_speed(config: Path | None) -> _Results:
+def boot_rates(config: Path) -> list[int]:
+    """Return the speeds of the I2C bus that a config.txt sets, bits per second; the last counts."""
+    return [int(rate) for rate in _BAUD.findall("\n".join(boot_lines(config)))]
+
+
+def _bus_speed(config: Path | None) -> Results:
     """Check that the I2C bus is fast enough to read the encoders in each tick of the guard."""
     if config is None:
         yield (
             "unknown",
-            f"The bus should have {_FAST_HZ} bits per second, which cannot be read here.",
+            f"The bus should have {FAST_HZ} bits per second, which cannot be read here.",
         )
         return
-    rates = _BAUD.findall(config.read_text())
-    if rates and int(rates[-1]) >= _FAST_HZ:
+    rates = boot_rates(config)
+    if rates and rates[-1] >= FAST_HZ:
         yield "good", f"{config} sets {rates[-1]} bits per second."
     else:
         yield (
             "missing",
             f"Four encoders take 3 of every 10 ms at the default of 100000 bits per second: add "
-            f"`dtparam=i2c_arm_baudrate={_FAST_HZ}` to {config} and restart the computer.",
+            f"`dtparam=i2c_arm_baudrate={FAST_HZ}` to {config} and restart the computer.",
         )
 
 
-def _encoders(
-    plans: Sequence[SensorPlan],
-    root: Path,
-    connect: Callable[[SensorPlan], As5600],
-    *,
-    served: bool,
-) -> _Results:
+def _has_bus(bus: int, root: Path) -> bool:
+    """Return whether this user may open an I2C bus."""
+    return os.access(root / f"dev/i2c-{bus}", os.R_OK | os.W_OK)
+
+
+def _encoders(plans: Sequence[SensorPlan], root: Path, hardware: Hardware) -> Results:
     """Check the encoders at the joints, where their bus can be opened."""
+    from shapechanger.robot.drivers.as5600 import connect_encoders
+
     for plan in plans:
-        if not os.access(root / f"dev/i2c-{plan.settings['bus']}", os.R_OK | os.W_OK):
-            continue
-        if served:
-            # The guard then has the multiplexer to itself: a channel opened by another process
-            # would give it the angle of another joint.
-            yield "unknown", "The robot may be served now, and its encoders were left alone."
+        if not _has_bus(plan.settings["bus"], root):
             continue
         try:
-            sensor = connect(plan)
+            sensor = connect_encoders(plan, hardware)
         except RobotError as error:
             yield "missing", str(error)
             continue
@@ -326,12 +399,6 @@ def _encoders(
                 yield _encoder(sensor, encoder)
         finally:
             sensor.close()
-
-
-def _real_encoders(plan: SensorPlan) -> As5600:
-    from shapechanger.robot.drivers.as5600 import connect_encoders
-
-    return connect_encoders(plan, RealHardware())
 
 
 def _encoder(sensor: As5600, encoder: JointEncoder) -> tuple[Level, str]:

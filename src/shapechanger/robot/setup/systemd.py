@@ -30,7 +30,7 @@ def unit_text(
         robot: Name of the robot.
         profile: Its profile.
         program: Path of the command `shapechanger`.
-        user: User that runs it, a member of the groups gpio, i2c and video.
+        user: User that runs it, a member of the groups of its devices.
         credentials: Folder of the key and the certificate; None for the default.
     """
     text = _TEMPLATE.read_text(encoding="utf-8")

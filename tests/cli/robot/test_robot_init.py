@@ -1,0 +1,119 @@
+"""`shapechanger robot init`: its questions."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli.robot import setup
+from shapechanger.cli.robot.setup import Init, Install
+from shapechanger.errors import RobotError
+from shapechanger.robot.profile.load import load_profile, shipped_profiles
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[str], list[str]]:
+    """Questions so far, and the answers to come; Ctrl-D follows them."""
+    questions: list[str] = []
+    answers: list[str] = []
+
+    def answer(question: str) -> str:
+        questions.append(question)
+        if not answers:
+            raise EOFError
+        return answers.pop(0)
+
+    monkeypatch.setattr("builtins.input", answer)
+    monkeypatch.setattr("sys.stdin", _Terminal())
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    return questions, answers
+
+
+def test_enter_takes_the_defaults(asked: tuple[list[str], list[str]]) -> None:
+    """The profile is then the shipped one."""
+    questions, answers = asked
+    answers += [""] * 4
+    Init().run()
+    assert len(questions) == 4
+    assert all(question.endswith("]: ") for question in questions)
+    assert Path("car.toml").read_text() == shipped_profiles()["car"].read_text()
+
+
+def test_answers_are_checked_one_by_one(
+    asked: tuple[list[str], list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A wrong one gives a sentence, and is asked for again."""
+    questions, answers = asked
+    Path("taken.toml").touch()
+    answers += ["kar", "car", "../up", "taken", "rover", "noen", "none", "me", "anyone"]
+    Init().run()
+    said = capsys.readouterr().out
+    for words in (
+        "No kind of robot matches 'kar'. Did you mean 'car'?",
+        "Cannot write taken.toml: it exists.",
+        "No camera matches 'noen'. Did you mean 'none'?",
+        "No answer matches 'me'.",
+    ):
+        assert words in said
+    assert len(questions) == 9
+    profile = load_profile("rover.toml")
+    assert (profile.name, profile.camera, profile.arming) == ("rover", None, "anyone")
+
+
+def test_on_a_pi_the_fifth_question_installs(
+    asked: tuple[list[str], list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No question is a sixth."""
+    questions, answers = asked
+    installed: list[str] = []
+    monkeypatch.setattr(setup, "require_pi", lambda _: None)
+    monkeypatch.setattr(Install, "run", lambda self: installed.append(self.profile))
+    answers += ["tank", "", "usb", "", "maybe", ""]
+    Init().run()
+    assert installed == ["tank.toml"]
+    assert len(set(questions)) == 5
+    camera = load_profile("tank.toml").camera
+    assert camera is not None
+    assert camera.driver == "v4l2"
+    answers += ["tank", "second", "", "", "no"]
+    Init().run()
+    assert installed == ["tank.toml"]
+
+
+def test_the_end_of_the_answers_writes_nothing(
+    asked: tuple[list[str], list[str]], tmp_path: Path
+) -> None:
+    """Ctrl-D ends it with one sentence."""
+    _, answers = asked
+    answers += ["car", "rover"]
+    with pytest.raises(RobotError, match="nothing was written"):
+        Init().run()
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize("command", [Init(), Init(name="rover")])
+def test_without_a_terminal_nothing_is_asked(
+    asked: tuple[list[str], list[str]], monkeypatch: pytest.MonkeyPatch, command: Init
+) -> None:
+    """The kind is then needed, as it is with any other argument."""
+    if command == Init():
+        monkeypatch.setattr("sys.stdin", io.StringIO())
+    with pytest.raises(RobotError, match=r"`shapechanger robot init car`. There are: .*boat"):
+        command.run()
+    assert asked[0] == []
+
+
+def test_arguments_ask_nothing(asked: tuple[list[str], list[str]]) -> None:
+    """A script can choose the same."""
+    Init("car", "bench", camera="none").run()
+    assert asked[0] == []
+    assert load_profile("bench.toml").camera is None

@@ -1,0 +1,96 @@
+"""A Raspberry Pi in a folder, with the commands that change it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shapechanger.robot.setup.install import Machine, RootCommand
+
+
+class FakePi:
+    """Files of a Raspberry Pi, and commands with their effects on them.
+
+    Args:
+        root: Folder for its files.
+        config: Content of its config.txt; None for none.
+        groups: Its groups, none with members.
+
+    Attributes:
+        root: Folder of its files.
+        ran: The commands so far, as typed.
+        refuses: Program that fails.
+    """
+
+    def __init__(
+        self,
+        root: Path,
+        config: str | None = "camera_auto_detect=1\n",
+        groups: tuple[str, ...] = ("dialout", "gpio", "i2c", "video"),
+    ) -> None:
+        self.root = root
+        self.ran: list[str] = []
+        self.refuses = ""
+        self.write("proc/device-tree/model", "Raspberry Pi 4 Model B Rev 1.5\0")
+        self.write("etc/group", "".join(f"{name}:x:1:\n" for name in groups))
+        self.write("usr/lib/python3/dist-packages/picamera2/__init__.py", "")
+        for folder in ("run/systemd/system", "etc/systemd/system/multi-user.target.wants"):
+            (root / folder).mkdir(parents=True)
+        for folder in ("etc/modules-load.d", "etc/udev/rules.d"):
+            (root / folder).mkdir(parents=True)
+        if config is not None:
+            self.write("boot/firmware/config.txt", config)
+            self.write("boot/firmware/cmdline.txt", "console=serial0,115200 console=tty1\n")
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, for its user pi."""
+        return Machine("pi", self.root, self.run)
+
+    @property
+    def config(self) -> str:
+        """Content of its config.txt."""
+        return (self.root / "boot/firmware/config.txt").read_text()
+
+    def write(self, name: str, text: str) -> None:
+        """Write one of its files."""
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+    def run(self, command: RootCommand) -> str:
+        """Run a command as root; see `Runner`."""
+        self.ran.append(str(command))
+        if command.arguments[0] == self.refuses:
+            return f"{self.refuses}: permission denied"
+        wanted = self.root / "etc/systemd/system/multi-user.target.wants"
+        match command.arguments:
+            case ("tee", "-a", path):
+                Path(path).write_text(Path(path).read_text() + command.text)
+            case ("tee", path):
+                Path(path).write_text(command.text)
+            case ("install", "-m", "644", source, path):
+                Path(path).write_text(Path(source).read_text())
+            case ("rm", "-f", path):
+                Path(path).unlink(missing_ok=True)
+            case ("usermod", "-aG", group, user):
+                lines = (self.root / "etc/group").read_text().splitlines()
+                lines = [f"{one}{user}" if one.startswith(f"{group}:") else one for one in lines]
+                self.write("etc/group", "\n".join(lines) + "\n")
+            case ("systemctl", "enable", unit):
+                (wanted / unit).symlink_to(wanted.parent / unit)
+            case ("systemctl", "disable", "--now", unit):
+                (wanted / unit).unlink(missing_ok=True)
+            case ("raspi-config", "nonint", "do_i2c", "0"):
+                self.write("boot/firmware/config.txt", f"dtparam=i2c_arm=on\n{self.config}")
+            case ("raspi-config", "nonint", "do_serial_hw", "0"):
+                self.write("boot/firmware/config.txt", f"enable_uart=1\n{self.config}")
+            case ("raspi-config", "nonint", "do_serial_cons", "1"):
+                self.write("boot/firmware/cmdline.txt", "console=tty1\n")
+            case ("systemctl", "daemon-reload") | ("udevadm", "control", "--reload"):
+                pass
+            case ("apt-get", "install", "-y", package):
+                folder = package.removeprefix("python3-")
+                self.write(f"usr/lib/python3/dist-packages/{folder}/__init__.py", "")
+            case _:
+                raise AssertionError(f"unexpected command: {command}")
+        return ""

@@ -1,0 +1,232 @@
+"""Putting a robot in place on a Raspberry Pi, on a fake one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.setup.doctor import examine_robot
+from shapechanger.robot.setup.install import (
+    RootCommand,
+    changes_to_install,
+    changes_to_remove,
+    make_changes,
+    require_pi,
+    run_as_root,
+)
+from shapechanger.robot.setup.systemd import write_unit
+from tests.robot.setup.fake_pi import FakePi
+
+_CAMERA = CameraPlan("picamera2")
+_UNIT = "etc/systemd/system/shapechanger-car.service"
+
+
+def _plan(name: str) -> GuardPlan:
+    return load_profile(find_profile(name)).guard_plan()
+
+
+def _install(
+    pi: FakePi, plan: GuardPlan, camera: CameraPlan | None = None, *, dry: bool = False
+) -> dict[str, tuple[str, str]]:
+    unit, _ = write_unit(plan.name, pi.root / "home" / f"{plan.name}.toml")
+    changes = changes_to_install(plan, camera, unit, pi.machine)
+    return {o.change.name: (o.level, o.sentence) for o in make_changes(changes, pi.run, dry=dry)}
+
+
+def _levels(found: dict[str, tuple[str, str]]) -> dict[str, str]:
+    return {name: level for name, (level, _) in found.items()}
+
+
+@pytest.fixture
+def pi(tmp_path: Path) -> FakePi:
+    """A fresh Raspberry Pi."""
+    return FakePi(tmp_path)
+
+
+def test_a_car_is_put_in_place_once(pi: FakePi) -> None:
+    """The second run changes nothing and says so."""
+    found = _install(pi, _plan("car"), _CAMERA)
+    assert _levels(found) == {
+        "group gpio": "did",
+        "group video": "did",
+        "strict_gpiod": "did",
+        "camera": "already",
+        "picamera2": "already",
+        "service": "did",
+        "start": "did",
+    }
+    assert (pi.root / _UNIT).read_text().count("ExecStart=") == 1
+    ran = list(pi.ran)
+    assert set(_levels(_install(pi, _plan("car"), _CAMERA)).values()) == {"already"}
+    assert pi.ran == ran
+
+
+def test_the_doctor_is_content_afterwards(pi: FakePi) -> None:
+    """What the doctor finds missing in the computer's settings is what `install` puts in place."""
+    plan = _plan("car")
+    profile = pi.root / "home" / "car.toml"
+
+    def levels() -> dict[str, str]:
+        found = examine_robot(plan, None, 0, pi.root, profile=profile)
+        return {one.check: one.level for one in found}
+
+    before = levels()
+    assert (before["strict_gpiod"], before["systemd"]) == ("missing", "missing")
+    _install(pi, plan)
+    after = levels()
+    assert (after["strict_gpiod"], after["systemd"]) == ("good", "good")
+
+
+def test_a_dry_run_changes_nothing(pi: FakePi) -> None:
+    """Each sentence is the command."""
+    found = _install(pi, _plan("car"), _CAMERA, dry=True)
+    assert pi.ran == []
+    assert found["group gpio"] == (
+        "would",
+        "sudo usermod -aG gpio pi",
+    )
+    assert "dtparam=strict_gpiod" in found["strict_gpiod"][1]
+    assert not (pi.root / _UNIT).exists()
+
+
+@pytest.mark.parametrize("raspi_config", [True, False])
+def test_a_servo_board_needs_i2c(pi: FakePi, raspi_config: bool) -> None:
+    """raspi-config is used where it is there, and config.txt otherwise."""
+    if raspi_config:
+        pi.write("usr/bin/raspi-config", "")
+    found = _levels(_install(pi, _plan("car-esc")))
+    assert (found["I2C"], found["group i2c"]) == ("did", "did")
+    assert any("raspi-config nonint do_i2c 0" in line for line in pi.ran) == raspi_config
+    assert (pi.root / "etc/modules-load.d/i2c-dev.conf").exists() != raspi_config
+    assert _levels(_install(pi, _plan("car-esc")))["I2C"] == "already"
+
+
+def test_another_bus_is_left_to_a_person(pi: FakePi) -> None:
+    """Its overlay depends on its pins."""
+    plan = _plan("car-esc")
+    outputs = tuple(replace(o, settings={**o.settings, "bus": 3}) for o in plan.outputs)
+    plan = replace(plan, outputs=outputs)
+    level, sentence = _install(pi, plan)["I2C bus 3"]
+    assert (level, "dtoverlay=i2c3" in sentence) == ("failed", True)
+    pi.write("dev/i2c-3", "")
+    assert _install(pi, plan)["I2C bus 3"][0] == "already"
+
+
+def test_lines_of_another_model_do_not_count(tmp_path: Path) -> None:
+    """A line below a filter, such as [pi5], applies to that model only; ours applies to all."""
+    pi = FakePi(tmp_path, "camera_auto_detect=1\n[pi5]\ndtparam=strict_gpiod\n")
+    assert _install(pi, _plan("car"))["strict_gpiod"][0] == "did"
+    assert pi.config.endswith("[pi5]\ndtparam=strict_gpiod\n\n[all]\ndtparam=strict_gpiod\n")
+
+
+def test_a_rig_on_an_adapter(pi: FakePi) -> None:
+    """Its adapter gets a short latency, and its encoders a fast bus."""
+    found = _levels(_install(pi, _plan("finger")))
+    assert (found["latency timer"], found["I2C speed"], found["group dialout"]) == ("did",) * 3
+    assert set(_levels(_install(pi, _plan("finger"))).values()) == {"already"}
+
+
+@pytest.mark.parametrize(("raspi_config", "level"), [(True, "did"), (False, "failed")])
+def test_a_rig_on_the_headers_serial_port(pi: FakePi, raspi_config: bool, level: str) -> None:
+    """Only raspi-config knows how a model's port is freed from the console."""
+    if raspi_config:
+        pi.write("usr/bin/raspi-config", "")
+    plan = _plan("finger")
+    settings = {"device": "/dev/serial0"}
+    outputs = tuple(replace(o, settings={**o.settings, **settings}) for o in plan.outputs)
+    found = _install(pi, replace(plan, outputs=outputs))
+    assert (found["serial port"][0], found["serial console"][0]) == (level, level)
+    assert ("enable_uart=1" in found["serial port"][1]) != raspi_config
+
+
+def test_what_fails_is_told_with_its_command(pi: FakePi) -> None:
+    """The other changes are made."""
+    pi.refuses = "usermod"
+    found = _install(pi, _plan("car"))
+    assert found["group gpio"] == (
+        "failed",
+        "usermod: permission denied. By hand: sudo usermod -aG gpio pi",
+    )
+    assert found["service"][0] == "did"
+
+
+def test_a_command_without_an_effect_is_told(pi: FakePi) -> None:
+    """An exit code of 0 is not proof."""
+    unit, _ = write_unit("car", pi.root / "home" / "car.toml")
+    changes = changes_to_install(_plan("car"), None, unit, pi.machine)
+    outcomes = list(make_changes(changes, lambda _: ""))
+    assert {outcome.level for outcome in outcomes} == {"failed"}
+    assert all("the command had no effect" in outcome.sentence for outcome in outcomes)
+
+
+def test_without_groups_and_config(tmp_path: Path) -> None:
+    """What Raspberry Pi OS would have is named."""
+    pi = FakePi(tmp_path, config=None, groups=())
+    found = _install(pi, _plan("car"), _CAMERA)
+    assert found["group gpio"] == (
+        "failed",
+        "There is no group gpio here, which Raspberry Pi OS has.",
+    )
+    assert "no config.txt" in found["strict_gpiod"][1]
+    assert "dtparam=strict_gpiod" in found["strict_gpiod"][1]
+
+
+def test_an_older_unit_is_replaced(pi: FakePi) -> None:
+    """The unit beside the profile, which a person may edit, is the one that counts."""
+    pi.write(_UNIT, "old")
+    assert _install(pi, _plan("car"))["service"][0] == "did"
+    assert "safe-pins" in (pi.root / _UNIT).read_text()
+
+
+def test_the_service_is_removed(pi: FakePi) -> None:
+    """Nothing of it is left, and removing it again says so."""
+    _install(pi, _plan("car"))
+    for level in ("did", "already"):
+        changes = changes_to_remove("shapechanger-car.service", pi.root)
+        assert [outcome.level for outcome in make_changes(changes, pi.run)] == [level]
+    assert not list((pi.root / "etc/systemd").rglob("shapechanger*"))
+    assert "dtparam=strict_gpiod" in pi.config
+
+
+@pytest.mark.parametrize(
+    ("missing", "words"),
+    [("run/systemd", "not run by systemd"), ("proc/device-tree/model", "not a Raspberry Pi")],
+)
+def test_other_machines_are_refused(pi: FakePi, missing: str, words: str) -> None:
+    """The error names what is needed."""
+    require_pi(pi.root)
+    (pi.root / missing).rename(pi.root / "away")
+    with pytest.raises(RobotError, match=f"{words}.*Raspberry Pi OS"):
+        require_pi(pi.root)
+
+
+def test_commands_run_as_root(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without root they go through sudo, and a failure is its last line."""
+    code = "import sys; sys.stderr.write('one\\ntwo\\n'); sys.exit(len(sys.stdin.read()))"
+    script = RootCommand((sys.executable, "-c", code), "text")
+    monkeypatch.setattr("os.geteuid", lambda: 0)
+    assert run_as_root(script) == "two"
+    assert run_as_root(script._replace(text="")) == ""
+    silent = RootCommand((sys.executable, "-c", "raise SystemExit(3)"))
+    assert run_as_root(silent) == f"{sys.executable} exited with 3"
+    monkeypatch.setattr("os.geteuid", lambda: 1000)
+    monkeypatch.setenv("PATH", "")
+    assert run_as_root(script) == "sudo: No such file or directory"
+
+
+def test_a_typed_command_does_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A person can copy it."""
+    (tmp_path / "sudo").write_text('#!/bin/sh\nexec "$@"\n')
+    (tmp_path / "sudo").chmod(0o755)
+    command = RootCommand(("tee", str(tmp_path / "made")), "\n[all]\ndtparam=a\\b 'c'\n")
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    subprocess.run(str(command), shell=True, check=True, capture_output=True)
+    assert (tmp_path / "made").read_text() == command.text
