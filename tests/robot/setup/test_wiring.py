@@ -143,7 +143,7 @@ def test_the_servos_of_a_rig_answer() -> None:
     plan = load_profile(find_profile("finger")).guard_plan()
     board = _Board(TwinWiring(plan), DrivingWorld({"tendon"}, (160, 120), seed=0))
     ((level, sentence),) = _found(plan, board)["servo bus"]
-    servos = [output for output in plan.outputs if output.driver == "dynamixel"]
+    servos = [output for output in plan.outputs if output.driver == "bus_servo"]
     assert (level, sentence) == ("good", f"All {len(servos)} servos answer.")
     board.pins.require_rig().break_servo(servos[0].name, "mute")
     ((level, sentence),) = _found(plan, board)["servo bus"]

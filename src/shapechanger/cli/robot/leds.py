@@ -49,7 +49,7 @@ Ask = Callable[[str], bool | None]
 """Asks a person a question; None if nobody answers."""
 
 
-class Lamp(NamedTuple):
+class BenchLamp(NamedTuple):
     """An LED in place of a motor or servo.
 
     Attributes:
@@ -67,7 +67,7 @@ class Lamp(NamedTuple):
     pin: int | None = None
 
 
-def lamps_of(plan: GuardPlan) -> list[Lamp]:
+def lamps_of(plan: GuardPlan) -> list[BenchLamp]:
     """Return the LEDs of a bench, in the order of the outputs.
 
     Args:
@@ -76,25 +76,25 @@ def lamps_of(plan: GuardPlan) -> list[Lamp]:
     Raises:
         RobotError: If an output takes no LED.
     """
-    found: list[Lamp] = []
+    found: list[BenchLamp] = []
     for output in plan.outputs:
         settings, name = output.settings, output.name
         match output.driver:
             case "hbridge":
                 for way, value in (("forward", 1.0), ("backward", -1.0), ("enable", 1.0)):
                     if (pin := settings[way]) >= 0:
-                        found.append(Lamp(f"{name} {way}", f"GPIO{pin}", output, value, pin))
+                        found.append(BenchLamp(f"{name} {way}", f"GPIO{pin}", output, value, pin))
             case "phase_enable":
                 pin = settings["enable"]
-                found.append(Lamp(f"{name} enable", f"GPIO{pin}", output, 1.0, pin))
+                found.append(BenchLamp(f"{name} enable", f"GPIO{pin}", output, 1.0, pin))
                 pin = settings["phase"]
-                found.append(Lamp(f"{name} backward", f"GPIO{pin}", output, -1.0, pin))
+                found.append(BenchLamp(f"{name} backward", f"GPIO{pin}", output, -1.0, pin))
             case "servo" | "esc" if settings["over"] == "lgpio":
                 pin = settings["pin"]
-                found.append(Lamp(f"{name}, dimly", f"GPIO{pin}", output, 1.0, pin))
+                found.append(BenchLamp(f"{name}, dimly", f"GPIO{pin}", output, 1.0, pin))
             case "servo" | "esc":
                 place = f"channel {settings['channel']} of the {settings['over']}"
-                found.append(Lamp(f"{name}, dimly", place, output))
+                found.append(BenchLamp(f"{name}, dimly", place, output))
             case driver:
                 raise RobotError(
                     f"Output {name} is a servo on a bus ({driver}), and an LED cannot stand for "
@@ -102,12 +102,12 @@ def lamps_of(plan: GuardPlan) -> list[Lamp]:
                 )
     if plan.enable_pin is not None:
         pin = plan.enable_pin
-        found.append(Lamp("enable line", f"GPIO{pin}", None, pin=pin))
+        found.append(BenchLamp("enable line", f"GPIO{pin}", None, pin=pin))
     return found
 
 
 @contextmanager
-def lit(lamp: Lamp, plan: GuardPlan, hardware: Hardware) -> Generator[None]:
+def lit(lamp: BenchLamp, plan: GuardPlan, hardware: Hardware) -> Generator[None]:
     """Light one LED, through the driver of its output, and put it out at the end.
 
     Args:
@@ -138,10 +138,10 @@ def lit(lamp: Lamp, plan: GuardPlan, hardware: Hardware) -> Generator[None]:
         driver.close()
 
 
-class Judge(Protocol):
+class LampJudge(Protocol):
     """Measures what the outputs do, independently of the robot's programs."""
 
-    def sees(self, lamp: Lamp) -> bool | None:
+    def sees(self, lamp: BenchLamp) -> bool | None:
         """Return whether an LED is lit; None if that is not measured."""
         ...
 
@@ -155,14 +155,14 @@ class Judge(Protocol):
 
 
 class TwinJudge:
-    """Reads the levels and the ledger of a twin; see `Judge`."""
+    """Reads the levels and the ledger of a twin; see `LampJudge`."""
 
     def __init__(self, board: BoardAt, operator: Operator, wiring: TwinWiring) -> None:
         self._board = board
         self._operator = operator
         self._wiring = wiring
 
-    def sees(self, lamp: Lamp) -> bool | None:
+    def sees(self, lamp: BenchLamp) -> bool | None:
         """Return whether an LED is lit."""
         levels = self._operator.levels()
         if lamp.pin is not None:
@@ -185,7 +185,7 @@ class TwinJudge:
 
 
 class ProbeJudge:
-    """Watches the pin of a motor through a wire to a free pin; see `Judge`.
+    """Watches the pin of a motor through a wire to a free pin; see `LampJudge`.
 
     Edges are stamped here when they arrive, about a millisecond late.
 
@@ -200,7 +200,7 @@ class ProbeJudge:
         self._edges: list[int] = []
         self._input = EdgeInput(probe, "down", hardware.pin_factory(), self._changed)
 
-    def sees(self, lamp: Lamp) -> bool | None:
+    def sees(self, lamp: BenchLamp) -> bool | None:
         """Return whether the LED on the probed pin is lit."""
         return self.moves() if lamp.pin == self._probed else None
 
@@ -225,7 +225,7 @@ class ProbeJudge:
 
 
 def walk(
-    plan: GuardPlan, connect_pins: Callable[[], Hardware], ask: Ask, judge: Judge | None
+    plan: GuardPlan, connect_pins: Callable[[], Hardware], ask: Ask, judge: LampJudge | None
 ) -> Iterator[SelftestResult]:
     """Light each LED alone, and ask or measure whether it is lit.
 
@@ -392,7 +392,7 @@ class Bench:
             hardware.close()
 
     @contextmanager
-    def _judged(self, board: BoardAt | None) -> Generator[Judge | None]:
+    def _judged(self, board: BoardAt | None) -> Generator[LampJudge | None]:
         """Open the judge."""
         with ExitStack() as stack:
             if board is not None:
@@ -438,7 +438,7 @@ class Bench:
                 if failures:
                     yield SelftestResult("safe pins", "bad", " ".join(failures))
 
-    def _tried(self, name: str, robot: RunningRobot, judge: Judge | None) -> SelftestResult:
+    def _tried(self, name: str, robot: RunningRobot, judge: LampJudge | None) -> SelftestResult:
         """Drive, let one fault happen, and measure or ask when the LED went out."""
         fault = FAULTS[name]
         limit_ms = fault.limit_ms(self._plan.limits)
@@ -462,7 +462,7 @@ class Bench:
         return result
 
     def _judge_stop(
-        self, name: str, judge: Judge | None, at_ns: int, limit_ms: float
+        self, name: str, judge: LampJudge | None, at_ns: int, limit_ms: float
     ) -> SelftestResult:
         promised = f"{limit_ms:.0f} ms are promised"
         if judge is not None:
@@ -488,7 +488,7 @@ def _found(check: str, level: str, sentence: str) -> SelftestResult:
     return SelftestResult(check, known.get(level, "unknown"), sentence)
 
 
-def _awaited_motion(judge: Judge | None) -> bool:
+def _awaited_motion(judge: LampJudge | None) -> bool:
     """Wait until the judge sees motion; without a judge, assume it."""
     until_s = time.monotonic() + _MOVES_S
     while judge is not None and not judge.moves():

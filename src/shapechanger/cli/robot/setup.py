@@ -31,12 +31,8 @@ from shapechanger.robot.profile.load import (
     starter_text,
     write_text,
 )
-<<<<<<< HEAD
-from shapechanger.robot.setup.doctor import Finding, examine_robot, needs_pins
-from shapechanger.robot.setup.systemd import write_unit
-=======
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.setup.doctor import Finding, examine_robot, uses_pins
+from shapechanger.robot.setup.doctor import Finding, examine_robot, needs_pins
 from shapechanger.robot.setup.install import (
     Machine,
     Outcome,
@@ -47,7 +43,6 @@ from shapechanger.robot.setup.install import (
     require_systemd,
 )
 from shapechanger.robot.setup.systemd import unit_name, write_unit
->>>>>>> h-install
 from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
 
 

@@ -18,14 +18,9 @@ from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
-<<<<<<< HEAD
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
-from shapechanger.robot.hardware import RealHardware
-=======
-from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
->>>>>>> h-install
 from shapechanger.robot.setup.systemd import unit_name
 from shapechanger.robot.setup.wiring import Level, Results, examine_wiring
 
@@ -210,13 +205,8 @@ def _unit(robot: str, profile: Path | None, root: Path) -> Results:
     yield "good", f"{path} restarts the robot and makes its pins safe."
 
 
-<<<<<<< HEAD
-def _one_shot(guard: GuardPlan) -> _Results:
-    if all(map(stops_itself, guard.outputs)):
-=======
 def _one_shot(guard: GuardPlan) -> Results:
-    if all(output.driver == "dynamixel" for output in guard.outputs):
->>>>>>> h-install
+    if all(map(stops_itself, guard.outputs)):
         yield "good", "Each servo has its own watchdog, and releases when its bus is silent."
     elif guard.enable_pin is None:
         yield (
@@ -263,24 +253,13 @@ def _latency_timers(guard: GuardPlan, root: Path) -> Results:
 def device_groups(guard: GuardPlan) -> dict[str, str]:
     """Return the group that may open each device file of a robot's outputs and sensors."""
     groups: dict[str, str] = {}
-<<<<<<< HEAD
     if needs_pins(guard):
-        groups["dev/gpiochip0"] = "gpio"
-=======
-    if any(uses_pins(output) for output in guard.outputs):
         groups["/dev/gpiochip0"] = "gpio"
->>>>>>> h-install
     for plan in (*guard.outputs, *guard.sensors):
         if "bus" in plan.settings and plan.settings.get("over", "pca9685") == "pca9685":
             groups[f"/dev/i2c-{plan.settings['bus']}"] = "i2c"
     for plan in guard.outputs:
-<<<<<<< HEAD
         if plan.driver == DRIVER:
-            groups[plan.settings["device"].lstrip("/")] = "dialout"
-    for name, group in groups.items():
-        path = root / name
-=======
-        if plan.driver == "dynamixel":
             groups[plan.settings["device"]] = "dialout"
     return groups
 
@@ -289,7 +268,6 @@ def _devices(guard: GuardPlan, root: Path) -> Results:
     """Check that this user can open the device files."""
     for name, group in device_groups(guard).items():
         path = root / name.lstrip("/")
->>>>>>> h-install
         if not path.exists():
             remedy = "enable it with `sudo raspi-config` (Interface Options)"
             if group == "dialout":

@@ -16,6 +16,7 @@ from typing import Final, Literal, NamedTuple
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.drivers.servos.settings import DRIVER
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.setup.doctor import (
     FAST_HZ,
@@ -23,8 +24,8 @@ from shapechanger.robot.setup.doctor import (
     boot_lines,
     boot_rates,
     device_groups,
+    needs_pins,
     sets_parameter,
-    uses_pins,
 )
 
 _UNITS: Final = "etc/systemd/system"
@@ -290,7 +291,7 @@ def _boot_changes(
         added = RootCommand(("tee", "-a", str(config)), f"\n[all]\n{text}\n")
         return SystemChange(name, state, is_made, (added,), "restart", text)
 
-    if any(map(uses_pins, guard.outputs)) or guard.enable_pin is not None:
+    if needs_pins(guard):
         yield line(
             "strict_gpiod",
             "The pins of a process that dies go low.",
@@ -363,7 +364,7 @@ def _serial(guard: GuardPlan, machine: Machine, config: Path | None) -> Iterator
     def has_console() -> bool:
         return cmdline is None or "console=serial0" in cmdline.read_text()
 
-    devices = {o.settings["device"] for o in guard.outputs if o.driver == "dynamixel"}
+    devices = {o.settings["device"] for o in guard.outputs if o.driver == DRIVER}
     for device in sorted(devices):
         if not Path(device).name.startswith(_UARTS):
             yield SystemChange(

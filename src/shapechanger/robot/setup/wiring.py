@@ -12,6 +12,7 @@ from typing import Final, Literal
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.sensor import open_sensor
+from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.outputs import OutputBank
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan, driven_pins
 from shapechanger.robot.hardware import Hardware
@@ -188,8 +189,11 @@ def servo_bus(guard: GuardPlan, hardware: Hardware) -> Results:
     Raises:
         RobotError: If one does not.
     """
-    servos = tuple(output for output in guard.outputs if output.driver == "dynamixel")
+    servos = tuple(output for output in guard.outputs if output.driver == DRIVER)
     if not servos:
+        return
+    if not all(map(stops_itself, servos)):
+        yield "unknown", "Not asked: these servos have power only while the enable line has it."
         return
     bank = OutputBank(replace(guard, outputs=servos), hardware)
     try:
@@ -228,7 +232,7 @@ def examine_wiring(
     on_buses = [one for one in guard.outputs if has_bus(one.settings.get("bus", -1))]
     checks.append(("servo board", servo_boards(replace(guard, outputs=tuple(on_buses)), hardware)))
     for plan in guard.sensors:
-        if plan.driver in {"as5600", "dynamixel"}:  # They have checks of their own.
+        if plan.driver in {"as5600", DRIVER}:  # They have checks of their own.
             continue
         there = has_bus(plan.settings["bus"]) if "bus" in plan.settings else has_pins
         if there or plan.driver == "cpu_temperature":
