@@ -163,7 +163,7 @@ def _driven_on_board(vehicle: str, file: Path, course: int) -> tuple[DriveResult
     """Return a drive of a policy on board, and the times between its commands, ms."""
     profile = find_profile(f"lab-{vehicle}")
     arguments = ("--policy", str(file))
-    times_ns: list[int] = []
+    seen_at: dict[int, int] = {}  # Arrival of each command that was seen, ns, by its number.
     with (
         run_robot(profile, clock="real", seed=course, arguments=arguments) as robot,
         robot.operator() as operator,
@@ -184,12 +184,13 @@ def _driven_on_board(vehicle: str, file: Path, course: int) -> tuple[DriveResult
             and not where.truth["collisions"]
         ):
             seen = person.ask().message
-            if seen.command_ns is not None and seen.command_ns not in times_ns[-1:]:
-                times_ns.append(seen.command_ns)
+            if seen.command_ns is not None and seen.applied_seq is not None:
+                seen_at[seen.applied_seq] = seen.command_ns
             where = operator.where()
     came, took_s = where.truth["progress_m"], (where.t - began_ns) / 1e9
     result = DriveResult(course, came, took_s, int(where.truth["collisions"]), came >= METRES)
-    return result, (np.diff(times_ns) / 1e6).tolist()
+    # The observer misses some commands, so only neighbours count.
+    return result, [(at - seen_at[n - 1]) / 1e6 for n, at in seen_at.items() if n - 1 in seen_at]
 
 
 def _compared(name: str, here: DriveScore, there: DriveScore) -> list[Row]:
