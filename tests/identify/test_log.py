@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -230,3 +231,20 @@ def test_a_log_of_an_old_version_knows_no_motors(tmp_path: Path) -> None:
     with path.open("wb") as file:
         np.savez(file, **arrays)
     assert load_log(path).motors is None
+
+
+def test_an_archive_that_unpacks_to_anything_is_refused(tmp_path: Path) -> None:
+    """A log of 300 kilobytes that holds 300 megabytes, and one with a pickled object."""
+    bomb = tmp_path / "bomb.npz"
+    with (
+        zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("t.npy", "w", force_zip64=True) as file,
+    ):
+        for _ in range(300):
+            file.write(bytes(1 << 20))
+    with pytest.raises(FingerError, match="unpacks to 314572800 bytes"):
+        load_log(bomb)
+    pickled = tmp_path / "pickled.npz"
+    np.savez(pickled, t=np.array([object()], dtype=object))
+    with pytest.raises(FingerError):
+        load_log(pickled)

@@ -46,6 +46,13 @@ def test_everything_is_read() -> None:
     assert profile.reset == (((0.0, -0.4, 0.25), 1.0), ((0.0, 0.0, 0.5), 0.5))
 
 
+def test_a_profile_may_state_how_the_robot_turns() -> None:
+    """In degrees there, and in rad for programs; one of the two numbers suffices."""
+    assert read().turning is None
+    stated = read(changed("control_hz = 25", "control_hz = 25\nturn_deg_per_m = 90"))
+    assert stated.turning == pytest.approx((0.5 * math.pi, 0.0))
+
+
 def test_drivers_find_all_their_settings() -> None:
     """Each driver gets all of its keys, and pins as BCM numbers."""
     settings = {output.name: output.settings for output in read().outputs}
