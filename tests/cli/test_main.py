@@ -155,7 +155,12 @@ def test_an_option_that_is_unknown_or_lacks_its_value_is_one_sentence(
 
 @pytest.mark.parametrize(
     "arguments",
-    [["policies", "list", "--no-references"], ["suite", "list"], ["methods"], ["train", "--help"]],
+    [
+        ["robot", "serve", "car", "--no-announce", "--help"],
+        ["suite", "list"],
+        ["methods"],
+        ["train", "--help"],
+    ],
 )
 def test_flags_and_help_are_options(
     capsys: pytest.CaptureFixture[str], arguments: list[str]
