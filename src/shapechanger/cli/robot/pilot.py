@@ -148,10 +148,12 @@ def require_fit(card: CloneCard, origin: Origin, robot: RobotFacts, *, measures:
             f"The policy learned at {rate:g} actions a second, and {robot.name} has control_hz = "
             f"{robot.control_hz:g}."
         )
+    has_waypoints = points_ways(card)
+    if not has_waypoints:
+        card.require_layouts(robot.actions, robot.state)
     if card.eyes != "none" and robot.image_size is None:
         raise RobotRefused(f"{robot.name} has no camera, and the policy drives by pictures.")
-    if not points_ways(card):
-        card.require_layouts(robot.actions, robot.state)
+    if not has_waypoints:
         return
     if not robot.has_geometry:
         raise RobotRefused(
