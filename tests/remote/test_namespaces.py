@@ -65,6 +65,13 @@ def there(robot: RunningRobot) -> KnownRobot:
     return robot.known_at(f"{ROBOT}:{robot.port}")
 
 
+def reaches(namespace: str, port: int) -> bool:
+    """Return whether the robot can be reached; a new link needs a moment."""
+    code = f"import socket; socket.create_connection(({ROBOT!r}, {port}), 1.0)"
+    command = ["ip", "netns", "exec", namespace, sys.executable, "-c", code]
+    return subprocess.run(command, check=False, capture_output=True).returncode == 0
+
+
 def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
     """The robot stops at its deadline, and can be driven again after the cable is rejoined."""
     profile = write_profile(tmp_path)
@@ -79,6 +86,7 @@ def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
             outputs = wiring.read(operator.levels(), 0)
             return not all(outputs[name].at_rest for name in wiring.propelling)
 
+        until(lambda: reaches(namespace, robot.port))
         operator.place(0)
         with Driver(there(robot), within) as driver:
             driver.await_commands(8)
@@ -95,6 +103,7 @@ def test_the_cable_is_cut(namespace: str, tmp_path: Path) -> None:
             assert again == ends
             assert not drives()
         ip("link", "set", f"{namespace}a", "up")
+        until(lambda: reaches(namespace, robot.port))
         operator.place(0)
         with Driver(there(robot), within) as driver:
             driver.await_commands(8)
