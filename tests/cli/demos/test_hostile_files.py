@@ -5,10 +5,12 @@ Each command runs with 384 MiB of memory, ten seconds of processor time and 64 M
 
 from __future__ import annotations
 
+import binascii
 import json
 import os
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,10 +19,10 @@ import h5py
 import pytest
 
 from shapechanger.demos.episodes.records import decode_line, encode_line
-from shapechanger.demos.exchange import export_recording, import_recording
+from shapechanger.demos.exchange import export_recording
 from shapechanger.demos.jpeg import picture_size
 from shapechanger.errors import DemosError
-from tests.demos.exchange.small import drive, picture
+from tests.demos.exchange.small import drive, huge, picture, tub_folder
 
 pytestmark = [pytest.mark.system, pytest.mark.realtime]
 
@@ -105,8 +107,6 @@ def added(line: dict[str, Any] | bytes) -> Callable[[Path], None]:
 
 def nested(depth: int = 100_000) -> bytes:
     """Return a line of deeply nested JSON with a right checksum."""
-    import binascii
-
     body = b'{"kind":' + b"[" * depth + b"]" * depth
     return body + b',"crc":"%08x"}\n' % binascii.crc32(body)
 
@@ -162,9 +162,7 @@ def test_a_hostile_episode_is_refused(tmp_path: Path, jail: Jail, name: str) -> 
         ("export", tmp_path / "data", "--out", out, "--to", "csv"),
         ("train", tmp_path / "data", "--out", tmp_path / "policy.safetensors"),
     ):
-        code, text = jail(*command)
-        assert code == 2, text
-        assert one_sentence(text), text
+        refuse(jail(*command))
         assert not out.exists()
     code, text = jail("list", tmp_path / "data")
     assert code in {0, 2}, text
@@ -185,30 +183,195 @@ def test_a_picture_of_many_scans_is_refused() -> None:
         picture_size(jpeg[:start] + jpeg[start:-2] * 500 + b"\xff\xd9", "bomb.jpg")
 
 
-@pytest.mark.parametrize(
-    ("how", "words"),
-    [
-        ("soft link", "links are not followed"),
-        ("external link", "in another file"),
-        ("chunk of a gigabyte", "more than the limit"),
-        ("claimed steps", "claims at least"),
-    ],
-)
-def test_a_hostile_minari_dataset_is_refused(how: str, words: str, tmp_path: Path) -> None:
+def refuse(answer: tuple[int, str]) -> str:
+    """Return the sentence with which a command refused."""
+    code, text = answer
+    assert code == 2, text
+    assert one_sentence(text), text
+    return text
+
+
+def framed(jpeg: bytes) -> Callable[[Path], None]:
+    """Return a change of all pictures of an episode, with the right size and checksum."""
+
+    def change(episode: Path) -> None:
+        (episode / "frames/000000.jpg").write_bytes(jpeg)
+        steps_with(frame=["000000.jpg", len(jpeg), f"{binascii.crc32(jpeg):08x}"])(episode)
+
+    return change
+
+
+PICTURES = {
+    "60000 x 60000 pixels": huge(),
+    "no JPEG": bytes(1000),
+    "cut off": picture(0)[:-200],
+}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_hostile_picture_is_refused(tmp_path: Path, jail: Jail, name: str) -> None:
+    """By each command that decodes it."""
+    framed(PICTURES[name])(drive(tmp_path / "data"))
+    for command in (
+        ("train", tmp_path / "data", "--out", tmp_path / "policy.safetensors"),
+        ("export", tmp_path / "data", "--out", tmp_path / "out-v0", "--to", "minari"),
+    ):
+        refuse(jail(*command))
+
+
+@pytest.mark.parametrize("command", ["list", "merge", "import", "export", "train", "repair"])
+def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path, jail: Jail, command: str) -> None:
+    """An archive is not unpacked, and a pickle, an HDF5 file or a pipe not opened."""
+    options = {
+        "merge": ("--out", tmp_path / "out"),
+        "import": ("--out", tmp_path / "out"),
+        "export": ("--out", tmp_path / "out", "--to", "csv"),
+        "train": ("--out", tmp_path / "policy.safetensors"),
+    }
+    with (
+        zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("t.npy", "w", force_zip64=True) as file,
+    ):
+        for _ in range(300):  # 300 MB in 300 kB.
+            file.write(bytes(1 << 20))
+    (tmp_path / "evil.npz").hardlink_to(tmp_path / "bomb.zip")
+    (tmp_path / "evil.pkl").write_bytes(b"cos\nsystem\n(S'touch pwned'\ntR.")
+    sparse(tmp_path / "evil.hdf5", 8 * GIB)
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("bomb.zip", "evil.npz", "evil.pkl", "evil.hdf5", "pipe"):
+        text = refuse(jail(command, tmp_path / name, *options.get(command, ())))
+        assert "is a file" in text
+
+
+@pytest.mark.parametrize("target", ["/etc/passwd", "/etc", ".."])
+def test_merge_copies_nothing_that_a_link_leads_to(tmp_path: Path, jail: Jail, target: str) -> None:
+    """A merged recording that is given back would otherwise contain the reader's files."""
+    link(drive(tmp_path / "data") / "frames/extra", target)
+    text = refuse(jail("merge", tmp_path / "data", "--out", tmp_path / "out"))
+    assert "is a link" in text
+    assert not (tmp_path / "out").exists()
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    """Replace a text of a file, which must be there."""
+    text = path.read_text()
+    assert old in text, text
+    path.write_text(text.replace(old, new))
+
+
+TUBS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "a catalog twice": (
+        lambda f: edit(f / "manifest.json", '"catalog_1.catalog"', '"catalog_0.catalog"'),
+        "names a catalog twice",
+    ),
+    "a catalog elsewhere": (
+        lambda f: edit(f / "manifest.json", "catalog_0.catalog", "../secret"),
+        "leaves the folder",
+    ),
+    "a picture twice": (lambda f: edit(f / "catalog_0.catalog", "1_cam", "0_cam"), "one picture"),
+    "a picture elsewhere": (
+        lambda f: edit(f / "catalog_0.catalog", "1_cam", "../../1_cam"),
+        "leaves the folder",
+    ),
+    "a picture of 60000 x 60000 pixels": (
+        lambda f: (f / "images/1_cam_image_array_.jpg").write_bytes(huge()),
+        "claims 60000 x 60000",
+    ),
+    "a catalog of 8 GiB": (lambda f: sparse(f / "catalog_0.catalog", 8 * GIB), "the limit"),
+    "a catalog that is a pipe": (lambda f: pipe(f / "catalog_0.catalog"), "is not in"),
+    "a catalog nested deeply": (
+        lambda f: (f / "catalog_0.catalog").write_text("[" * 100_000),
+        "is not valid JSON",
+    ),
+    "a manifest that is cut off": (
+        lambda f: (f / "manifest.json").write_text("[]\n[]\n"),
+        "has 2 lines",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TUBS)
+def test_a_hostile_tub_is_refused(tmp_path: Path, jail: Jail, name: str) -> None:
+    """The error names the file, and nothing is written."""
+    (tmp_path / "secret").write_text("{}")
+    records = [{"user/angle": 0.0, "user/throttle": 0.1, "_timestamp_ms": 50 * n} for n in range(4)]
+    tub_folder(tmp_path / "tub", records)
+    spoil, words = TUBS[name]
+    spoil(tmp_path / "tub")
+    assert words in refuse(jail("import", tmp_path / "tub", "--out", tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_csv_that_returns_to_a_picture_is_refused(tmp_path: Path, jail: Jail) -> None:
+    """A line of a few bytes would otherwise write a picture once more."""
+    drive(tmp_path / "data")
+    export_recording(tmp_path / "data", tmp_path / "csv", "csv")
+    edit(tmp_path / "csv/steps.csv", "000002.jpg", "000000.jpg")
+    text = refuse(jail("import", tmp_path / "csv", "--out", tmp_path / "out"))
+    assert "returns to the picture" in text
+
+
+REWARDS = "episode_0/rewards"
+ACTIONS = "episode_0/actions"
+DATASETS: dict[str, tuple[str, Callable[[h5py.File, str], object], str]] = {
+    "a soft link": (
+        REWARDS,
+        lambda f, at: f.__setitem__(at, h5py.SoftLink("/episode_0/terminations")),
+        "links are not followed",
+    ),
+    "a soft link to itself": (
+        REWARDS,
+        lambda f, at: f.__setitem__(at, h5py.SoftLink(f"/{at}")),
+        "links are not followed",
+    ),
+    "an external link": (
+        REWARDS,
+        lambda f, at: f.__setitem__(at, h5py.ExternalLink("/etc/passwd", "/x")),
+        "in another file",
+    ),
+    "data in another file": (
+        REWARDS,
+        lambda f, at: f.create_dataset(at, (5,), "f8", external=[("/etc/passwd", 0, 40)]),
+        "in another file",
+    ),
+    "a chunk of a gigabyte": (
+        REWARDS,
+        lambda f, at: f.create_dataset(at, (1 << 27,), "f8", chunks=(1 << 27,), compression="gzip"),
+        "more than the limit",
+    ),
+    "10^12 steps": (
+        REWARDS,
+        lambda f, at: f.create_dataset(at, (1 << 40,), "f8", chunks=(1 << 10,)),
+        "claims at least",
+    ),
+    "10^12 values in a step": (
+        ACTIONS,
+        lambda f, at: f.create_dataset(at, (5, 1 << 40), "f8", chunks=(1, 1 << 10)),
+        "more than the limit",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DATASETS)
+def test_a_hostile_minari_dataset_is_refused(tmp_path: Path, jail: Jail, name: str) -> None:
     """Links, and arrays that HDF5 stores in no bytes."""
     drive(tmp_path / "data")
     export_recording(tmp_path / "data", tmp_path / "minari-v0", "minari")
-    (main,) = (tmp_path / "minari-v0").rglob("*.hdf5")
-    with h5py.File(main, "a") as file:
-        rewards = "episode_0/rewards"
-        del file[rewards]
-        if how == "soft link":
-            file[rewards] = h5py.SoftLink("/episode_0/terminations")
-        elif how == "external link":
-            file[rewards] = h5py.ExternalLink("/etc/passwd", "/x")
-        elif how == "chunk of a gigabyte":
-            file.create_dataset(rewards, (1 << 27,), "f8", chunks=(1 << 27,), compression="gzip")
-        else:
-            file.create_dataset(rewards, (1 << 40,), "f8", chunks=(1 << 10,))
-    with pytest.raises(DemosError, match=words):
-        import_recording(tmp_path / "minari-v0", tmp_path / "out")
+    place, spoil, words = DATASETS[name]
+    with h5py.File(tmp_path / "minari-v0/data/main_data.hdf5", "a") as file:
+        del file[place]
+        spoil(file, place)
+    assert words in refuse(jail("import", tmp_path / "minari-v0", "--out", tmp_path / "out"))
+
+
+def test_a_space_of_any_size_is_refused(tmp_path: Path, jail: Jail) -> None:
+    """In a dataset of others, whose space Minari would fill with its bounds."""
+    drive(tmp_path / "data")
+    export_recording(tmp_path / "data", tmp_path / "minari-v0", "minari")
+    path = tmp_path / "minari-v0/data/metadata.json"
+    known = {"total_episodes", "data_format", "dataset_id"}
+    fields = {key: value for key, value in json.loads(path.read_text()).items() if key in known}
+    space = {"type": "Box", "dtype": "float32", "shape": [10**9], "low": -1.0, "high": 1.0}
+    path.write_text(json.dumps(fields | {"observation_space": json.dumps(space)}))
+    text = refuse(jail("import", tmp_path / "minari-v0", "--out", tmp_path / "out"))
+    assert "claims more than" in text

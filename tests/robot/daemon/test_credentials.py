@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import ssl
 import subprocess
 import sys
@@ -29,6 +30,18 @@ def test_credentials_are_made_once(tmp_path: Path) -> None:
     made = make_credentials(tmp_path / "car", "car")
     assert make_credentials(tmp_path / "car", "car") == made == load_credentials(tmp_path / "car")
     assert len(read_key(made.key_file)) == 16
+
+
+def test_a_new_folder_has_a_new_key_and_a_new_certificate(tmp_path: Path) -> None:
+    """Deleting the folder revokes the key, the certificate and its private key."""
+    folder = tmp_path / "car"
+    old = make_credentials(folder, "car")
+    key, private = read_key(old.key_file), old.private_key.read_text()
+    shutil.rmtree(folder)
+    new = make_credentials(folder, "car")
+    assert read_key(new.key_file) != key
+    assert new.private_key.read_text() != private
+    assert new.fingerprint != old.fingerprint
 
 
 def test_only_the_owner_can_read_credentials(tmp_path: Path) -> None:
