@@ -13,11 +13,12 @@ import os
 import socket
 import ssl
 import struct
+import time
 from typing import Any, Self
 
 import msgspec.msgpack
 
-PATIENCE_S = 20.0
+PATIENCE_S = 10.0
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 PURPOSE = b"shapechanger link 1"
 
@@ -176,6 +177,7 @@ class Stranger:
 
     def receive(self) -> dict[str, Any]:
         """Return the next message of the robot; {} after the connection has closed."""
+        until_s = time.monotonic() + PATIENCE_S
         while head := self.read(2):
             length = head[-1] & 127
             if length > 125:
@@ -185,6 +187,8 @@ class Stranger:
             opcode = head[0] & 15
             if opcode == PING:
                 self.write(frame(data, PONG))
+                if time.monotonic() > until_s:
+                    raise AssertionError("The robot sends pings and no message.")
             elif opcode == BINARY:
                 return msgspec.msgpack.decode(data)
             elif opcode == CLOSE:
