@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import gymnasium as gym
 import pytest
 
 from shapechanger.bodies import Family
+from shapechanger.bodies.ant import ANT
+from shapechanger.bodies.families import HOPPER
 from shapechanger.errors import MorphologyError, UnknownName
-from shapechanger.morphology import Mass, Stretch, to_json
+from shapechanger.morphology import AddSegment, Body, Cut, Friction, Mass, Stretch, to_json
+from shapechanger.morphology.certificate import certify
 from tests.morphology.models import LEG
 
 FAMILY = Family("Leg", {"Leg": (), "LongLeg": (Stretch("thigh", 2.0),)}, {"knee": "calf"})
@@ -57,3 +61,83 @@ def test_a_model_is_loaded_with_names(tmp_path: Path) -> None:
         assert [body.name for body in spec.bodies] == ["world", "trunk", "thigh", "calf"]
     plain = Family("Leg", {}).load(path)
     assert [body.name for body in plain.bodies] == ["world", "trunk", "thigh", "knee"]
+
+
+def test_samples_repeat_and_grow() -> None:
+    """The same seed gives the same bodies, and a larger number only adds some."""
+    assert ANT.sample(5, 3) == ANT.sample(9, 3)[:5]
+    assert ANT.sample(5, 3) != ANT.sample(5, 4)
+    splits = ("train", "interpolation", "extrapolation", "composition")
+    drawn = [body for split in splits for body in ANT.sample(8, 0, split)]
+    assert len(set(map(to_json, drawn))) == len(drawn)
+
+
+def _values(body: Body) -> dict[str, float]:
+    """Value of each axis of an ant."""
+    edits = set(map(to_json, ([edit] for edit in body)))
+    found = {}
+    for axis in ANT.axes:
+        named = [edit for edit in body if type(edit) is type(axis.edit(1.0))]
+        for edit in named:
+            value = getattr(edit, "factor", None) or getattr(edit, "scale", None)
+            if value is not None and to_json([axis.edit(value)]) in edits:
+                found[axis.name] = value
+    return found
+
+
+@pytest.mark.parametrize("split", ["train", "interpolation", "extrapolation", "composition"])
+def test_splits_keep_to_their_ranges(split: Any) -> None:
+    """Only extrapolation leaves the ranges to learn in, and only composition combines parts."""
+    outside, parts = [], []
+    for body in ANT.sample(24, 0, split):
+        values = _values(body)
+        assert set(values) == {axis.name for axis in ANT.axes}
+        assert all(a.lowest <= values[a.name] <= a.highest for a in ANT.axes)
+        outside.append(any(not a.low <= values[a.name] <= a.high for a in ANT.axes))
+        parts.append(sum(isinstance(edit, Cut | AddSegment) for edit in body))
+    assert set(outside) == {split == "extrapolation"}
+    assert (min(parts) >= 2) if split == "composition" else (set(parts) == {0, 1})
+
+
+@pytest.mark.parametrize(
+    ("env", "split"),
+    [
+        ("Ant", "extrapolation"),
+        ("Ant", "composition"),
+        ("HalfCheetah", "composition"),
+        ("Walker2d", "extrapolation"),
+        ("Hopper", "train"),
+    ],
+)
+def test_drawn_bodies_compile_stand_and_differ(env: str, split: str) -> None:
+    """Each body can be made, stands, and is certified to differ from the family's own."""
+    with gym.make(f"shapechanger/{env}-v1") as own:
+        inner: Any = own.unwrapped
+        for body in inner.drawn_bodies(4, 1, split):
+            with gym.make(f"shapechanger/{env}-v1", body=body) as drawn:
+                assert cast("Any", drawn.unwrapped).standing_height > 0.1
+                assert certify(cast("Any", own), cast("Any", drawn)).changes
+
+
+def test_a_body_at_named_values() -> None:
+    """Values and parts by name give the edits of the family."""
+    body = ANT.body_at({"length of shank_4": 1.5, "friction": 0.5}, {"leg 2": "stump"})
+    assert body == (Cut("shank_2", 0.25), Stretch("shank_4", 1.5), Friction("*", 0.5))
+
+
+def test_what_cannot_be_drawn_is_refused() -> None:
+    """Each error is a sentence with what exists."""
+    with pytest.raises(MorphologyError, match=r"friction .* lies between 0.45 and 2 \[1\], got 3"):
+        ANT.body_at({"friction": 3.0})
+    with pytest.raises(UnknownName, match=r"axis of the family Ant matches 'frictoin'. Did you"):
+        ANT.body_at({"frictoin": 1.0})
+    with pytest.raises(UnknownName, match="place of the family Ant matches 'leg 5'"):
+        ANT.body_at({}, {"leg 5": "stump"})
+    with pytest.raises(UnknownName, match="part of leg 1 matches 'wheel'"):
+        ANT.body_at({}, {"leg 1": "wheel"})
+    with pytest.raises(UnknownName, match="split matches 'test'"):
+        ANT.sample(1, 0, cast("Any", "test"))
+    with pytest.raises(MorphologyError, match="The family Leg declares no axes"):
+        FAMILY.sample(1)
+    with pytest.raises(MorphologyError, match="Hopper has no parts to combine: its splits are tr"):
+        HOPPER.sample(1, 0, "composition")

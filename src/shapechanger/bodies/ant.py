@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from shapechanger.bodies.families import Family
+from shapechanger.bodies.families import Family, length_axes, strength_axes
 from shapechanger.morphology import AddSegment, Body, Cut, JointRange, StartHeight, Stretch
 
 # Legs in the order of the model's motors, with the signs of x and y of their directions. The ankles
@@ -26,15 +26,19 @@ _ANKLE_RANGE_DEG: Final = (30.0, 50.0)
 _EXTENDED_START_HEIGHT_M: Final = 1.25
 
 
+def _foot(leg: int, gear: float | None) -> tuple[AddSegment, JointRange]:
+    """A third segment on a leg, with a motor of this gear, N·m, or without."""
+    x, y = LEGS[leg]
+    end = (x * _FOOT_REACH_M, y * _FOOT_REACH_M, 0.0)
+    return (
+        AddSegment(f"shank_{leg}", f"foot_{leg}", end, *_range(leg, _FOOT_RANGE_DEG), gear),
+        JointRange(f"ankle_{leg}", *_range(leg, _ANKLE_RANGE_DEG)),
+    )
+
+
 def _extended(gear: float | None) -> Body:
     """Ant with a third segment on each leg, with motors of this gear, N·m, or without."""
-    feet: list[AddSegment] = []
-    ankles: list[JointRange] = []
-    for leg, (x, y) in LEGS.items():
-        foot, ankle = _range(leg, _FOOT_RANGE_DEG), _range(leg, _ANKLE_RANGE_DEG)
-        end = (x * _FOOT_REACH_M, y * _FOOT_REACH_M, 0.0)
-        feet.append(AddSegment(f"shank_{leg}", f"foot_{leg}", end, *foot, gear))
-        ankles.append(JointRange(f"ankle_{leg}", *ankle))
+    feet, ankles = zip(*(_foot(leg, gear) for leg in LEGS), strict=True)
     return (*feet, *ankles, StartHeight("torso", _EXTENDED_START_HEIGHT_M))
 
 
@@ -54,4 +58,16 @@ ANT: Final = Family(
         "ExtendedAntPassive": _extended(None),
     },
     bodies_by_joint={f"ankle_{leg}": f"shank_{leg}" for leg in LEGS},
+    axes=(
+        *length_axes((f"aux_{leg}" for leg in sorted(LEGS)), 0.7, 1.4),
+        *length_axes((f"shank_{leg}" for leg in sorted(LEGS)), 0.6, 1.5),
+        *strength_axes("torso"),
+    ),
+    parts={
+        f"leg {leg}": {
+            "stump": (Cut(f"shank_{leg}", 0.25),),
+            "foot": _foot(leg, _FOOT_GEAR_NM),
+        }
+        for leg in sorted(LEGS)
+    },
 )

@@ -7,33 +7,80 @@ m with h = 0.6, 0.3 and 1.2: stretching along z keeps the lean of 1 mm.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal, get_args
 
 import mujoco
+import numpy as np
 
-from shapechanger.errors import UnknownName
-from shapechanger.morphology import Body, Edit, Stretch, as_body, name_elements
+from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.morphology import (
+    Body,
+    Cut,
+    Edit,
+    Friction,
+    Gear,
+    Mass,
+    Stretch,
+    as_body,
+    name_elements,
+)
 
 BodyLike = str | Edit | Iterable[Edit]
 """A body as users give it: its name, edits as JSON, one edit, or several."""
 
+Split = Literal["train", "interpolation", "extrapolation", "composition"]
+"""Parts of a family that bodies are drawn from: one to learn in, three to be judged in."""
+
+# Share of the bodies to learn in that have one of the family's parts.
+_WITH_PART: Final = 0.5
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A number by which the bodies of a family differ.
+
+    Attributes:
+        name: Its name, such as "length of shank_4".
+        edit: Makes the edit of a value.
+        low: Smallest value of the bodies to learn in.
+        high: Largest value of the bodies to learn in.
+        lowest: Smallest value of all bodies.
+        highest: Largest value of all bodies.
+        unit: Its unit; "1" for a ratio to the model's own value.
+    """
+
+    name: str
+    edit: Callable[[float], Edit]
+    low: float
+    high: float
+    lowest: float
+    highest: float
+    unit: str = "1"
+
 
 @dataclass(frozen=True)
 class Family:
-    """One model and its named bodies.
+    """One model, its named bodies, and how its other bodies differ.
 
     Attributes:
         name: Name of the family, which is also that of its unedited body.
         bodies: Edits of each named body.
         bodies_by_joint: Names for bodies that the model leaves unnamed, by the name of their joint.
+        axes: The numbers by which its bodies differ; none for a family that cannot be sampled.
+        parts: Parts that a place, such as a leg, can have instead of the model's own, by the name
+            of the place and of the part.
     """
 
     name: str
     bodies: Mapping[str, Body]
     bodies_by_joint: Mapping[str, str] = field(default_factory=dict[str, str])
+    axes: tuple[Axis, ...] = ()
+    parts: Mapping[str, Mapping[str, Body]] = field(default_factory=dict[str, Mapping[str, Body]])
 
     def load(self, path: str | Path) -> mujoco.MjSpec:
         """Load the model at `path`, and name all its elements."""
@@ -57,6 +104,124 @@ class Family:
             return self.bodies[value]
         return as_body(value)
 
+    def body_at(self, values: Mapping[str, float], parts: Mapping[str, str] | None = None) -> Body:
+        """Return the body at some values of the family's axes; the others are 1.
+
+        Args:
+            values: Value of each axis, by its name.
+            parts: Name of the part at each place that has not the model's own.
+
+        Raises:
+            UnknownName: If the family has no such axis, place or part.
+            MorphologyError: If a value lies beyond its axis.
+        """
+        axes = {axis.name: axis for axis in self.axes}
+        edits: list[Edit] = []
+        for place, part in (parts or {}).items():
+            if place not in self.parts:
+                raise UnknownName(f"place of the family {self.name}", place, self.parts)
+            if part not in self.parts[place]:
+                raise UnknownName(f"part of {place}", part, self.parts[place])
+            edits += self.parts[place][part]
+        for name, value in values.items():
+            if name not in axes:
+                raise UnknownName(f"axis of the family {self.name}", name, axes)
+            axis = axes[name]
+            if not axis.lowest <= value <= axis.highest:  # Also refuses NaN.
+                raise MorphologyError(
+                    f"{name} of the family {self.name} lies between {axis.lowest:g} and "
+                    f"{axis.highest:g} [{axis.unit}], got {value:g}."
+                )
+            edits.append(axis.edit(value))
+        return tuple(edits)
+
+    def sample(self, n: int, seed: int = 0, split: Split = "train") -> list[Body]:
+        """Draw bodies; the first ones are the same whatever the number is.
+
+        - "train": each axis within the range to learn in, drawn uniformly in its logarithm, and in
+          half of the bodies one part.
+        - "interpolation": other bodies of the same distribution.
+        - "extrapolation": each axis within its whole range, at least one outside the range to
+          learn in; parts as in "train".
+        - "composition": axes as in "train", and parts at two places or more.
+
+        The bodies depend on the version of Shapechanger, since its axes may change.
+
+        Args:
+            n: How many.
+            seed: Seed of the draws; each split has draws of its own.
+            split: Which part of the family.
+
+        Raises:
+            UnknownName: If there is no such split.
+            MorphologyError: If the family has no axes, or for "composition" not two places.
+        """
+        if split not in get_args(Split):
+            raise UnknownName("split", split, get_args(Split))
+        if not self.axes:
+            raise MorphologyError(f"The family {self.name} declares no axes to draw bodies from.")
+        if split == "composition" and len(self.parts) < 2:
+            raise MorphologyError(
+                f"The family {self.name} has no parts to combine: its splits are "
+                f"{', '.join(get_args(Split)[:3])}."
+            )
+        rng = np.random.default_rng([seed, get_args(Split).index(split)])
+        return [self._draw(rng, split) for _ in range(n)]
+
+    def _draw(self, rng: np.random.Generator, split: Split) -> Body:
+        """Draw one body."""
+        places: list[str] = list(self.parts)
+        count = 0
+        if split == "composition":
+            count = int(rng.integers(2, len(places) + 1))
+        elif places:
+            count = int(rng.uniform() < _WITH_PART)
+        numbers: list[int] = sorted(rng.permutation(len(places))[:count].tolist())
+        chosen = [places[i] for i in numbers]
+        parts = {place: str(rng.choice(list(self.parts[place]))) for place in chosen}
+        while True:
+            values = {
+                axis.name: math.exp(
+                    rng.uniform(math.log(axis.lowest), math.log(axis.highest))
+                    if split == "extrapolation"
+                    else rng.uniform(math.log(axis.low), math.log(axis.high))
+                )
+                for axis in self.axes
+            }
+            outside = any(not a.low <= values[a.name] <= a.high for a in self.axes)
+            if outside == (split == "extrapolation"):
+                # Rounded so that the edits can be read; log and exp may leave the range by an ulp.
+                rounded = {name: round(value, 4) for name, value in values.items()}
+                return self.body_at(rounded, parts)
+
+
+def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, ...]:
+    """Return an axis for the length of each of these bodies.
+
+    Args:
+        bodies: Names of bodies.
+        low: Smallest ratio to learn in; the smallest of all is 0.3 below it.
+        high: Largest ratio to learn in; the largest of all is 0.4 above it.
+    """
+    return tuple(
+        Axis(f"length of {body}", partial(Stretch, body), low, high, low - 0.3, high + 0.4)
+        for body in bodies
+    )
+
+
+def strength_axes(trunk: str, actuators: str = "*") -> tuple[Axis, ...]:
+    """Return axes for the mass of the trunk, the strength of the motors and all friction.
+
+    Args:
+        trunk: Name of the body that carries the limbs.
+        actuators: Glob of the motors.
+    """
+    return (
+        Axis(f"mass of {trunk}", partial(Mass, trunk), 0.7, 1.5, 0.5, 2.5),
+        Axis("strength of the motors", partial(Gear, actuators), 0.8, 1.25, 0.6, 1.6),
+        Axis("friction", partial(Friction, "*"), 0.7, 1.4, 0.45, 2.0),
+    )
+
 
 PENDULUM: Final = Family(
     name="InvertedPendulum",
@@ -73,9 +238,34 @@ def _plain(name: str) -> Family:
     return Family(name, {name: ()})
 
 
-HALF_CHEETAH: Final = _plain("HalfCheetah")
-HOPPER: Final = _plain("Hopper")
-WALKER2D: Final = _plain("Walker2d")
+def _runner(name: str, legs: Mapping[str, tuple[str, str, str]]) -> Family:
+    """Family of runners in a plane, whose parts are feet cut short.
+
+    Args:
+        name: Its name.
+        legs: Thigh, shank and foot of each leg.
+    """
+    limbs = [limb for leg in legs.values() for limb in leg]
+    return Family(
+        name,
+        {name: ()},
+        axes=length_axes(limbs, 0.7, 1.4) + strength_axes("torso"),
+        parts={leg: {"stump": (Cut(limbs[-1], 0.4),)} for leg, limbs in legs.items()},
+    )
+
+
+HALF_CHEETAH: Final = _runner(
+    "HalfCheetah",
+    {"back leg": ("bthigh", "bshin", "bfoot"), "front leg": ("fthigh", "fshin", "ffoot")},
+)
+HOPPER: Final = _runner("Hopper", {"leg": ("thigh", "leg", "foot")})
+WALKER2D: Final = _runner(
+    "Walker2d",
+    {
+        "right leg": ("thigh", "leg", "foot"),
+        "left leg": ("thigh_left", "leg_left", "foot_left"),
+    },
+)
 SWIMMER: Final = _plain("Swimmer")
 HUMANOID: Final = _plain("Humanoid")
 DOUBLE_PENDULUM: Final = _plain("InvertedDoublePendulum")

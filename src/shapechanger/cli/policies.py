@@ -21,6 +21,7 @@ from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
 from shapechanger.transfer.learners.settings import (
+    LimbSettings,
     OffPolicySettings,
     PpoSettings,
     Sb3Settings,
@@ -198,9 +199,11 @@ class PlayPolicy(Watching):
 
 def _env_of(file: Path, env: str, body: str) -> EnvRef:
     """Return the env that is named, else the one in which a policy was trained."""
-    if env or body:
-        return driven(env_ref(env or _trained_in(file).id, body))
-    return driven(_trained_in(file))
+    trained_in = _trained_in(file)
+    # A policy of many bodies is seen in the family's own.
+    if env or body or "bodies" in trained_in.kwargs:
+        return driven(env_ref(env or trained_in.id, body))
+    return driven(trained_in)
 
 
 def _trained_in(file: Path) -> EnvRef:
@@ -261,6 +264,10 @@ def load_any_policy(file: Path) -> TrainedPolicy | OnnxPolicy:
 
 def _fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any, Any]:
     """Return an env with a policy's layouts, through the body map of same names if needed."""
+    if isinstance(settings := getattr(card, "settings", None), LimbSettings):
+        from shapechanger.transfer.limbs.envs import fitted
+
+        return fitted(env, card.observation, settings.room)
     observation, action = layouts_of(env)
     if (observation, action) == (card.observation, card.action):
         return env

@@ -8,6 +8,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
 from shapechanger.cli.env_arguments import (
     Body,
@@ -22,9 +24,10 @@ from shapechanger.cli.env_arguments import (
     settings_of,
 )
 from shapechanger.errors import MissingExtra, StudyError
-from shapechanger.transfer.env_ref import EnvRef, env_traits
+from shapechanger.transfer.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners.settings import (
+    LimbSettings,
     Sb3Settings,
     require_budget,
     resolve_learner,
@@ -45,6 +48,8 @@ class Train:
     env: EnvId
     """Id of the env, such as BigAnt."""
     body: Body = ""
+    bodies: int = 0
+    """Train one policy in this many bodies at once, drawn from the env's family; 0 for one body."""
     out: Path | None = None
     """The file to write; results/policies/ENV.safetensors if not given."""
     steps: int | None = None
@@ -69,6 +74,8 @@ class Train:
         require_seed(self.seed)
         allow_own_modules(self.learner)
         env = driven(env_ref(self.env, self.body))
+        if self.bodies:
+            env = self._of_many(env)
         out = self.out or Path("results", "policies", env.id.split("/")[-1] + ".safetensors")
         steps, training = (
             self._by_learner(env, out)
@@ -84,6 +91,17 @@ class Train:
             raise Interrupted("Stopped; a training that is cut off leaves no policy.") from None
         say(f"wrote {out}")
 
+    def _of_many(self, env: EnvRef) -> EnvRef:
+        """Return the env with bodies to draw from its family.
+
+        Raises:
+            StudyError: If the number is negative, or one body is named too.
+        """
+        if self.bodies < 0 or self.body:
+            raise StudyError("--bodies takes a number above 0, and no --body beside it.")
+        draw = BodyDraw(count=self.bodies, seed=self.seed)
+        return env.having({"bodies": msgspec.to_builtins(draw)})
+
     def _by_learner(self, env: EnvRef, out: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training by a learner, after checking both."""
         from shapechanger.transfer.learners import DemonstrationFile
@@ -92,12 +110,16 @@ class Train:
         from shapechanger.transfer.learners.sb3 import Sb3Learner
         from shapechanger.transfer.runs import learner_of
 
-        learner, settings = resolve_learner(
-            self.learner or default_learner(env), settings_of(self.set)
-        )
+        own = "limbs" if self.bodies else default_learner(env)
+        learner, settings = resolve_learner(self.learner or own, settings_of(self.set))
+        if self.bodies and not isinstance(settings, LimbSettings):
+            raise StudyError(
+                f"{learner} learns in one body: give --learner limbs, which fits many, with "
+                "--bodies."
+            )
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
-        with opened(env) as made:
+        with opened(each_body(env)[0]) as made:
             learner_of(learner, settings).require(env, env_traits(made))
         if self.tensorboard is not None:
             if not isinstance(settings, Sb3Settings):

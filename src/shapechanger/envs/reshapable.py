@@ -21,7 +21,7 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.bodies.families import BodyLike, Family
+from shapechanger.bodies.families import BodyLike, Family, Split
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
 from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures, light_up
@@ -34,6 +34,7 @@ from shapechanger.morphology.pose import (
     start_pose,
     travelling_body,
 )
+from shapechanger.morphology.tree import Tree, tree_of
 
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec
@@ -394,6 +395,21 @@ class Reshapable(MujocoEnv):
         ends = {"body": to_json(self.body), "towards": to_json(target.body)}
         # A fast model that serves one episode takes longer to find than it saves.
         return {**ends, "fast_model": False}
+
+    def drawn_bodies(self, count: int, seed: int, split: Split) -> list[str]:
+        """Return bodies of the family as JSON, drawn as `Family.sample` does.
+
+        Args:
+            count: How many.
+            seed: Seed of the draws.
+            split: Part of the family to draw from.
+        """
+        return [to_json(body) for body in self.family.sample(count, seed, split)]
+
+    @property
+    def tree(self) -> Tree:
+        """The trunk and the limbs of the present body, and the numbers that describe them."""
+        return tree_of(self.model, self.init_qpos)
 
     @property
     def reach(self) -> float:

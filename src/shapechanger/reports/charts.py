@@ -85,6 +85,7 @@ _LINE_STYLES: Final[dict[str, _LineStyle]] = {
     "rehearsal": _LineStyle(_SKY, "-", "P"),
     "kickstart": _LineStyle(_YELLOW, "-", "v"),
     "evolution": _LineStyle(_BLACK, "-", "d"),
+    "generalist": _LineStyle(_PURPLE, "-", "*"),
     "random": _LineStyle(_GREY, ":", ""),
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, cast, runtime_checkable
 
@@ -57,6 +57,53 @@ class EnvRef(msgspec.Struct, frozen=True):
             if not refused:
                 raise
             raise StudyError(f"{self.id} cannot be made with these options: {reason}.") from error
+
+
+class BodyDraw(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Bodies of a family, as the argument `bodies` of an env that stands for many.
+
+    Attributes:
+        split: Part of the family: "train", "interpolation", "extrapolation" or "composition".
+        count: How many bodies.
+        seed: Seed of the draws.
+    """
+
+    split: str = "train"
+    count: int = 32
+    seed: int = 0
+
+
+def each_body(env: EnvRef) -> list[EnvRef]:
+    """Return one env for each of the bodies that an env stands for.
+
+    Args:
+        env: An env; its argument `bodies` is a list of bodies as JSON, or a `BodyDraw` as a
+            mapping. Without one it stands for itself.
+
+    Raises:
+        StudyError: If `bodies` is neither, or the env's body belongs to no family.
+        UnknownName: If there is no such split.
+        MorphologyError: If the family cannot be drawn from.
+    """
+    if "bodies" not in env.kwargs:
+        return [env]
+    one = EnvRef(env.id, {k: v for k, v in env.kwargs.items() if k != "bodies"})
+    given = env.kwargs["bodies"]
+    if isinstance(given, Mapping):
+        try:
+            draw = msgspec.convert(given, BodyDraw)
+        except msgspec.ValidationError as error:
+            raise StudyError(f"The bodies of {env.id} are wrong: {error}.") from None
+        made = one.make()
+        try:
+            if not isinstance(made.unwrapped, HasBodyFamily):
+                raise StudyError(f"The body of {env.id} belongs to no family to draw from.")
+            given = made.unwrapped.drawn_bodies(draw.count, draw.seed, draw.split)
+        finally:
+            made.close()
+    if not given:
+        raise StudyError(f"{env.id} needs at least one body.")
+    return [one.having({"body": body}) for body in given]
 
 
 class TaskDemonstrator(Protocol):
@@ -133,6 +180,79 @@ class HasBodyFamily(Protocol):
         Args:
             target: An env of the same family and spaces.
         """
+        ...
+
+    def drawn_bodies(self, count: int, seed: int, split: Any) -> list[str]:
+        """Return bodies of the family as JSON.
+
+        Args:
+            count: How many.
+            seed: Seed of the draws.
+            split: Part of the family to draw from.
+        """
+        ...
+
+
+class LimbNumbers(Protocol):
+    """One joint of a body, and what it moves up to the next."""
+
+    @property
+    def joint(self) -> str:
+        """Name of its hinge or slide."""
+        ...
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of its body and of those fixed to it."""
+        ...
+
+    @property
+    def actuator(self) -> str:
+        """Name of the actuator that moves the joint; empty if there is none."""
+        ...
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Numbers that describe it."""
+        ...
+
+
+class KinematicTree(Protocol):
+    """The trunk and the limbs of a body."""
+
+    @property
+    def trunk(self) -> tuple[str, ...]:
+        """Names of the trunk's body and of those fixed to it."""
+        ...
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Numbers that describe the trunk."""
+        ...
+
+    @property
+    def limbs(self) -> Sequence[LimbNumbers]:
+        """Its limbs."""
+        ...
+
+    @property
+    def trunk_numbers(self) -> tuple[str, ...]:
+        """Names of the numbers of the trunk."""
+        ...
+
+    @property
+    def limb_numbers(self) -> tuple[str, ...]:
+        """Names of the numbers of each limb."""
+        ...
+
+
+@runtime_checkable
+class HasTree(Protocol):
+    """An env that tells how its body is built."""
+
+    @property
+    def tree(self) -> KinematicTree:
+        """The trunk and the limbs of the present body."""
         ...
 
 

@@ -10,7 +10,11 @@ import gymnasium as gym
 import msgspec
 
 from shapechanger.errors import MissingExtra, StudyError, UnknownName
-from shapechanger.transfer.learners.settings import ImportedSettings, Sb3Settings
+from shapechanger.transfer.learners.settings import (
+    ImportedSettings,
+    LimbSettings,
+    Sb3Settings,
+)
 
 try:
     from sb3_contrib import TQC
@@ -46,7 +50,7 @@ def build_model(
         if _is_class(made):
             arguments.setdefault("policy_kwargs", {"net_arch": list(settings.net_arch)})
             arguments |= {"seed": seed, "device": "cpu", "tensorboard_log": tensorboard}
-            return made("MlpPolicy", envs, **arguments)
+            return made(_policy_class(settings), envs, **arguments)
         model = made(envs, seed, **arguments)
     except (TypeError, ValueError, AssertionError) as error:
         if not isinstance(settings, ImportedSettings):
@@ -58,6 +62,15 @@ def build_model(
             "Stable-Baselines3."
         )
     return model
+
+
+def _policy_class(settings: Sb3Settings) -> Any:
+    """Return the class of the policy, or the name that Stable-Baselines3 has for it."""
+    if isinstance(settings, LimbSettings):
+        from shapechanger.transfer.limbs.policy import LimbPolicy
+
+        return LimbPolicy
+    return "MlpPolicy"
 
 
 def _is_class(algorithm: object) -> bool:

@@ -20,7 +20,7 @@ from shapechanger.transfer.env_ref import (
     is_single_instance,
     measures_of,
 )
-from shapechanger.transfer.learners.settings import Settings
+from shapechanger.transfer.learners.settings import LimbSettings, Settings
 
 EVALUATION_SEED: Final = 10_000_000
 """Seed of the first evaluation episode: far from those of training, the same for every run."""
@@ -71,6 +71,10 @@ def evaluation_envs(env: EnvRef, settings: Settings) -> list[gym.Env[Any, Any]]:
     Returns:
         One env for each episode; a single env if only one instance can exist.
     """
+    if isinstance(settings, LimbSettings):
+        from shapechanger.transfer.limbs.envs import limb_envs
+
+        return limb_envs(env, settings.eval_episodes, settings.room)
     limit = settings.episode_limit
     more = {} if limit is None else {"max_episode_steps": limit}
     envs = [env.make(**more)]

@@ -25,6 +25,7 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
 from shapechanger.transfer.learners.settings import Sb3Settings
+from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 
 try:
@@ -123,6 +124,8 @@ def actor(
         deterministic: Whether actions are the mean ones, without exploration noise.
     """
     mean = _mean_action(model) if deterministic else None
+    if mean is not None and isinstance(model.policy, LimbPolicy):
+        return mean  # Its observations are scaled already, and of any body.
 
     def act(observations: NDArray[Any]) -> NDArray[Any]:
         inputs = observations
@@ -142,6 +145,8 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
     long as the network itself.
     """
     policy: Any = model.policy
+    if isinstance(policy, LimbPolicy):
+        return policy.act
     kinds: Any = (type(policy), type(policy.features_extractor), type(policy.action_space))
     if kinds != (ActorCriticPolicy, FlattenExtractor, gym.spaces.Box):
         return None

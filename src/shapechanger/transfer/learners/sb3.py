@@ -11,10 +11,16 @@ import gymnasium as gym
 import numpy as np
 
 import shapechanger
-from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.errors import MissingExtra, StudyError, TransplantError
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
-from shapechanger.transfer.env_ref import EnvRef, EnvTraits, is_single_instance, layouts_of
+from shapechanger.transfer.env_ref import (
+    EnvRef,
+    EnvTraits,
+    each_body,
+    is_single_instance,
+    layouts_of,
+)
 from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin, ignore
 from shapechanger.transfer.learners.algorithms import build_model
 from shapechanger.transfer.learners.cloning import is_clone
@@ -33,11 +39,14 @@ from shapechanger.transfer.learners.policy_file import (
     save_policy,
 )
 from shapechanger.transfer.learners.settings import (
+    LimbSettings,
     OffPolicySettings,
     Sb3Settings,
     require_budget,
 )
 from shapechanger.transfer.learners.vec_env import training_vec_env
+from shapechanger.transfer.limbs.envs import LimbVecEnv, rows_of_each
+from shapechanger.transfer.limbs.rows import require_same_places
 from shapechanger.transfer.transplant import transplant
 
 try:
@@ -45,6 +54,7 @@ try:
     from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.policies import ActorCriticPolicy
+    from stable_baselines3.common.running_mean_std import RunningMeanStd
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor, VecNormalize
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
@@ -90,6 +100,8 @@ class Sb3Learner:
         """Refuse an env whose spaces are not flat boxes of the sizes of its layouts."""
         check_size(f"observation of {env}", traits.observation_space, traits.observation_layout)
         check_size(f"action of {env}", traits.action_space, traits.action_layout)
+        if isinstance(self._settings, LimbSettings):
+            rows_of_each(each_body(env), self._settings.room)
 
     def train(
         self,
@@ -128,14 +140,23 @@ class Sb3Learner:
             settings = settings.for_one_env()
             together: VecEnv = DummyVecEnv([lambda: eval_envs[0]])
         else:
-            together = training_vec_env(env, settings.n_envs, self._threads)
+            together = _training_envs(env, settings, self._threads)
         envs: VecEnv = VecMonitor(together)
         if settings.normalise:
-            envs = VecNormalize(envs, gamma=settings.model_arguments.get("gamma", 0.99))
+            # Rows of limbs are scaled already.
+            seen = not isinstance(settings, LimbSettings)
+            gamma = settings.model_arguments.get("gamma", 0.99)
+            envs = VecNormalize(envs, norm_obs=seen, gamma=gamma)
         explores: tuple[float, ...] | None = None
         try:
             if start is None or body_map is None:
                 model = build_model(settings, envs, seed, self._tensorboard)
+            elif isinstance(settings, LimbSettings):
+                model = build_model(settings, envs, seed, self._tensorboard)
+                rows, _ = layouts_of(eval_envs[0])
+                require_same_places(start.card.observation, rows, env.id)
+                _take_weights(model, envs, start)
+                explores = _explore(model, settings)
             else:
                 model = _transplanted_model(
                     envs, settings, seed, self._tensorboard, start, body_map
@@ -174,8 +195,12 @@ class Sb3Learner:
                 one.close()
 
     def evaluate(self, env: EnvRef, policy: TrainedPolicy, body_map: BodyMap) -> Evaluation:
-        """Evaluate a policy through the body map."""
-        envs = [MappedEnv(one, body_map) for one in evaluation_envs(env, self._settings)]
+        """Evaluate a policy through the body map, which a policy of limbs does not need."""
+        envs: list[gym.Env[Any, Any]] = evaluation_envs(env, self._settings)
+        if isinstance(self._settings, LimbSettings):
+            require_same_places(policy.card.observation, layouts_of(envs[0])[0], env.id)
+        else:
+            envs = [MappedEnv(one, body_map) for one in envs]
         try:
             return evaluate(
                 policy.act, envs, EVALUATION_SEED, episodes=self._settings.eval_episodes
@@ -210,6 +235,31 @@ class Sb3Learner:
                 f"{self._settings.algorithm}: give --learner {card.learner}."
             )
         return PolicyOrigin(card.env, card.steps)
+
+
+def _training_envs(env: EnvRef, settings: Sb3Settings, threads: int | None) -> VecEnv:
+    """Make the parallel envs of a training."""
+    if isinstance(settings, LimbSettings):
+        return LimbVecEnv(env, settings.n_envs, threads=threads, room=settings.room)
+    return training_vec_env(env, settings.n_envs, threads)
+
+
+def _take_weights(model: BaseAlgorithm, envs: VecEnv, source: TrainedPolicy) -> None:
+    """Give a model the weights of a policy of limbs, which fit any body of its family.
+
+    Raises:
+        TransplantError: If its network is padded for another number of limbs.
+    """
+    statistics = source.normalisation
+    if statistics is not None and isinstance(envs, VecNormalize):
+        envs.ret_rms = statistics.reward.copy()
+    try:
+        cast("Any", model.policy).load_state_dict(source.model.policy.state_dict())
+    except RuntimeError as error:
+        raise TransplantError(
+            f"The network of the policy of {source.card.env.id} is padded for another number of "
+            "limbs than this training's: give the same --set room."
+        ) from error
 
 
 def use_one_thread() -> None:
@@ -277,7 +327,10 @@ def _require_finite(model: BaseAlgorithm, learner: str) -> None:
 def _statistics(envs: VecEnv) -> Normalisation | None:
     if not isinstance(envs, VecNormalize):
         return None
-    return Normalisation(envs.obs_rms, envs.ret_rms)  # pyright: ignore[reportArgumentType]
+    observation = (
+        envs.obs_rms if envs.norm_obs else RunningMeanStd(shape=envs.observation_space.shape)
+    )  # pyright: ignore[reportArgumentType]
+    return Normalisation(observation, envs.ret_rms)  # pyright: ignore[reportArgumentType]
 
 
 class _ActFirst(BaseCallback):

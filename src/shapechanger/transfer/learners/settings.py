@@ -138,6 +138,35 @@ class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
         return arguments
 
 
+class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
+    """Settings of PPO with a policy that sees a body as a trunk and limbs.
+
+    Attributes:
+        network: "limbs" for a network that fits any number of limbs, whatever `net_arch` is;
+            "padded" for a plain one of `net_arch` on the rows of `room` limbs, with zeros where a
+            body has fewer.
+        room: Limbs that there are rows for; 0 for as many as the bodies have.
+    """
+
+    network: Literal["limbs", "padded"] = "limbs"
+    room: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.network == "padded" and self.room < 1:
+            raise StudyError("A padded network needs room for at least one limb, as --set room=12.")
+
+    @property
+    def model_arguments(self) -> dict[str, Any]:
+        """Arguments of the class besides policy, env and seed."""
+        arguments = super().model_arguments
+        policy = arguments["policy_kwargs"]
+        policy["network"] = arguments.pop("network")
+        policy["hidden"] = policy.pop("net_arch")
+        del arguments["room"]
+        return arguments
+
+
 class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
     """Settings of SAC of Stable-Baselines3, or TQC of sb3-contrib, under their names.
 
@@ -276,7 +305,7 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
         return tuple(budget for budget in self.budgets if budget <= steps)
 
 
-Sb3Settings = PpoSettings | OffPolicySettings | ImportedSettings
+Sb3Settings = PpoSettings | LimbSettings | OffPolicySettings | ImportedSettings
 """The settings of any learner of Stable-Baselines3."""
 
 Settings = Sb3Settings | CloningSettings
@@ -359,6 +388,34 @@ LEARNERS: Final[dict[str, Settings]] = {
         normalise=True,
         steps=1_048_576,
         eval_every=65_536,
+    ),
+    # One policy for the bodies of a family. Half the passes of `ppo-run`: each costs three times as
+    # much, and twice as many steps are worth more.
+    "limbs": LimbSettings(
+        n_envs=64,
+        n_steps=128,
+        batch_size=2048,
+        n_epochs=5,
+        learning_rate=3e-4,
+        log_std_init=-1.0,
+        normalise=True,
+        steps=1_048_576,
+        eval_every=131_072,
+    ),
+    # What it is compared with; an extended ant has 12 limbs.
+    "padded": LimbSettings(
+        network="padded",
+        net_arch=(256, 256),
+        room=12,
+        n_envs=64,
+        n_steps=128,
+        batch_size=2048,
+        n_epochs=5,
+        learning_rate=3e-4,
+        log_std_init=-1.0,
+        normalise=True,
+        steps=1_048_576,
+        eval_every=131_072,
     ),
     # A humanoid takes actions up to 0.4, so it explores with less noise, in smaller batches: it
     # ends at 653, and with `ppo-run` at 468. With both it falls after two seconds, before it walks.
@@ -447,6 +504,8 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "ppo-swim": ("Swimmer",),
     "ppo-planar": ("Hopper", "Walker2d", "InvertedDoublePendulum"),
     "ppo-humanoid": ("Humanoid",),
+    "limbs": ("Ant",),
+    "padded": ("Ant",),
     "ppo-finger": ("Finger", "FingerTrack"),
     "ppo-rig": ("Finger",),
     "ppo-drive": ("CarRanges",),

@@ -46,6 +46,7 @@ _SHIPPED: Final = {
     "shuffled-map": f"{_HERE}.shuffled_map:ShuffledMap",
     "randomised": f"{_HERE}.adapted_source:Randomised",
     "identified": f"{_HERE}.adapted_source:Identified",
+    "generalist": f"{_HERE}.generalist:Generalist",
 }
 
 

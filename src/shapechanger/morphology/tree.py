@@ -1,0 +1,187 @@
+"""The kinematic tree of a body: its trunk, its limbs, and numbers that describe each.
+
+A policy for many bodies reads them beside what it senses: A. Bohlinger and others, One Policy to
+Run Them All, CoRL 2024, and A. Gupta and others, MetaMorph, ICLR 2022.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import msgspec
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.morphology.pose import travelling_body
+
+_Array = NDArray[np.float64]
+_GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+_LONG: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
+_MOVES_ONE_WAY: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+
+LIMB_NUMBERS: Final = (
+    *("joint x", "joint y", "joint z"),  # From the trunk's origin, m.
+    *("axis x", "axis y", "axis z"),
+    *("end x", "end y", "end z"),  # From the joint to the farthest end of the limb, m.
+    *("mass", "mass with limbs"),  # Decades above 1 kg.
+    *("start", "lower", "upper"),  # Of the joint, rad or m; 0 for limits that it has not.
+    *("strength", "damping", "armature"),  # Decades, so that each is about 1.
+    *("limited", "slides", "depth"),
+)
+"""Meaning of the numbers of a limb; vectors are in the trunk's frame, in the start pose."""
+
+TRUNK_NUMBERS: Final = ("mass", "mass with limbs", "start height", "radius", "friction", "gravity")
+"""Meaning of the numbers of a trunk: decades above 1 kg, m, m, and ratios to 1 and 9.81 m/s²."""
+
+
+class Limb(msgspec.Struct, frozen=True):
+    """One joint, and what it moves up to the next.
+
+    Attributes:
+        joint: Name of its hinge or slide.
+        bodies: Names of its body and of those fixed to it; none if another joint of the same body
+            has them.
+        actuator: Name of the actuator that moves the joint; empty if there is none.
+        numbers: What describes it, see `LIMB_NUMBERS`.
+    """
+
+    joint: str
+    bodies: tuple[str, ...]
+    actuator: str
+    numbers: tuple[float, ...]
+
+
+class Tree(msgspec.Struct, frozen=True):
+    """A trunk and its limbs.
+
+    Attributes:
+        trunk: Names of the trunk's body and of those fixed to it; of a body that cannot travel, of
+            the world.
+        numbers: What describes the trunk, see `TRUNK_NUMBERS`.
+        limbs: Its limbs, each after the one that carries it.
+        trunk_numbers: Names of the numbers of the trunk.
+        limb_numbers: Names of the numbers of each limb.
+    """
+
+    trunk: tuple[str, ...]
+    numbers: tuple[float, ...]
+    limbs: tuple[Limb, ...]
+    trunk_numbers: tuple[str, ...] = TRUNK_NUMBERS
+    limb_numbers: tuple[str, ...] = LIMB_NUMBERS
+
+
+def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
+    """Describe the kinematic tree of a body.
+
+    Args:
+        model: The body.
+        pose: Its start pose (nq,).
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)  # Masses of subtrees.
+    trunk = travelling_body(model) or 0
+    joints = [
+        j
+        for j in range(model.njnt)
+        if model.jnt_type[j] in _MOVES_ONE_WAY and (model.jnt_bodyid[j] != trunk or trunk == 0)
+    ]
+    # The last joint of a body moves it.
+    mover = {int(model.jnt_bodyid[j]): j for j in joints}
+    owner: dict[int, int | None] = {0: None}
+    for body in range(1, model.nbody):
+        owner[body] = mover.get(body, owner[int(model.body_parentid[body])])
+    moved_by = {int(model.actuator_trnid[a, 0]): a for a in range(model.nu)}
+    limbs: list[Limb] = []
+    for j in joints:
+        own = [body for body, mover_of in owner.items() if mover_of == j]
+        numbers = _limb_numbers(model, data, j, own, trunk, moved_by.get(j))
+        names = tuple(model.body(body).name for body in own)
+        actuator = model.actuator(moved_by[j]).name if j in moved_by else ""
+        limbs.append(Limb(model.joint(j).name, names, actuator, numbers))
+    own = [body for body, mover_of in owner.items() if mover_of is None and body > 0]
+    own = own if trunk else [0, *own]
+    floor = np.flatnonzero(model.geom_bodyid == 0)
+    return Tree(
+        tuple(model.body(body).name for body in own),
+        (
+            _decades(float(model.body_mass[own].sum())),
+            _decades(float(model.body_subtreemass[trunk])),
+            float(data.xpos[trunk, 2]),
+            float(_farthest(model, data, own, data.xpos[trunk])[1]),
+            float(model.geom_friction[floor[0], 0]) if floor.size else 1.0,
+            float(np.linalg.norm(model.opt.gravity)) / 9.81,
+        ),
+        tuple(limbs),
+    )
+
+
+def _limb_numbers(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    joint: int,
+    bodies: list[int],
+    trunk: int,
+    actuator: int | None,
+) -> tuple[float, ...]:
+    """Return the numbers of a limb."""
+    body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
+    into_trunk = data.xmat[trunk].reshape(3, 3).T
+    anchor: _Array = data.xanchor[joint]
+    end, _ = _farthest(model, data, bodies, anchor)
+    limited = bool(model.jnt_limited[joint])
+    lower, upper = model.jnt_range[joint] if limited else (0.0, 0.0)
+    strength = 0.0
+    if actuator is not None:
+        strength = abs(model.actuator_gear[actuator, 0] * model.actuator_gainprm[actuator, 0])
+    depth = sum(
+        1 for above in _ancestors(model, body) if model.body_jntnum[above] and above != trunk
+    )
+    vectors = [into_trunk @ each for each in (anchor - data.xpos[trunk], data.xaxis[joint], end)]
+    numbers = (
+        *np.concatenate(vectors),
+        *(_decades(float(model.body_mass[bodies].sum())), _decades(model.body_subtreemass[body])),
+        *(data.qpos[model.jnt_qposadr[joint]], lower, upper),
+        math.log10(1.0 + strength) / 2.0,
+        math.log10(1.0 + model.dof_damping[dof]),
+        math.log10(1.0 + model.dof_armature[dof]),
+        *(limited, model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE, depth),
+    )
+    return tuple(float(number) for number in numbers)
+
+
+def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:
+    """Return the bodies that carry a body, and itself, without the world."""
+    found: list[int] = []
+    while body:
+        found.append(body)
+        body = int(model.body_parentid[body])
+    return found
+
+
+def _farthest(
+    model: mujoco.MjModel, data: mujoco.MjData, bodies: list[int], point: _Array
+) -> tuple[_Array, float]:
+    """Return the farthest end of some bodies' geoms from a point: the way there, and its length."""
+    way, length = np.zeros(3), 0.0
+    for geom in np.flatnonzero(np.isin(model.geom_bodyid, bodies)):
+        kind = int(model.geom_type[geom])
+        if kind in _GROUND:
+            continue
+        # Capsules and cylinders end on their own z axis; others are as long as their bound.
+        half = data.geom_xmat[geom].reshape(3, 3)[:, 2] * model.geom_size[geom, 1] * (kind in _LONG)
+        more = 0.0 if kind in _LONG else float(model.geom_rbound[geom])
+        for side in (1.0, -1.0):
+            to_end = data.geom_xpos[geom] + side * half - point
+            reach = float(np.linalg.norm(to_end)) + more
+            if reach > length:
+                way, length = to_end, reach
+    return way, length
+
+
+def _decades(mass_kg: float) -> float:
+    """Return the decades of a mass above 1 kg; -3 for less than a gram."""
+    return math.log10(max(mass_kg, 1e-3))

@@ -1,0 +1,294 @@
+"""Envs whose observations are rows of a trunk and its limbs: one, and many of different bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.layout import Layout
+from shapechanger.transfer.env_ref import EnvRef, each_body
+from shapechanger.transfer.learners.vec_env import training_vec_env
+from shapechanger.transfer.limbs.rows import Rows, require_same_places, rows_of
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError as error:
+    raise MissingExtra("stable-baselines3", "learn") from error
+
+
+class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
+    """An env that is observed and moved by rows of its limbs.
+
+    Args:
+        env: The env; it tells its body's kinematic tree.
+        room: Limbs to have rows for; 0 for as many as the body has.
+
+    Attributes:
+        rows: The map between the body's own numbers and the rows.
+        observation_layout: Meaning of each number of the rows.
+        action_layout: Meaning of each action, from -1 to 1.
+
+    Raises:
+        StudyError: If the body has more limbs than room, or the env does not tell its tree.
+        LayoutError: If an observation or an action belongs to no part of the body.
+    """
+
+    rows: Rows
+    observation_layout: Layout
+    action_layout: Layout
+
+    def __init__(self, env: gym.Env[Any, Any], room: int = 0) -> None:
+        super().__init__(env)
+        self.rows = rows_of(env, room)
+        self.observation_layout, self.action_layout = self.rows.layouts()
+        self.observation_space, self.action_space = limb_spaces(self.rows)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: As of the env.
+            options: Those of the env that leave the body as it is.
+
+        Raises:
+            StudyError: If an option would change the body.
+        """
+        if options and "body" in options:
+            raise StudyError("A reset cannot change the body behind its rows: make another env.")
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self.rows.of(observation), info
+
+    def step(self, action: NDArray[Any]) -> Any:
+        """Take one step.
+
+        Args:
+            action: A number from -1 to 1 for each limb; those of limbs without a motor do nothing.
+        """
+        observation, *rest = self.env.step(self.rows.actions(action))
+        return self.rows.of(observation), *rest
+
+
+def limb_spaces(rows: Rows) -> tuple[gym.spaces.Box, gym.spaces.Box]:
+    """Return the spaces of rows, flattened, and of the limbs' actions."""
+    size = rows.constant.size
+    return (
+        gym.spaces.Box(-np.inf, np.inf, (size,), np.float32),
+        gym.spaces.Box(-1.0, 1.0, (rows.room,), np.float32),
+    )
+
+
+def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]:
+    """Return envs as rows, all of the same spaces.
+
+    Args:
+        env: The env; they have its bodies in turn, see `each_body`.
+        count: Number of envs.
+        room: Limbs to have rows for; 0 for as many as the bodies have.
+
+    Raises:
+        StudyError: If a body has more limbs than room, or an env does not tell its tree.
+    """
+    bodies = each_body(env)
+    chosen = [bodies[i % len(bodies)] for i in range(count)]
+    room = max(rows.room for rows in rows_of_each(chosen, room))
+    return [LimbEnv(one.make(), room) for one in chosen]
+
+
+def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
+    """Return an env as a policy of limbs senses it.
+
+    Args:
+        env: The env, of any body of the policy's family.
+        rows: Layout of the policy's observations.
+        room: Limbs that the policy has room for; 0 for any number.
+
+    Raises:
+        TransplantError: If the body belongs to another family.
+        StudyError: If it has more limbs than room.
+    """
+    limbs = LimbEnv(env, room)
+    name = env.spec.id if env.spec else type(env.unwrapped).__name__
+    require_same_places(rows, limbs.observation_layout, name)
+    return limbs
+
+
+class LimbVecEnv(VecEnv):
+    """Many envs of different bodies, also with different numbers of limbs, as rows.
+
+    Envs whose spaces agree are stepped together.
+
+    Args:
+        env: The env; its argument `bodies` says which bodies, see `each_body`. The envs have them
+            in turn.
+        num_envs: Number of envs, at least one of each body.
+        threads: As in `shapechanger.make_vec`.
+        room: Limbs to have rows for; 0 for as many as the bodies have.
+
+    Raises:
+        StudyError: If there are more bodies than envs, or a body has more limbs than room.
+    """
+
+    def __init__(
+        self, env: EnvRef, num_envs: int, *, threads: int | None = 1, room: int = 0
+    ) -> None:
+        bodies = each_body(env)
+        if len(bodies) > num_envs:
+            raise StudyError(
+                f"{len(bodies)} bodies need as many envs, and there are {num_envs}: give "
+                f"--set n_envs={len(bodies)}."
+            )
+        own = rows_of_each(bodies, room)
+        room = own[0].room
+        # Envs that are stepped together have the same layouts.
+        groups: dict[tuple[tuple[str, ...], ...], list[int]] = {}
+        for i in range(num_envs):
+            groups.setdefault(own[i % len(bodies)].names, []).append(i)
+        self._groups = [
+            _Group(
+                numbers,
+                [bodies[i % len(bodies)] for i in numbers],
+                [own[i % len(bodies)] for i in numbers],
+                threads,
+            )
+            for numbers in groups.values()
+        ]
+        cast("Any", super()).__init__(num_envs, *limb_spaces(own[0]))
+        self._size = own[0].constant.size
+        self._actions = np.zeros((num_envs, room), np.float32)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start an episode in each env with the seeds that were set."""
+        rows = np.empty((self.num_envs, self._size), np.float32)
+        for group in self._groups:
+            group.envs._seeds = [self._seeds[i] for i in group.numbers]
+            rows[group.numbers] = group.rows(group.envs.reset())
+            for i, info in zip(group.numbers, group.envs.reset_infos, strict=True):
+                self.reset_infos[i] = info
+        self._reset_seeds()
+        self._reset_options()
+        return rows
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Keep the actions for `step_wait`; shape (envs, room)."""
+        self._actions = actions
+
+    def step_wait(
+        self,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Step each env; return rows, rewards, ends and infos."""
+        rows = np.empty((self.num_envs, self._size), np.float32)
+        rewards = np.empty(self.num_envs, np.float32)
+        ends = np.empty(self.num_envs, np.bool_)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for group in self._groups:
+            given = group.actions(self._actions[group.numbers])
+            observed, paid, ended, told = group.envs.step(given)
+            rows[group.numbers] = group.rows(observed)
+            rewards[group.numbers], ends[group.numbers] = paid, ended
+            for k, (i, info) in enumerate(zip(group.numbers, told, strict=True)):
+                infos[i] = info
+                if "terminal_observation" in info:
+                    info["terminal_observation"] = group.each[k].of(info["terminal_observation"])
+        return rows, rewards, ends, infos
+
+    def close(self) -> None:
+        """Close all envs."""
+        for group in self._groups:
+            group.envs.close()
+
+    # Unused by learners, and asked for by the base class.
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Return an attribute of each env, in the order of the envs."""
+        del indices
+        found: list[Any] = [None] * self.num_envs
+        for group in self._groups:
+            for i, value in zip(group.numbers, group.envs.get_attr(attr_name), strict=True):
+                found[i] = value
+        return found
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of each env."""
+        del indices
+        for group in self._groups:
+            group.envs.set_attr(attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
+        """Call a method of each env; return the results in the order of the envs."""
+        del indices
+        found: list[Any] = [None] * self.num_envs
+        for group in self._groups:
+            each = group.envs.env_method(method_name, *args, **kwargs)
+            for i, value in zip(group.numbers, each, strict=True):
+                found[i] = value
+        return found
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Return that no env is wrapped."""
+        del wrapper_class, indices
+        return [False] * self.num_envs
+
+
+class _Group:
+    """Envs whose bodies have equal spaces.
+
+    Args:
+        numbers: Their numbers among all envs.
+        bodies: The env of each.
+        each: The rows of each.
+        threads: Threads that step them.
+    """
+
+    def __init__(
+        self, numbers: list[int], bodies: Sequence[EnvRef], each: list[Rows], threads: int | None
+    ) -> None:
+        self.numbers = numbers
+        self.each = each
+        first = bodies[0]
+        kwargs = {name: value for name, value in first.kwargs.items() if name != "body"}
+        if "body" in first.kwargs:
+            kwargs["bodies"] = [body.kwargs["body"] for body in bodies]
+        # Stable-Baselines3 leaves out types.
+        self.envs: Any = training_vec_env(EnvRef(first.id, kwargs), len(numbers), threads)
+        self._scale = np.stack([rows.scale for rows in each])
+        self._offset = np.stack([rows.offset for rows in each])
+        self._constant = np.stack([rows.constant for rows in each])
+
+    def rows(self, observations: NDArray[Any]) -> NDArray[np.float32]:
+        """Return the rows of all envs; observations have the shape (envs, observations)."""
+        scaled = observations * self._scale + self._offset
+        return (scaled @ self.each[0].place + self._constant).astype(np.float32)
+
+    def actions(self, limbs: NDArray[Any]) -> NDArray[Any]:
+        """Return the actions of all envs; `limbs` has the shape (envs, room)."""
+        return np.stack([rows.actions(own) for rows, own in zip(self.each, limbs, strict=True)])
+
+
+def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[Rows]:
+    """Return the rows of the bodies of some envs, all with the same room.
+
+    Args:
+        bodies: The envs.
+        room: Limbs to have rows for; 0 for as many as the bodies have.
+
+    Raises:
+        StudyError: If a body has more limbs than room, or senses other things of its limbs.
+    """
+    own: list[Rows] = []
+    for body in bodies:
+        made = body.make()
+        try:
+            own.append(rows_of(made, room))
+        finally:
+            made.close()
+    if others := [rows.places for rows in own if rows.places != own[0].places]:
+        raise StudyError(f"These bodies sense different things: {own[0].places} and {others[0]}.")
+    room = max(rows.room for rows in own)
+    return [rows.with_room(room) for rows in own]

@@ -1,0 +1,277 @@
+"""Observations and actions of any body as rows: one of the trunk, and one of each limb.
+
+A row holds what its part senses and the numbers that describe it, in places that are the same for
+all bodies of a family. So one network fits every body of the family.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import LayoutError, StudyError, TransplantError
+from shapechanger.layout import Element, Feature, Layout
+from shapechanger.transfer.env_ref import HasTree, layouts_of
+
+_Floats = NDArray[np.float64]
+
+NUMBERS: Final = 20
+"""Places of a row for the numbers that describe a trunk or a limb."""
+
+DESCRIBED: Final = 2 + NUMBERS
+"""Places of a row before those of what is sensed: it exists, it has a motor, and the numbers."""
+
+# Each number of a row is about as large as 1.
+_SCALES: Final = {"rad/s": 0.1, "m/s": 0.3, "N·m": 1.0, "N": 1.0}
+
+
+class Places(msgspec.Struct, frozen=True):
+    """The places of a row, the same for all bodies of a family.
+
+    Attributes:
+        trunk: Names of what a trunk senses.
+        limb: Names of what a limb senses.
+        trunk_numbers: Names of the numbers that describe a trunk.
+        limb_numbers: Names of the numbers that describe a limb.
+    """
+
+    trunk: tuple[str, ...]
+    limb: tuple[str, ...]
+    trunk_numbers: tuple[str, ...]
+    limb_numbers: tuple[str, ...]
+
+    @property
+    def width(self) -> int:
+        """Numbers of a row. The trunk's row ends with zeros where it is shorter, and vice versa."""
+        return DESCRIBED + max(len(self.trunk), len(self.limb))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Map between a body's own observations and actions, and rows.
+
+    Rows are `(observations * scale + offset) @ place + constant`, flattened.
+
+    Attributes:
+        places: The places of each row.
+        limbs: Names of the joints, in the order of the rows.
+        names: Names of the body's own observations and actions.
+        scale: Shape (observations,).
+        offset: Shape (observations,).
+        place: Shape (observations, (room + 1) * width), of zeros and ones.
+        constant: Shape ((room + 1) * width,).
+        actuators: For each action the limb that takes it.
+        low: Smallest of each action.
+        high: Largest of each action.
+    """
+
+    places: Places
+    limbs: tuple[str, ...]
+    names: tuple[tuple[str, ...], tuple[str, ...]]
+    scale: _Floats
+    offset: _Floats
+    place: _Floats
+    constant: _Floats
+    actuators: NDArray[np.intp]
+    low: _Floats
+    high: _Floats
+
+    def of(self, observation: NDArray[Any]) -> NDArray[np.float32]:
+        """Return the rows of observations.
+
+        Args:
+            observation: Shape (..., observations).
+
+        Returns:
+            Shape (..., (room + 1) * width).
+        """
+        rows = (observation * self.scale + self.offset) @ self.place + self.constant
+        return rows.astype(np.float32)
+
+    def actions(self, limbs: NDArray[Any]) -> NDArray[Any]:
+        """Return a body's own actions.
+
+        Args:
+            limbs: A number from -1 to 1 for each limb, shape (..., room).
+
+        Returns:
+            Shape (..., actions).
+        """
+        share = 0.5 * (limbs[..., self.actuators] + 1.0)
+        return (self.low + share * (self.high - self.low)).astype(np.float32)
+
+    @property
+    def room(self) -> int:
+        """Limbs that there are rows for."""
+        return len(self.constant) // self.places.width - 1
+
+    def with_room(self, room: int) -> Rows:
+        """Return the same with rows for more limbs."""
+        more = (room - self.room) * self.places.width
+        return replace(
+            self,
+            place=np.pad(self.place, ((0, 0), (0, more))),
+            constant=np.pad(self.constant, (0, more)),
+        )
+
+    def layouts(self) -> tuple[Layout, Layout]:
+        """Return the layouts of the rows, flattened, and of the limbs' actions."""
+        names = ["trunk", *self.limbs]
+        names += [f"no limb {i}" for i in range(len(self.limbs), self.room)]
+        features: list[Feature] = []
+        for i, name in enumerate(names):
+            own = _filled(self.places, trunk=i == 0)
+            element = Element("joint", name) if 0 < i <= len(self.limbs) else None
+            features += [Feature(f"{name}: {what}", "1", element=element) for what in own]
+        actions = [Feature(f"{name}: action", "1", -1.0, 1.0) for name in names[1:]]
+        return Layout(tuple(features)), Layout(tuple(actions))
+
+
+def rows_of(env: gym.Env[Any, Any], room: int = 0) -> Rows:
+    """Return the rows of an env's body.
+
+    Args:
+        env: The env.
+        room: Limbs to have rows for; 0 for as many as the body has.
+
+    Raises:
+        StudyError: If the env does not tell its body's kinematic tree, or has more limbs than room.
+        LayoutError: If an observation or an action belongs to no part of the body.
+    """
+    inner = env.unwrapped
+    name = env.spec.id if env.spec else type(inner).__name__
+    if not isinstance(inner, HasTree):
+        raise StudyError(
+            f"{name} has no kinematic tree, which a policy for many bodies reads: it needs a "
+            "property `tree`, as the MuJoCo bodies have."
+        )
+    tree = inner.tree
+    observation, action = layouts_of(env)
+    if room and len(tree.limbs) > room:
+        raise StudyError(
+            f"{name} has a body of {len(tree.limbs)} limbs, and the policy has room for {room}: "
+            f"train it with --set room={len(tree.limbs)}."
+        )
+    room = room or len(tree.limbs)
+    limb_of = {limb.joint: i for i, limb in enumerate(tree.limbs)}
+    limb_of_body = {body: i for i, limb in enumerate(tree.limbs) for body in limb.bodies}
+    found: list[tuple[int, str]] = []
+    for feature in observation.features:
+        found.append(_place(feature, limb_of, limb_of_body, tree.trunk))
+    places = Places(
+        tuple(dict.fromkeys(what for row, what in found if row == 0)),
+        tuple(dict.fromkeys(what for row, what in found if row > 0)),
+        tree.trunk_numbers,
+        tree.limb_numbers,
+    )
+    if max(len(places.trunk_numbers), len(places.limb_numbers)) > NUMBERS:
+        raise StudyError(f"{name} describes a limb by more than {NUMBERS} numbers.")
+    width = places.width
+    place = np.zeros((observation.size, (room + 1) * width))
+    scale, offset = np.ones(observation.size), np.zeros(observation.size)
+    for i, (row, what) in enumerate(found):
+        senses = places.limb if row else places.trunk
+        place[i, row * width + DESCRIBED + senses.index(what)] = 1.0
+        scale[i], offset[i] = _scaling(observation.features[i])
+    constant = np.zeros((room + 1, width))
+    constant[0, 0] = 1.0
+    constant[0, 2 : 2 + len(tree.numbers)] = tree.numbers
+    for i, limb in enumerate(tree.limbs):
+        constant[i + 1, :2] = 1.0, bool(limb.actuator)
+        constant[i + 1, 2 : 2 + len(limb.numbers)] = limb.numbers
+    limb_of_actuator = {limb.actuator: i for i, limb in enumerate(tree.limbs) if limb.actuator}
+    owners = [feature.element.name if feature.element else "" for feature in action.features]
+    if lost := [owner for owner in owners if owner not in limb_of_actuator]:
+        raise LayoutError(f"{name}: the action {lost[0]!r} moves no limb of the body.")
+    return Rows(
+        places,
+        tuple(limb_of),
+        (observation.names, action.names),
+        scale,
+        offset,
+        place,
+        constant.ravel(),
+        np.array([limb_of_actuator[owner] for owner in owners], np.intp),
+        action.low.astype(np.float64),
+        action.high.astype(np.float64),
+    )
+
+
+def require_same_places(trained: Layout, present: Layout, env: str) -> None:
+    """Refuse a body whose rows mean something else than those that a policy has learned from.
+
+    Args:
+        trained: Layout of the rows of the policy.
+        present: Layout of the rows of the body.
+        env: Id of the body's env, for the message.
+
+    Raises:
+        TransplantError: If the bodies belong to different families.
+    """
+    learned, own = _meanings(trained), _meanings(present)
+    if learned != own:
+        strange = [name for name in own if name not in learned] or list(own)
+        raise TransplantError(
+            f"The policy has learned in bodies of another family than that of {env}: it knows no "
+            f"{strange[0]!r} among {', '.join(learned[:3])} and {len(learned) - 3} more."
+        )
+
+
+def _meanings(layout: Layout) -> tuple[str, ...]:
+    """Return what the numbers of a trunk and of a limb are."""
+    rows: dict[str, list[str]] = {}
+    for name in layout.names:
+        row, _, what = name.partition(": ")
+        rows.setdefault(row, []).append(what)
+    _, limb, *_ = rows.values()
+    return (*rows["trunk"], *limb)
+
+
+def _filled(places: Places, *, trunk: bool) -> list[str]:
+    """Return the name of each number of a row."""
+    numbers, senses = (
+        (places.trunk_numbers, places.trunk) if trunk else (places.limb_numbers, places.limb)
+    )
+    names = ["exists", "has a motor", *numbers]
+    names += [f"number {k}" for k in range(len(names), DESCRIBED)]
+    names += senses
+    return names + [f"number {k}" for k in range(len(names), places.width)]
+
+
+def _place(
+    feature: Feature,
+    limb_of: dict[str, int],
+    limb_of_body: dict[str, int],
+    trunk: tuple[str, ...],
+) -> tuple[int, str]:
+    """Return the row of a feature, and the name of its place there.
+
+    What the parts of one limb sense, such as contact, is added up.
+    """
+    element = feature.element
+    if element is None or element.kind == "task":
+        return 0, feature.name
+    quantity = feature.name.removeprefix(f"{element.name}/")
+    if element.kind == "joint":
+        # A joint of the trunk, such as the height of a runner, keeps its name.
+        row = limb_of.get(element.name)
+        return (0, feature.name) if row is None else (row + 1, quantity)
+    if element.kind == "body" and element.name in limb_of_body:
+        return limb_of_body[element.name] + 1, quantity
+    if element.kind == "body" and element.name in trunk:
+        return 0, f"trunk/{quantity}"
+    raise LayoutError(f"{feature.name} belongs to no limb of the body, and not to its trunk.")
+
+
+def _scaling(feature: Feature) -> tuple[float, float]:
+    """Return factor and offset that bring a feature to about -1 to 1."""
+    finite = np.isfinite(feature.low) and np.isfinite(feature.high)
+    if finite and feature.unit in ("rad", "m") and feature.high > feature.low:
+        half = 0.5 * (feature.high - feature.low)
+        return 1.0 / half, -feature.middle / half
+    return _SCALES.get(feature.unit, 1.0), 0.0

@@ -1,0 +1,45 @@
+"""Learn in many bodies of the family first, and then in the target."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import msgspec
+
+from shapechanger.transfer.env_ref import BodyDraw, EnvTraits
+from shapechanger.transfer.learners.settings import LimbSettings, Settings
+from shapechanger.transfer.methods import Method, MethodRun
+
+BODIES: Final = 32
+"""Bodies that the policy learns in before the target."""
+
+
+class Generalist(Method):
+    """Learn in bodies drawn from the source's family, then in the target with the same weights.
+
+    The evaluation before the first target step is that of the generalist in a body that it has
+    never had.
+    """
+
+    name = "generalist"
+    paper = "A. Gupta and others, MetaMorph: Learning Universal Controllers, ICLR 2022"
+    uses_source_policy = False
+
+    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+        """Require a policy that fits many bodies, and a family to draw them from."""
+        if not isinstance(settings, LimbSettings):
+            raise self._lacks("a policy that fits many bodies: give --learner limbs")
+        if not source.family or source.family != target.family:
+            raise self._lacks("two bodies of one family")
+
+    def learn(self, run: MethodRun) -> Any:
+        """Train on many bodies, then on the target."""
+        many = run.source.having({"bodies": msgspec.to_builtins(BodyDraw(count=BODIES))})
+        policy = run.train(many, run.source_steps)
+        return run.train(
+            run.target,
+            run.steps,
+            start=policy,
+            body_map=run.body_map,
+            on_evaluation=run.report,
+        )

@@ -1,0 +1,125 @@
+"""The kinematic tree of bodies, and the numbers that describe it."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.bodies.ant import ANT
+from shapechanger.morphology import Body, Cut, Gear, Mass, Stretch, compile_body
+from shapechanger.morphology.pose import start_pose
+from shapechanger.morphology.tree import LIMB_NUMBERS, TRUNK_NUMBERS, Tree, tree_of
+
+_ARM = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 1" friction="0.8"/>
+    <geom name="base" type="box" size="0.1 0.1 0.1"/>
+    <body name="slider" pos="0 0 1">
+      <joint name="along" type="slide" axis="1 0 0" range="-1 1" limited="true"/>
+      <joint name="around" axis="0 0 1"/>
+      <geom type="sphere" size="0.1" mass="2"/>
+      <body name="tip" pos="0.5 0 0"><geom type="capsule" size="0.05 0.2" mass="1"/></body>
+      <body name="thin" pos="0 0.2 0">
+        <joint name="ball" type="ball"/>
+        <geom type="sphere" size="0.1" mass="0.0001"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor name="pull" joint="along" gear="9"/></actuator>
+</mujoco>
+"""
+
+
+def _ant(body: Body) -> Tree:
+    model = compile_body(ANT.load(_path()), body)
+    return tree_of(model, start_pose(model))
+
+
+def _path() -> str:
+    from gymnasium.envs.mujoco import mujoco_env
+
+    return f"{mujoco_env.__file__.rpartition('/')[0]}/assets/ant.xml"
+
+
+def _number(tree: Tree, joint: str, name: str) -> float:
+    limb = next(limb for limb in tree.limbs if limb.joint == joint)
+    return limb.numbers[LIMB_NUMBERS.index(name)]
+
+
+def test_an_ants_tree() -> None:
+    """Eight joints with a motor each; parts without joints belong to what carries them."""
+    tree = _ant(())
+    assert [limb.joint for limb in tree.limbs[:3]] == ["hip_1", "ankle_1", "hip_2"]
+    assert {limb.actuator for limb in tree.limbs} == {limb.joint for limb in tree.limbs}
+    assert tree.trunk[0] == "torso"
+    assert set(tree.trunk[1:]) == {
+        "front_left_leg",
+        "front_right_leg",
+        "back_leg",
+        "right_back_leg",
+    }
+    assert len(tree.numbers) == len(TRUNK_NUMBERS)
+    assert {len(limb.numbers) for limb in tree.limbs} == {len(LIMB_NUMBERS)}
+    assert _number(tree, "hip_1", "depth") == 1.0
+    assert _number(tree, "ankle_1", "depth") == 2.0
+
+
+def test_numbers_follow_the_edits() -> None:
+    """A longer shank ends farther away, a stronger motor and a heavier trunk show, no other."""
+    plain, changed = (
+        _ant(()),
+        _ant((Stretch("shank_1", 2.0), Gear("hip_2", 10.0), Mass("torso", 10.0))),
+    )
+    ends = [
+        np.linalg.norm([_number(tree, "ankle_1", f"end {axis}") for axis in "xyz"])
+        for tree in (plain, changed)
+    ]
+    assert ends[1] == pytest.approx(2.0 * ends[0])
+    stronger = _number(changed, "hip_2", "strength") - _number(plain, "hip_2", "strength")
+    assert stronger == pytest.approx(0.5, abs=0.01)
+    assert _number(changed, "hip_4", "strength") == _number(plain, "hip_4", "strength")
+    assert changed.numbers[0] > plain.numbers[0]
+    assert _ant((Cut("shank_1", 0.25),)).limbs[0] != plain.limbs[0]  # It carries less.
+
+
+def test_vectors_are_in_the_frame_of_the_trunk() -> None:
+    """Turning the whole body changes no number of its limbs."""
+    model = compile_body(ANT.load(_path()), ())
+    pose = start_pose(model)
+    turned = pose.copy()
+    mujoco.mju_axisAngle2Quat(turned[3:7], np.array([0.0, 0.0, 1.0]), 1.0)
+    for one, other in zip(tree_of(model, pose).limbs, tree_of(model, turned).limbs, strict=True):
+        np.testing.assert_allclose(one.numbers, other.numbers, atol=1e-9)
+
+
+def test_a_body_on_the_world() -> None:
+    """The trunk is the world; joints of one body share it, and the last one has its parts."""
+    model = mujoco.MjModel.from_xml_string(_ARM)
+    tree = tree_of(model, model.qpos0)
+    assert tree.trunk == ("world",)
+    assert [(limb.joint, limb.bodies, limb.actuator) for limb in tree.limbs] == [
+        ("along", (), "pull"),
+        ("around", ("slider", "tip", "thin"), ""),
+    ]
+    assert tree.numbers[TRUNK_NUMBERS.index("friction")] == 0.8
+    assert _number(tree, "along", "slides") == 1.0
+    assert (_number(tree, "along", "lower"), _number(tree, "around", "upper")) == (-1.0, 0.0)
+    assert _number(tree, "around", "strength") == 0.0
+    assert _number(tree, "along", "mass") == -3.0  # Of nothing.
+    assert _number(tree, "around", "mass with limbs") == pytest.approx(math.log10(3.0), abs=1e-3)
+    # The capsule's end is farther from the joint than the spheres.
+    assert _number(tree, "around", "end x") == pytest.approx(0.5)
+
+
+def test_without_a_floor() -> None:
+    """Friction is 1 where the world has no geom."""
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
+    )
+    tree = tree_of(model, model.qpos0)
+    assert tree.limbs == ()
+    assert tree.numbers[TRUNK_NUMBERS.index("friction")] == 1.0

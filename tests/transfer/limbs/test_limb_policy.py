@@ -1,0 +1,213 @@
+"""One policy for bodies of any number of limbs: its network, its learner, its files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+import pytest
+import torch
+
+from shapechanger.errors import StudyError, TransplantError
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.sb3 import Sb3Learner
+from shapechanger.transfer.learners.settings import LimbSettings
+from shapechanger.transfer.limbs.envs import limb_envs
+from shapechanger.transfer.limbs.policy import LimbPolicy
+from shapechanger.transfer.plan import TransferTask
+from shapechanger.transfer.study import make_plan, run_study
+
+ANT, EXTENDED = EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1")
+FEW: Final = ANT.having({"bodies": {"count": 2}, "max_episode_steps": 20})
+TINY: Final = LimbSettings(
+    n_envs=2,
+    n_steps=16,
+    batch_size=32,
+    n_epochs=1,
+    learning_rate=1e-3,
+    normalise=True,
+    steps=64,
+    source_steps=32,
+    eval_every=32,
+    eval_episodes=2,
+)
+# A policy of limbs needs no map.
+_NO_MAP: Any = object()
+
+
+def _learner(**changed: Any) -> Sb3Learner:
+    return Sb3Learner("limbs", msgspec.structs.replace(TINY, **changed))
+
+
+@pytest.fixture(scope="module")
+def policy() -> TrainedPolicy:
+    """A policy that has hardly learned."""
+    return _learner().train(FEW, 32, 0, on_evaluation=lambda evaluation: None)
+
+
+def _net(policy: TrainedPolicy) -> LimbPolicy:
+    net = policy.model.policy
+    assert isinstance(net, LimbPolicy)
+    return net
+
+
+def test_limbs_may_come_in_any_order_and_number(policy: TrainedPolicy) -> None:
+    """Another order gives the same actions in that order; empty rows change nothing."""
+    (env,) = limb_envs(ANT, 1)
+    rows, _ = env.reset(seed=0)
+    width = rows.size // 9
+    actions = policy.act(rows[None])[0]
+    order = np.random.default_rng(0).permutation(8)
+    turned = rows.reshape(9, width)[[0, *(order + 1)]].ravel()
+    np.testing.assert_allclose(policy.act(turned[None])[0], actions[order], atol=1e-6)
+    roomy = np.concatenate([rows, np.zeros(3 * width, np.float32)])
+    np.testing.assert_allclose(policy.act(roomy[None])[0, :8], actions, atol=1e-6)
+    value = _net(policy).critic_net
+    np.testing.assert_allclose(
+        value(torch.as_tensor(rows.reshape(1, 9, width))).item(),
+        value(torch.as_tensor(roomy.reshape(1, 12, width))).item(),
+        atol=1e-5,
+    )
+
+
+def test_limbs_without_a_motor_count_in_no_probability(policy: TrainedPolicy) -> None:
+    """Their actions change neither the probability of the others nor the entropy."""
+    (env,) = limb_envs(EXTENDED.having({"actuated_extension": False}), 1)
+    rows, _ = env.reset(seed=0)
+    net = _net(policy)
+    observation = torch.as_tensor(rows[None])
+    idle = torch.as_tensor(rows.reshape(13, -1)[1:, 1] == 0.0)
+    assert idle.sum() == 4
+    actions = torch.zeros(1, 12)
+    _, before, entropy = net.evaluate_actions(observation, actions)
+    _, other, _ = net.evaluate_actions(observation, torch.where(idle, 5.0, actions))
+    assert before.item() == other.item()
+    _, moved, _ = net.evaluate_actions(observation, torch.where(idle, actions, 0.5))
+    assert moved.item() != before.item()
+    one = 0.5 + 0.5 * np.log(2 * np.pi) + float(net.log_std.detach())
+    assert entropy.item() == pytest.approx(8 * one, rel=1e-5)
+
+
+def test_probabilities_of_drawn_actions(policy: TrainedPolicy) -> None:
+    """What is drawn has the probability that the update sees."""
+    (env,) = limb_envs(ANT, 1)
+    rows = torch.as_tensor(env.reset(seed=0)[0][None])
+    net = _net(policy)
+    actions, values, drawn = net(rows)
+    again, seen, _ = net.evaluate_actions(rows, actions)
+    assert drawn.item() == pytest.approx(seen.item())
+    assert values.item() == again.item() == net.predict_values(rows).item()
+    mean, _, _ = net(rows, deterministic=True)
+    np.testing.assert_allclose(mean.detach().numpy().clip(-1, 1), policy.act(rows.numpy()))
+    predicted, _ = policy.model.predict(rows.numpy(), deterministic=True)
+    np.testing.assert_allclose(predicted, policy.act(rows.numpy()))
+
+
+def test_training_changes_what_it_does() -> None:
+    """Two updates on many bodies move every layer of the network."""
+    before: dict[str, Any] = {}
+
+    def keep(evaluation: Evaluation) -> None:
+        del evaluation
+
+    learner = _learner(n_epochs=2)
+    trained = learner.train(FEW, 64, 0, on_evaluation=keep)
+    fresh = learner.train(FEW, 32, 0, on_evaluation=keep)
+    before = _net(fresh).state_dict()
+    for name, weights in _net(trained).state_dict().items():
+        assert not torch.equal(weights, before[name]), name
+
+
+def test_a_file_fits_any_body(policy: TrainedPolicy, tmp_path: Path) -> None:
+    """A saved policy acts in an ant that has more limbs than any that it was trained in."""
+    path = tmp_path / "ants.safetensors"
+    save_policy(policy, path)
+    loaded = load_policy(path)
+    assert loaded.card == policy.card
+    assert loaded.card.env == FEW
+    target = EXTENDED.having({"max_episode_steps": 20})
+    zero_shot = _learner().evaluate(target, loaded, _NO_MAP)
+    assert zero_shot == _learner().evaluate(target, policy, _NO_MAP)
+    found: list[Evaluation] = []
+    tuned = _learner().train(
+        target, 32, 1, start=loaded, body_map=_NO_MAP, on_evaluation=found.append
+    )
+    assert found[0].mean_return == zero_shot.mean_return
+    assert found[0].steps == 0
+    assert tuned.card.action.size == 12
+    assert tuned.card.start_log_std is not None
+
+
+def test_other_families_are_refused(policy: TrainedPolicy) -> None:
+    """A policy of ants neither acts in a cheetah nor starts one's training."""
+    cheetah = EnvRef("shapechanger/HalfCheetah-v1")
+    with pytest.raises(TransplantError, match=r"of another family than that of .*HalfCheetah-v1"):
+        _learner().evaluate(cheetah, policy, _NO_MAP)
+    with pytest.raises(TransplantError, match=r"of another family than that of .*HalfCheetah-v1"):
+        _learner().train(
+            cheetah, 32, 0, start=policy, body_map=_NO_MAP, on_evaluation=lambda _: None
+        )
+
+
+def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
+    """It trains on the same bodies and is refused where the room differs."""
+    learner = _learner(network="padded", room=9, net_arch=(8,))
+    trained = learner.train(FEW, 32, 0, on_evaluation=lambda _: None)
+    save_policy(trained, tmp_path / "padded.safetensors")
+    loaded = load_policy(tmp_path / "padded.safetensors")
+    assert learner.evaluate(FEW, loaded, _NO_MAP) == learner.evaluate(FEW, trained, _NO_MAP)
+    with pytest.raises(StudyError, match="12 limbs, and the policy has room for 9"):
+        learner.evaluate(EXTENDED, loaded, _NO_MAP)
+    with pytest.raises(TransplantError, match=r"padded for another number of limbs .*--set room"):
+        _learner(network="padded", room=12, net_arch=(8,)).train(
+            EXTENDED, 32, 0, start=loaded, body_map=_NO_MAP, on_evaluation=lambda _: None
+        )
+    with pytest.raises(StudyError, match="A padded network needs room"):
+        msgspec.structs.replace(TINY, network="padded")
+
+
+def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path) -> None:
+    """It is evaluated before the first target step, and then learns there."""
+    short = {"max_episode_steps": 20}
+    task = TransferTask(ANT.having(short), EXTENDED.having(short))
+    plan = make_plan(
+        task,
+        "limbs",
+        msgspec.structs.replace(
+            TINY, n_envs=32, n_steps=2, eval_every=64, steps=64, source_steps=64
+        ),
+        seeds=2,
+        arms=("scratch", "generalist"),
+    )
+    study = run_study(plan, tmp_path / "study", executor=Serial())
+    curve = study.of("generalist")[0].curve
+    assert [evaluation.steps for evaluation in curve] == [0, 64]
+    assert curve[0].mean_return != study.of("scratch")[0].curve[0].mean_return
+
+
+def test_a_generalist_needs_limbs_and_a_family() -> None:
+    """The arm is refused with other learners, and between families."""
+    settings = TINY
+    with pytest.raises(StudyError, match="generalist needs two bodies of one family"):
+        make_plan(
+            TransferTask(ANT, EnvRef("shapechanger/HalfCheetah-v1")),
+            "limbs",
+            settings,
+            seeds=2,
+            arms=("scratch", "generalist"),
+        )
+
+
+def test_the_env_of_a_policy_is_many_bodies() -> None:
+    """Envs of evaluations have the bodies in turn, and one space."""
+    envs = limb_envs(FEW, 3)
+    bodies = [env.unwrapped.spec.kwargs["body"] for env in envs]  # pyright: ignore[reportOptionalMemberAccess]
+    assert bodies[0] == bodies[2] != bodies[1]
+    assert len({env.observation_space.shape for env in envs}) == 1
+    assert isinstance(envs[0].action_space, gym.spaces.Box)
