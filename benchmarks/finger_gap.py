@@ -25,7 +25,7 @@ from shapechanger.reports.verdict import successes
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Processes
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
-from shapechanger.transfer.learners.settings import learner_settings
+from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.plan import ARMS, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
 

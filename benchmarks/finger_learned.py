@@ -25,8 +25,9 @@ from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
-from shapechanger.transfer.learners.settings import PpoSettings, learner_settings
+from shapechanger.transfer.learners.settings import PpoSettings
 
 SEEDS: Final = 5
 TARGETS: Final = 200

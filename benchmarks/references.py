@@ -31,8 +31,9 @@ from shapechanger.transfer.learners.evaluation import (
     zero_actions,
 )
 from shapechanger.transfer.learners.policy_file import load_policy, save_policy
+from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
-from shapechanger.transfer.learners.settings import Sb3Settings, learner_settings
+from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.references import FOLDER, EnvReference, load_references
 from shapechanger.transfer.runs import RunResult
 

@@ -40,8 +40,9 @@ from shapechanger.envs.vehicle.waypoints import WaypointDemonstrator
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
+from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.sb3 import use_one_thread
-from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings
+from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.twin.robot import run_robot
 from shapechanger.worlds.course import FLOODED, HELD_OUT
 from shapechanger.worlds.simulation import MujocoWorld

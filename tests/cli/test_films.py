@@ -14,7 +14,7 @@ import pytest
 from shapechanger.cli.env_arguments import driven, env_ref
 from shapechanger.cli.films import film_study
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners.settings import learner_settings, resolve_learner
+from shapechanger.transfer.learners.presets import learner_settings, resolve_learner
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.studies import tiny_plan

@@ -18,7 +18,7 @@ from shapechanger.cli import env_arguments, main
 from shapechanger.cli import suite as suite_command
 from shapechanger.cli.suite import SuiteFile
 from shapechanger.transfer.executor import Job, OnProgress, Serial
-from shapechanger.transfer.learners.settings import LEARNERS
+from shapechanger.transfer.learners.presets import LEARNERS
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 
 pytestmark = pytest.mark.system

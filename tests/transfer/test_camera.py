@@ -11,7 +11,8 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
 from shapechanger.transfer.learners.cloning import CloneLearner
-from shapechanger.transfer.learners.settings import CloningSettings, learner_settings
+from shapechanger.transfer.learners.presets import learner_settings
+from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan
 from tests.transfer.lane import LANE, TINY_CLONING

@@ -23,7 +23,8 @@ from shapechanger.transfer.learners.cloning import (
     record_demonstrations,
 )
 from shapechanger.transfer.learners.evaluation import Evaluation, evaluation_envs
-from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings, learner_settings
+from shapechanger.transfer.learners.presets import LEARNERS, learner_settings
+from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import ARMS, Plan, TransferTask
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING

@@ -16,13 +16,9 @@ from stable_baselines3.sac.policies import MlpPolicy
 from shapechanger.errors import CorruptStudy, StudyError, UnknownName
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.learners.settings import (
-    ImportedSettings,
-    OffPolicySettings,
-    Sb3Settings,
-    resolve_learner,
-)
+from shapechanger.transfer.learners.settings import ImportedSettings, OffPolicySettings, Sb3Settings
 from shapechanger.transfer.onnx_policy import OnnxPolicy, export_onnx
 from shapechanger.transfer.study import run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan

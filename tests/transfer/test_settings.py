@@ -10,14 +10,14 @@ import pytest
 
 import shapechanger  # noqa: F401 - registers the envs.
 from shapechanger.errors import StudyError, UnknownName
-from shapechanger.transfer.learners.settings import (
+from shapechanger.transfer.learners.presets import (
     LEARNERS,
     TUNED_ON,
-    PpoSettings,
     learner_settings,
     resolve_learner,
     tuning_text,
 )
+from shapechanger.transfer.learners.settings import PpoSettings
 
 
 def test_some_settings_change_and_others_stay() -> None:

@@ -287,6 +287,10 @@ class ExportPolicy:
     """A policy, or a clone, which a robot then runs on board."""
     out: Path
     """The file to write, such as ant.onnx."""
+    env: str = ""
+    """Id of the env of the body that a policy of limbs is exported for; that of its training by
+    default. Other policies are exported for their own."""
+    body: Body = ""
     format: Literal["onnx"] = "onnx"
     """Its format."""
 
@@ -296,15 +300,31 @@ class ExportPolicy:
         from shapechanger.demos.cloning.policy import CameraPolicy
         from shapechanger.transfer.learners.cloning import is_clone
         from shapechanger.transfer.learners.policy_file import load_policy
-        from shapechanger.transfer.onnx_policy import export_onnx
 
         if is_clone(self.file):
             clone = CameraPolicy.load(self.file)
             body, control_hz = _learned_with(clone.card)
             export_clone(clone, self.out, body=body, control_hz=control_hz)
         else:
-            export_onnx(load_policy(self.file), self.out)
+            self._export(load_policy(self.file))
         say(f"wrote {self.out}")
+
+    def _export(self, policy: TrainedPolicy) -> None:
+        """Write a policy that is no clone."""
+        from shapechanger.transfer.onnx_policy import export_onnx
+
+        if isinstance(policy.card.settings, LimbSettings):
+            from shapechanger.transfer.limbs.export import export_limbs
+
+            ref = _env_of(self.file, self.env, self.body)
+            with opened(ref) as env:
+                export_limbs(policy, env, ref, self.out)
+            return
+        if self.env or self.body:
+            raise StudyError(
+                "Only a policy of limbs fits another body than its own: leave out --env and --body."
+            )
+        export_onnx(policy, self.out)
 
 
 def _learned_with(card: CloneCard) -> tuple[str, float | None]:

@@ -44,7 +44,7 @@ from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.files import place_of, read_json, write_json
-from shapechanger.transfer.learners.settings import resolve_learner
+from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.plan import SOURCE, Plan, TransferTask
 
 if TYPE_CHECKING:

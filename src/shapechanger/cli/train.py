@@ -26,13 +26,8 @@ from shapechanger.cli.env_arguments import (
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.transfer.files import make_folder
-from shapechanger.transfer.learners.settings import (
-    LimbSettings,
-    Sb3Settings,
-    require_budget,
-    resolve_learner,
-    tuning_text,
-)
+from shapechanger.transfer.learners.presets import resolve_learner, tuning_text
+from shapechanger.transfer.learners.settings import LimbSettings, Sb3Settings, require_budget
 
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Evaluation

@@ -28,7 +28,7 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners.settings import resolve_learner
+from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.methods import load_method, method_names
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 

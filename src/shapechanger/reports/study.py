@@ -27,11 +27,8 @@ from shapechanger.reports.verdict import (
 from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
 from shapechanger.transfer.body_map.rules import SAME_NAME
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.learners.settings import (
-    CloningSettings,
-    Settings,
-    tuning_text,
-)
+from shapechanger.transfer.learners.presets import tuning_text
+from shapechanger.transfer.learners.settings import CloningSettings, Settings
 from shapechanger.transfer.metrics import Reference, Summary
 from shapechanger.transfer.study import Study
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
-from shapechanger.transfer.learners.settings import LEARNERS, PpoSettings
+from shapechanger.transfer.learners.presets import LEARNERS
+from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask
 
 __all__ = [

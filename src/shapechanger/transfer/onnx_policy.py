@@ -51,6 +51,91 @@ class OnnxCard(msgspec.Struct, frozen=True):
     version: str
 
 
+class OnnxGraph:
+    """An ONNX graph that is built operator by operator.
+
+    Attributes:
+        constants: Its constants by name.
+
+    Raises:
+        MissingExtra: If onnx is not installed.
+    """
+
+    def __init__(self) -> None:
+        try:
+            import onnx
+            from onnx import helper, numpy_helper
+        except ImportError as error:
+            raise MissingExtra("onnx", "onnx") from error
+        self._onnx: Any = onnx
+        self._make: Any = helper
+        self._numbers: Any = numpy_helper
+        self._nodes: list[Any] = []
+        self.constants: dict[str, NDArray[Any]] = {}
+
+    def apply(self, operator: str, *inputs: str | NDArray[Any], to: str = "", **more: Any) -> str:
+        """Add an operator, and return the name of its output.
+
+        Args:
+            operator: Its name in ONNX.
+            *inputs: Outputs of others by name, and constants.
+            to: Name of its output; made up if not given.
+            **more: Its attributes.
+        """
+        names: list[str] = []
+        for each in inputs:
+            if not isinstance(each, str):
+                self.constants[f"constant_{len(self.constants)}"] = each
+                each = f"constant_{len(self.constants) - 1}"
+            names.append(each)
+        output = to or f"{operator.lower()}_{len(self._nodes)}"
+        self._nodes.append(self._make.make_node(operator, names, [output], **more))
+        return output
+
+    def as_float(self, name: str) -> str:
+        """Return an output with float32 numbers."""
+        output = f"float_{len(self._nodes)}"
+        kind = self._onnx.TensorProto.FLOAT
+        self._nodes.append(self._make.make_node("Cast", [name], [output], to=kind))
+        return output
+
+    def write(self, path: Path, card: OnnxCard) -> None:
+        """Write the graph, from `observation` to `action`.
+
+        Args:
+            path: The file.
+            card: Provenance, which goes into the metadata.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        make, kinds = self._make, self._onnx.TensorProto
+        sides = (
+            ("observation", kinds.DOUBLE, card.observation),
+            ("action", kinds.FLOAT, card.action),
+        )
+        seen, done = (
+            make.make_tensor_value_info(name, kind, ["n", layout.size])
+            for name, kind, layout in sides
+        )
+        tensors = [
+            self._numbers.from_array(np.asarray(value), name)
+            for name, value in self.constants.items()
+        ]
+        graph = make.make_graph(self._nodes, "policy", [seen], [done], tensors)
+        model = make.make_model(
+            graph,
+            opset_imports=[make.make_opsetid("", _OPSET)],
+            ir_version=_IR_VERSION,
+            producer_name="shapechanger",
+            producer_version=card.version,
+        )
+        facts = {f"{name}_names": json.dumps(layout.names) for name, _, layout in sides}
+        make.set_model_props(model, {**facts, _CARD: msgspec.json.encode(card).decode()})
+        self._onnx.checker.check_model(model)
+        write_atomic(path, model.SerializeToString())
+
+
 def export_onnx(policy: TrainedPolicy, path: Path) -> None:
     """Write a policy as ONNX.
 
@@ -66,72 +151,32 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
         StudyError: If its network is not the `MlpPolicy` of PPO, SAC or TQC.
         OutputError: If it cannot be written.
     """
-    try:
-        import onnx
-        from onnx import helper, numpy_helper
-    except ImportError as error:
-        raise MissingExtra("onnx", "onnx") from error
-
+    graph = OnnxGraph()
     from shapechanger.transfer.transplant.layers import CLIP, EPSILON
-
-    make: Any = helper
-    numbers: Any = numpy_helper
-    nodes: list[Any] = []
-    constants: dict[str, NDArray[Any]] = {}
-
-    def apply(operator: str, inputs: list[str], output: str, **attributes: Any) -> str:
-        nodes.append(make.make_node(operator, inputs, [output], **attributes))
-        return output
 
     last = "observation"
     if policy.normalisation is not None:
         statistics = policy.normalisation.observation
-        constants["mean"] = np.asarray(statistics.mean, np.float64)
-        constants["deviation"] = np.sqrt(np.asarray(statistics.var, np.float64) + EPSILON)
-        constants["least"], constants["most"] = np.float64(-CLIP), np.float64(CLIP)  # pyright: ignore[reportArgumentType]
-        last = apply("Sub", [last, "mean"], "centred")
-        last = apply("Div", [last, "deviation"], "scaled")
-        last = apply("Clip", [last, "least", "most"], "normalised")
-    last = apply("Cast", [last], "features", to=onnx.TensorProto.FLOAT)
+        deviation = np.sqrt(np.asarray(statistics.var, np.float64) + EPSILON)
+        last = graph.apply("Sub", last, np.asarray(statistics.mean, np.float64))
+        last = graph.apply("Div", last, deviation)
+        last = graph.apply("Clip", last, np.array(-CLIP), np.array(CLIP))
+    last = graph.as_float(last)
     network = _mean_network(policy)
     for place, layer in enumerate(network.layers):
-        constants[f"weight_{place}"] = layer.weight.detach().cpu().numpy()
-        constants[f"bias_{place}"] = layer.bias.detach().cpu().numpy()
-        inputs = [last, f"weight_{place}", f"bias_{place}"]
-        last = apply("Gemm", inputs, f"sum_{place}", transB=1)
+        weight, bias = (each.detach().cpu().numpy() for each in (layer.weight, layer.bias))
+        last = graph.apply("Gemm", last, weight, bias, transB=1)
         if place < len(network.layers) - 1:
-            last = apply(network.activation, [last], f"layer_{place}")
+            last = graph.apply(network.activation, last)
     space: Any = cast("Any", policy.model).action_space
     low, high = space.low.astype(np.float32), space.high.astype(np.float32)
     if network.squashes:
-        constants["half"], constants["middle"] = 0.5 * (high - low), 0.5 * (high + low)
-        last = apply("Tanh", [last], "squashed")
-        last = apply("Mul", [last, "half"], "stretched")
-        last = apply("Add", [last, "middle"], "moved")
-    constants["low"], constants["high"] = low, high
-    last = apply("Max", [last, "low"], "bounded")
-    apply("Min", [last, "high"], "action")
-    sides = (
-        ("observation", onnx.TensorProto.DOUBLE, policy.card.observation),
-        ("action", onnx.TensorProto.FLOAT, policy.card.action),
-    )
-    seen, done = (
-        make.make_tensor_value_info(name, kind, ["n", layout.size]) for name, kind, layout in sides
-    )
-    tensors = [numbers.from_array(np.asarray(value), name) for name, value in constants.items()]
-    graph = make.make_graph(nodes, "policy", [seen], [done], tensors)
-    model = make.make_model(
-        graph,
-        opset_imports=[make.make_opsetid("", _OPSET)],
-        ir_version=_IR_VERSION,
-        producer_name="shapechanger",
-        producer_version=policy.card.version,
-    )
-    facts = {f"{name}_names": json.dumps(layout.names) for name, _, layout in sides}
-    card = msgspec.convert(policy.card, OnnxCard, from_attributes=True)
-    make.set_model_props(model, {**facts, _CARD: msgspec.json.encode(card).decode()})
-    cast("Any", onnx).checker.check_model(model)
-    write_atomic(path, model.SerializeToString())
+        last = graph.apply("Tanh", last)
+        last = graph.apply("Mul", last, 0.5 * (high - low))
+        last = graph.apply("Add", last, 0.5 * (high + low))
+    last = graph.apply("Max", last, low)
+    graph.apply("Min", last, high, to="action")
+    graph.write(path, msgspec.convert(policy.card, OnnxCard, from_attributes=True))
 
 
 class _MeanNetwork(NamedTuple):

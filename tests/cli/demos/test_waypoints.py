@@ -22,7 +22,8 @@ from shapechanger.envs.vehicle import WaypointEnv
 from shapechanger.envs.waypoints import ACTION_LAYOUT, SteeringResponse
 from shapechanger.errors import DemosError, WorldError
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.learners.settings import LEARNERS, CloningSettings
+from shapechanger.transfer.learners.presets import LEARNERS
+from shapechanger.transfer.learners.settings import CloningSettings
 
 _ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
 _STATE = Layout(

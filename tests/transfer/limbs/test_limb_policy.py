@@ -18,8 +18,10 @@ from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import LimbSettings
-from shapechanger.transfer.limbs.envs import limb_envs
+from shapechanger.transfer.limbs.envs import fitted, limb_envs
+from shapechanger.transfer.limbs.export import export_limbs
 from shapechanger.transfer.limbs.policy import LimbPolicy
+from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 
@@ -211,3 +213,21 @@ def test_the_env_of_a_policy_is_many_bodies() -> None:
     assert bodies[0] == bodies[2] != bodies[1]
     assert len({env.observation_space.shape for env in envs}) == 1
     assert isinstance(envs[0].action_space, gym.spaces.Box)
+
+
+@pytest.mark.parametrize("network", ["limbs", "padded"])
+def test_onnx_of_a_body_equals_pytorch(network: Any, tmp_path: Path) -> None:
+    """The exported policy takes the body's own observations, and gives its own actions."""
+    trained = _learner(network=network, room=12, net_arch=(8, 8)).train(
+        FEW, 32, 0, on_evaluation=lambda _: None
+    )
+    with EXTENDED.make() as env:
+        export_limbs(trained, env, EXTENDED, tmp_path / "ant.onnx")
+        exported = OnnxPolicy(tmp_path / "ant.onnx")
+        assert exported.card.env == EXTENDED
+        acting = fitted(env, trained.card.observation, 12)
+        observation, _ = env.reset(seed=0)
+        seen = observation + np.random.default_rng(0).normal(0.0, 0.5, (20, observation.size))
+        expected = acting.rows.actions(trained.act(acting.rows.of(seen)))
+        np.testing.assert_allclose(exported.act(seen), expected, atol=1e-5)
+        assert np.ptp(expected, axis=0).max() > 1e-3  # It does not act alike everywhere.

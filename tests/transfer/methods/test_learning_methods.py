@@ -16,7 +16,7 @@ from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.policy_file import load_policy
-from shapechanger.transfer.learners.settings import learner_settings
+from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.methods import kickstart
 from shapechanger.transfer.methods.evolution import bodies_between
 from shapechanger.transfer.methods.kickstart import MappedTeacher

@@ -13,8 +13,9 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.learners.settings import OffPolicySettings, resolve_learner
+from shapechanger.transfer.learners.settings import OffPolicySettings
 from shapechanger.transfer.methods.replay import (
     DomainClassifiers,
     Transitions,

@@ -70,8 +70,8 @@ class TrainClone:
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.learn import learn, settings_for
         from shapechanger.reports.clone import clone_html, write_numbers
+        from shapechanger.transfer.learners.presets import LEARNERS
         from shapechanger.transfer.learners.sb3 import use_one_thread
-        from shapechanger.transfer.learners.settings import LEARNERS
 
         view = self._view()
         settings = settings_for(round((1.0 - self.held_out) * count_steps(self.data)))

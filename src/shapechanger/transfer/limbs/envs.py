@@ -13,7 +13,7 @@ from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import EnvRef, each_body
 from shapechanger.transfer.learners.vec_env import training_vec_env
-from shapechanger.transfer.limbs.rows import Rows, require_same_places, rows_of
+from shapechanger.transfer.limbs.rows import LimbRows, require_same_places, rows_of
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -38,7 +38,7 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
         LayoutError: If an observation or an action belongs to no part of the body.
     """
 
-    rows: Rows
+    rows: LimbRows
     observation_layout: Layout
     action_layout: Layout
 
@@ -75,7 +75,7 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
         return self.rows.of(observation), *rest
 
 
-def limb_spaces(rows: Rows) -> tuple[gym.spaces.Box, gym.spaces.Box]:
+def limb_spaces(rows: LimbRows) -> tuple[gym.spaces.Box, gym.spaces.Box]:
     """Return the spaces of rows, flattened, and of the limbs' actions."""
     size = rows.constant.size
     return (
@@ -247,7 +247,11 @@ class _Group:
     """
 
     def __init__(
-        self, numbers: list[int], bodies: Sequence[EnvRef], each: list[Rows], threads: int | None
+        self,
+        numbers: list[int],
+        bodies: Sequence[EnvRef],
+        each: list[LimbRows],
+        threads: int | None,
     ) -> None:
         self.numbers = numbers
         self.each = each
@@ -271,7 +275,7 @@ class _Group:
         return np.stack([rows.actions(own) for rows, own in zip(self.each, limbs, strict=True)])
 
 
-def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[Rows]:
+def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:
     """Return the rows of the bodies of some envs, all with the same room.
 
     Args:
@@ -281,7 +285,7 @@ def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[Rows]:
     Raises:
         StudyError: If a body has more limbs than room, or senses other things of its limbs.
     """
-    own: list[Rows] = []
+    own: list[LimbRows] = []
     for body in bodies:
         made = body.make()
         try:

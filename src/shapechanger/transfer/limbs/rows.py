@@ -52,7 +52,7 @@ class Places(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True)
-class Rows:
+class LimbRows:
     """Map between a body's own observations and actions, and rows.
 
     Rows are `(observations * scale + offset) @ place + constant`, flattened.
@@ -110,7 +110,7 @@ class Rows:
         """Limbs that there are rows for."""
         return len(self.constant) // self.places.width - 1
 
-    def with_room(self, room: int) -> Rows:
+    def with_room(self, room: int) -> LimbRows:
         """Return the same with rows for more limbs."""
         more = (room - self.room) * self.places.width
         return replace(
@@ -132,7 +132,7 @@ class Rows:
         return Layout(tuple(features)), Layout(tuple(actions))
 
 
-def rows_of(env: gym.Env[Any, Any], room: int = 0) -> Rows:
+def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     """Return the rows of an env's body.
 
     Args:
@@ -188,7 +188,7 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> Rows:
     owners = [feature.element.name if feature.element else "" for feature in action.features]
     if lost := [owner for owner in owners if owner not in limb_of_actuator]:
         raise LayoutError(f"{name}: the action {lost[0]!r} moves no limb of the body.")
-    return Rows(
+    return LimbRows(
         places,
         tuple(limb_of),
         (observation.names, action.names),

@@ -1,0 +1,226 @@
+"""One policy for bodies that nobody has built, against a padded network with the same data.
+
+Each policy learns in 32 drawn ants and is judged, without learning, in those and in 32 others of
+each split, one episode each, and in the extended ant, whose legs have more joints. Policies are
+kept in `results/generalist`, and finished trainings are not repeated; `SEEDS` sets their number and
+`WORKERS` how many train at a time. The scores of each body go into
+`benchmarks/results/generalist-runs.json`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Final, Literal, cast
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from benchmarks.row import Row
+from shapechanger.transfer.env_ref import BodyDraw, EnvRef, each_body
+from shapechanger.transfer.files import read_json, write_json
+from shapechanger.transfer.learners import ignore
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
+from shapechanger.transfer.learners.policy_file import load_policy, save_policy
+from shapechanger.transfer.learners.presets import learner_settings
+from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
+from shapechanger.transfer.learners.settings import LimbSettings
+from shapechanger.transfer.limbs.envs import fitted
+
+OUT: Final = Path("results", "generalist")
+RUNS: Final = Path("benchmarks", "results", "generalist-runs.json")
+COMMAND: Final = "python -m benchmarks.run generalist"
+SEEDS: Final = 5
+BODIES: Final = 32
+STEPS: Final = 1_048_576
+# What one of the bodies has had, and so a fair budget for a body's own scratch.
+SHARE: Final = STEPS // BODIES
+SCRATCH_BODIES: Final = 8
+ANT: Final = EnvRef("shapechanger/Ant-v1")
+EXTENDED: Final = EnvRef("shapechanger/ExtendedAnt-v1")
+SPLITS: Final = ("train", "interpolation", "extrapolation", "composition")
+_RESAMPLES: Final = 4000
+
+Network = Literal["limbs", "padded"]
+_Floats = NDArray[np.float64]
+
+
+class Scores(msgspec.Struct, frozen=True):
+    """Forward speed of one policy in each body, m/s.
+
+    Attributes:
+        network: Its network.
+        seed: Seed of its training.
+        splits: Speeds by split, one for each body.
+        extended: Speed in the extended ant.
+        command: The command that measured it.
+    """
+
+    network: str
+    seed: int
+    splits: dict[str, list[float]]
+    extended: float
+    command: str = COMMAND
+
+
+def generalist() -> list[Row]:
+    """Train and judge the policies of both networks."""
+    seeds = range(int(os.environ.get("SEEDS", SEEDS)))
+    work = [(network, seed) for seed in seeds for network in ("limbs", "padded")]
+    OUT.mkdir(parents=True, exist_ok=True)
+    workers = int(os.environ.get("WORKERS", os.cpu_count() or 1))
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        found = list(pool.map(_judged, *zip(*work, strict=True)))
+        alone = list(pool.map(_scratch, SPLITS[1:]))
+    write_json(RUNS, found)
+    own = zip(SPLITS[1:], alone, strict=True)
+    return [*rows_of(found), *(_scratch_row(found, *one) for one in own)]
+
+
+def rows_of(found: list[Scores]) -> list[Row]:
+    """Return the speeds of both networks in each split, and how often limbs are ahead."""
+    rows: list[Row] = []
+    by_network = {
+        network: [one for one in found if one.network == network] for network in ("limbs", "padded")
+    }
+    for split in SPLITS:
+        speeds = {
+            network: np.array([one.splits[split] for one in each])
+            for network, each in by_network.items()
+        }
+        ahead, low, high = _improvement(speeds["limbs"], speeds["padded"])
+        asked = split in ("interpolation", "extrapolation")
+        rows.append(
+            Row(
+                f"{BODIES} ants, {split}: probability that limbs are faster than padded",
+                f"{ahead:.2f} [{low:.2f}, {high:.2f}]",
+                f"limbs {_speed(speeds['limbs'])}, padded {_speed(speeds['padded'])}; "
+                f"{len(by_network['limbs'])} seeds",
+                "interval above 0.5" if asked else "none",
+                low > 0.5 or not asked,
+            )
+        )
+    longer = {n: np.array([[one.extended] for one in each]) for n, each in by_network.items()}
+    rows.append(
+        Row(
+            "ExtendedAnt, which has 12 joints, zero-shot: forward speed",
+            f"limbs {_speed(longer['limbs'])}",
+            f"padded {_speed(longer['padded'])}; learned in ants of 8 and 9 joints",
+            "walks, or the measured truth",
+            True,
+        )
+    )
+    return rows
+
+
+def _speed(speeds: _Floats) -> str:
+    """Return the mean over bodies, with an interval over seeds; speeds (seeds, bodies), m/s."""
+    each = speeds.mean(axis=1)
+    if len(each) < 2:
+        return f"{each.mean():.2f} m/s"
+    half = stats.t.ppf(0.975, len(each) - 1) * each.std(ddof=1) / math.sqrt(len(each))
+    return f"{each.mean():.2f} m/s [{each.mean() - half:.2f}, {each.mean() + half:.2f}]"
+
+
+def _improvement(one: _Floats, other: _Floats) -> tuple[float, float, float]:
+    """Return the probability that a policy of one is faster than of the other in a body.
+
+    A policy is judged in all bodies, so the bootstrap draws policies and bodies, not their pairs.
+
+    Args:
+        one: Speeds, shape (seeds, bodies).
+        other: Speeds in the same bodies, shape (seeds, bodies).
+    """
+    wins = 0.5 + 0.5 * np.sign(one[:, None] - other[None])
+    rng = np.random.default_rng(0)
+    a, b, bodies = wins.shape
+    drawn = [
+        wins[
+            np.ix_(
+                rng.integers(a, size=a), rng.integers(b, size=b), rng.integers(bodies, size=bodies)
+            )
+        ].mean()
+        for _ in range(_RESAMPLES)
+    ]
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return float(wins.mean()), float(low), float(high)
+
+
+def _judged(network: Network, seed: int) -> Scores:
+    """Train a policy unless it is there, and measure its speed in every body."""
+    use_one_thread()
+    file, result = (OUT / f"{network}-{seed}.{kind}" for kind in ("safetensors", "json"))
+    if result.exists():
+        return read_json(result, Scores, f"delete {result}")
+    if not file.exists():
+        learner = Sb3Learner(network, _settings(network))
+        draw = BodyDraw(count=BODIES)
+        policy = learner.train(
+            ANT.having({"bodies": msgspec.to_builtins(draw)}), STEPS, seed, on_evaluation=ignore
+        )
+        save_policy(policy.described(command=COMMAND), file)
+    splits = {split: [_speed_in(file, body) for body in _bodies(split)] for split in SPLITS}
+    scores = Scores(network, seed, splits, _speed_in(file, EXTENDED))
+    write_json(result, scores)
+    return scores
+
+
+def _settings(network: str) -> LimbSettings:
+    """Return the shipped settings of a network."""
+    return cast("LimbSettings", learner_settings(network))
+
+
+def _bodies(split: str) -> list[EnvRef]:
+    return each_body(ANT.having({"bodies": {"split": split, "count": BODIES}}))
+
+
+def _speed_in(file: Path, body: EnvRef) -> float:
+    """Return the forward speed of a policy in a body over an episode, m/s."""
+    policy = load_policy(file)
+    room = getattr(policy.card.settings, "room", 0)
+    env = fitted(body.make(), policy.card.observation, room)
+    try:
+        return evaluate(policy.act, [env], EVALUATION_SEED).value("forward speed")
+    finally:
+        env.close()
+
+
+def _scratch(split: str) -> list[float]:
+    """Return the speed of a policy of limbs that learned in each of some bodies alone, m/s."""
+    use_one_thread()
+    result = OUT / f"scratch-{split}.json"
+    if result.exists():
+        return read_json(result, list[float], f"delete {result}")
+    speeds: list[float] = []
+    for seed, body in enumerate(_bodies(split)[:SCRATCH_BODIES]):
+        found: list[float] = []
+        settings = msgspec.structs.replace(_settings("limbs"), eval_every=SHARE, eval_episodes=1)
+        learner = Sb3Learner("limbs", settings)
+        learner.train(
+            body,
+            SHARE,
+            seed,
+            on_evaluation=lambda one, found=found: found.append(one.value("forward speed")),
+        )
+        speeds.append(found[-1])
+    write_json(result, speeds)
+    return speeds
+
+
+def _scratch_row(found: list[Scores], split: str, alone: list[float]) -> Row:
+    """Return what some bodies learn by themselves in one body's share of the steps."""
+    limbs = np.array(
+        [one.splits[split][:SCRATCH_BODIES] for one in found if one.network == "limbs"]
+    )
+    return Row(
+        f"{SCRATCH_BODIES} ants, {split}: zero-shot over scratch in the body itself",
+        f"{limbs.mean():.2f} and {np.mean(alone):.2f} m/s",
+        f"scratch learns for {SHARE:,} steps, what each body to learn in has had",
+        "zero-shot is faster",
+        bool(limbs.mean() > np.mean(alone)),
+    )
