@@ -1,0 +1,117 @@
+"""The commands for one policy of many bodies: train, evaluate, export."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import torch
+
+from shapechanger.cli import main
+from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.transfer.onnx_policy import OnnxPolicy
+
+_TINY = [
+    "n_envs=3",
+    "n_steps=16",
+    "batch_size=48",
+    "n_epochs=1",
+    "eval_every=48",
+    "eval_episodes=1",
+]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def one_thread() -> Iterator[None]:
+    """Networks this small gain nothing from more threads."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A policy of three ants that has hardly learned."""
+    out = tmp_path_factory.mktemp("policies") / "ants.safetensors"
+    main(["train", "Ant", "--bodies", "3", "--steps", "48", "--set", *_TINY, "--out", str(out)])
+    return out
+
+
+def test_it_is_trained_in_drawn_bodies(policy: Path) -> None:
+    """The card says in which bodies, and is that of a policy of limbs."""
+    card = load_policy(policy).card
+    assert card.env.kwargs == {"bodies": {"split": "train", "count": 3, "seed": 0}}
+    assert card.learner == "limbs"
+
+
+def test_it_is_evaluated_in_any_body(policy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a body in the family's own, otherwise in the named one, without a body map."""
+    main(["policies", "evaluate", str(policy), "--episodes", "1"])
+    own = capsys.readouterr().out
+    main(["policies", "evaluate", str(policy), "--env", "ExtendedAnt", "--episodes", "1"])
+    other = capsys.readouterr().out
+    assert "forward speed" in own
+    assert "forward speed" in other
+    assert own != other
+    assert "counterpart" not in other
+
+
+def test_it_is_exported_for_one_body(policy: Path, tmp_path: Path) -> None:
+    """The file has the layouts of the body that is named."""
+    out = tmp_path / "ant.onnx"
+    main(["policies", "export", str(policy), "--env", "ExtendedAnt", "--out", str(out)])
+    card = OnnxPolicy(out).card
+    assert card.action.size == 12
+    assert card.env.id == "shapechanger/ExtendedAnt-v1"
+
+
+@pytest.mark.parametrize(
+    ("command", "sentence"),
+    [
+        ("train Ant --bodies 3 --learner ppo-run", "ppo-run learns in one body: give --learner l"),
+        ("train Ant --bodies 3 --body BigAnt", "--bodies takes a number above 0, and no --body"),
+        ("train Ant --bodies -1", "--bodies takes a number above 0"),
+        ("train Swimmer --bodies 3", "The family Swimmer declares no axes"),
+        ("train Car --bodies 3", "belongs to no family to draw from"),
+        ("train HalfCheetah --bodies 70", "70 bodies need as many envs, and there are 64"),
+        ("policies evaluate POLICY --env HalfCheetah", "another family than that of"),
+        ("policies export POLICY --env Walker2d --out a.onnx", "another family than that of"),
+        (
+            "transfer Ant BigAnt --arms scratch generalist",
+            "generalist needs a policy that fits many bodies: give --learner limbs",
+        ),
+        (
+            "transfer Ant HalfCheetah --learner limbs --arms scratch generalist",
+            "needs two bodies of one family",
+        ),
+    ],
+)
+def test_mistakes_give_one_sentence(
+    command: str,
+    sentence: str,
+    policy: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Each is refused before anything is trained."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit):
+        main([str(policy) if word == "POLICY" else word for word in command.split()])
+    error = capsys.readouterr().err
+    assert sentence in " ".join(error.split())
+    assert "Traceback" not in error
+
+
+def test_other_policies_are_exported_for_their_own_body(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A body beside a policy that fits only one is refused."""
+    from shapechanger.envs.finger.policies import POLICIES
+
+    out = str(tmp_path / "finger.onnx")
+    with pytest.raises(SystemExit):
+        main(["policies", "export", str(POLICIES["reach"]), "--env", "Finger", "--out", out])
+    assert "Only a policy of limbs fits another body" in capsys.readouterr().err
