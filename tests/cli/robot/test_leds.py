@@ -26,7 +26,7 @@ from shapechanger.cli.robot.leds import (
 )
 from shapechanger.cli.robot.leds_report import anonymous, facts, run_leds
 from shapechanger.cli.robot.selftest import SelftestResult
-from shapechanger.errors import OutputError, RobotError
+from shapechanger.errors import LinkError, OutputError, RobotError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
@@ -209,7 +209,9 @@ def test_a_report_names_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert "anna" not in text.replace("banana", "")
 
 
-def test_a_report_is_kept_whatever_happens(tmp_path: Path) -> None:
+def test_a_report_is_kept_whatever_happens(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """What was found before an error stays, and so do earlier reports."""
     report = tmp_path / "report.txt"
     bad = SelftestResult("drives", "bad", "It did not.")
@@ -218,10 +220,14 @@ def test_a_report_is_kept_whatever_happens(tmp_path: Path) -> None:
         run_leds(_Bench(bad, RobotError("gone")), _profile("car"), report, twin=False)
     with pytest.raises(KeyboardInterrupt):
         run_leds(_Bench(KeyboardInterrupt()), _profile("car"), report, twin=False)
+    # Its errors are no errors of writing, although they inherit from OSError.
+    with pytest.raises(LinkError, match=r"^silent$"):
+        run_leds(_Bench(LinkError("silent")), _profile("car"), report, twin=False)
     second, third = (tmp_path / f"report-{number}.txt" for number in (2, 3))
+    assert f"{third} has what was tested so far." in capsys.readouterr().out
     assert "0 good, 1 bad" in report.read_text()
     assert second.read_text().endswith("BAD   drives: It did not.\n\nIt ended early: gone\n")
-    assert "It ended early: KeyboardInterrupt" in third.read_text()
+    assert "It ended early: it was interrupted." in third.read_text()
     with pytest.raises(OutputError, match="Cannot write"):
         run_leds(_Bench(bad), _profile("car"), report / "below.txt", twin=False)
 

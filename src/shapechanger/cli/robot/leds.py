@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol
 
 from shapechanger.cli.console import say
-from shapechanger.cli.robot.selftest import SelftestResult, check_robot, pins_of
+from shapechanger.cli.robot.selftest import SelftestResult, check_robot, require_free_pin
 from shapechanger.cli.robot.trial import FAULTS, calm, has
 from shapechanger.cli.robot.trial_driver import Driver
 from shapechanger.errors import RobotError, ShapechangerError
@@ -506,11 +506,9 @@ def probed_pin(plan: GuardPlan, probe: int) -> int:
         probe: BCM pin of the probe.
 
     Raises:
-        RobotError: If the robot uses the probe's pin, or nothing can be probed.
+        RobotError: If there is no such pin, the robot uses it, or nothing can be probed.
     """
-    used = pins_of(plan)
-    if probe in used:
-        raise RobotError(f"Pin {probe} is used by {used[probe]}: join a free pin.")
+    require_free_pin(probe, plan)
     for output in plan.outputs:
         weight = output.mix.get("throttle", 0.0)
         if weight and output.driver == "hbridge":
