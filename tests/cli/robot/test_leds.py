@@ -179,7 +179,8 @@ class _Bench(Bench):
     def __init__(self, *results: SelftestResult | BaseException) -> None:
         self._results = results
 
-    def results(self) -> Iterator[tuple[str, SelftestResult]]:
+    def results(self) -> Iterator[tuple[str, SelftestResult | None]]:
+        yield "checks", None
         for result in self._results:
             if isinstance(result, BaseException):
                 raise result
@@ -207,6 +208,38 @@ def test_a_report_names_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert "good  drives: USER owns ~/car.toml on HOST" in text
     assert "1 good, 0 bad, 0 not measured." in text
     assert "anna" not in text.replace("banana", "")
+
+
+def test_a_person_judges_each_fault() -> None:
+    """The question names the fault; an LED that never was lit proves no stop."""
+    asked: list[str] = []
+
+    def ask(question: str) -> bool:
+        asked.append(question)
+        return len(asked) == 1
+
+    bench = Bench(_profile("car"), twin=True, probe=None, ask=ask, cap=0.2)
+    results = [bench._judge_stop(name, None, 0, 270.0) for name in ("driver killed", "disarmed")]
+    assert [result.level for result in results] == ["good", "bad"]
+    assert asked[0] == ("Did a motor's LED light up, and are all of them out now (driver killed)?")
+    assert results[1].sentence == "NOT lit, or NOT out afterwards."
+
+
+def test_a_part_is_named_before_its_questions(pins: _Pins, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The heading comes when no LED was asked for yet."""
+    asked: list[str] = []
+    bench = Bench(_profile("car"), twin=True, probe=None, ask=asked.append, cap=0.2)
+    monkeypatch.setattr(bench, "_board", lambda *_: None)
+    monkeypatch.setattr(bench, "_wiring", lambda _: iter(()))
+    monkeypatch.setattr(bench, "_judged", lambda _: contextlib.nullcontext())
+    monkeypatch.setattr(leds, "_pins", lambda _: pins)
+    results = bench.results()
+    assert [next(results), next(results)] == [("wiring", None), ("LEDs", None)]
+    assert asked == []
+    part, result = next(results)
+    assert part == "LEDs"
+    assert result is not None
+    assert len(asked) == 1
 
 
 def test_a_report_is_kept_whatever_happens(

@@ -92,7 +92,6 @@ def run_leds(bench: Bench, profile: Profile, report: Path, *, twin: bool) -> boo
     path = free_name(report)
     counts = dict.fromkeys(("good", "bad", "unknown"), 0)
     good = True
-    part = ""
     head = ["Shapechanger: one board with LEDs in place of motors", ""]
     with _written(path):
         write_new(path, "\n".join([*head, *facts(profile, twin=twin), ""]).encode())
@@ -106,13 +105,13 @@ def run_leds(bench: Bench, profile: Profile, report: Path, *, twin: bool) -> boo
             say(anonymous(line))
 
         try:
-            for of, result in bench.results():
-                if of != part:
-                    part = of
-                    tell(f"\n{of}")
+            for part, result in bench.results():
+                if result is None:
+                    tell(f"\n{part}")
+                    continue
                 tell(f"{_MARKS[result.level]:4}  {result.name}: {result.sentence}")
                 counts[result.level] += 1
-                good = good and (result.level != "bad" or of == "wiring")
+                good = good and (result.level != "bad" or part == "wiring")
         except BaseException as error:
             # Also after Ctrl-C, a report is worth sending.
             why = "it was interrupted." if isinstance(error, KeyboardInterrupt) else str(error)
