@@ -111,7 +111,7 @@ class Board:
         try:
             self._time.run(self)
         except OwnerGone:
-            _log.info("the owner is gone, so this board ends")
+            _log.debug("the owner is gone, so this board ends")
         finally:
             self.server.close()
             self._ledger.close()

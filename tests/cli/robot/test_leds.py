@@ -26,7 +26,7 @@ from shapechanger.cli.robot.leds import (
 )
 from shapechanger.cli.robot.leds_report import anonymous, facts, run_leds
 from shapechanger.cli.robot.selftest import SelftestResult
-from shapechanger.errors import OutputError, RobotError
+from shapechanger.errors import LinkError, OutputError, RobotError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
@@ -179,7 +179,8 @@ class _Bench(Bench):
     def __init__(self, *results: SelftestResult | BaseException) -> None:
         self._results = results
 
-    def results(self) -> Iterator[tuple[str, SelftestResult]]:
+    def results(self) -> Iterator[tuple[str, SelftestResult | None]]:
+        yield "checks", None
         for result in self._results:
             if isinstance(result, BaseException):
                 raise result
@@ -209,7 +210,41 @@ def test_a_report_names_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert "anna" not in text.replace("banana", "")
 
 
-def test_a_report_is_kept_whatever_happens(tmp_path: Path) -> None:
+def test_a_person_judges_each_fault() -> None:
+    """The question names the fault; an LED that never was lit proves no stop."""
+    asked: list[str] = []
+
+    def ask(question: str) -> bool:
+        asked.append(question)
+        return len(asked) == 1
+
+    bench = Bench(_profile("car"), twin=True, probe=None, ask=ask, cap=0.2)
+    results = [bench._judge_stop(name, None, 0, 270.0) for name in ("driver killed", "disarmed")]
+    assert [result.level for result in results] == ["good", "bad"]
+    assert asked[0] == ("Did a motor's LED light up, and are all of them out now (driver killed)?")
+    assert results[1].sentence == "NOT lit, or NOT out afterwards."
+
+
+def test_a_part_is_named_before_its_questions(pins: _Pins, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The heading comes when no LED was asked for yet."""
+    asked: list[str] = []
+    bench = Bench(_profile("car"), twin=True, probe=None, ask=asked.append, cap=0.2)
+    monkeypatch.setattr(bench, "_board", lambda *_: None)
+    monkeypatch.setattr(bench, "_wiring", lambda _: iter(()))
+    monkeypatch.setattr(bench, "_judged", lambda _: contextlib.nullcontext())
+    monkeypatch.setattr(leds, "_pins", lambda _: pins)
+    results = bench.results()
+    assert [next(results), next(results)] == [("wiring", None), ("LEDs", None)]
+    assert asked == []
+    part, result = next(results)
+    assert part == "LEDs"
+    assert result is not None
+    assert len(asked) == 1
+
+
+def test_a_report_is_kept_whatever_happens(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """What was found before an error stays, and so do earlier reports."""
     report = tmp_path / "report.txt"
     bad = SelftestResult("drives", "bad", "It did not.")
@@ -218,10 +253,14 @@ def test_a_report_is_kept_whatever_happens(tmp_path: Path) -> None:
         run_leds(_Bench(bad, RobotError("gone")), _profile("car"), report, twin=False)
     with pytest.raises(KeyboardInterrupt):
         run_leds(_Bench(KeyboardInterrupt()), _profile("car"), report, twin=False)
+    # Its errors are no errors of writing, although they inherit from OSError.
+    with pytest.raises(LinkError, match=r"^silent$"):
+        run_leds(_Bench(LinkError("silent")), _profile("car"), report, twin=False)
     second, third = (tmp_path / f"report-{number}.txt" for number in (2, 3))
+    assert f"{third} has what was tested so far." in capsys.readouterr().out
     assert "0 good, 1 bad" in report.read_text()
     assert second.read_text().endswith("BAD   drives: It did not.\n\nIt ended early: gone\n")
-    assert "It ended early: KeyboardInterrupt" in third.read_text()
+    assert "It ended early: it was interrupted." in third.read_text()
     with pytest.raises(OutputError, match="Cannot write"):
         run_leds(_Bench(bad), _profile("car"), report / "below.txt", twin=False)
 

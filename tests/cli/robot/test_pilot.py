@@ -74,7 +74,7 @@ def student(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ("profile", "name", "words"),
     [
         ("lab-tank", "student.onnx", "learned to steer a car, and lab-tank is a tank"),
-        ("lab-car", "studnt.onnx", "There is no policy file"),
+        ("lab-car", "studnt.onnx", "student.onnx?"),
         ("lab-car", "student.safetensors", "policies export"),
         ("lab-car", "", "There is no policy NAME.onnx"),
     ],
@@ -91,6 +91,7 @@ def test_serving_refuses_other_policies(
     """Before anything is served."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     path = (student.parent if name.endswith(".onnx") else tmp_path) / name
+    (tmp_path / "student.safetensors").touch()
     capsys.readouterr()
     command = ["robot", "serve", profile, "--twin", "--world", "room", "--port", "0"]
     with pytest.raises(SystemExit) as stop:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from shapechanger.cli import main
 from shapechanger.robot.profile.load import load_profile
+from tests.demos.exchange.small import huge
 from tests.robots import CAR, write_profile
 from tests.worlds.test_rectify import board_picture
 
@@ -89,10 +91,20 @@ def test_shipped_profiles_and_invalid_images_are_refused(
 ) -> None:
     """Shipped profiles are not written."""
     (tmp_path / "text.jpg").write_bytes(b"no picture")
+    (tmp_path / "noise.jpg").write_bytes(b"\xff\xd8\xff" + bytes(100))
+    (tmp_path / "bomb.jpg").write_bytes(huge())
+    with (tmp_path / "sparse.jpg").open("wb") as file:
+        file.truncate(1 << 33)
+    os.mkfifo(tmp_path / "pipe.jpg")
     for robot, options, message in (
         ("lab-car", ["--fovy", "50"], "comes with Shapechanger"),
         (str(profile), ["--picture", "text.jpg"], "is not a JPEG"),
         (str(profile), ["--picture", "none.jpg"], "Cannot read none.jpg"),
+        (str(profile), ["--picture", "noise.jpg"], "noise.jpg is a damaged JPEG"),
+        (str(profile), ["--picture", "bomb.jpg"], "more than 16 million pixels"),
+        (str(profile), ["--picture", "sparse.jpg"], "sparse.jpg is larger than a picture"),
+        (str(profile), ["--picture", "pipe.jpg"], "pipe.jpg is not a file"),
+        (str(profile), ["--picture", "/dev/zero"], "/dev/zero is not a file"),
     ):
         with pytest.raises(SystemExit):
             main(["robot", "camera", robot, *options])

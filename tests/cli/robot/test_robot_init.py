@@ -69,10 +69,28 @@ def test_answers_are_checked_one_by_one(
     assert (profile.name, profile.camera, profile.arming) == ("rover", None, "anyone")
 
 
-def test_on_a_pi_the_fifth_question_installs(
-    asked: tuple[list[str], list[str]], monkeypatch: pytest.MonkeyPatch
+def test_the_start_of_an_answer_is_enough(
+    asked: tuple[list[str], list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """No question is a sixth."""
+    """In any case, where it is clear; each kind is explained, and the next steps follow."""
+    _, answers = asked
+    answers += ["Ca", "Lab-T", "lab-tan", "rover", "N", "Any"]
+    Init().run()
+    said = capsys.readouterr().out
+    assert "  car         The New Bright car of 2017: two small motors" in said
+    assert "No kind of robot matches 'Ca'." in said
+    assert "No kind of robot matches 'Lab-T'." in said
+    assert "Next: shapechanger robot install rover.toml" in said
+    profile = load_profile("rover.toml")
+    assert (profile.body, profile.camera, profile.arming) == ("tank", None, "anyone")
+
+
+def test_on_a_pi_the_fifth_question_installs(
+    asked: tuple[list[str], list[str]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """No question is a sixth, and the next step is not one that is taken already."""
     questions, answers = asked
     installed: list[str] = []
     monkeypatch.setattr(setup, "require_pi", lambda _: None)
@@ -80,6 +98,7 @@ def test_on_a_pi_the_fifth_question_installs(
     answers += ["tank", "", "usb", "", "maybe", ""]
     Init().run()
     assert installed == ["tank.toml"]
+    assert "robot install" not in capsys.readouterr().out
     assert len(set(questions)) == 5
     camera = load_profile("tank.toml").camera
     assert camera is not None

@@ -45,7 +45,8 @@ def test_it_says_what_it_did(pi: FakePi, car: Profile, capsys: pytest.CaptureFix
     assert "did      group gpio: pi is in the group gpio." in said
     assert f"did      service: {unit} is the unit beside the profile." in said
     assert any(line.startswith("Restart the computer") for line in said)
-    assert any(line.startswith("Log out and in") for line in said)
+    # Which logs in again, too.
+    assert not any(line.startswith("Log out and in") for line in said)
     assert any("sudo systemctl start shapechanger-rover" in line for line in said)
     assert f"robot serve {car.path} " in f"{unit.read_text()} ".replace("\n", " ")
     again = _said(pi, car, capsys, command)
@@ -78,6 +79,41 @@ def test_a_failure_is_counted(pi: FakePi, car: Profile, capsys: pytest.CaptureFi
     assert "could not be done." in said
 
 
+def test_new_groups_alone_need_a_login(
+    pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without a line of config.txt, no restart is asked for."""
+    pi.write("boot/firmware/config.txt", "dtparam=strict_gpiod\ncamera_auto_detect=1\n")
+    said = _said(pi, car, capsys, Install("rover.toml"))
+    assert any(line.startswith("Log out and in") for line in said)
+    assert not any(line.startswith("Restart the computer") for line in said)
+
+
+def test_a_path_with_blanks_is_one_word(
+    pi: FakePi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the unit, and for the install that reads it."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    make_credentials(tmp_path / "config/shapechanger/robots/rover", "rover")
+    car = load_profile(write_profile("car", tmp_path / "my robots/rover.toml", "rover"))
+    _said(pi, car, capsys, Install("rover.toml"))
+    unit = pi.root / "etc/systemd/system/shapechanger-rover.service"
+    assert f'robot serve "{car.path}"\n' in unit.read_text()
+    _said(pi, car, capsys, Install("rover.toml"))
+
+
+def test_the_profile_of_this_folder_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A shipped name is meant for the file of that name, where there is one."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RobotError, match="`shapechanger robot init car` writes one"):
+        Install("car").run()
+    Path("car.toml").touch()
+    with pytest.raises(RobotError, match=r"car\.toml in this folder is your own"):
+        Install("car").run()
+
+
 def test_it_is_removed(pi: FakePi, car: Profile, capsys: pytest.CaptureFixture[str]) -> None:
     """The service is gone; groups stay."""
     _said(pi, car, capsys, Install("rover.toml"))
@@ -96,6 +132,12 @@ def test_who_is_refused(pi: FakePi, car: Profile) -> None:
     unit = car.path.with_name("shapechanger-rover.service")
     unit.write_text("[Service]\n")
     with pytest.raises(RobotError, match=r"does not name .*rover\.toml: remove it"):
+        command.install(car, pi.machine)
+    unit.unlink()
+    command.install(car, pi.machine)
+    unit.write_text(unit.read_text().replace("User=pi", "User=root"))
+    pi.ran.clear()
+    with pytest.raises(RobotError, match="does not run the robot as pi"):
         command.install(car, pi.machine)
     shutil.rmtree(pi.root / "run/systemd")
     with pytest.raises(RobotError, match="not run by systemd"):

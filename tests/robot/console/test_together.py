@@ -182,6 +182,25 @@ def test_a_page_reconnects_after_a_restart_and_moves_nothing(
         console.stop()
 
 
+def test_a_displaced_page_waits_for_its_person(car: RunningRobot, visit: Visit) -> None:
+    """With more people than places, pages that reconnect would displace one another for ever."""
+    console = visit(car)
+    console.await_state(link="open")
+    with contextlib.ExitStack() as stack:
+        people = [
+            stack.enter_context(car.client(role="person", name=f"person {n}", frames=False))
+            for n in range(8)
+        ]
+        console.await_state(link="displaced")
+        console.await_words("#key-trouble", "8 clients are the limit. Connect again")
+        for person in people:
+            person.ping()
+        console.page.click("#enter")
+        console.await_state(link="open")
+        with pytest.raises(LinkError, match="are the limit"):
+            until(lambda: people[0].ask() is None, 60.0)
+
+
 def test_recording_a_drive(car: RunningRobot, visit: Visit, recordings: Path) -> None:
     """Record, mark, undo, browse and judge an episode from the page."""
     console, pins = visit(car), Pins(car)

@@ -124,6 +124,10 @@ def test_only_the_devices_of_the_outputs_are_checked(tmp_path: Path) -> None:
     }
     assert sorted(sentences.values()) == ["good", "missing"]
     assert any("raspi-config" in sentence and "i2c-1" in sentence for sentence in sentences)
+    # No setting of a computer adds pins to it.
+    elsewhere = _found(tmp_path / "workstation")["devices"].sentence
+    assert "only a computer with GPIO pins" in elsewhere
+    assert "raspi-config" not in elsewhere
 
 
 def test_the_camera_is_opened(tmp_path: Path) -> None:

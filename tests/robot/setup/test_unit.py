@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from shapechanger.robot.setup.doctor import Finding, examine_robot
-from shapechanger.robot.setup.systemd import unit_text, write_unit
+from shapechanger.robot.setup.systemd import unit_text, unit_word, write_unit
 from tests.robot.setup.test_doctor import CAR
 
 
@@ -41,3 +41,25 @@ def test_an_existing_unit_is_kept(tmp_path: Path) -> None:
     path.write_text("mine")
     assert write_unit("car", tmp_path / "car.toml") == (path, False)
     assert path.read_text() == "mine"
+
+
+def test_words_of_a_unit_are_quoted() -> None:
+    """What systemd would split, expand or take for the end of a line."""
+    assert unit_word("/home/pi/car-2.toml") == "/home/pi/car-2.toml"
+    assert unit_word("/my robots/100%.toml") == '"/my robots/100%%.toml"'
+    assert unit_word('/a"b\\c$d\ne') == '"/a\\"b\\\\c$$d\\ne"'
+    text = unit_text("my car", Path("/@USER@/a\nUser=root"), "/bin/shapechanger", "pi")
+    assert [line for line in text.splitlines() if line.startswith("User=")] == ["User=pi"]
+    assert 'robot serve "/@USER@/a\\nUser=root"\n' in text
+    assert "Description=Shapechanger robot my-car\n" in text
+
+
+def test_the_doctor_reads_quoted_paths(tmp_path: Path) -> None:
+    """A profile in a folder with a blank is found in its unit."""
+    folder = tmp_path / "etc/systemd/system"
+    folder.mkdir(parents=True)
+    profile = tmp_path / "my robots/car.toml"
+    path, _ = write_unit("car", profile)
+    (folder / path.name).write_bytes(path.read_bytes())
+    findings = examine_robot(CAR, None, 0, tmp_path, profile=profile)
+    assert next(one for one in findings if one.check == "systemd").level == "good"

@@ -203,17 +203,20 @@ def test_the_doctor_examines_the_wiring(tmp_path: Path, car: GuardPlan) -> None:
         (tmp_path / "dev").mkdir(exist_ok=True)
         (tmp_path / "dev" / name).touch()
 
-    def checks(port: int, root: Path = tmp_path) -> set[str]:
+    def checks(port: int, root: Path = tmp_path) -> dict[str, str]:
         board = _board(car)
         found = examine_robot(
             car, None, port, root, hardware=lambda: board.hardware, motors_off=True
         )
-        return {one.check for one in found}
+        return {one.check: one.sentence for one in found}
 
     wiring = {"resistors", "emergency button", "sensor"}
-    assert wiring <= checks(0)
-    assert not wiring & checks(0, tmp_path / "workstation")
+    assert wiring <= checks(0).keys()
+    # Who asked for the resistors is told why nothing follows.
+    without_pins = checks(0, tmp_path / "workstation")
+    assert without_pins["resistors"] == "Not tested: this computer has no pins."
+    assert wiring & without_pins.keys() == {"resistors"}
     with socket.create_server(("", 0)) as taken:
         found = checks(taken.getsockname()[1])
     assert "wiring" in found
-    assert not wiring & found
+    assert not wiring & found.keys()

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.setup import change_profile, own_profile
-from shapechanger.errors import OutputError, RobotError
+from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture
+from shapechanger.errors import DemosError, OutputError, RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, open_camera
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 # As in a profile.
 _LEAST_FOVY_DEG: Final = 10.0
 _MOST_FOVY_DEG: Final = 170.0
+_MOST_BYTES: Final = 2**25
+_JPEG: Final = b"\xff\xd8\xff"  # Begins each JPEG.
 
 
 @dataclass(frozen=True)
@@ -128,23 +131,36 @@ def _stated(profile: Profile) -> CameraGeometry:
 
 def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
     """Read a picture from a file, or take one, shape (height, width, 3)."""
-    import simplejpeg
-
     if path is None:
         camera = open_camera(plan)
         try:
             jpeg = camera.read().jpeg
         finally:
             camera.close()
-    else:
-        try:
-            jpeg = path.read_bytes()
-        except OSError as error:
-            raise RobotError(f"Cannot read {path}: {error.strerror or error}.") from error
+        return _decoded(jpeg, "The robot's camera sent")
     try:
-        return simplejpeg.decode_jpeg(jpeg)
-    except ValueError as error:
-        raise RobotError(f"{path or 'The picture'} is not a JPEG: {error}.") from error
+        if path.exists() and not path.is_file():  # A pipe would wait for ever.
+            raise RobotError(f"{path} is not a file: --picture is a JPEG.")
+        with path.open("rb") as file:
+            jpeg = file.read(_MOST_BYTES + 1)
+    except OSError as error:
+        raise RobotError(f"Cannot read {path}: {error.strerror or error}.") from error
+    if len(jpeg) > _MOST_BYTES:
+        raise RobotError(f"{path} is larger than a picture can be, {_MOST_BYTES >> 20} MiB.")
+    if not jpeg.startswith(_JPEG):
+        raise RobotError(f"{path} is not a JPEG: save the picture as one, such as picture.jpg.")
+    return _decoded(jpeg, f"{path} is")
+
+
+def _decoded(jpeg: bytes, subject: str) -> NDArray[np.uint8]:
+    """Decode a JPEG, shape (height, width, 3); the codec's own words would help nobody."""
+    try:
+        return decode_picture(jpeg, "")
+    except DemosError as error:
+        raise RobotError(
+            f"{subject} a damaged JPEG, or one of more than {MAX_PIXELS >> 20} million pixels: "
+            "take or save the picture again."
+        ) from error
 
 
 def _drawing(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:

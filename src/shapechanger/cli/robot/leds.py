@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol
 
 from shapechanger.cli.console import say
-from shapechanger.cli.robot.selftest import SelftestResult, check_robot, pins_of
+from shapechanger.cli.robot.selftest import SelftestResult, check_robot, require_free_pin
 from shapechanger.cli.robot.trial import FAULTS, calm, has
 from shapechanger.cli.robot.trial_driver import Driver
 from shapechanger.errors import RobotError, ShapechangerError
@@ -341,8 +341,10 @@ class Bench:
         lamps_of(self._plan)
         self._probe = None if probe is None else (probe, probed_pin(self._plan, probe))
 
-    def results(self) -> Iterator[tuple[str, SelftestResult]]:
+    def results(self) -> Iterator[tuple[str, SelftestResult | None]]:
         """Run everything, and yield the part and the result of each check.
+
+        At the start of a part, before its first question, there is no result yet.
 
         Raises:
             RobotError: If the robot cannot be served.
@@ -350,14 +352,18 @@ class Bench:
         with ExitStack() as stack:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="shapechanger-leds-"))
             board = self._board(Path(folder), stack) if self._twin else None
+            yield "wiring", None
             for result in self._wiring(board):
                 yield "wiring", result
+            yield "LEDs", None
             with self._judged(board) as judge:
                 for result in walk(self._plan, lambda: _pins(board), self._ask, judge):
                     yield "LEDs", result
+            yield "checks", None
             with self._served(Path(folder)) as robot:
                 for result in check_robot(robot, self._profile, self._cap):
                     yield "checks", result
+            yield "faults", None
             for result in self._faults(Path(folder), board):
                 yield "faults", result
 
@@ -470,12 +476,12 @@ class Bench:
             words = "never" if math.isinf(stopped_ms) else f"{stopped_ms:.0f} ms later"
             good = stopped_ms <= limit_ms
             return SelftestResult(name, "good" if good else "bad", f"At rest {words}; {promised}.")
-        answer = self._ask(f"Are the motors' LEDs out now ({name})?")
+        answer = self._ask(f"Did a motor's LED light up, and are all of them out now ({name})?")
         if answer is None:
             words = f"Not measured: a wire to a free pin does, with --probe; {promised}."
             return SelftestResult(name, "unknown", words)
-        seen = "out" if answer else "NOT out"
-        return SelftestResult(name, "good" if answer else "bad", f"The LEDs were {seen}.")
+        words = "The LEDs were lit, and then out." if answer else "NOT lit, or NOT out afterwards."
+        return SelftestResult(name, "good" if answer else "bad", words)
 
 
 def _pins(board: BoardAt | None) -> Hardware:
@@ -506,11 +512,9 @@ def probed_pin(plan: GuardPlan, probe: int) -> int:
         probe: BCM pin of the probe.
 
     Raises:
-        RobotError: If the robot uses the probe's pin, or nothing can be probed.
+        RobotError: If there is no such pin, the robot uses it, or nothing can be probed.
     """
-    used = pins_of(plan)
-    if probe in used:
-        raise RobotError(f"Pin {probe} is used by {used[probe]}: join a free pin.")
+    require_free_pin(probe, plan)
     for output in plan.outputs:
         weight = output.mix.get("throttle", 0.0)
         if weight and output.driver == "hbridge":

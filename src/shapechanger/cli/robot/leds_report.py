@@ -8,9 +8,10 @@ import getpass
 import platform
 import re
 import socket
+from collections.abc import Generator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import IO, Final
+from typing import Final
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.leds import Bench, lamps_of
@@ -91,38 +92,43 @@ def run_leds(bench: Bench, profile: Profile, report: Path, *, twin: bool) -> boo
     path = free_name(report)
     counts = dict.fromkeys(("good", "bad", "unknown"), 0)
     good = True
-    part = ""
     head = ["Shapechanger: one board with LEDs in place of motors", ""]
-    try:
+    with _written(path):
         write_new(path, "\n".join([*head, *facts(profile, twin=twin), ""]).encode())
-        with path.open("a", encoding="utf-8", buffering=1) as file:
-            try:
-                for of, result in bench.results():
-                    if of != part:
-                        part = of
-                        _both(file, f"\n{of}")
-                    _both(file, f"{_MARKS[result.level]:4}  {result.name}: {result.sentence}")
-                    counts[result.level] += 1
-                    good = good and (result.level != "bad" or of == "wiring")
-            except BaseException as error:
-                # Also after Ctrl-C, a report is worth sending.
-                file.write(anonymous(f"\nIt ended early: {str(error) or type(error).__name__}\n"))
-                raise
-            known, bad, unknown = counts.values()
-            _both(file, f"\n{known} good, {bad} bad, {unknown} not measured.")
-    except OSError as error:
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
+        file = path.open("a", encoding="utf-8", buffering=1)
+    with contextlib.closing(file):
+
+        def tell(line: str) -> None:
+            """Write a line to the report, and print it."""
+            with _written(path):
+                file.write(f"{anonymous(line)}\n")
+            say(anonymous(line))
+
+        try:
+            for part, result in bench.results():
+                if result is None:
+                    tell(f"\n{part}")
+                    continue
+                tell(f"{_MARKS[result.level]:4}  {result.name}: {result.sentence}")
+                counts[result.level] += 1
+                good = good and (result.level != "bad" or part == "wiring")
+        except BaseException as error:
+            # Also after Ctrl-C, a report is worth sending.
+            why = "it was interrupted." if isinstance(error, KeyboardInterrupt) else str(error)
+            with contextlib.suppress(OSError):
+                file.write(anonymous(f"\nIt ended early: {why or type(error).__name__}\n"))
+            say(f"\n{path} has what was tested so far.")
+            raise
+        known, bad, unknown = counts.values()
+        tell(f"\n{known} good, {bad} bad, {unknown} not measured.")
     say(f"wrote {path}: it holds no key, no network and no name of this computer")
     return good
 
 
-def _both(file: IO[str], line: str) -> None:
-    """Write a line to the report, and print it.
-
-    Args:
-        file: The report.
-        line: The line.
-    """
-    line = anonymous(line)
-    file.write(f"{line}\n")
-    say(line)
+@contextlib.contextmanager
+def _written(path: Path) -> Generator[None]:
+    """Translate failures of writing a report."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error

@@ -70,25 +70,42 @@ class Selftest:
     def run(self) -> None:
         """Run the tests, print the results, and exit with 1 on a failure."""
         profile = load_profile(find_profile(self.profile))
+        self._refuse_contradictions()
         # Makes the output self-contained.
         say(
             f"shapechanger {version('shapechanger')}, {profile.name} ({profile.body}), "
             f"{'twin' if self.twin else 'hardware'}, Python {platform.python_version()}, "
             f"{platform.platform()}"
         )
-        for option, given in {
-            "--yes": self.yes,
-            "--probe": self.probe is not None,
-            "--report": self.report is not None,
-        }.items():
-            if given and not self.leds:
-                raise RobotError(f"{option} needs --leds.")
         if self.leds:
             good = self._on_leds(profile)
         else:
             good = self._on_twin(profile) if self.twin else self._on_hardware(profile)
         if not good:
             sys.exit(1)
+
+    def _refuse_contradictions(self) -> None:
+        """Refuse options that would have no effect, and numbers that mean nothing."""
+        on_twin = self.twin and not self.leds
+        on_hardware = not (self.twin or self.leds)
+        for option, given, needs, has in (
+            ("--yes", self.yes, "needs --leds", self.leds),
+            ("--probe", self.probe is not None, "needs --leds", self.leds),
+            ("--report", self.report is not None, "needs --leds", self.leds),
+            ("--trials", self.trials != 1, "needs --twin, without --leds", on_twin),
+            ("--no-one-shot", not self.one_shot, "needs --twin, without --leds", on_twin),
+            (
+                "--jumper",
+                self.jumper is not None,
+                "goes with neither --twin nor --leds",
+                on_hardware,
+            ),
+            ("--wheels-up", self.wheels_up, "goes with neither --twin nor --leds", on_hardware),
+        ):
+            if given and not has:
+                raise RobotError(f"{option} {needs}.")
+        if not 0.0 < self.cap <= 1.0:
+            raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
 
     def _on_leds(self, profile: Profile) -> bool:
         from shapechanger.cli.robot.leds import Bench, ask_nobody, ask_person
@@ -139,8 +156,6 @@ class Selftest:
     def _on_hardware(self, profile: Profile) -> bool:
         from shapechanger.twin.robot import run_robot
 
-        if not 0.0 < self.cap <= 1.0:
-            raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
         if not self.wheels_up:
             ask_for_wheels_up()
         good = True
@@ -377,10 +392,10 @@ def check_jumper(
     """
     from gpiozero import DigitalInputDevice, DigitalOutputDevice
 
-    used = pins_of(plan)
     for pin in (output, sensed):
-        if pin in used:
-            raise RobotError(f"Pin {pin} is used by {used[pin]}: join two free pins.")
+        require_free_pin(pin, plan)
+    if output == sensed:
+        raise RobotError(f"A jumper joins two pins, got {output} twice.")
     pins = hardware or RealHardware()
     try:
         factory = pins.pin_factory()
@@ -399,6 +414,25 @@ def check_jumper(
         if hardware is None:
             pins.close()
     return f"pin {sensed} followed pin {output} {_TOGGLES} times."
+
+
+_LAST_PIN: Final = 27  # BCM number; of the header, GPIO0 to GPIO27.
+
+
+def require_free_pin(pin: int, plan: GuardPlan) -> None:
+    """Refuse a pin that the header lacks, or that the robot uses.
+
+    Args:
+        pin: BCM number.
+        plan: The robot.
+
+    Raises:
+        RobotError: If it is one of these.
+    """
+    if not 0 <= pin <= _LAST_PIN:
+        raise RobotError(f"The header has the pins GPIO0 to GPIO{_LAST_PIN}, got {pin}.")
+    if use := pins_of(plan).get(pin):
+        raise RobotError(f"Pin {pin} is used by {use}: join a free pin.")
 
 
 def pins_of(plan: GuardPlan) -> dict[int, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import math
 import os
 import shutil
@@ -20,7 +21,7 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.key import robot_at
-from shapechanger.cli.robot.setup import require_pins
+from shapechanger.cli.robot.setup import require_pins, require_port
 from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.errors import (
     LinkError,
@@ -46,7 +47,6 @@ from shapechanger.twin.start import BoardAt, find_board, start_board
 from shapechanger.twin.world.place import Place
 from shapechanger.worlds.course import HOME, require_element
 
-_LAST_PORT: Final = 65535
 _HERE: Final = "127.0.0.1"
 _EVERYWHERE: Final = "0.0.0.0"
 _ROOM: Final = "room"
@@ -156,10 +156,7 @@ class Serve:
             raise RobotError("--finger-seed selects a finger of a --gap: give --gap, too.")
         if self.gap and self.world:
             raise RobotError("A finger of a --gap has no --world: give only one of them.")
-        if not 0 <= self.port <= _LAST_PORT:
-            raise RobotError(
-                f"A port is 0, for any that is free, to {_LAST_PORT}: got {self.port}."
-            )
+        require_port(self.port)
 
     def _board(self, profile: Profile, undo: contextlib.ExitStack) -> BoardAt:
         """Return the twin's board: a running one in the folder, or a new one, in a new process."""
@@ -254,6 +251,11 @@ class Serve:
                     f"There is no policy NAME{ENDING} in {self.policy}: "
                     "`shapechanger policies export` writes one."
                 )
+        elif not self.policy.exists():
+            known = [f"{name}{ENDING}" for name in policies_in(self.policy.parent)]
+            near = difflib.get_close_matches(self.policy.name, known, n=1)
+            hint = f"; did you mean {self.policy.with_name(near[0])}?" if near else "."
+            raise PolicyError(f"There is no policy file or folder {self.policy}{hint}")
         elif self.policy.suffix != ENDING:
             raise PolicyError(
                 f"A policy on board is a file NAME{ENDING}, got {self.policy.name}: "

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -27,6 +28,7 @@ from shapechanger.robot.hardware import REAL, connect
 from shapechanger.robot.profile.load import (
     find_profile,
     load_profile,
+    profile_text,
     shipped_profiles,
     starter_text,
     write_text,
@@ -42,7 +44,7 @@ from shapechanger.robot.setup.install import (
     require_pi,
     require_systemd,
 )
-from shapechanger.robot.setup.systemd import unit_name, write_unit
+from shapechanger.robot.setup.systemd import unit_name, unit_word, write_unit
 from shapechanger.robot.setup.zeros import find_joint_zeros, find_zeros
 
 
@@ -79,35 +81,39 @@ class Init:
 
     def _ask(self) -> None:
         """Ask what is needed, each with a default, write the files, and install them on a Pi."""
-        say("Enter takes the answer in brackets.")
-
-        def of(options: Iterable[str], what: str) -> Callable[[str], object]:
-            def check(answer: str) -> None:
-                if answer not in options:
-                    raise UnknownName(what, answer, options)
-
-            return check
-
         kinds = shipped_profiles()
-        kind = _answer(f"Kind of robot ({', '.join(kinds)})", "car", of(kinds, "kind of robot"))
-        name = _answer("Its name", kind, lambda name: Init(kind, name)._checked())
-        has = "none" if load_profile(kinds[kind]).camera is None else "ribbon"
+        say("Kinds of robot:")
+        for kind, path in kinds.items():
+            say(f"  {kind:10}  {_first_sentence(path)}")
+        say("Enter takes the answer in brackets.")
+        kind = _answer("Kind of robot", "car", _one_of(kinds, "kind of robot"))
+        stated = load_profile(kinds[kind])
+
+        def free(name: str) -> str:
+            Init(kind, name)._checked()
+            return name
+
+        name = _answer("Its name", kind, free)
+        has = "none" if stated.camera is None else "ribbon"
         camera = _answer(
             "Camera (ribbon: the Pi's own cable, usb: a webcam, none)",
             has,
-            of(("ribbon", "usb", "none"), "camera"),
+            _one_of(("ribbon", "usb", "none"), "camera"),
         )
-        ways = ("person", "anyone")
-        arming = _answer("Who may arm it (person, anyone)", "person", of(ways, "answer"))
+        arming = _answer(
+            "Who may arm it, so that it can move (person; anyone: programs, too)",
+            stated.arming,
+            _one_of(("person", "anyone"), "answer"),
+        )
         installs = "no"
         if _is_pi():
-            question = "Start it with the computer, which sets the Pi up with sudo (yes, no)"
-            installs = _answer(question, "yes", of(("yes", "no"), "answer"))
+            question = "Install it now, with sudo, to start with the computer (yes, no)"
+            installs = _answer(question, "yes", _one_of(("yes", "no"), "answer"))
         chosen: Any = {
             "camera": "" if camera == has else camera,
-            "arming": "" if arming == "person" else arming,
+            "arming": "" if arming == stated.arming else arming,
         }
-        made = Init(kind, name, **chosen)._write()
+        made = Init(kind, name, **chosen)._write(installs=installs == "yes")
         if installs == "yes":
             say("")
             Install(str(made)).run()
@@ -124,8 +130,12 @@ class Init:
             text = adapted(text, out, self.camera, self.arming)
         return name, out, text
 
-    def _write(self) -> Path:
-        """Write the files, print the next steps, and return the profile."""
+    def _write(self, *, installs: bool = False) -> Path:
+        """Write the files, print the next steps, and return the profile.
+
+        Args:
+            installs: Whether it is installed next.
+        """
         name, out, text = self._checked()  # Check everything before creating anything.
         credentials = make_credentials(self.credentials or credentials_folder(name), name)
         # Lets this machine drive it, especially on a twin.
@@ -138,12 +148,16 @@ class Init:
             f"wrote {profile}: check its pins before anything moves\n"
             f"{'wrote' if is_new else 'kept'} {unit}: its systemd unit\n"
             f"key and certificate in {credentials.key_file.parent}\n\n"
-            f"{shown_credentials(credentials)}\n\n"
-            f"Next: shapechanger robot install {profile}   (on the Pi: service, groups, buses)\n"
-            f"      shapechanger robot doctor {profile}\n"
-            f"      shapechanger robot serve {profile}   (with --twin: without any hardware)\n"
-            f"{how_to_remember(name, credentials)}"
+            f"{shown_credentials(credentials)}\n"
         )
+        if not installs:
+            say(
+                f"Next: shapechanger robot install {profile}   "
+                "(on the Pi: service, groups, buses)\n"
+                f"      shapechanger robot doctor {profile}\n"
+                f"      shapechanger robot serve {profile}   (with --twin: without any hardware)"
+            )
+        say(how_to_remember(name, credentials))
         return profile
 
 
@@ -156,8 +170,32 @@ def _is_pi() -> bool:
     return True
 
 
-def _answer(question: str, default: str, check: Callable[[str], object]) -> str:
-    """Ask until an answer passes a check.
+def _first_sentence(profile: Path) -> str:
+    """Return the first sentence of the comment at the head of a shipped profile."""
+    lines = takewhile(lambda line: line.startswith("#"), profile_text(profile).splitlines())
+    return " ".join(line.lstrip("# ") for line in lines).partition(". ")[0].rstrip(".")
+
+
+def _one_of(options: Iterable[str], what: str) -> Callable[[str], str]:
+    """Return a check that takes one of some words, in any case, or the start of one.
+
+    Args:
+        options: The words, in lower case.
+        what: What they are, such as "camera".
+    """
+
+    def check(answer: str) -> str:
+        word = answer.lower()
+        starts = [option for option in options if option.startswith(word)]
+        if word not in options and len(starts) != 1:
+            raise UnknownName(what, answer, options)
+        return word if word in options else starts[0]
+
+    return check
+
+
+def _answer(question: str, default: str, check: Callable[[str], str]) -> str:
+    """Ask until an answer passes a check, and return what the check makes of it.
 
     Args:
         question: The question.
@@ -171,13 +209,12 @@ def _answer(question: str, default: str, check: Callable[[str], object]) -> str:
         try:
             answer = input(f"{question} [{default}]: ").strip() or default
         except EOFError:
+            say("")
             raise RobotError("No more answers: nothing was written.") from None
         try:
-            check(answer)
+            return check(answer)
         except ShapechangerError as error:
             say(str(error))
-        else:
-            return answer
 
 
 def own_profile(name: str) -> Path:
@@ -192,10 +229,11 @@ def own_profile(name: str) -> Path:
     """
     path = find_profile(name)
     if path in shipped_profiles().values():
-        raise RobotError(
-            f"{path.stem} comes with Shapechanger and is not changed: "
-            f"`shapechanger robot init {path.stem}` writes one of your own."
-        )
+        own = Path(path.name)
+        remedy = f"`shapechanger robot init {path.stem}` writes one of your own"
+        if own.is_file():
+            remedy = f"{own} in this folder is your own"
+        raise RobotError(f"{path.stem} comes with Shapechanger and is not changed: {remedy}.")
     return path
 
 
@@ -251,7 +289,7 @@ class Home:
 
 _OUTCOMES = {"did": "did    ", "already": "already", "would": "would  ", "failed": "FAILED "}
 _AFTERWARDS = {
-    "restart": "Restart the computer, so that its pins and buses are set up: sudo reboot",
+    "restart": "Restart the computer, which sets up groups, pins and buses: sudo reboot",
     "log in": "Log out and in again, so that this user has the new groups.",
 }
 
@@ -296,14 +334,15 @@ class Install:
                 )
             folder = self.credentials or credentials_folder(profile.name)
             load_credentials(folder)
-            unit = self._unit(profile)
+            unit = self._unit(profile, machine.user)
             changes = changes_to_install(profile.guard_plan(), profile.camera, unit, machine)
         outcomes: list[Outcome] = []
         for outcome in make_changes(changes, machine.run, dry=self.dry_run):
             say(f"{_OUTCOMES[outcome.level]}  {outcome.change.name}: {outcome.sentence}")
             outcomes.append(outcome)
         then = {outcome.change.then for outcome in outcomes if outcome.level in {"did", "would"}}
-        for what in sorted(then - {""}):
+        # A restart logs the user in again, too.
+        for what in sorted(then - {"", "log in"} or then - {""}):
             say(_AFTERWARDS[what])
         failed = sum(outcome.level == "failed" for outcome in outcomes)
         if failed:
@@ -316,16 +355,22 @@ class Install:
                 f"      sudo systemctl start {unit}   (restart, if it runs already)"
             )
 
-    def _unit(self, profile: Profile) -> Path:
+    def _unit(self, profile: Profile, user: str) -> Path:
         """Return the unit beside the profile, written now if there is none."""
         path = profile.path.absolute()
         unit = path.parent / unit_name(profile.name)
         if not unit.exists() and self.dry_run:
             # `init` wrote one, and this run must not.
             raise RobotError(f"There is no {unit}: it is written without --dry-run.")
-        unit, _ = write_unit(profile.name, path, self.credentials)
-        if str(path) not in unit.read_text():
+        unit, _ = write_unit(profile.name, path, self.credentials, user)
+        text = unit.read_text(errors="replace")
+        if unit_word(str(path)) not in text:
             raise RobotError(f"{unit} does not name {path}: remove it, and install again.")
+        if f"\nUser={user}\n" not in text:
+            raise RobotError(
+                f"{unit} does not run the robot as {user}, who installs it: remove it, and install "
+                "again."
+            )
         return unit
 
 
@@ -347,6 +392,7 @@ class Doctor:
 
     def run(self) -> None:
         """Print the findings and exit with 1 if something is missing."""
+        require_port(self.port)
         profile = load_profile(find_profile(self.profile))
         findings = [Finding("profile", "good", f"{profile.path} is valid.")]
         try:
@@ -371,6 +417,22 @@ class Doctor:
         if missing:
             say(f"\n{missing} of {len(findings)} to fix.")
             sys.exit(1)
+
+
+_LAST_PORT: Final = 65535
+
+
+def require_port(port: int) -> None:
+    """Refuse a number that is no TCP port, or 0 for any that is free.
+
+    Args:
+        port: The number.
+
+    Raises:
+        RobotError: If it is neither.
+    """
+    if not 0 <= port <= _LAST_PORT:
+        raise RobotError(f"A port is 0, for any that is free, to {_LAST_PORT}: got {port}.")
 
 
 @dataclass(frozen=True)

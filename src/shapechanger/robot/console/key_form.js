@@ -50,9 +50,10 @@ export class KeyForm {
     });
   }
 
-  /** Show the form, with the text of the last attempt. */
-  show(key = "") {
+  /** Show the form, with the text of the last attempt, and why the connection ended. */
+  show(key = "", why = "") {
     if (key) this.#key.value = key;
+    setText(find("key-trouble"), why);
     find("enter").disabled = false;
     this.#key.focus();
   }

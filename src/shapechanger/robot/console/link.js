@@ -21,7 +21,8 @@ export async function describeRobot() {
 }
 
 /**
- * Fires `state` (detail: {state, text}) with the states connecting, open, waiting and refused;
+ * Fires `state` (detail: {state, text}) with the states connecting, open, waiting, refused and
+ * displaced, when another person took this page's place: then it does not reconnect by itself;
  * `invalid` (detail: a sentence) for bytes that are no message; and for each other message of the
  * robot, but for pongs, an event of its type, with the message as detail.
  */
@@ -116,6 +117,8 @@ export class Link extends EventTarget {
       const was = this.welcome;
       this.#drop();
       if (refused && !was && /key/i.test(refused)) this.#report("refused", refused);
+      // Pages that reconnect at once would displace one another for ever.
+      else if (was && /are the limit/.test(refused)) this.#report("displaced", refused);
       else this.#wait(refused || (was ? "The connection is lost." : "The robot does not answer."));
     };
     socket.onmessage = async ({ data }) => {

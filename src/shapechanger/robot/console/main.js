@@ -74,6 +74,10 @@ link.addEventListener("state", ({ detail: { state, text } }) => {
     keyForm.show(key);
     keyForm.showError(text);
   }
+  if (state === "displaced") {
+    view("login");
+    keyForm.show(key, `${text} Connect again to take the place of another.`);
+  }
   if (state === "waiting" && wasConnected) log.add(text, "trouble");
   if (state !== "connecting") disconnected(text);
 });

@@ -21,7 +21,7 @@ from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
-from shapechanger.robot.setup.systemd import unit_name
+from shapechanger.robot.setup.systemd import unit_name, unit_word
 from shapechanger.robot.setup.wiring import Level, Results, examine_wiring
 
 if TYPE_CHECKING:  # The drivers need gpiozero, which may be missing.
@@ -197,7 +197,7 @@ def _unit(robot: str, profile: Path | None, root: Path) -> Results:
         yield "missing", f"{path} lacks {' and '.join(lacks)}."
         return
     for word in ("serve", "safe-pins") if profile is not None else ():
-        named = rf"^Exec\w+=.*robot {word} {re.escape(str(profile))}(\s|$)"
+        named = rf"^Exec\w+=.*robot {word} {re.escape(unit_word(str(profile)))}(\s|$)"
         if not re.search(named, text, re.MULTILINE):
             words = f"{path} is for another profile: `robot {word}` does not name {profile}."
             yield "missing", words
@@ -264,15 +264,20 @@ def device_groups(guard: GuardPlan) -> dict[str, str]:
     return groups
 
 
+_WITHOUT_DEVICE: Final = {
+    "gpio": "only a computer with GPIO pins, such as a Raspberry Pi, drives this robot",
+    "i2c": "switch the bus on with `sudo raspi-config` (Interface Options), and restart",
+    "dialout": "plug in the adapter of the servo bus",
+}
+"""Remedies for device files that do not exist, by their group."""
+
+
 def _devices(guard: GuardPlan, root: Path) -> Results:
     """Check that this user can open the device files."""
     for name, group in device_groups(guard).items():
         path = root / name.lstrip("/")
         if not path.exists():
-            remedy = "enable it with `sudo raspi-config` (Interface Options)"
-            if group == "dialout":
-                remedy = "plug in the adapter of the servo bus"
-            yield "missing", f"{path} does not exist: {remedy}."
+            yield "missing", f"{path} does not exist: {_WITHOUT_DEVICE[group]}."
         elif not os.access(path, os.R_OK | os.W_OK):
             remedy = f"`sudo adduser $USER {group}` and log in again"
             yield "missing", f"This user may not open {path}: {remedy}."

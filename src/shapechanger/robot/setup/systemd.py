@@ -14,11 +14,24 @@ from shapechanger.robot.new_file import write_new
 
 _TEMPLATE: Final = Path(__file__).parent / "robot.service"
 _NOT_IN_UNITS: Final = re.compile(r"[^A-Za-z0-9_.-]")
+_PLAIN_WORD: Final = re.compile(r"[A-Za-z0-9_./+:@,=-]+")
+_ESCAPES: Final = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "%": "%%", "$": "$$"}
 
 
 def unit_name(robot: str) -> str:
     """Return the name of a robot's systemd unit; one computer may serve several robots."""
     return f"shapechanger-{_NOT_IN_UNITS.sub('-', robot)}.service"
+
+
+def unit_word(text: str) -> str:
+    """Return a word of a unit's command line, in quotes where it needs them (systemd.service(5)).
+
+    Args:
+        text: The word, such as a path with blanks.
+    """
+    if _PLAIN_WORD.fullmatch(text):
+        return text
+    return f'"{"".join(_ESCAPES.get(character, character) for character in text)}"'
 
 
 def unit_text(
@@ -36,23 +49,26 @@ def unit_text(
     text = _TEMPLATE.read_text(encoding="utf-8")
     values = {
         "UNIT": unit_name(robot).removesuffix(".service"),
-        "PROFILE": str(profile),
-        "PROGRAM": program,
+        "ROBOT": _NOT_IN_UNITS.sub("-", robot),
+        "PROFILE": unit_word(str(profile)),
+        "PROGRAM": unit_word(program),
         "USER": user,
-        "OPTIONS": f" --credentials {credentials}" if credentials else "",
+        "OPTIONS": f" --credentials {unit_word(str(credentials))}" if credentials else "",
     }
-    for name, value in values.items():
-        text = text.replace(f"@{name}@", value)
-    return text
+    # At once, because a path may hold what looks like another placeholder.
+    return re.sub("@([A-Z]+)@", lambda match: values[match[1]], text)
 
 
-def write_unit(robot: str, profile: Path, credentials: Path | None = None) -> tuple[Path, bool]:
+def write_unit(
+    robot: str, profile: Path, credentials: Path | None = None, user: str = ""
+) -> tuple[Path, bool]:
     """Write the unit beside a profile; an existing file stays.
 
     Args:
         robot: Name of the robot.
         profile: Its profile, which need not exist yet.
         credentials: Folder of its key and certificate; None for the default.
+        user: User that runs it; "" for the one of this process.
 
     Returns:
         The file, and True if it was written now.
@@ -63,7 +79,7 @@ def write_unit(robot: str, profile: Path, credentials: Path | None = None) -> tu
     path = profile.absolute().parent / unit_name(robot)
     program = shutil.which("shapechanger") or f"{sys.prefix}/bin/shapechanger"
     folder = credentials.absolute() if credentials else None
-    text = unit_text(robot, profile.absolute(), program, getpass.getuser(), folder)
+    text = unit_text(robot, profile.absolute(), program, user or getpass.getuser(), folder)
     try:
         write_new(path, text.encode())
     except FileExistsError:

@@ -221,12 +221,14 @@ def examine_wiring(
         has_bus: Tells whether it has an I2C bus with that number, which this user may open.
     """
     checks: list[tuple[str, Results]] = []
-    if has_pins and (driven_pins(guard) or _enables(guard)):
-        if motors_off:
+    if driven_pins(guard) or _enables(guard):
+        if has_pins and motors_off:
             checks.append(("resistors", pull_resistors(guard, hardware)))
         else:
-            words = "Not tested: take the motors' supply off, and add --motors-off"
-            yield "resistors", "unknown", f"{words}."
+            words = "take the motors' supply off, and add --motors-off"
+            if not has_pins:
+                words = "this computer has no pins"
+            yield "resistors", "unknown", f"Not tested: {words}."
     if has_pins:
         checks.append(("emergency button", emergency_button(guard, hardware)))
     on_buses = [one for one in guard.outputs if has_bus(one.settings.get("bus", -1))]
