@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.finger_learned import CIRCLE, TRACKS, played, trained
+from benchmarks.finger_reach import Statics, held_by_controller
 from benchmarks.row import Row
 from shapechanger.cli.transfer import write_study_report
 from shapechanger.envs.finger.policies import POLICIES
@@ -24,6 +26,7 @@ from shapechanger.reports.numbers import share_text
 from shapechanger.reports.verdict import successes
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Processes
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 from shapechanger.transfer.learners.settings import learner_settings
 from shapechanger.transfer.plan import ARMS, TransferTask
@@ -40,6 +43,8 @@ _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 _MILD: Final = 0.5
 _RECOVERED: Final = 0.8
 _FOLLOWED: Final = 2.0
+# Distance within which a target counts as reached, m, as in `Finger-v1`.
+_NEAR_M: Final = 0.005
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
 
 
@@ -72,6 +77,7 @@ def gap() -> list[Row]:
     return [
         *rows_of(study, "fingers of the gap real-like"),
         *halves,
+        *_ceiling(study, Path("results", "finger-gap")),
         Row(
             "nominal finger with a delay of 10 ms: targets reached by the shipped policy",
             f"{np.mean(delay_only):.0%}",
@@ -79,15 +85,53 @@ def gap() -> list[Row]:
             "none",
             True,
         ),
-        Row(
+        _share_row(
             "fingers of the gap real-like, policy that knows the rig's motors and delay only",
-            f"{shares.mean():.0%}",
-            f"{share_text(shares)} over {len(shares)} fingers: "
-            f"{', '.join(f'{each:.0%}' for each in shares)}",
+            shares,
+        ),
+    ]
+
+
+def _ceiling(study: Study, out: Path) -> list[Row]:
+    """Return how many targets of the study each finger can hold, and which ones policies miss."""
+    plan = study.plan
+    held, moved_to, controlled, reached = (np.zeros((plan.seeds, TARGETS), bool) for _ in range(4))
+    for seed in range(plan.seeds):
+        finger = plan.task.target.having({"finger_seed": seed})
+        policy = load_policy(out / "runs" / f"identified-{seed}" / "policy.safetensors")
+        ends = played(policy, finger, TARGETS, EVALUATION_SEED)
+        reached[seed] = [info["is_success"] for info in ends]
+        controlled[seed] = held_by_controller(finger.kwargs, EVALUATION_SEED, TARGETS)
+        with finger.make() as env:
+            inner: Any = env.unwrapped
+            statics = Statics(inner.parameters)
+        for i, info in enumerate(ends):
+            held[seed, i] = statics.distance(info["target"]) <= _NEAR_M
+            moved_to[seed, i] = statics.distance_coming_from_rest(info["target"]) <= _NEAR_M
+    where = "fingers of the gap real-like"
+    rows = {
+        f"{where}: targets that some tensions hold within 5 mm": held,
+        f"{where}: targets that the finger comes to from rest, against friction": moved_to,
+        f"{where}, controller that knows the finger: targets reached within 5 mm": controlled,
+    }
+    others = reached[~moved_to]
+    return [
+        *(_share_row(name, shares.mean(axis=1)) for name, shares in rows.items()),
+        Row(
+            f"{where}, identified: reached of the targets that the finger comes to from rest",
+            f"{reached[moved_to].mean():.0%}",
+            f"{reached[moved_to].sum()} of {moved_to.sum()}; {others.sum()} of the other "
+            f"{others.size}",
             "none",
             True,
         ),
     ]
+
+
+def _share_row(name: str, shares: NDArray[np.float64]) -> Row:
+    each = ", ".join(f"{share:.0%}" for share in shares)
+    spread = f"{share_text(shares)} over {len(shares)} fingers: {each}"
+    return Row(name, f"{shares.mean():.0%}", spread, "none", True)
 
 
 def _halfway(study: Study, arm: str) -> Row:

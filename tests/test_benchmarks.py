@@ -6,10 +6,15 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks import run
+from benchmarks.finger_reach import Statics
 from benchmarks.row import Row, asked
+from shapechanger.bodies.finger import NOMINAL
+from shapechanger.bodies.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.tasks.finger import fingertip
 
 
 def test_rows_that_only_leaves_out_are_kept(
@@ -45,3 +50,24 @@ def test_a_wrong_name_in_only_gets_the_nearest(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("ONLY", "baot")
     with pytest.raises(SystemExit, match=r"^No vehicle matches 'baot'\. Did you mean 'boat'\?"):
         run.main()
+
+
+def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
+    """Tensions hold a straight knuckle above a bent finger, and do not bring it there."""
+    hook = fingertip(np.radians([0.0, 0.0, 85.0, 55.0]), PHALANX_LENGTH_M)
+    tensions = {
+        share: tuple(share * most for most in NOMINAL.most_tension) for share in (0.4, 0.56)
+    }
+    strong, weak, rubbing = (
+        Statics(finger)
+        for finger in (
+            NOMINAL,
+            NOMINAL.replace(most_tension=tensions[0.4]),
+            NOMINAL.replace(most_tension=tensions[0.56], tendon_friction=0.8),
+        )
+    )
+    assert strong.distance_coming_from_rest(hook) < 1e-4
+    assert weak.distance(hook) > 1e-3
+    assert rubbing.distance(hook) < 1e-4
+    assert rubbing.distance_coming_from_rest(hook) > 4e-3
+    assert rubbing.distance_coming_from_rest(fingertip(JOINT_REST, PHALANX_LENGTH_M)) < 1e-4
