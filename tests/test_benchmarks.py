@@ -63,7 +63,7 @@ def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
         for finger in (
             NOMINAL,
             NOMINAL.replace(most_tension=tensions[0.4]),
-            NOMINAL.replace(most_tension=tensions[0.56], tendon_friction=0.8),
+            NOMINAL.replace(most_tension=tensions[0.56], least_tension=1.0, tendon_friction=0.8),
         )
     )
     assert strong.distance_coming_from_rest(hook) < 1e-4
