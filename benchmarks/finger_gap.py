@@ -10,6 +10,8 @@ The study equals `shapechanger transfer Finger Finger --target-options '{"gap": 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -19,11 +21,10 @@ from numpy.typing import NDArray
 
 from benchmarks.finger_learned import CIRCLE, TRACKS, played, trained
 from benchmarks.finger_reach import Statics, held_by_controller
-from benchmarks.row import Row
+from benchmarks.row import Row, asked
 from shapechanger.cli.transfer import write_study_report
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.reports.numbers import share_text
-from shapechanger.reports.verdict import successes
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Processes
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED
@@ -41,11 +42,21 @@ RIG_STEPS: Final = 6144
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 # Zero-shot success below this counts as a gap.
 _MILD: Final = 0.5
+# Success that is asked of arms: on a rig's twin, in process, and after twenty minutes of tuning.
 _RECOVERED: Final = 0.8
+_RECOVERED_IN_GAP: Final = 0.9
+_TUNED: Final = 0.7
 _FOLLOWED: Final = 2.0
 # Distance within which a target counts as reached, m, as in `Finger-v1`.
 _NEAR_M: Final = 0.005
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
+
+
+_WHERE: Final = "fingers of the gap real-like"
+_GAP_ARMS: Final = (*ARMS, "randomised", "identified")
+# A study compares with scratch, and the targets that fingers can hold are those of `identified`.
+_ALWAYS: Final = ("scratch", "identified")
+_RIG_ONLY: Final = "rig"
 
 
 def gap() -> list[Row]:
@@ -55,41 +66,41 @@ def gap() -> list[Row]:
     policy of the nominal finger on the rig's motors what the other moment arms and joints cost.
     """
     target = _FINGER.having({"gap": "real-like"})
-    study = _study(
-        target,
-        "ppo-finger",
-        (*ARMS, "randomised", "identified"),
-        SEEDS,
-        STEPS,
-        Path("results", "finger-gap"),
-    )
+    out = Path("results", "finger-gap")
+    wanted = asked("arm or row", (*_GAP_ARMS, _RIG_ONLY))
+    arms = tuple(arm for arm in _GAP_ARMS if arm in (*wanted, *_ALWAYS))
+    study = _study(target, "ppo-finger", arms, SEEDS, STEPS, out)
+    rows = [
+        *rows_of(study, _WHERE, {"identified": _RECOVERED_IN_GAP, "fine-tune": _TUNED}),
+        *(
+            _share_row(
+                f"{_WHERE}, {arm} after {STEPS // 2:,} steps", _shares(study, arm, STEPS // 2)
+            )
+            for arm in ("scratch", "fine-tune")
+            if arm in arms
+        ),
+        *_ceiling(study, out),
+    ]
     shipped, late = load_policy(POLICIES["reach"]), _FINGER.having(_LATE)
     delay_only = [info["is_success"] for info in played(shipped, late, TARGETS)]
-    knows_rig = load_policy(trained("rig", 0))
-    shares = np.array(
-        [
-            np.mean([i["is_success"] for i in played(knows_rig, target.having(one), TARGETS)])
-            for one in ({"finger_seed": seed} for seed in range(study.plan.seeds))
-        ],
-        np.float64,
-    )
-    halves = [_halfway(study, arm) for arm in ("scratch", "fine-tune")]
-    return [
-        *rows_of(study, "fingers of the gap real-like"),
-        *halves,
-        *_ceiling(study, Path("results", "finger-gap")),
+    rows.append(
         Row(
             "nominal finger with a delay of 10 ms: targets reached by the shipped policy",
             f"{np.mean(delay_only):.0%}",
             f"{TARGETS} targets",
             "none",
             True,
-        ),
-        _share_row(
-            "fingers of the gap real-like, policy that knows the rig's motors and delay only",
-            shares,
-        ),
-    ]
+        )
+    )
+    if _RIG_ONLY in wanted:
+        knows_rig = load_policy(trained(_RIG_ONLY, 0))
+        fingers = [target.having({"finger_seed": seed}) for seed in range(study.plan.seeds)]
+        ends = [[i["is_success"] for i in played(knows_rig, each, TARGETS)] for each in fingers]
+        shares = np.mean(np.array(ends, np.float64), axis=1)
+        rows.append(
+            _share_row(f"{_WHERE}, policy that knows the rig's motors and delay only", shares)
+        )
+    return rows
 
 
 def _ceiling(study: Study, out: Path) -> list[Row]:
@@ -108,17 +119,16 @@ def _ceiling(study: Study, out: Path) -> list[Row]:
         for i, info in enumerate(ends):
             held[seed, i] = statics.distance(info["target"]) <= _NEAR_M
             moved_to[seed, i] = statics.distance_coming_from_rest(info["target"]) <= _NEAR_M
-    where = "fingers of the gap real-like"
     rows = {
-        f"{where}: targets that some tensions hold within 5 mm": held,
-        f"{where}: targets that the finger comes to from rest, against friction": moved_to,
-        f"{where}, controller that knows the finger: targets reached within 5 mm": controlled,
+        f"{_WHERE}: targets that some tensions hold within 5 mm": held,
+        f"{_WHERE}: targets that the finger comes to from rest, against friction": moved_to,
+        f"{_WHERE}, controller that knows the finger: targets reached within 5 mm": controlled,
     }
     others = reached[~moved_to]
     return [
         *(_share_row(name, shares.mean(axis=1)) for name, shares in rows.items()),
         Row(
-            f"{where}, identified: reached of the targets that the finger comes to from rest",
+            f"{_WHERE}, identified: reached of the targets that the finger comes to from rest",
             f"{reached[moved_to].mean():.0%}",
             f"{reached[moved_to].sum()} of {moved_to.sum()}; {others.sum()} of the other "
             f"{others.size}",
@@ -134,21 +144,14 @@ def _share_row(name: str, shares: NDArray[np.float64]) -> Row:
     return Row(name, f"{shares.mean():.0%}", spread, "none", True)
 
 
-def _halfway(study: Study, arm: str) -> Row:
-    """Return the success of an arm after half of its steps."""
-    steps = STEPS // 2
-    shares = np.array(
+def _shares(study: Study, arm: str, steps: int | None = None) -> NDArray[np.float64]:
+    """Return the success of each run of an arm after some steps, by default after all."""
+    return np.array(
         [
-            float(np.mean([e.success or 0.0 for e in result.curve if e.steps == steps]))
-            for result in study.of(arm)
-        ]
-    )
-    return Row(
-        f"fingers of the gap real-like, {arm} after {steps:,} steps",
-        f"{shares.mean():.0%}",
-        f"{share_text(shares)} over {len(shares)} fingers",
-        "none",
-        True,
+            next(e.success or 0.0 for e in reversed(run.curve) if steps in (None, e.steps))
+            for run in study.of(arm)
+        ],
+        np.float64,
     )
 
 
@@ -157,7 +160,7 @@ def rig() -> list[Row]:
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
     arms: tuple[str, ...] = ("scratch", "zero-shot", "identified")
     study = _study(target, "ppo-rig", arms, RIGS, RIG_STEPS, Path("results", "finger-rig"))
-    return rows_of(study, "twins of a rig, real-like")
+    return rows_of(study, "twins of a rig, real-like", {"identified": _RECOVERED})
 
 
 def follow() -> list[Row]:
@@ -239,22 +242,23 @@ def _study(
     return study
 
 
-def rows_of(study: Study, where: str) -> list[Row]:
-    """Return the success of each arm next to its target; the nominal finger reaches all."""
-    shares = {arm: successes(study, arm) for arm in study.plan.arms}
-    adapted = [arm for arm in ("randomised", "identified") if arm in shares]
-    best = max(adapted, key=lambda arm: float(shares[arm].mean()))
-    limits = {"zero-shot": ("< 50 %", float(shares["zero-shot"].mean()) < _MILD)}
-    wanted = ">= 80 %" + (", this or the other" if len(adapted) > 1 else "")
-    limits[best] = (wanted, float(shares[best].mean()) >= _RECOVERED)
-    seeds = study.plan.seeds
-    return [
-        Row(
-            f"{where}, {arm}: targets reached within 5 mm",
-            f"{np.mean(share):.0%}",
-            f"{share_text(share)} over {seeds} fingers: "
-            f"{', '.join(f'{each:.0%}' for each in share)}",
-            *limits.get(arm, ("none", True)),
-        )
-        for arm, share in shares.items()
-    ]
+def rows_of(study: Study, where: str, least: Mapping[str, float]) -> list[Row]:
+    """Return the success of each arm at its end next to its target; the nominal finger reaches all.
+
+    Args:
+        study: The study.
+        where: Its targets, in words.
+        least: Least mean success of an arm, where one is asked.
+    """
+    rows: list[Row] = []
+    for arm in study.plan.arms:
+        shares = _shares(study, arm)
+        name = f"{where}, {arm}: targets reached within 5 mm"
+        row = _share_row(name, shares)
+        if arm in least:
+            wanted, met = f">= {least[arm]:.0%}", shares.mean() >= least[arm]
+            row = replace(row, target=wanted, met=bool(met))
+        elif arm == "zero-shot":
+            row = replace(row, target="< 50 %", met=bool(shares.mean() < _MILD))
+        rows.append(row)
+    return rows
