@@ -20,9 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.finger_learned import CIRCLE, TRACKS, played, trained
-from benchmarks.finger_reach import Statics, held_by_controller
+from benchmarks.finger_reach import FINGERS, TARGETS, Statics, held_by_controller
 from benchmarks.row import Row, asked
+from shapechanger.bodies.finger import FingerParameters
 from shapechanger.cli.transfer import write_study_report
+from shapechanger.envs.finger.env import SMOOTHNESS
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.reports.numbers import share_text
 from shapechanger.transfer.env_ref import EnvRef
@@ -33,11 +35,9 @@ from shapechanger.transfer.learners.settings import learner_settings
 from shapechanger.transfer.plan import ARMS, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
 
-SEEDS: Final = 10
 # Twenty minutes on a bench; arms are also evaluated after ten.
 STEPS: Final = 61_440
 RIGS: Final = 5
-TARGETS: Final = 20
 RIG_STEPS: Final = 6144
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 # Zero-shot success below this counts as a gap.
@@ -69,7 +69,7 @@ def gap() -> list[Row]:
     out = Path("results", "finger-gap")
     wanted = asked("arm or row", (*_GAP_ARMS, _RIG_ONLY))
     arms = tuple(arm for arm in _GAP_ARMS if arm in (*wanted, *_ALWAYS))
-    study = _study(target, "ppo-finger", arms, SEEDS, STEPS, out)
+    study = _study(target, "ppo-finger", arms, FINGERS, STEPS, out)
     rows = [
         *rows_of(study, _WHERE, {"identified": _RECOVERED_IN_GAP, "fine-tune": _TUNED}),
         *(
@@ -81,6 +81,16 @@ def gap() -> list[Row]:
         ),
         *_ceiling(study, out),
     ]
+    chatter = {arm: np.mean(_chatter(study, arm)) for arm in arms}
+    rows.append(
+        Row(
+            f"{_WHERE}, identified: mean change of a command per step, over its range",
+            f"{chatter['identified']:.1%}",
+            ", ".join(f"{arm} {change:.1%}" for arm, change in chatter.items()),
+            "none",
+            True,
+        )
+    )
     shipped, late = load_policy(POLICIES["reach"]), _FINGER.having(_LATE)
     delay_only = [info["is_success"] for info in played(shipped, late, TARGETS)]
     rows.append(
@@ -112,10 +122,11 @@ def _ceiling(study: Study, out: Path) -> list[Row]:
         policy = load_policy(out / "runs" / f"identified-{seed}" / "policy.safetensors")
         ends = played(policy, finger, TARGETS, EVALUATION_SEED)
         reached[seed] = [info["is_success"] for info in ends]
-        controlled[seed] = held_by_controller(finger.kwargs, EVALUATION_SEED, TARGETS)
         with finger.make() as env:
             inner: Any = env.unwrapped
-            statics = Statics(inner.parameters)
+            parameters: FingerParameters = inner.parameters
+        controlled[seed] = held_by_controller(parameters, EVALUATION_SEED, TARGETS)
+        statics = Statics(parameters)
         for i, info in enumerate(ends):
             held[seed, i] = statics.distance(info["target"]) <= _NEAR_M
             moved_to[seed, i] = statics.distance_coming_from_rest(info["target"]) <= _NEAR_M
@@ -153,6 +164,11 @@ def _shares(study: Study, arm: str, steps: int | None = None) -> NDArray[np.floa
         ],
         np.float64,
     )
+
+
+def _chatter(study: Study, arm: str) -> list[float]:
+    """Return the mean change of a command per step, over its range, at the end of each run."""
+    return [1.0 - run.curve[-1].measures[SMOOTHNESS.name] for run in study.of(arm)]
 
 
 def rig() -> list[Row]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, Final, cast
 
 import gymnasium as gym
@@ -11,12 +12,15 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import shapechanger  # noqa: F401 - Registers the ids.
-from shapechanger.bodies.finger import FingerParameters, build_finger, drive_of
+from benchmarks.row import Row
+from shapechanger.bodies.finger import NOMINAL, FingerParameters, build_finger, drive_of
 from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, PHALANX_LENGTH_M
 from shapechanger.bodies.finger.tensions import tensions_for_torque
+from shapechanger.envs.finger.gap import GAPS
 from shapechanger.envs.finger.oracle import FingerOracle
 from shapechanger.envs.finger.postures import angles_for, joint_torque
 from shapechanger.tasks.finger import fingertip, fingertip_jacobian
+from shapechanger.transfer.learners.evaluation import EVALUATION_SEED
 
 # With a larger gain, 1/s, a finger on a rig's path of commands oscillates; a smaller one, 6, leaves
 # it on its way after 2 s.
@@ -24,10 +28,33 @@ _GAIN: Final = 12.0
 # Units in which the solver's numbers are near 1: errors of 1 cm, tensions of 10 N, torques of
 # 10 mN·m.
 _ERROR_M, _TENSION_N, _TORQUE_NM = 0.01, 10.0, 0.01
-# Largest torque that an equilibrium may lack, N·m: a thousandth of a finger's weight.
+# Largest torque that an equilibrium may lack, N·m: a thousandth of that of the weight at the knuckle.
 _BALANCED_NM: Final = 1e-5
+# Searches for an equilibrium, and the spread of their starts, rad.
 _STARTS: Final = 4
 _SPREAD_RAD: Final = 0.3
+FINGERS: Final = 10
+TARGETS: Final = 20
+_RIG: Final = GAPS["real-like"]
+
+
+def _nominal(*names: str) -> dict[str, Any]:
+    return {name: getattr(NOMINAL, name) for name in names}
+
+
+_REPLACED: Final = {
+    "": {},
+    " without noise": _nominal("joint_noise", "tension_noise"),
+    " without delay": _nominal("command_delay"),
+    " with stiff tendons": _nominal("tendon_stiffness", "backlash"),
+    # Without any, the controller oscillates.
+    " with the least friction of the gap": {"tendon_friction": _RIG.tendon_friction[0]},
+    " with the nominal finger's tensions": _nominal("most_tension", "least_tension"),
+    " with the nominal finger's moment arms": _nominal("moment_arms"),
+    " with the nominal finger's joints": _nominal(
+        "joint_stiffness", "joint_damping", "joint_friction"
+    ),
+}
 
 
 class Statics:
@@ -120,18 +147,44 @@ class Statics:
         return (self._arms.T @ (_TENSION_N * x[4:]) - self._torque(x[:4])) / _TORQUE_NM
 
 
-def held_by_controller(arguments: dict[str, Any], first_seed: int, targets: int) -> list[bool]:
+def causes() -> list[Row]:
+    """Measure what keeps the controller that knows a finger of the gap from its targets.
+
+    Each row replaces some parameters of the fingers.
+    """
+    many = int(os.environ.get("FINGERS", FINGERS))
+    fingers = [_RIG.draw(np.random.default_rng(seed)) for seed in range(many)]
+    rows: list[Row] = []
+    for what, changes in _REPLACED.items():
+        shares = [
+            float(np.mean(held_by_controller(finger.replace(**changes), EVALUATION_SEED, TARGETS)))
+            for finger in fingers
+        ]
+        rows.append(
+            Row(
+                f"controller that knows the finger, fingers of the gap real-like{what}: targets "
+                "reached within 5 mm",
+                f"{np.mean(shares):.0%}",
+                f"{', '.join(f'{share:.0%}' for share in shares)} of {TARGETS} targets each",
+                "none",
+                True,
+            )
+        )
+    return rows
+
+
+def held_by_controller(finger: FingerParameters, first_seed: int, targets: int) -> list[bool]:
     """Return whether the controller that knows the finger reaches and holds each target.
 
     Args:
-        arguments: Arguments of `Finger-v1`.
+        finger: Its parameters.
         first_seed: Seed of the first episode.
         targets: Number of episodes.
     """
     reached: list[bool] = []
-    with gym.make("shapechanger/Finger-v1", **arguments) as env:
+    with gym.make("shapechanger/Finger-v1", parameters=finger) as env:
         inner: Any = env.unwrapped
-        act = FingerOracle(inner.observation_layout, parameters=inner.parameters, gain=_GAIN)
+        act = FingerOracle(inner.observation_layout, parameters=finger, gain=_GAIN)
         for i in range(targets):
             observation, info = env.reset(seed=first_seed + i)
             act.reset()
