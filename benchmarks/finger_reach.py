@@ -28,7 +28,7 @@ _GAIN: Final = 12.0
 # Units in which the solver's numbers are near 1: errors of 1 cm, tensions of 10 N, torques of
 # 10 mN·m.
 _ERROR_M, _TENSION_N, _TORQUE_NM = 0.01, 10.0, 0.01
-# Largest torque that an equilibrium may lack, N·m: a thousandth of that of the weight at the knuckle.
+# Largest torque that an equilibrium may lack, N·m: a thousandth of that of the finger's weight.
 _BALANCED_NM: Final = 1e-5
 # Searches for an equilibrium, and the spread of their starts, rad.
 _STARTS: Final = 4
