@@ -193,7 +193,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
 
 def _asked() -> str:
     """Return the environment variables that were set, as shell assignments."""
-    names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "ONLY", "VEHICLE", "LP_NUM_THREADS")
+    names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "ONLY", "ENDED", "VEHICLE", "LP_NUM_THREADS")
     return "".join(
         f"{name}={shlex.quote(os.environ[name])} " for name in names if name in os.environ
     )

@@ -10,11 +10,15 @@ import numpy as np
 import pytest
 
 from benchmarks import run
+from benchmarks.finger_gap import rows_of
 from benchmarks.finger_reach import Statics
 from benchmarks.row import Row, asked
 from shapechanger.bodies.finger import NOMINAL
 from shapechanger.bodies.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
 from shapechanger.tasks.finger import fingertip
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.plan import Run
+from shapechanger.transfer.runs import RunResult
 
 
 def test_rows_that_only_leaves_out_are_kept(
@@ -71,3 +75,21 @@ def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
     assert rubbing.distance(hook) < 1e-4
     assert rubbing.distance_coming_from_rest(hook) > 4e-3
     assert rubbing.distance_coming_from_rest(fingertip(JOINT_REST, PHALANX_LENGTH_M)) < 1e-4
+
+
+def test_rows_of_a_study_that_has_not_ended_name_their_fingers() -> None:
+    """A mean over some fingers says over which, and the end of a run counts, not its start."""
+
+    def run(arm: str, index: int, *successes: float) -> RunResult:
+        curve = tuple(Evaluation(i, 0.0, 1.0, success=each) for i, each in enumerate(successes))
+        return RunResult(Run(arm, index), 0, curve, 0.0)
+
+    runs = {
+        "fine-tune": [run("fine-tune", 0, 0.0, 0.8), run("fine-tune", 1, 0.0, 0.6)],
+        "identified": [run("identified", 0, 0.9), run("identified", 6, 0.8)],
+    }
+    tuned, identified = rows_of(runs, "fingers", {"fine-tune": 0.7, "identified": 0.9})
+    assert (tuned.value, tuned.target, tuned.met) == ("70%", ">= 70%", True)
+    assert (identified.value, identified.met) == ("85%", False)
+    assert "over 2 fingers: 80%, 60%" in tuned.spread
+    assert "over 2 fingers (seeds 0, 6): 90%, 80%" in identified.spread
