@@ -158,12 +158,16 @@ def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
 
 
 def _row(name: str, shares: Mapping[int, float]) -> Row:
-    """Return a row of shares of the targets by the seed of the finger."""
+    """Return a row of shares of the targets by the seed of the finger.
+
+    A row of some fingers names their seeds, so that it does not replace that of the first ones.
+    """
     values = np.array([*shares.values()])
     seeds = [*shares]
-    which = "" if seeds == [*range(len(seeds))] else f" (seeds {', '.join(map(str, seeds))})"
-    spread = f"{share_text(values)} over {len(values)} fingers{which}: "
-    spread += ", ".join(f"{share:.0%}" for share in values)
+    if seeds != [*range(len(seeds))]:
+        name += f", seeds {', '.join(map(str, seeds))}"
+    each = ", ".join(f"{share:.0%}" for share in values)
+    spread = f"{share_text(values)} over {len(values)} fingers: {each}"
     return Row(name, f"{values.mean():.0%}", spread, "none", True)
 
 

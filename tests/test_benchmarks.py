@@ -92,4 +92,6 @@ def test_rows_of_a_study_that_has_not_ended_name_their_fingers() -> None:
     assert (tuned.value, tuned.target, tuned.met) == ("70%", ">= 70%", True)
     assert (identified.value, identified.met) == ("85%", False)
     assert "over 2 fingers: 80%, 60%" in tuned.spread
-    assert "over 2 fingers (seeds 0, 6): 90%, 80%" in identified.spread
+    assert "over 2 fingers: 90%, 80%" in identified.spread
+    assert tuned.name.endswith("within 5 mm")
+    assert identified.name.endswith("within 5 mm, seeds 0, 6")
