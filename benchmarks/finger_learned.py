@@ -149,18 +149,21 @@ def _tracker(seed: int) -> TrainedPolicy:
     return load_policy(FOLDER / f"track-{seed}.safetensors")
 
 
-def played(policy: TrainedPolicy, env: EnvRef, episodes: int) -> list[dict[str, Any]]:
+def played(
+    policy: TrainedPolicy, env: EnvRef, episodes: int, first_seed: int = FIRST_SEED
+) -> list[dict[str, Any]]:
     """Return the last info of each episode.
 
     Args:
         policy: The policy.
         env: The env.
         episodes: Number of episodes.
+        first_seed: Seed of the first episode.
     """
     infos: list[dict[str, Any]] = []
     with gym.make(env.id, **env.kwargs) as made:
         for i in range(episodes):
-            observation, info = made.reset(seed=FIRST_SEED + i)
+            observation, info = made.reset(seed=first_seed + i)
             ended = False
             while not ended:
                 action = policy.act(observation[None])[0]

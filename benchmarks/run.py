@@ -37,6 +37,7 @@ from benchmarks import (
     finger_oracle,
     finger_path,
     finger_physics,
+    finger_reach,
     finger_speed,
     generalist,
     references,
@@ -161,6 +162,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "finger-follow": finger_gap.follow,
     "finger-path": finger_path.path,
     "finger-physics": finger_physics.physics,
+    "finger-reach": finger_reach.causes,
     "finger-oracle": finger_oracle.oracle,
     "finger-speed": finger_speed.against_myosuite,
     "finger-learned": finger_learned.learned,
@@ -193,7 +195,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
 
 def _asked() -> str:
     """Return the environment variables that were set, as shell assignments."""
-    names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "ONLY", "VEHICLE", "LP_NUM_THREADS")
+    names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "ONLY", "ENDED", "VEHICLE", "LP_NUM_THREADS")
     return "".join(
         f"{name}={shlex.quote(os.environ[name])} " for name in names if name in os.environ
     )

@@ -6,10 +6,19 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks import run
+from benchmarks.finger_gap import rows_of
+from benchmarks.finger_reach import Statics
 from benchmarks.row import Row, asked
+from shapechanger.bodies.finger import NOMINAL
+from shapechanger.bodies.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.tasks.finger import fingertip
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.plan import Run
+from shapechanger.transfer.runs import RunResult
 
 
 def test_rows_that_only_leaves_out_are_kept(
@@ -45,3 +54,44 @@ def test_a_wrong_name_in_only_gets_the_nearest(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("ONLY", "baot")
     with pytest.raises(SystemExit, match=r"^No vehicle matches 'baot'\. Did you mean 'boat'\?"):
         run.main()
+
+
+def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
+    """Tensions hold a straight knuckle above a bent finger, and do not bring it there."""
+    hook = fingertip(np.radians([0.0, 0.0, 85.0, 55.0]), PHALANX_LENGTH_M)
+    tensions = {
+        share: tuple(share * most for most in NOMINAL.most_tension) for share in (0.4, 0.56)
+    }
+    strong, weak, rubbing = (
+        Statics(finger)
+        for finger in (
+            NOMINAL,
+            NOMINAL.replace(most_tension=tensions[0.4]),
+            NOMINAL.replace(most_tension=tensions[0.56], least_tension=1.0, tendon_friction=0.8),
+        )
+    )
+    assert strong.distance_coming_from_rest(hook) < 1e-4
+    assert weak.distance(hook) > 1e-3
+    assert rubbing.distance(hook) < 1e-4
+    assert rubbing.distance_coming_from_rest(hook) > 4e-3
+    assert rubbing.distance_coming_from_rest(fingertip(JOINT_REST, PHALANX_LENGTH_M)) < 1e-4
+
+
+def test_rows_of_a_study_that_has_not_ended_name_their_fingers() -> None:
+    """A mean over some fingers says over which, and the end of a run counts, not its start."""
+
+    def run(arm: str, index: int, *successes: float) -> RunResult:
+        curve = tuple(Evaluation(i, 0.0, 1.0, success=each) for i, each in enumerate(successes))
+        return RunResult(Run(arm, index), 0, curve, 0.0)
+
+    runs = {
+        "fine-tune": [run("fine-tune", 0, 0.0, 0.8), run("fine-tune", 1, 0.0, 0.6)],
+        "identified": [run("identified", 0, 0.9), run("identified", 6, 0.8)],
+    }
+    tuned, identified = rows_of(runs, "fingers", {"fine-tune": 0.7, "identified": 0.9})
+    assert (tuned.value, tuned.target, tuned.met) == ("70%", ">= 70%", True)
+    assert (identified.value, identified.met) == ("85%", False)
+    assert "over 2 fingers: 80%, 60%" in tuned.spread
+    assert "over 2 fingers: 90%, 80%" in identified.spread
+    assert tuned.name.endswith("within 5 mm")
+    assert identified.name.endswith("within 5 mm, seeds 0, 6")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -145,6 +146,15 @@ def test_other_files_are_rejected(tmp_path: Path) -> None:
         load_log(path)
     with pytest.raises(FingerError, match="cannot be read: Is a directory"):
         load_log(tmp_path)
+
+
+def test_pipes_and_devices_are_refused_unread(tmp_path: Path) -> None:
+    """A pipe without a writer would wait forever."""
+    pipe = tmp_path / "log.npz"
+    os.mkfifo(pipe)
+    for path in (pipe, Path(os.devnull)):
+        with pytest.raises(FingerError, match="cannot be read: it is not a regular file"):
+            load_log(path)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import tyro
 from rich.table import Table
@@ -19,6 +19,9 @@ from shapechanger.transfer.files import write_atomic
 if TYPE_CHECKING:
     from shapechanger.bodies.finger import FingerParameters
     from shapechanger.identify import IdentifiedFinger
+
+# Largest file of parameters, which have some kilobytes.
+_MOST_BYTES: Final = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -179,6 +182,7 @@ class ExportFinger:
 def _parameters(given: str) -> FingerParameters:
     """Return a set of parameters by name, or from a file."""
     from shapechanger.bodies.finger.parameters import PARAMETER_SETS, FingerParameters
+    from shapechanger.demos.episodes.files import read_file
 
     if given in PARAMETER_SETS:
         return PARAMETER_SETS[given]
@@ -186,7 +190,7 @@ def _parameters(given: str) -> FingerParameters:
     if not path.suffix and not path.exists():
         raise UnknownName("set of finger parameters", given, PARAMETER_SETS)
     try:
-        return FingerParameters.from_json(path.read_bytes())
+        return FingerParameters.from_json(read_file(path, _MOST_BYTES))
     except OSError as error:
         raise FingerError(f"{path} cannot be read: {error.strerror or error}.") from error
 

@@ -204,9 +204,13 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
             `FingerLog` rejects.
         UnknownName: If its mode of action is unknown.
     """
-    name = Path(path).name
+    place = Path(path)
+    name = place.name
+    # Opening a pipe waits for a writer, and a device may never end.
+    if place.exists() and not (place.is_file() or place.is_dir()):
+        raise FingerError(f"{name} cannot be read: it is not a regular file.")
     try:
-        with Path(path).open("rb") as raw:  # NumPy leaves a damaged file open.
+        with place.open("rb") as raw:  # NumPy leaves a damaged file open.
             loaded: Any = np.load(raw, allow_pickle=False)
             if not isinstance(loaded, NpzFile):
                 raise ValueError("one array, not an archive of arrays")
@@ -222,7 +226,7 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
     except FingerError:  # A ValueError, too.
         raise
     except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
-        raise FingerError(_unreadable(Path(path))) from error
+        raise FingerError(_unreadable(place)) from error
     header = _read_header(name, read)
     missing = [key for key in SIGNALS if key not in read]
     if missing:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,8 @@ def test_a_finger_is_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "not both" in refused(capsys, "export", *to, *both)
     assert "real-like" in refused(capsys, "export", *to, "--gap", "real-lik")
     assert "cannot be read" in refused(capsys, "export", *to, "--parameters", tmp_path / "no.json")
+    os.mkfifo(pipe := tmp_path / "pipe.json")  # Without a writer, which would be waited for.
+    assert "not a regular file" in refused(capsys, "export", *to, "--parameters", pipe)
     assert "an-1983" in refused(capsys, "export", *to, "--parameters", "an-1984")
     file.write_text("{}]")
     assert "Invalid finger parameters" in refused(capsys, "export", *to, "--parameters", file)

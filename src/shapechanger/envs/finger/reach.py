@@ -25,7 +25,7 @@ _HELD_S: Final = 0.2
 
 
 class FingerReachEnv(FingerEnv):
-    """Bring the fingertip to a random point that it can reach, and keep it there.
+    """Bring the fingertip to a random point that the nominal finger can reach, and keep it there.
 
     ## Action space
     `Box(-1, 1, (7,), float32)`, one number per tendon: FDP, FDS, EIP, EDC, LUM, DI, PI. The
@@ -47,7 +47,8 @@ class FingerReachEnv(FingerEnv):
 
     ## Start
     At rest, near the posture of a hand at rest. The target is the fingertip of a random posture
-    that the nominal finger can hold, at least a tenth of its range away from each limit.
+    that the nominal finger can hold, at least a tenth of its range away from each limit. A weaker
+    finger of a gap may not come to all of them.
 
     ## End
     Never terminated; truncated after 100 steps, 2 s.
