@@ -17,7 +17,7 @@ ShapechangerError
 ├── MapError (ValueError)           body map that cannot be built, inverted or composed
 ├── TransplantError (ValueError)    policy whose weights cannot be transplanted
 ├── StudyError (ValueError)         study that cannot start
-│   ├── FailedRuns                  runs that failed on a cluster, while all others ended
+│   ├── FailedRuns                  runs that failed, while all others ended
 │   ├── ForeignStudy                output folder of something else
 │   └── CorruptStudy                unreadable file of a study
 ├── DemosError (ValueError)         demonstrations that cannot be recorded, read or learned from
@@ -128,7 +128,7 @@ class StudyError(ShapechangerError, ValueError):
 
 
 class FailedRuns(StudyError):
-    """Runs of a study that failed on a cluster, while all others ended."""
+    """Runs of a study that failed, while all others ended."""
 
 
 class ForeignStudy(StudyError):

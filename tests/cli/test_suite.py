@@ -11,12 +11,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import msgspec
 import pytest
 import torch
 
 from shapechanger.cli import env_arguments, main
 from shapechanger.cli import suite as suite_command
 from shapechanger.cli.suite import SuiteFile
+from shapechanger.errors import FailedRuns
 from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.learners.presets import LEARNERS
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
@@ -167,6 +169,33 @@ def test_a_stopped_suite_resumes_to_the_same_numbers(
     again = _Counting()
     assert _run(out, again)[0] == 0
     assert again.done == []
+
+
+class _Failing(_Counting):
+    """Executor of which every study has a run that fails."""
+
+    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
+        """Count the study, and fail."""
+        self.done.append(jobs[0].name)
+        raise FailedRuns("These runs failed: source-0 (broken).")
+
+
+@pytest.mark.parametrize(("exclusive", "studies"), [(False, 6), (True, 1)], ids=["sim", "robot"])
+def test_after_a_failed_run_other_studies_go_on_except_on_a_robot(
+    exclusive: bool, studies: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The failed runs are reported at the end; a robot does not move again by itself."""
+    plan = suite_command._plan
+    monkeypatch.setattr(
+        suite_command,
+        "_plan",
+        lambda *arguments: msgspec.structs.replace(plan(*arguments), exclusive=exclusive),
+    )
+    failing = _Failing()
+    code, _, errors = _run(tmp_path / "all", failing)
+    assert code == 2
+    assert len(failing.done) == studies
+    assert errors.count("source-0 (broken)") == studies
 
 
 def test_folders_of_two_machines_are_merged(

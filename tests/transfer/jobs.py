@@ -8,7 +8,7 @@ import threading
 import time
 from pathlib import Path
 
-from shapechanger.errors import UnknownName
+from shapechanger.errors import OutputError, UnknownName
 from shapechanger.transfer.executor import Job, Processes, ReportSteps
 
 
@@ -28,9 +28,29 @@ def crash(report: ReportSteps) -> None:
     raise ZeroDivisionError("a bug")
 
 
-def vanish(report: ReportSteps) -> None:
-    """End by SIGKILL."""
+def fill_the_disk(report: ReportSteps) -> None:
+    """Raise the error of a file that cannot be written."""
+    raise OutputError("Cannot write run.json: No space left on device.")
+
+
+def vanish(mark: str, report: ReportSteps) -> None:
+    """Append a line, and end by SIGKILL."""
+    _append(mark)
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def vanish_once(mark: str, report: ReportSteps) -> None:
+    """Append a line, and end by SIGKILL at the first attempt."""
+    again = Path(mark).exists()
+    _append(mark)
+    if not again:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _append(mark: str) -> None:
+    """Append a line for an attempt."""
+    with Path(mark).open("a") as log:
+        log.write("attempt\n")
 
 
 def wait_for_ever(pid_file: str, report: ReportSteps) -> None:
@@ -47,8 +67,7 @@ def run_for_ever(pid_file: str) -> None:
 
 def end_when_there_is_one(mark: str, go: str, report: ReportSteps) -> None:
     """Append a line for each attempt, and end once `go` exists."""
-    with Path(mark).open("a") as log:
-        log.write("attempt\n")
+    _append(mark)
     never = threading.Event()
     while not Path(go).exists():
         report(time.monotonic_ns())

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.errors import StudyError, UnknownName
+from shapechanger.errors import FailedRuns, OutputError, StudyError, UnknownName
 from shapechanger.transfer.executor import Executor, Job, Processes, Serial
 from tests.transfer import jobs
 
@@ -47,23 +47,68 @@ def test_jobs_wait_for_those_before_them(executor: Executor, tmp_path: Path) -> 
     assert seen == ["first", "middle", "last"]
 
 
-@pytest.mark.parametrize("executor", EXECUTORS, ids=["serial", "processes"])
-def test_a_user_error_comes_back_as_it_was(executor: Executor) -> None:
-    """A ShapechangerError of a job is raised in the parent."""
+def test_in_this_process_an_error_comes_back_as_it_was() -> None:
+    """For debugging, the error of a job is raised itself."""
     with pytest.raises(UnknownName, match="No thing matches 'this'"):
-        executor.run([Job("refuse", jobs.refuse, ())], lambda *_: None)
+        Serial().run([Job("refuse", jobs.refuse, ())], lambda *_: None)
 
 
-def test_a_bug_comes_back_with_its_traceback() -> None:
-    """Other errors become a StudyError with the job's name and traceback."""
-    with pytest.raises(StudyError, match=r"(?s)crash failed.*ZeroDivisionError: a bug"):
-        Processes(1).run([Job("crash", jobs.crash, ())], lambda *_: None)
+def test_failed_jobs_are_reported_and_others_continue(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Users' errors, bugs with their tracebacks, lost processes, and the jobs that need them."""
+    mark, attempts = tmp_path / "mark", tmp_path / "attempts"
+    seen: list[str] = []
+    with pytest.raises(FailedRuns) as caught:
+        Processes(1).run(
+            [
+                Job("refuse", jobs.refuse, ()),
+                Job("again", jobs.refuse, ()),
+                Job("crash", jobs.crash, ()),
+                Job("vanish", jobs.vanish, (str(attempts),)),
+                Job("needs", jobs.leave_a_mark, (str(tmp_path / "never"),), ("refuse",)),
+                Job("others", jobs.leave_a_mark, (str(mark),)),
+            ],
+            lambda name, steps, ended: seen.append(name) if ended else None,
+        )
+    text = str(caught.value)
+    assert "refuse, again (No thing matches 'this'" in text
+    assert "crash (Traceback" in text
+    assert "ZeroDivisionError: a bug" in text
+    assert "vanish (its process was lost 3 times, at last with exit code -9)" in text
+    assert "These need them: needs." in text
+    assert "crash failed: ZeroDivisionError: a bug" in caplog.messages
+    assert seen == ["others"]
+    assert attempts.read_text() == "attempt\n" * 3
+    assert mark.exists()
+    assert not (tmp_path / "never").exists()
 
 
-def test_a_process_that_is_killed_is_reported() -> None:
-    """A worker that is killed raises a StudyError."""
-    with pytest.raises(StudyError, match="vanish ended by itself with exit code -9"):
-        Processes(1).run([Job("vanish", jobs.vanish, ())], lambda *_: None)
+def test_a_lost_process_is_replaced(tmp_path: Path) -> None:
+    """A job whose process was killed once ends in another."""
+    mark = tmp_path / "mark"
+    Processes(1).run([Job("vanish", jobs.vanish_once, (str(mark),))], lambda *_: None)
+    assert mark.read_text() == "attempt\nattempt\n"
+
+
+def test_a_job_of_one_attempt_is_not_repeated(tmp_path: Path) -> None:
+    """A robot must not move again by itself."""
+    mark = tmp_path / "mark"
+    job = Job("vanish", jobs.vanish, (str(mark),), attempts=1)
+    with pytest.raises(FailedRuns, match=r"vanish \(its process was lost once with exit code -9"):
+        Processes(1).run([job], lambda *_: None)
+    assert mark.read_text() == "attempt\n"
+
+
+def test_a_full_disk_ends_all_jobs(tmp_path: Path) -> None:
+    """No other job could write its result either."""
+    mark = tmp_path / "mark"
+    with pytest.raises(OutputError, match="No space left"):
+        Processes(1).run(
+            [Job("full", jobs.fill_the_disk, ()), Job("next", jobs.leave_a_mark, (str(mark),))],
+            lambda *_: None,
+        )
+    assert not mark.exists()
 
 
 def test_a_script_without_a_guarded_start_is_reported(tmp_path: Path) -> None:
@@ -75,7 +120,7 @@ def test_a_script_without_a_guarded_start_is_reported(tmp_path: Path) -> None:
     )
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True)
     last = done.stderr.splitlines()[-1]
-    assert "StudyError: The process of sum ended by itself with exit code 1" in last
+    assert "sum (its process was lost 3 times, at last with exit code 1)" in last
 
 
 def test_no_workers_are_refused() -> None:

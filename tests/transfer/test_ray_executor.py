@@ -112,7 +112,7 @@ def test_a_failed_job_is_reported_and_others_continue(cluster: Any, tmp_path: Pa
         RayCluster(cluster.address).run(
             [
                 Job("refuse", jobs.refuse, ()),
-                Job("vanish", jobs.vanish, ()),
+                Job("vanish", jobs.vanish, (str(tmp_path / "attempts"),)),
                 Job("needs", jobs.leave_a_mark, (str(tmp_path / "never"),), ("refuse",)),
                 Job("others", jobs.leave_a_mark, (str(mark),)),
             ],
@@ -120,7 +120,7 @@ def test_a_failed_job_is_reported_and_others_continue(cluster: Any, tmp_path: Pa
         )
     text = str(caught.value)
     assert "refuse (No thing matches 'this'" in text
-    assert "vanish (lost 3 times" in text
+    assert "vanish (its process was lost 3 times" in text
     assert "These need them: needs." in text
     assert mark.exists()
     assert not (tmp_path / "never").exists()

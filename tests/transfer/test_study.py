@@ -6,6 +6,8 @@ import errno
 import json
 import os
 import shutil
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +28,7 @@ from shapechanger.errors import (
 )
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.env_ref import EnvRef, certify_shift
-from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.files import read_json
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.plan import ARMS, Run, TransferTask
@@ -263,6 +265,24 @@ def test_a_policy_that_was_deleted_is_made_again(
     again = run_study(tiny_plan(), out, executor=Serial())
     assert curves(again) == curves(finished[0])
     assert (out / "runs" / "source-1" / "policy.safetensors").exists()
+
+
+class _Planned:
+    """An executor that keeps its jobs and runs none."""
+
+    def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
+        self.jobs = jobs
+
+
+def test_runs_of_a_robot_wait_for_one_another(tmp_path: Path) -> None:
+    """None moves the robot again once one has failed, on whatever executor."""
+    plan, planned = msgspec.structs.replace(tiny_plan(), exclusive=True), _Planned()
+    with pytest.raises(StudyError, match="are not in"):
+        run_study(plan, tmp_path / "robot", executor=planned)
+    names = [run.name for run in plan.runs()]
+    assert [job.name for job in planned.jobs] == names
+    assert all(before.name in job.after for before, job in pairwise(planned.jobs))
+    assert {job.attempts for job in planned.jobs} == {1}
 
 
 @pytest.mark.parametrize("how", ["another run's", "cut short", "empty"])

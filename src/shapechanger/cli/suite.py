@@ -287,6 +287,8 @@ class RunSuite:
                         traits=traits,
                     )
             except FailedRuns as error:
+                if plan.exclusive:  # The next study would move the robot.
+                    raise
                 failed.append(f"{name}: {error}")
                 continue
             except KeyboardInterrupt:

@@ -120,8 +120,7 @@ class Transfer:
         given = self.source_policy and policy_file(self.source_policy, task.source)
         plan = self._plan(task, traits, given)
         _ = traits.shift  # An empty shift is refused before anything is written.
-        workers = 1 if plan.exclusive and self.executor == "processes" else self.workers
-        executor = executor_of(self.executor, workers, self.address)
+        executor = executor_of(self.executor, self.workers, self.address)
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
         to_do = unfinished_runs(plan, out) if is_folder_of(plan, out) else plan.runs()
         if len(to_do) < len(plan.runs()):

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
 import threading
 import time
 import traceback
+from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Final, Protocol
 
-from shapechanger.errors import ShapechangerError, StudyError
+from shapechanger.errors import FailedRuns, OutputError, ShapechangerError, StudyError
 
 _REPORT_EVERY_S: Final = 0.25
+_log = logging.getLogger(__name__)
 
 # Called in the job with the number of steps done.
 ReportSteps = Callable[[int], None]
@@ -34,19 +38,21 @@ class Job:
             another process can import it.
         arguments: Its arguments; must be picklable.
         after: Names of the jobs that must end before it starts.
+        attempts: Times that it is tried while its process is lost; one that raises is not repeated.
     """
 
     name: str
     function: Callable[..., None]
     arguments: tuple[Any, ...]
     after: tuple[str, ...] = ()
+    attempts: int = 3
 
 
 class Executor(Protocol):
     """Runs jobs."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs in order of their dependencies; raise what one of them raised.
+        """Run all jobs in order of their dependencies.
 
         Args:
             jobs: The jobs.
@@ -55,9 +61,85 @@ class Executor(Protocol):
         ...
 
 
-def done_before(jobs: Sequence[Job]) -> set[str]:
-    """Return the names that jobs wait for but that are not among them: those have ended."""
-    return {name for job in jobs for name in job.after} - {job.name for job in jobs}
+class Schedule:
+    """Jobs that wait, have ended and have failed, in order of their dependencies.
+
+    A job that fails does not stop the others, except those that need its result. One whose process
+    is lost is repeated.
+
+    Args:
+        jobs: The jobs; names that they wait for and that are not among them have ended before.
+    """
+
+    def __init__(self, jobs: Sequence[Job]) -> None:
+        self._waiting = list(jobs)
+        self._ended = {name for job in jobs for name in job.after} - {job.name for job in jobs}
+        self._failed: dict[str, list[str]] = {}  # Names of jobs by reason.
+        self._lost: Counter[str] = Counter()
+
+    def start(self, most: int | None = None) -> list[Job]:
+        """Return jobs whose dependencies have ended; they wait no longer.
+
+        Args:
+            most: Number of jobs to return at most; None for all.
+        """
+        ready = [job for job in self._waiting if self._ended.issuperset(job.after)][:most]
+        for job in ready:
+            self._waiting.remove(job)
+        return ready
+
+    def end(self, job: Job) -> None:
+        """Record that a job has ended."""
+        self._ended.add(job.name)
+
+    def fail(self, job: Job, error: ShapechangerError | str) -> None:
+        """Record that a job has failed.
+
+        Args:
+            job: The job.
+            error: What it raised, or a reason.
+
+        Raises:
+            OutputError: If it could not write its result: no other job could.
+        """
+        if isinstance(error, OutputError):
+            raise error
+        reason = str(error).strip().rstrip(".")
+        self._failed.setdefault(reason, []).append(job.name)
+        # At once, because the others may take hours.
+        _log.error("%s failed: %s", job.name, reason.rpartition("\n")[2])
+
+    def lose(self, job: Job, how: str) -> None:
+        """Record that the process of a job has ended by itself; the job waits again, or has failed.
+
+        Args:
+            job: The job.
+            how: How its process ended, such as "exit code -9".
+        """
+        self._lost[job.name] += 1
+        if self._lost[job.name] < job.attempts:
+            self._waiting.append(job)
+        else:
+            times = "once" if job.attempts == 1 else f"{job.attempts} times, at last"
+            self.fail(job, f"its process was lost {times} with {how}")
+
+    def require_success(self) -> None:
+        """Raise if jobs have failed.
+
+        Raises:
+            FailedRuns: With the reason of each, and the jobs that need them.
+        """
+        if not self._failed:
+            return
+        reasons = "; ".join(
+            f"{', '.join(names)} ({reason})" for reason, names in self._failed.items()
+        )
+        skipped = ", ".join(job.name for job in self._waiting)
+        raise FailedRuns(
+            f"These runs failed: {reasons}. "
+            + (f"These need them: {skipped}. " if skipped else "")
+            + "All others have ended; the same command tries these again."
+        )
 
 
 def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
@@ -80,21 +162,19 @@ def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
 
 
 class Serial:
-    """Runs jobs one after another in this process, for debugging."""
+    """Runs jobs one after another in this process, for debugging; raises what the first raises."""
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         """Run all jobs; see `Executor.run`."""
-        ended = done_before(jobs)
-        waiting = list(jobs)
-        while waiting:
-            job = next(job for job in waiting if ended.issuperset(job.after))
-            waiting.remove(job)
+        schedule = Schedule(jobs)
+        while ready := schedule.start(1):
+            job = ready[0]
 
             def report(steps: int, name: str = job.name) -> None:
                 on_progress(name, steps, False)
 
             job.function(*job.arguments, report)
-            ended.add(job.name)
+            schedule.end(job)
             on_progress(job.name, 0, True)
 
 
@@ -114,37 +194,50 @@ class Processes:
         self._workers = workers or os.cpu_count() or 1
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs; see `Executor.run`. The first failure ends the others.
+        """Run all jobs; see `Executor.run` and `Schedule`.
 
         Raises:
-            ShapechangerError: What a job raised, or a `StudyError` with its traceback.
+            FailedRuns: If jobs have failed; all others are complete.
+            OutputError: If a job could not write its result; the others are ended.
         """
-        waiting = list(jobs)
-        ended = done_before(jobs)
-        idle = [_Worker() for _ in range(min(self._workers, len(jobs)))]
+        schedule = Schedule(jobs)
+        idle: list[_Worker] = []
         busy: dict[Connection, _Worker] = {}
         try:
-            while waiting or busy:
-                ready = [job for job in waiting if ended.issuperset(job.after)]
-                for job in ready[: len(idle)]:
-                    worker = idle.pop()
-                    worker.begin(job)
+            while True:
+                for job in schedule.start(self._workers - len(busy)):
+                    worker = idle.pop() if idle else _Worker()
                     busy[worker.connection] = worker
-                    waiting.remove(job)
+                    worker.begin(job)
+                if not busy:
+                    break
                 for connection in wait(list(busy)):
                     worker = busy[connection]  # pyright: ignore[reportArgumentType]
-                    done = worker.receive()
-                    on_progress(worker.job_name, worker.steps, done)
-                    if done:
-                        ended.add(worker.job_name)
-                        idle.append(busy.pop(worker.connection))
+                    kind, content = worker.receive()
+                    if kind == "steps":
+                        worker.steps = content
+                        on_progress(worker.job.name, worker.steps, False)
+                        continue
+                    del busy[worker.connection]
+                    if kind == "lost":
+                        schedule.lose(worker.job, f"exit code {worker.end()}")
+                        continue
+                    idle.append(worker)
+                    if kind == "failed":
+                        schedule.fail(worker.job, content)
+                        continue
+                    schedule.end(worker.job)
+                    on_progress(worker.job.name, worker.steps, True)
         finally:
             for worker in (*idle, *busy.values()):
                 worker.end()
+        schedule.require_success()
 
 
 class _Worker:
     """A process that runs jobs one after another."""
+
+    job: Job
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -152,41 +245,26 @@ class _Worker:
         self._process: BaseProcess = context.Process(target=_serve, args=(theirs,), daemon=True)
         self._process.start()
         theirs.close()
-        self.job_name = ""
         self.steps = 0
 
     def begin(self, job: Job) -> None:
-        self.job_name, self.steps = job.name, 0
-        try:
+        self.job, self.steps = job, 0
+        with suppress(ConnectionError):  # A process that has ended is noticed when it is heard.
             self.connection.send((job.function, job.arguments))
-        except ConnectionError:
-            raise self._ended() from None
 
-    def receive(self) -> bool:
-        """Receive one message; return whether the job has ended."""
+    def receive(self) -> tuple[str, Any]:
+        """Receive "steps" with their number, "failed" with the error, "ended" or "lost"."""
         try:
-            kind, content = self.connection.recv()
+            return self.connection.recv()
         except (EOFError, ConnectionError):  # The latter if it has not read its job.
-            raise self._ended() from None
-        if kind == "failed":
-            raise content
-        if kind == "crashed":
-            raise StudyError(f"{self.job_name} failed:\n{content}")
-        if kind == "steps":
-            self.steps = content
-        return kind == "ended"
+            return "lost", None
 
-    def _ended(self) -> StudyError:
-        self._process.join()
-        return StudyError(
-            f"The process of {self.job_name} ended by itself with exit code "
-            f"{self._process.exitcode}; runs that had ended are kept."
-        )
-
-    def end(self) -> None:
+    def end(self) -> int | None:
+        """End the process, and return its exit code; negative for a signal."""
         self._process.terminate()
         self._process.join()
         self.connection.close()
+        return self._process.exitcode
 
 
 def _serve(connection: Connection) -> None:
@@ -204,8 +282,8 @@ def _serve(connection: Connection) -> None:
             function(*arguments, report)
         except ShapechangerError as error:
             connection.send(("failed", error))
-        except Exception:  # It crosses to the parent, which raises it.
-            connection.send(("crashed", traceback.format_exc()))
+        except Exception:  # It crosses to the parent, which reports it.
+            connection.send(("failed", traceback.format_exc()))
         else:
             connection.send(("ended", None))
 

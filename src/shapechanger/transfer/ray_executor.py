@@ -15,8 +15,8 @@ import traceback
 from collections.abc import Sequence
 from typing import Any, Final
 
-from shapechanger.errors import FailedRuns, MissingExtra, ShapechangerError, StudyError
-from shapechanger.transfer.executor import Job, OnProgress, done_before, throttled
+from shapechanger.errors import MissingExtra, ShapechangerError, StudyError
+from shapechanger.transfer.executor import Job, OnProgress, Schedule, throttled
 
 # Set before Ray is imported; otherwise Ray reports usage statistics.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -28,7 +28,6 @@ try:
 except ImportError as error:
     raise MissingExtra("ray", "ray") from error
 
-_ATTEMPTS: Final = 3
 _CONNECT_S: Final = 2.0
 _ANSWER_S: Final = 8.0
 _REPORT_EVERY_S: Final = 0.5
@@ -38,8 +37,7 @@ _ray: Any = ray
 class RayCluster:
     """Runs jobs on the nodes of a Ray cluster, one job per core.
 
-    A job whose worker or node is lost is repeated on another, up to three times. A job that fails
-    is reported at the end, and the others go on, except those that need its result.
+    A job whose worker or node is lost is repeated on another; see `Schedule`.
 
     Args:
         address: Address of a running cluster, such as `10.0.0.1:6379`, or "auto" for the one that
@@ -55,12 +53,13 @@ class RayCluster:
         Raises:
             StudyError: If the cluster does not answer.
             FailedRuns: If jobs have failed; all others are complete.
+            OutputError: If a job could not write its result; the others are cancelled.
         """
         own = not _ray.is_initialized()
         if own:
             self._connect()
         try:
-            _Schedule(jobs, on_progress).run()
+            _Session(jobs, on_progress).run()
         finally:
             if own:
                 _ray.shutdown()
@@ -103,15 +102,12 @@ def _no_answer(address: str, reason: str) -> StudyError:
     )
 
 
-class _Schedule:
-    """The jobs that wait, run, have ended and have failed."""
+class _Session:
+    """The jobs that run on a cluster, and their steps."""
 
     def __init__(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         self._on_progress = on_progress
-        self._waiting = list(jobs)
-        self._ended = done_before(jobs)
-        self._failed: dict[str, str] = {}
-        self._attempts = {job.name: 0 for job in jobs}
+        self._schedule = Schedule(jobs)
         self._running: dict[Any, Job] = {}
         self._steps: dict[str, int] = {}
         self._board: Any = _new_board()
@@ -129,21 +125,12 @@ class _Schedule:
             for task in self._running:
                 _ray.cancel(task, force=True)
             raise
-        if self._failed:
-            reasons = "; ".join(f"{name} ({reason})" for name, reason in self._failed.items())
-            skipped = ", ".join(job.name for job in self._waiting)
-            raise FailedRuns(
-                f"These runs failed: {reasons}. "
-                + (f"These need them: {skipped}. " if skipped else "")
-                + "All others have ended; the same command tries these again."
-            )
+        self._schedule.require_success()
 
     def _start_ready(self) -> bool:
         """Start the jobs whose dependencies have ended; return whether there were any."""
-        ready = [job for job in self._waiting if self._ended.issuperset(job.after)]
+        ready = self._schedule.start()
         for job in ready:
-            self._waiting.remove(job)
-            self._attempts[job.name] += 1
             self._steps[job.name] = 0
             task = self._perform.remote(job.function, job.arguments, job.name, self._board)
             self._running[task] = job
@@ -151,16 +138,14 @@ class _Schedule:
 
     def _finish(self, job: Job, task: Any) -> None:
         try:
-            failure: str = _ray.get(task)
+            failure: ShapechangerError | str | None = _ray.get(task)
         except RayError as error:  # The worker or its node is gone.
-            if self._attempts[job.name] < _ATTEMPTS:
-                self._waiting.append(job)
-                return
-            failure = f"lost {_ATTEMPTS} times, at last with {type(error).__name__}"
-        if failure:
-            self._failed[job.name] = failure
+            self._schedule.lose(job, type(error).__name__)
             return
-        self._ended.add(job.name)
+        if failure is not None:
+            self._schedule.fail(job, failure)
+            return
+        self._schedule.end(job)
         self._on_progress(job.name, self._steps[job.name], True)
 
     def _report(self) -> None:
@@ -197,14 +182,16 @@ class _Board:
         return steps
 
 
-def _perform(function: Any, arguments: tuple[Any, ...], name: str, board: Any) -> str:
-    """Perform a job on a node; return why it failed, or nothing."""
+def _perform(
+    function: Any, arguments: tuple[Any, ...], name: str, board: Any
+) -> ShapechangerError | str | None:
+    """Perform a job on a node; return the error or the traceback if it failed."""
     try:
         function(
             *arguments, throttled(lambda steps: board.put.remote(name, steps), _REPORT_EVERY_S)
         )
     except ShapechangerError as error:
-        return str(error).rstrip(".")
+        return error
     except Exception:  # It crosses to the program that started the study.
         return traceback.format_exc()
-    return ""
+    return None

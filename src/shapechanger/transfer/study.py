@@ -6,6 +6,7 @@ import hashlib
 import platform
 from collections.abc import Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
@@ -307,6 +308,7 @@ def run_study(
         OutputError: If `out` cannot be written; finished runs are kept.
         ForeignStudy: If `out` holds another study, or something else.
         CorruptStudy: If a file in `out` cannot be read.
+        FailedRuns: If runs have failed; all others that do not need them have ended.
     """
     if (_digest(source_policy) if source_policy else "") != plan.source_policy:
         raise StudyError("The source policy is not the one that this study was planned with.")
@@ -316,6 +318,8 @@ def run_study(
         Job(run.name, perform_run, (plan, run, str(out), source_policy), after=_after(plan, run))
         for run in unfinished_runs(plan, out)
     ]
+    if plan.exclusive:
+        jobs = _one_by_one(jobs)
     if jobs:
         (executor or Processes()).run(jobs, on_progress)
     found = {run: load_result(plan, out, run) for run in plan.runs()}
@@ -434,6 +438,15 @@ def _after(plan: Plan, run: Run) -> tuple[str, ...]:
     if run.kind not in plan.arms or plan.source_policy:
         return ()
     return (Run(SOURCE, run.index).name,) if load_method(run.kind).uses_source_policy else ()
+
+
+def _one_by_one(jobs: Sequence[Job]) -> list[Job]:
+    """Let each job wait for the one before, so that no robot moves again once a run has failed."""
+    names = ["", *(job.name for job in jobs)]
+    return [
+        replace(job, after=(*job.after, before) if before else job.after, attempts=1)
+        for before, job in zip(names, jobs, strict=False)
+    ]
 
 
 def _summaries(study: Study) -> dict[str, Summary]:
