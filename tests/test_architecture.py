@@ -56,9 +56,11 @@ _RULES = {
     # remote ones reach it over the link.
     "envs": _Rule(
         _names("errors layout rendering morphology bodies tasks")
-        | _names("link robot remote twin worlds identify"),
+        | _names("link robot remote twin worlds identify envs.warp"),
         never=_HARDWARE | {"torch"},
     ),
+    # Worlds on a device are imported only when asked for: their results are tensors.
+    "envs.warp": _Rule(_names("errors layout morphology bodies envs"), never=_HARDWARE),
     # Transfer does not distinguish simulators from robots. Cloning is one of its learners.
     "transfer": _Rule(
         _names("errors layout tasks demos shapechanger tensor_file"),
@@ -108,6 +110,8 @@ def _package(module: str) -> str:
     parts = module.split(".")
     if len(parts) == 1:
         return parts[0]
+    if parts[1:3] == ["envs", "warp"]:
+        return "envs.warp"
     return "cli" if parts[1] == "__main__" else parts[1]
 
 

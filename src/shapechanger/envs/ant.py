@@ -165,7 +165,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         finite = math.isfinite(sum(observation[: bound.state_size].tolist()) + x + y) or bool(
             np.isfinite(qpos).all() and np.isfinite(bound.qvel).all()
         )
-        healthy = finite and _is_upright(z, up_x, up_y, *self._healthy_z_range)
+        healthy = finite and is_upright(z, up_x, up_y, *self._healthy_z_range)
         reward, info = self._reward(
             qpos[0],
             qpos[1],
@@ -263,7 +263,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
         contact_cost = self._contact_cost_weight * _sum(np.square(clipped, out=clipped), axis=1)
         with np.errstate(over="ignore", invalid="ignore"):  # As with Python's own numbers.
             velocity = (main_xy - main_xy_before) / one.dt
-            upright = _is_upright(after[:, 2], after[:, 4], after[:, 5], low, high)
+            upright = is_upright(after[:, 2], after[:, 4], after[:, 5], low, high)
             # Rounded as `dot` rounds, which need not be as NumPy rounds a sum of products.
             distance = np.sqrt(np.vecdot(place, place))
         healthy = upright & np.isfinite(state).all(axis=1)
@@ -311,7 +311,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
 AntEnv.tuned = AntEnv
 
 
-def _is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
+def is_upright(z: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
     """Return whether a torso is within its heights with its up axis above the horizon.
 
     Args:

@@ -34,12 +34,12 @@ from shapechanger.morphology import compile_body
 _CART_AND_POLE: Final = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 _CART_AND_POLES: Final = (*_CART_AND_POLE, int(mujoco.mjtJoint.mjJNT_HINGE))
 
-# The lean at which Gymnasium ends an episode of the single pendulum.
-_FALLEN_RAD: Final = 0.2
-# The tip's height at which Gymnasium ends an episode of the unedited double pendulum, m.
-_FALLEN_M: Final = 1.0
-# Where Gymnasium clips the double pendulum's velocities, m/s and rad/s, and the cart's force, N.
-_CLIPPED_AT: Final = 10.0
+FALLEN_RAD: Final = 0.2
+"""The lean at which Gymnasium ends an episode of the single pendulum."""
+FALLEN_M: Final = 1.0
+"""The tip's height at which Gymnasium ends an episode of the unedited double pendulum, m."""
+CLIPPED_AT: Final = 10.0
+"""Where Gymnasium clips the double pendulum's velocities, m/s and rad/s, and its force, N."""
 
 
 class _Pendulum(Binding):
@@ -90,7 +90,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         numbers = observation.tolist()
         # A sum is finite only if every number is; one that is not may have overflowed.
         finite = math.isfinite(sum(numbers)) or bool(np.isfinite(observation).all())
-        terminated = not finite or abs(numbers[1]) > _FALLEN_RAD
+        terminated = not finite or abs(numbers[1]) > FALLEN_RAD
         reward = int(not terminated)
         info: dict[str, Any] = {"reward_survive": reward}
         if bound.warnings.tolist() != NO_WARNINGS:
@@ -155,8 +155,8 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
                 for function in ("sin", "cos")
                 for hinge in hinges
             ),
-            *velocity_features(model, _CLIPPED_AT),
-            Feature(f"{cart.name}/constraint_force", "N", -_CLIPPED_AT, _CLIPPED_AT, cart),
+            *velocity_features(model, CLIPPED_AT),
+            Feature(f"{cart.name}/constraint_force", "N", -CLIPPED_AT, CLIPPED_AT, cart),
         ]
 
     def step(self, action: Any) -> Any:
@@ -174,7 +174,7 @@ class InvertedDoublePendulumEnv(  # pyright: ignore[reportIncompatibleVariableOv
         """
         part = (y - self._foot_m) * (self._plain_length_m / self._length_m)
         height = part + self._plain_foot_m
-        self._fallen = bool(height <= _FALLEN_M)
+        self._fallen = bool(height <= FALLEN_M)
         return cast("Any", super())._get_rew(x, height, self._fallen)
 
 

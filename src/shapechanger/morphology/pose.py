@@ -147,6 +147,10 @@ class StartRules:
 
     Attributes:
         lift: The coordinate that raises the trunk; see `trunk_lift`.
+        limited_places: Indices in qpos of the hinges and slides with limits.
+        lowest: Their lower limits, rad or m.
+        highest: Their upper limits, rad or m.
+        floor_pairs: Each floor with each geom of the body that it can touch.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -154,17 +158,16 @@ class StartRules:
         self._model = model
         one_number = np.isin(model.jnt_type, (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE)))
         joints = np.flatnonzero(one_number & (model.jnt_limited != 0))
-        self._lower, self._upper = model.jnt_range[joints].T
-        self._places = model.jnt_qposadr[joints]
-        # Each floor with each geom of the body that it can touch.
-        self._pairs: list[tuple[int, int]] = []
+        self.lowest, self.highest = model.jnt_range[joints].T
+        self.limited_places = model.jnt_qposadr[joints]
+        self.floor_pairs: list[tuple[int, int]] = []
         of_world = model.body_weldid[model.geom_bodyid] == 0
         for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)).tolist():
             touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
                 model.geom_conaffinity & model.geom_contype[floor]
             )
             geoms = np.flatnonzero(~of_world & (touching != 0)).tolist()
-            self._pairs += [(floor, geom) for geom in geoms]
+            self.floor_pairs += [(floor, geom) for geom in geoms]
 
     def keep_within_limits(self, pose: _Array, inside: float = 0.0) -> _Array:
         """Return a pose, shape (nq,), with every hinge and slide moved inside its limits.
@@ -174,15 +177,15 @@ class StartRules:
             inside: Share of each joint's range to keep from its limits.
         """
         result = pose.copy()
-        margin = inside * (self._upper - self._lower)
-        low, high = self._lower + margin, self._upper - margin
-        result[self._places] = np.clip(pose[self._places], low, high)
+        margin = inside * (self.highest - self.lowest)
+        low, high = self.lowest + margin, self.highest - margin
+        result[self.limited_places] = np.clip(pose[self.limited_places], low, high)
         return result
 
     def middle_pose(self) -> _Array:
         """Return the model's own pose, shape (nq,), with each joint in the middle of its range."""
         pose = self._model.qpos0.copy()
-        pose[self._places] = 0.5 * (self._lower + self._upper)
+        pose[self.limited_places] = 0.5 * (self.lowest + self.highest)
         return pose
 
     def floor_gap(self, data: mujoco.MjData) -> float:
@@ -195,7 +198,7 @@ class StartRules:
             data: Data of the model after `mj_kinematics`.
         """
         gap = _FAR_M
-        for floor, geom in self._pairs:
+        for floor, geom in self.floor_pairs:
             gap = min(gap, mujoco.mj_geomDistance(self._model, data, floor, geom, _FAR_M, None))
         return gap
 

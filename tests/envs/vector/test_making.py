@@ -19,7 +19,8 @@ from shapechanger.envs import CATALOGUE
 from shapechanger.envs.vector import ThreadVectorEnv, entry_points
 from shapechanger.envs.vector.batch import _work_off
 from shapechanger.envs.vector.checks import require_same_spaces
-from shapechanger.errors import SpaceMismatch, VectorEnvError
+from shapechanger.envs.warp import WarpVectorEnv
+from shapechanger.errors import SpaceMismatch, UnknownName, VectorEnvError
 from shapechanger.morphology import Stretch
 from tests.envs.vector.sameness import require_same
 
@@ -50,6 +51,25 @@ def test_threads_are_an_argument_of_gymnasiums_make_vec() -> None:
     envs.close()
     with pytest.raises(gym.error.Error, match="only through kwargs"):
         gym.make_vec("shapechanger/Ant-v1", num_envs=3, vector_kwargs={"threads": 2})
+
+
+def test_a_backend_of_worlds_on_a_device() -> None:
+    """Its arguments and those of threads exclude each other; the spec makes the same again."""
+    bodies = ["InvertedPendulum", "BigInvertedPendulum"]
+    envs = shapechanger.make_vec(
+        "InvertedPendulum", 2, backend="warp", device="cpu", bodies=bodies, max_episode_steps=7
+    )
+    assert isinstance(envs, WarpVectorEnv)
+    again: Any = gym.make_vec(envs.spec)
+    assert isinstance(again, WarpVectorEnv)
+    assert again.bodies == envs.bodies
+    assert again.max_episode_steps == envs.max_episode_steps == 7
+    with pytest.raises(VectorEnvError, match="has no threads"):
+        shapechanger.make_vec("Ant", 2, backend="warp", threads=2)
+    with pytest.raises(VectorEnvError, match="has no device: use backend='warp'"):
+        shapechanger.make_vec("Ant", 2, device="cpu")
+    with pytest.raises(UnknownName, match=r"No backend matches 'wrap'\. Did you mean 'warp'"):
+        shapechanger.make_vec("Ant", 2, backend="wrap")
 
 
 def test_a_vector_env_of_one_env() -> None:

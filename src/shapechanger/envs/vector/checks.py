@@ -44,16 +44,17 @@ def require_same_spaces(envs: Sequence[gym.Env[Any, Any]]) -> None:
                 continue
             if ours.shape != theirs.shape:
                 how = (
-                    f"{_size(theirs)} numbers, and that of env 0 ({_body(first)}) has {_size(ours)}"
+                    f"{_size(theirs)} numbers, and that of env 0 ({describe_body(first)}) has "
+                    f"{_size(ours)}"
                 )
             elif names != others:
                 apart = next((a, b) for a, b in zip(names, others, strict=True) if a != b)
-                how = f"{apart[1]!r} where that of env 0 ({_body(first)}) has {apart[0]!r}"
+                how = f"{apart[1]!r} where that of env 0 ({describe_body(first)}) has {apart[0]!r}"
             else:
-                how = f"other bounds than that of env 0 ({_body(first)})"
+                how = f"other bounds than that of env 0 ({describe_body(first)})"
             raise SpaceMismatch(
-                f"The {side} space of env {number} ({_body(env)}) has {how}: the envs of a vector "
-                "env share their spaces, so make one vector env for each kind of body."
+                f"The {side} space of env {number} ({describe_body(env)}) has {how}: the envs of a "
+                "vector env share their spaces, so make one vector env for each kind of body."
             )
 
 
@@ -67,8 +68,8 @@ def _size(space: gym.spaces.Box) -> int:
     return math.prod(space.shape)
 
 
-def _body(env: gym.Env[Any, Any]) -> str:
-    """Describe the body of an env: its name if it has one, else its edits, shortened."""
+def describe_body(env: gym.Env[Any, Any]) -> str:
+    """Return the id of an env and its body: the name if it has one, else its edits, shortened."""
     inner: Any = env.unwrapped
     name = type(inner).__name__ if env.spec is None else env.spec.id
     body = getattr(inner, "body", None)

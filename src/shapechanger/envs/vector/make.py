@@ -7,7 +7,7 @@ import operator
 import os
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, Literal, overload
 
 import gymnasium as gym
 from gymnasium.vector import AutoresetMode
@@ -18,58 +18,119 @@ from shapechanger.errors import UnknownName, VectorEnvError
 
 if TYPE_CHECKING:
     from shapechanger.bodies.families import BodyLike
+    from shapechanger.envs.warp.env import WarpVectorEnv
+
+_BACKENDS: Final = ("threads", "warp")
+
+
+@overload
+def make_vec(
+    env_id: str,
+    num_envs: int = 1,
+    *,
+    backend: Literal["threads"] = "threads",
+    threads: int | None = None,
+    bodies: Sequence[BodyLike] | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    copy: bool = True,
+    **arguments: Any,
+) -> ThreadVectorEnv: ...
+
+
+@overload
+def make_vec(
+    env_id: str,
+    num_envs: int = 1,
+    *,
+    backend: Literal["warp"],
+    device: str | None = None,
+    bodies: Sequence[BodyLike] | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    **arguments: Any,
+) -> WarpVectorEnv: ...
 
 
 def make_vec(
     env_id: str,
     num_envs: int = 1,
     *,
+    backend: str = "threads",
     threads: int | None = None,
+    device: str | None = None,
     bodies: Sequence[BodyLike] | None = None,
     autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     copy: bool = True,
     **arguments: Any,
-) -> ThreadVectorEnv:
+) -> ThreadVectorEnv | WarpVectorEnv:
     """Make a vector env of one id; `gymnasium.make_vec` returns the same.
 
     Args:
         env_id: A registered id; of the catalogue its name alone, such as `BigAnt`, will do. The
             envs of any other class must not share what they change, as they step in threads.
         num_envs: How many envs.
-        threads: How many threads step them, including the caller's; 1 starts none. None for as many
-            as the cores that this process may use. The results do not depend on it.
-        bodies: One body per env instead of one for all. Lengths and masses may differ, spaces may
-            not.
+        backend: `threads` steps CPU envs with a few threads; `warp` steps worlds on a device, with
+            tensors as results (see `shapechanger.envs.warp.WarpVectorEnv`).
+        threads: How many threads step the envs, including the caller's; 1 starts none. None for as
+            many as the cores that this process may use. The results do not depend on it.
+        device: Of the backend `warp`: `cpu`, `cuda:0`, ...; None for the first GPU, or the CPU
+            where there is none.
+        bodies: One body per env instead of one for all. With threads, lengths and masses may
+            differ, spaces may not; on a device they may, too.
         autoreset_mode: When to reset an env whose episode has ended, as in Gymnasium.
         copy: Whether to return copies of the observations; otherwise the next step overwrites them.
+            On a device they are always copies.
         **arguments: Arguments of `gymnasium.make`, such as `render_mode` or `max_episode_steps`.
 
     Raises:
-        UnknownName: If there is no such env, mode or body.
-        VectorEnvError: If the number of envs or threads is below one, or there are not as many
-            bodies as envs.
+        UnknownName: If there is no such env, backend, device, mode or body.
+        VectorEnvError: If the number of envs or threads is below one, there are not as many bodies
+            as envs, an argument belongs to the other backend, or the task has no functions for a
+            device.
         SpaceMismatch: If the spaces of two bodies differ.
+        MissingExtra: If the backend `warp` is not installed.
     """
     count = _at_least_one("env", num_envs)
-    cores = _cores() if threads is None else _at_least_one("thread", threads)
-    each: Sequence[dict[str, Any]] = [arguments] * count
-    if bodies is not None:
-        if len(bodies) != count:
-            raise VectorEnvError(f"There are {count} envs and {len(bodies)} bodies.")
-        each = [{**arguments, "body": body} for body in bodies]
-    made_from = _known_id(env_id)
-    envs = ThreadVectorEnv(
-        [partial(_make, made_from, one) for one in each],
-        threads=min(cores, count),
-        autoreset_mode=_mode(autoreset_mode),
-        copy=copy,
-    )
+    if bodies is not None and len(bodies) != count:
+        raise VectorEnvError(f"There are {count} envs and {len(bodies)} bodies.")
+    if backend not in _BACKENDS:
+        raise UnknownName("backend", backend, _BACKENDS)
+    made_from, mode = _known_id(env_id), _mode(autoreset_mode)
+    chosen: dict[str, Any] = {}
+    if backend == "warp":
+        if threads is not None or not copy:
+            raise VectorEnvError("backend='warp' has no threads, and always copies observations.")
+        from shapechanger.envs.warp import make_warp
+
+        envs = make_warp(
+            made_from,
+            partial(_make, made_from),
+            count,
+            device=device,
+            bodies=bodies,
+            autoreset_mode=mode,
+            arguments=arguments,
+        )
+        spec = copying.deepcopy(envs.made_from)
+        chosen |= {"backend": backend} | ({} if device is None else {"device": device})
+    else:
+        if device is not None:
+            raise VectorEnvError("backend='threads' has no device: use backend='warp'.")
+        cores = _cores() if threads is None else _at_least_one("thread", threads)
+        each: Sequence[dict[str, Any]] = [arguments] * count
+        if bodies is not None:
+            each = [{**arguments, "body": body} for body in bodies]
+        envs = ThreadVectorEnv(
+            [partial(_make, made_from, one) for one in each],
+            threads=min(cores, count),
+            autoreset_mode=mode,
+            copy=copy,
+        )
+        spec = copying.deepcopy(envs.envs[0].spec)
+        chosen |= {"copy": copy} | ({} if threads is None else {"threads": threads})
     # `gymnasium.make_vec(spec)` makes the same again; it sets the spec of its own results too.
-    spec = copying.deepcopy(envs.envs[0].spec)
     if spec is not None and spec.vector_entry_point is not None:
         spec.kwargs.update(arguments, num_envs=count, vectorization_mode="vector_entry_point")
-        spec.kwargs.update(autoreset_mode=_mode(autoreset_mode).value, copy=copy)
-        spec.kwargs.update({} if threads is None else {"threads": threads})
+        spec.kwargs.update(autoreset_mode=mode.value, **chosen)
         spec.kwargs.update({} if bodies is None else {"bodies": list(bodies)})
         envs.spec = spec
     return envs

@@ -1,0 +1,136 @@
+"""What a device needs to know about a body: rows of its model, and which arrays must be equal."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, NamedTuple, cast
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.envs.warp.devices import mjw, wp
+
+Rows = Mapping[str, NDArray[Any]]
+"""Arrays of one body by name."""
+
+# Nothing is drawn on the device.
+_DRAWN: Final = ("cam_", "light_", "mat_", "geom_rgba", "geom_matid", "geom_group", "site_type")
+# What each world has its own of, of the options.
+_OPTIONS: Final = ("timestep", "gravity", "wind", "magnetic", "density", "viscosity")
+# What is the same for all worlds, of the options.
+_SHARED_OPTIONS: Final = (
+    *("tolerance", "ls_tolerance", "noslip_tolerance", "ccd_tolerance", "impratio"),
+    *("integrator", "cone", "jacobian", "solver", "iterations", "ls_iterations"),
+    *("noslip_iterations", "ccd_iterations", "disableflags", "enableflags"),
+)
+# Read by sleeping bodies and by sensors alone, which our tasks do not have.
+_UNREAD: Final = ("dof_length", "site_size")
+
+
+class DeviceBody(NamedTuple):
+    """A body as the device needs it.
+
+    Attributes:
+        name: Its name or edits, for messages.
+        shared: Arrays that all worlds of a batch have in common, as bytes.
+        rows: Arrays that each world has its own of.
+        static: Places and orientations of the geoms that never move, which the device's kinematics
+            leaves as they are: `geom_xpos` (k, 3) and `geom_xmat` (k, 3, 3).
+        constants: Numbers of the task that depend on the body.
+    """
+
+    name: str
+    shared: Mapping[str, bytes]
+    rows: Rows
+    static: Rows
+    constants: Rows
+
+
+def device_body(name: str, model: mujoco.MjModel, constants: Rows) -> DeviceBody:
+    """Read a compiled body.
+
+    Args:
+        name: Its name or edits, for messages.
+        model: The compiled model.
+        constants: Numbers of the task that depend on the body.
+    """
+    rows = {field: np.array(getattr(model, field)) for field in _per_world()}
+    rows |= {f"opt.{field}": np.array(getattr(model.opt, field)) for field in _OPTIONS}
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    static = static_geoms(model)
+    places = {
+        "geom_xpos": data.geom_xpos[static],
+        "geom_xmat": data.geom_xmat[static].reshape(-1, 3, 3),
+    }
+    return DeviceBody(name, dict(_shared(model)), rows, places, constants)
+
+
+def static_geoms(model: mujoco.MjModel) -> NDArray[np.intp]:
+    """Return the indices of the geoms that are fixed to the world."""
+    return np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
+
+
+def differing_arrays(one: DeviceBody, other: DeviceBody) -> list[str]:
+    """Return the names of the arrays that keep two bodies from sharing a batch."""
+    names = {**one.shared, **other.shared}
+    return [name for name in names if one.shared.get(name) != other.shared.get(name)]
+
+
+def _per_world() -> Iterator[str]:
+    """Yield the fields of mujoco-warp's model that have a row per world."""
+    for field in dataclasses.fields(mjw.Model):
+        if _is_array(field) and _per_row(field) and not field.name.startswith(_DRAWN):
+            yield field.name
+
+
+def _is_array(field: Any) -> bool:
+    return isinstance(field.type, wp.array)
+
+
+def _per_row(field: Any) -> bool:
+    """Return whether each world may have its own."""
+    return field.type.shape[0] == "*"
+
+
+def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
+    """Yield the name and the bytes of all that mujoco-warp keeps once for all worlds."""
+    for field in dataclasses.fields(mjw.Model):
+        name = field.name
+        if name.startswith(_DRAWN) or name in _UNREAD or not hasattr(model, name):
+            continue
+        value: Any = getattr(model, name)
+        if field.type is int or field.type is bool:
+            yield name, str(int(value)).encode()
+        elif _is_array(field):
+            array: NDArray[Any] = np.asarray(value)
+            # Of the rows, only the shape is shared.
+            yield name, str(array.shape).encode() + (b"" if _per_row(field) else array.tobytes())
+    for name in _SHARED_OPTIONS:
+        yield f"opt.{name}", str(getattr(model.opt, name)).encode()
+    for name, pattern in _switches(model).items():
+        yield name, np.asarray(pattern).tobytes()
+
+
+def _switches(model: mujoco.MjModel) -> dict[str, Any]:
+    """Return where arrays are zero, where mujoco-warp leaves out what a zero does not need.
+
+    It decides this once for all worlds, from the model that a batch is made of (`put_model`).
+    """
+    found: dict[str, Any] = {
+        f"zeros of {name}": np.any(getattr(model, name))
+        for name in (
+            *("tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly"),
+            *("actuator_damping", "actuator_dampingpoly", "dof_frictionloss"),
+            *("tendon_frictionloss", "geom_adhesion", "geom_surfacevel"),
+        )
+    }
+    for name in ("actuator_gainprm", "actuator_biasprm", "actuator_gear", "body_mass"):
+        found[f"zeros of {name}"] = np.asarray(getattr(model, name)) != 0.0
+    options = cast("Any", model.opt)
+    found["zeros of opt.wind, opt.density and opt.viscosity"] = bool(
+        options.wind.any() or options.density > 0.0 or options.viscosity > 0.0
+    )
+    return found

@@ -1,0 +1,65 @@
+"""Warp, mujoco-warp and torch, and the devices that they share."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import Any, cast
+
+from shapechanger.errors import MissingExtra, UnknownName
+
+try:
+    import torch
+except ImportError as error:
+    raise MissingExtra("torch", "gpu") from error
+try:
+    import mujoco_warp  # pyright: ignore[reportMissingTypeStubs]
+    import warp
+except ImportError as error:
+    raise MissingExtra("mujoco-warp", "gpu") from error
+
+wp: Any = warp
+"""The module `warp`."""
+mjw: Any = mujoco_warp
+"""The module `mujoco_warp`."""
+
+if wp.config.log_level == wp.LOG_INFO:
+    # By default Warp prints a banner, a line for each kernel that it compiles, and a warning where
+    # there is no CUDA driver.
+    wp.config.log_level = wp.LOG_ERROR
+
+
+def find_device(name: str | None) -> str:
+    """Return the name of a device that Warp and torch can both use.
+
+    Args:
+        name: Such as `cpu` or `cuda:0`; None for the first GPU, or the CPU where there is none.
+
+    Raises:
+        UnknownName: If there is no such device.
+    """
+    gpus = min(int(wp.get_cuda_device_count()), torch.cuda.device_count())
+    known = ["cpu", *(f"cuda:{number}" for number in range(gpus))]
+    if name is None:
+        return known[min(1, gpus)]
+    wanted = "cuda:0" if name == "cuda" else name
+    if wanted not in known:
+        raise UnknownName("device", name, known)
+    return wanted
+
+
+@contextmanager
+def on(device: str) -> Generator[None]:
+    """Let Warp allocate and launch on a device, on a GPU in the order of torch's own work.
+
+    Args:
+        device: Its name.
+    """
+    with wp.ScopedDevice(device):
+        if device == "cpu":
+            yield
+        else:
+            with wp.ScopedStream(
+                wp.stream_from_torch(cast("Any", torch.cuda.current_stream(device)))
+            ):
+                yield

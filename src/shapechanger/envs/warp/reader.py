@@ -1,0 +1,89 @@
+"""Compile bodies, and read what a device needs to know about them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import gymnasium as gym
+
+from shapechanger.bodies.families import BodyLike
+from shapechanger.envs.vector.checks import describe_body
+from shapechanger.envs.warp.batch import BatchKind
+from shapechanger.envs.warp.bodies import DeviceBody, device_body
+from shapechanger.envs.warp.tasks import find_device_task
+from shapechanger.errors import SpaceMismatch
+from shapechanger.morphology import Body
+
+
+class BodyReader:
+    """Compiles bodies with CPU envs, and reads what a device needs to know about them.
+
+    Args:
+        env_id: Full id of the task.
+        make: Makes a CPU env of it from arguments.
+        arguments: Arguments of the CPU env.
+
+    Attributes:
+        spec: The spec of the CPU env, with its time limit.
+    """
+
+    def __init__(
+        self,
+        env_id: str,
+        make: Callable[[dict[str, Any]], gym.Env[Any, Any]],
+        arguments: dict[str, Any],
+    ) -> None:
+        self._arguments = arguments
+        self._make = make
+        first = make(arguments)
+        self._task = find_device_task(first, env_id)
+        self.spec = first.spec
+        # One CPU env for each pair of spaces; it changes its body.
+        self._envs: list[Any] = [first.unwrapped]
+        self._usual = cast("Body", self._envs[0].body)
+
+    def body(self, value: BodyLike | None) -> Body:
+        """Return the edits of a body; those of the arguments for None."""
+        return self._usual if value is None else self._envs[0].family.body(value)
+
+    def read(self, body: Body) -> tuple[DeviceBody, BatchKind]:
+        """Compile a body.
+
+        Args:
+            body: Its edits.
+
+        Returns:
+            The body, and the kind of a batch that begins with it.
+
+        Raises:
+            MorphologyError: If it cannot be built.
+        """
+        env = self._env_with(body)
+        found = device_body(describe_body(env), env.model, self._task.constants(env))
+        kind = BatchKind(
+            found,
+            env.model,
+            self._task(env),
+            int(env.frame_skip),
+            env.observation_layout,
+            env.action_layout,
+            env.action_space,
+        )
+        return found, kind
+
+    def _env_with(self, body: Body) -> Any:
+        for env in self._envs:
+            try:
+                env._change_body(body)
+            except SpaceMismatch:
+                continue
+            return env
+        made: Any = self._make({**self._arguments, "body": body}).unwrapped
+        self._envs.append(made)
+        return made
+
+    def close(self) -> None:
+        """Close the CPU envs."""
+        for env in self._envs:
+            env.close()

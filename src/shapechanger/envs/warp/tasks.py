@@ -1,0 +1,367 @@
+"""Tasks as functions of the state of many worlds, with the constants of their CPU envs.
+
+Rewards are computed by the CPU envs' own formulas on tensors where these do not read a simulation;
+every weight and range is read from a CPU env.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import partial
+from types import SimpleNamespace
+from typing import Any, ClassVar, Final, NamedTuple, cast
+
+import gymnasium as gym
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from shapechanger.envs.ant import AntEnv, ExtendedAntEnv, is_upright
+from shapechanger.envs.catalogue import CATALOGUE
+from shapechanger.envs.pendulum import (
+    CLIPPED_AT,
+    FALLEN_M,
+    FALLEN_RAD,
+    InvertedDoublePendulumEnv,
+    InvertedPendulumEnv,
+)
+from shapechanger.envs.runners import HalfCheetahEnv, HopperEnv, SwimmerEnv, Walker2dEnv
+from shapechanger.envs.warp.starts import DeviceStarts, length
+from shapechanger.envs.warp.worlds import Worlds
+from shapechanger.errors import VectorEnvError
+
+Constants = dict[str, Tensor]
+
+
+class DeviceOutcome(NamedTuple):
+    """What a step earns.
+
+    Attributes:
+        rewards: Shape (n,).
+        terminated: Shape (n,).
+        infos: Tensors of shape (n,).
+    """
+
+    rewards: Tensor
+    terminated: Tensor
+    infos: dict[str, Tensor]
+
+
+class DeviceTask(ABC):
+    """Observation, reward and end of a task.
+
+    Args:
+        env: A CPU env of the task, with any body of the batch.
+
+    Attributes:
+        noise_scale: Scale of the noise of start states.
+        normal_velocities: Whether start velocities are drawn normally, else uniformly.
+        contact_forces: Whether the task reads `cfrc_ext`.
+        start_forces: Whether the first observation reads forces.
+    """
+
+    normal_velocities: ClassVar[bool] = False
+    contact_forces: ClassVar[bool] = False
+    start_forces: ClassVar[bool] = False
+
+    def __init__(self, env: Any) -> None:
+        self._env = env
+        self.noise_scale = float(env._reset_noise_scale)
+
+    @staticmethod
+    def constants(env: Any) -> dict[str, NDArray[Any]]:
+        """Return the numbers of the task that depend on the body of a CPU env."""
+        return {**DeviceStarts.constants(env), "dt": np.array(env.dt)}
+
+    def place(self, worlds: Worlds) -> Tensor:
+        """Return what the reward needs from before the physics; a view."""
+        return worlds.qpos[:, :0]
+
+    @abstractmethod
+    def observations(self, worlds: Worlds) -> Tensor:
+        """Return the observations, shape (n, size)."""
+
+    @abstractmethod
+    def outcome(
+        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
+    ) -> DeviceOutcome:
+        """Return rewards, ends and infos of a step.
+
+        Args:
+            worlds: The worlds after the physics.
+            before: What `place` returned before.
+            actions: Shape (n, nu).
+            constants: Numbers of each world's body.
+        """
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """Return the infos of a reset, tensors of shape (n,)."""
+        return {}
+
+
+def _cost(weight: float, numbers: Tensor) -> Tensor:
+    return weight * numbers.square().flatten(1).sum(dim=1)
+
+
+class DeviceAnt(DeviceTask):
+    """Ants of any body."""
+
+    normal_velocities = True
+    contact_forces = True
+
+    def __init__(self, env: Any) -> None:
+        super().__init__(env)
+        self._main = int(env.model.body(env.main_body).id)
+
+    @staticmethod
+    def constants(env: Any) -> dict[str, NDArray[Any]]:
+        """See `DeviceTask`."""
+        low, high = env.healthy_z_range
+        return {**DeviceTask.constants(env), "low": np.array(low), "high": np.array(high)}
+
+    def place(self, worlds: Worlds) -> Tensor:
+        """Return the place of the main body, m, shape (n, 2)."""
+        return worlds.xpos[:, self._main, :2]
+
+    def _forces(self, worlds: Worlds) -> Tensor:
+        return worlds.cfrc_ext.clamp(*self._env._contact_force_range)
+
+    def observations(self, worlds: Worlds) -> Tensor:
+        """See `DeviceTask`."""
+        parts = [worlds.qpos[:, 2 if self._env.place_hidden else 0 :], worlds.qvel]
+        if self._env.contacts_observed:
+            parts.append(self._forces(worlds)[:, 1:].flatten(1))
+        return torch.cat(parts, dim=1)
+
+    def outcome(
+        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
+    ) -> DeviceOutcome:
+        """See `DeviceTask`."""
+        env, qpos = self._env, worlds.qpos
+        velocity = (self.place(worlds) - before) / constants["dt"][:, None]
+        upright = is_upright(
+            qpos[:, 2], qpos[:, 4], qpos[:, 5], constants["low"], constants["high"]
+        )
+        finite = qpos.isfinite().all(dim=1) & worlds.qvel.isfinite().all(dim=1)
+        healthy = upright & finite
+        rewards, infos = env._reward(
+            *self.start_infos(worlds, constants).values(),
+            velocity[:, 0],
+            velocity[:, 1],
+            _cost(env._ctrl_cost_weight, actions),
+            _cost(env._contact_cost_weight, self._forces(worlds)),
+            healthy,
+        )
+        return DeviceOutcome(rewards, ~healthy & bool(env._terminate_when_unhealthy), infos)
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        place = worlds.qpos[:, :2]
+        return {
+            "x_position": place[:, 0].clone(),
+            "y_position": place[:, 1].clone(),
+            "distance_from_origin": length(place),
+        }
+
+
+class DevicePendulum(DeviceTask):
+    """Inverted pendulums of any length."""
+
+    def observations(self, worlds: Worlds) -> Tensor:
+        """See `DeviceTask`."""
+        return torch.cat([worlds.qpos, worlds.qvel], dim=1)
+
+    def outcome(
+        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
+    ) -> DeviceOutcome:
+        """See `DeviceTask`."""
+        finite = self.observations(worlds).isfinite().all(dim=1)
+        up = finite & (worlds.qpos[:, 1].abs() <= FALLEN_RAD)
+        rewards = up.to(worlds.qpos.dtype)
+        return DeviceOutcome(rewards, ~up, {"reward_survive": rewards.clone()})
+
+
+class DeviceDoublePendulum(DeviceTask):
+    """Inverted double pendulums of any length."""
+
+    normal_velocities = True
+    start_forces = True
+
+    @staticmethod
+    def constants(env: Any) -> dict[str, NDArray[Any]]:
+        """See `DeviceTask`."""
+        found = DeviceTask.constants(env)
+        for name in ("foot_m", "length_m", "plain_foot_m", "plain_length_m"):
+            found[name] = np.array(getattr(env, f"_{name}"))
+        return found
+
+    def observations(self, worlds: Worlds) -> Tensor:
+        """See `DeviceTask`."""
+        qpos, clip = worlds.qpos, (-CLIPPED_AT, CLIPPED_AT)
+        hinges = qpos[:, 1:]
+        velocities, force = worlds.qvel.clamp(*clip), worlds.qfrc_constraint[:, :1].clamp(*clip)
+        return torch.cat([qpos[:, :1], hinges.sin(), hinges.cos(), velocities, force], dim=1)
+
+    def outcome(
+        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
+    ) -> DeviceOutcome:
+        """See `DeviceTask`."""
+        env, tip = self._env, worlds.site_xpos[:, 0]
+        part = tip[:, 2] - constants["foot_m"]
+        height = part * (constants["plain_length_m"] / constants["length_m"])
+        height = height + constants["plain_foot_m"]
+        fallen = ~(height > FALLEN_M)  # Also where it is not a number.
+        # Gymnasium's formula, without the bonus, which it adds by a condition.
+        there = SimpleNamespace(
+            data=SimpleNamespace(qvel=worlds.qvel.T), _healthy_reward=env._healthy_reward
+        )
+        rewards, infos = _base(env)._get_rew(there, tip[:, 0], height, True)
+        bonus = env._healthy_reward * (~fallen).to(height.dtype)
+        return DeviceOutcome(rewards + bonus, fallen, {**infos, "reward_survive": bonus})
+
+
+class DeviceRunner(DeviceTask):
+    """Runners that never end."""
+
+    place_size: ClassVar[int] = 1
+
+    def place(self, worlds: Worlds) -> Tensor:
+        """Return the place of the trunk, m, shape (n, place_size)."""
+        return worlds.qpos[:, : self.place_size]
+
+    def observations(self, worlds: Worlds) -> Tensor:
+        """See `DeviceTask`."""
+        env = self._env
+        hidden = env.place_size if env._place_hidden else 0
+        velocities = worlds.qvel.clamp(-env.velocity_limit, env.velocity_limit)
+        return torch.cat([worlds.qpos[:, hidden:], velocities], dim=1)
+
+    def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
+        """Return whether each body is healthy, shape (n,)."""
+        return torch.ones(worlds.count, dtype=torch.bool, device=worlds.qpos.device)
+
+    def outcome(
+        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
+    ) -> DeviceOutcome:
+        """See `DeviceTask`."""
+        env = self._env
+        velocity = (self.place(worlds) - before) / constants["dt"][:, None]
+        healthy = self.healthy(worlds, constants)
+        # What Gymnasium's formula asks its env for.
+        there = SimpleNamespace(
+            _forward_reward_weight=env._forward_reward_weight,
+            healthy_reward=healthy * getattr(env, "_healthy_reward", 0.0),
+            control_cost=partial(_cost, env._ctrl_cost_weight),
+        )
+        rewards, terms = _base(env)._get_rew(there, velocity[:, 0], actions)
+        infos = self.start_infos(worlds, constants)
+        infos |= {
+            f"{axis}_velocity": velocity[:, i] for i, axis in enumerate("xy"[: self.place_size])
+        }
+        ends = bool(getattr(env, "_terminate_when_unhealthy", False))
+        return DeviceOutcome(rewards, ~healthy & ends, {**infos, **terms})
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        return {"x_position": worlds.qpos[:, 0].clone()}
+
+
+class DeviceSwimmer(DeviceRunner):
+    """Swimmers, which are rewarded for their place in a horizontal plane."""
+
+    place_size = 2
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        place = self.place(worlds)
+        return {
+            "x_position": place[:, 0].clone(),
+            "y_position": place[:, 1].clone(),
+            "distance_from_origin": length(place),
+        }
+
+
+class DeviceCheetah(DeviceRunner):
+    """Half cheetahs."""
+
+    normal_velocities = True
+
+
+class DeviceWalker(DeviceRunner):
+    """Walkers, which are healthy within heights and leans."""
+
+    @staticmethod
+    def constants(env: Any) -> dict[str, NDArray[Any]]:
+        """See `DeviceTask`."""
+        low, high = env.healthy_z_range
+        return {**DeviceTask.constants(env), "low": np.array(low), "high": np.array(high)}
+
+    def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
+        """Return whether each body is healthy, shape (n,)."""
+        height, lean = worlds.qpos[:, 1], worlds.qpos[:, 2]
+        low, high = self._env._healthy_angle_range
+        upright = (low < lean) & (lean < high)
+        return upright & (constants["low"] < height) & (height < constants["high"])
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        qpos, start = worlds.qpos, constants["init_qpos"]
+        return {
+            "x_position": qpos[:, 0].clone(),
+            "z_distance_from_origin": qpos[:, 1] - start[:, 1],
+        }
+
+
+class DeviceHopper(DeviceWalker):
+    """Hoppers, which are healthy within heights, leans and states."""
+
+    def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
+        """Return whether each body is healthy, shape (n,)."""
+        low, high = self._env._healthy_state_range
+        state = torch.cat([worlds.qpos[:, 2:], worlds.qvel], dim=1)
+        within = ((low < state) & (state < high)).all(dim=1)
+        return super().healthy(worlds, constants) & within
+
+
+_TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
+    AntEnv: DeviceAnt,
+    ExtendedAntEnv: DeviceAnt,
+    InvertedPendulumEnv: DevicePendulum,
+    InvertedDoublePendulumEnv: DeviceDoublePendulum,
+    HalfCheetahEnv: DeviceCheetah,
+    HopperEnv: DeviceHopper,
+    Walker2dEnv: DeviceWalker,
+    SwimmerEnv: DeviceSwimmer,
+}
+
+
+def find_device_task(env: gym.Env[Any, Any], env_id: str) -> type[DeviceTask]:
+    """Return the batched functions of an env's task.
+
+    Args:
+        env: The CPU env; a subclass of ours may have changed the task, so it has none.
+        env_id: Its id, for messages.
+
+    Raises:
+        VectorEnvError: If the task has no batched functions.
+    """
+    task = _TASKS.get(type(env.unwrapped))
+    if task is None:
+        known = [
+            entry.name
+            for entry in CATALOGUE.values()
+            if entry.entry_point.rpartition(":")[2] in {kind.__name__ for kind in _TASKS}
+        ]
+        raise VectorEnvError(
+            f"{env_id} has no batched functions, which backend='warp' needs: there are those of "
+            f"{', '.join(known)}."
+        )
+    return task
+
+
+def _base(env: Any) -> Any:
+    """Return Gymnasium's class of an env."""
+    return cast(
+        "Any", next(each for each in type(env).__mro__ if each.__module__.startswith("gymnasium."))
+    )

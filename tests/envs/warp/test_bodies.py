@@ -1,0 +1,203 @@
+"""Bodies of worlds: rows of models, new bodies at resets, batches of several shapes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+
+import shapechanger
+from shapechanger.envs.warp import WarpVectorEnv
+from shapechanger.envs.warp.bodies import device_body, differing_arrays
+from shapechanger.envs.warp.devices import mjw, wp
+from shapechanger.errors import BadAction, UnknownName, VectorEnvError
+from shapechanger.morphology import (
+    AddSegment,
+    Cut,
+    Damping,
+    Edit,
+    Friction,
+    Gear,
+    Gravity,
+    JointRange,
+    Mass,
+    Radius,
+    Stiffness,
+    Stretch,
+)
+from tests.envs.warp.side_by_side import OBSERVATION_TOLERANCE, apart, set_all
+
+LONG = [Stretch("shank_*", 1.7), Mass("torso", 1.2), Friction("floor", 0.5)]
+
+
+@pytest.fixture(scope="module")
+def ants() -> Iterator[WarpVectorEnv]:
+    """Three plain ants."""
+    envs = shapechanger.make_vec("Ant", 3, backend="warp", device="cpu")
+    yield envs
+    envs.close()
+
+
+def model_rows(envs: WarpVectorEnv, name: str) -> Any:
+    """Return an array of the device's model, one row per world."""
+    rows = envs.batches[0].worlds.row(name)
+    return rows.expand(envs.num_envs, *rows.shape[1:]).numpy()
+
+
+def test_new_bodies_are_written_from_compiled_models(ants: WarpVectorEnv) -> None:
+    """A body drawn at a reset has its own numbers, however often it is drawn."""
+    ants.reset(seed=0)
+    mask = np.array([False, True, False])
+    for body in (LONG, "BigAnt", LONG):
+        ants.reset(options={"bodies": [body], "reset_mask": mask})
+        env: Any = gym.make("shapechanger/Ant-v1", body=body).unwrapped
+        plain: Any = gym.make("shapechanger/Ant-v1").unwrapped
+        for name in ("geom_size", "geom_pos", "body_mass", "body_inertia", "geom_friction"):
+            found = model_rows(ants, name)
+            np.testing.assert_allclose(found[1], getattr(env.model, name), rtol=1e-6, atol=1e-9)
+            np.testing.assert_allclose(found[0], getattr(plain.model, name), rtol=1e-6, atol=1e-9)
+    assert ants.bodies == [(), tuple(LONG), ()]
+
+
+def test_a_body_drawn_at_a_reset_moves_as_one_made_with_it(ants: WarpVectorEnv) -> None:
+    """After a reset with bodies, each world steps as the CPU env of its body."""
+    bodies: list[Any] = [LONG, "AmputatedAnt", [Gravity((0.0, 0.0, -4.0))]]
+    ants.reset(seed=1, options={"bodies": bodies})
+    alone: list[Any] = [gym.make("shapechanger/Ant-v1", body=body).unwrapped for body in bodies]
+    for env in alone:
+        env.reset(seed=0)
+    qpos = ants.batches[0].worlds.qpos
+    assert len({float(height) for height in qpos[:, 2]}) == 3
+    states = [(env.init_qpos - 0.3 * np.eye(env.model.nq)[2], env.init_qvel) for env in alone]
+    set_all(ants, alone, states)
+    action = np.linspace(-1.0, 1.0, 8, dtype=np.float32)
+    observations, _, terminated, *_ = ants.step(np.tile(action, (3, 1)))
+    for i, env in enumerate(alone):
+        observation, _, ended, *_ = env.step(action)
+        assert apart(observations[i], observation) < OBSERVATION_TOLERANCE
+        assert bool(terminated[i]) == ended
+
+
+def test_a_body_with_other_arrays_is_refused(ants: WarpVectorEnv) -> None:
+    """The sentence names the arrays and both bodies, and nothing has changed."""
+    ants.reset(seed=0, options={"bodies": ["Ant", "BigAnt", "Ant"]})
+    before = ants.bodies
+    sentence = (
+        r"body ExtendedAnt cannot join the batch of shapechanger/Ant-v1, body Ant, because nq, .* "
+        r"and \d+ more differ"
+    )
+    with pytest.raises(VectorEnvError, match=sentence):
+        ants.reset(options={"bodies": ["AmputatedAnt", "Ant", "ExtendedAnt"]})
+    assert ants.bodies == before
+    mask = torch.tensor([True, False, False])
+    with pytest.raises(VectorEnvError, match="1 worlds that start again and 2 bodies"):
+        ants.reset(options={"bodies": ["Ant", "Ant"], "reset_mask": mask})
+    with pytest.raises(UnknownName, match="No body matches 'nose'"):
+        ants.reset(options={"bodies": [[Stretch("nose", 2.0)], "Ant", "Ant"]})
+    with pytest.raises(UnknownName, match="Did you mean 'bodies'"):
+        ants.reset(options={"body": "Ant"})
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        Stretch("shank_*", 1.3),
+        Radius("shank_1", 1.5),
+        Cut("shank_4", 0.25),
+        Mass("torso", 2.0),
+        Friction("floor", 0.3),
+        Gear("*", 80.0),
+        JointRange("ankle_1", 0.6, 1.0),
+        Damping("hip_*", 2.0),
+        Stiffness("hip_1", 3.0),
+        Gravity((0.0, 0.0, -3.7)),
+        AddSegment("shank_1", "foot_1", (0.2, 0.2, 0.0), -0.5, 0.5, 100.0),
+    ],
+    ids=lambda edit: type(edit).__name__,
+)
+def test_what_may_share_a_batch_is_what_mujoco_warp_shares(edit: Edit) -> None:
+    """Bodies without differing arrays have equal models, except for the rows of each world."""
+    plain: Any = gym.make("shapechanger/Ant-v1").unwrapped
+    edited: Any = gym.make("shapechanger/Ant-v1", body=edit).unwrapped
+    bodies = [device_body("", env.model, {}) for env in (plain, edited)]
+    fits = not differing_arrays(*bodies)
+    assert fits == (not isinstance(edit, AddSegment))
+    if not fits:
+        return
+    one, other = mjw.put_model(plain.model), mjw.put_model(edited.model)
+    for field in dataclasses.fields(mjw.Model):
+        left, right = getattr(one, field.name), getattr(other, field.name)
+        if field.name in ("dof_length", "site_size"):
+            continue  # Read by sleeping bodies and by sensors alone.
+        if isinstance(left, int | bool):
+            assert left == right, field.name
+        elif isinstance(left, wp.array) and field.type.shape[0] != "*":
+            assert np.array_equal(left.numpy(), right.numpy()), field.name
+
+
+def test_what_a_zero_leaves_out_is_not_shared() -> None:
+    """A fluid, or a friction in joints, needs a batch of its own where others have none."""
+    plain: Any = gym.make("shapechanger/Ant-v1").unwrapped
+    bodies = []
+    for change in ("opt.density", "dof_frictionloss"):
+        other: Any = gym.make("shapechanger/Ant-v1").unwrapped
+        if change == "opt.density":
+            other.model.opt.density = 3.0
+        else:
+            other.model.dof_frictionloss[:] = 0.1
+        bodies.append(device_body("", other.model, {}))
+    base = device_body("", plain.model, {})
+    names = [differing_arrays(base, body) for body in bodies]
+    assert names == [
+        ["zeros of opt.wind, opt.density and opt.viscosity"],
+        ["zeros of dof_frictionloss"],
+    ]
+
+
+def test_bodies_of_other_shapes_form_batches() -> None:
+    """Where spaces differ, observations and actions come per batch, all else per world."""
+    envs = shapechanger.make_vec(
+        "Ant",
+        3,
+        backend="warp",
+        device="cpu",
+        bodies=["ExtendedAnt", "BigAnt", "ExtendedAnt"],
+        autoreset_mode="SameStep",
+        max_episode_steps=2,
+    )
+    assert [batch.numbers.tolist() for batch in envs.batches] == [[0, 2], [1]]
+    observations, infos = envs.reset(seed=0)
+    assert [part.shape for part in observations] == [(2, 137), (1, 105)]
+    assert infos["x_position"].shape == (3,)
+    actions = [torch.zeros(2, 12), torch.zeros(1, 8)]
+    envs.step(actions)
+    observations, rewards, _, truncated, infos = envs.step(actions)
+    assert truncated.all()
+    assert rewards.shape == (3,)
+    assert [part.shape for part in infos["final_obs"]] == [(2, 137), (1, 105)]
+    assert envs.observation_space.contains(tuple(part.numpy() for part in observations))
+    with pytest.raises(BadAction, match="a sequence of 2 tensors, one per batch"):
+        envs.step(torch.zeros(3, 8))
+    with pytest.raises(BadAction, match=r"actions of batch 1 are numbers of shape \(1, 8\)"):
+        envs.step([torch.zeros(2, 12), torch.zeros(2, 8)])
+    envs.close()
+
+
+def test_bodies_of_other_shapes_and_equal_spaces_share_tensors() -> None:
+    """Worlds of two batches with the same spaces are rows of one tensor, in the worlds' order."""
+    bound = [JointRange("free_body_rot", -2.0, 2.0)]
+    envs = shapechanger.make_vec(
+        "Swimmer", 3, backend="warp", device="cpu", bodies=["Swimmer", bound, "Swimmer"]
+    )
+    assert [batch.numbers.tolist() for batch in envs.batches] == [[0, 2], [1]]
+    observations, _ = envs.reset(seed=[3, 3, 4])
+    assert observations.shape == (3, 8)
+    one = shapechanger.make_vec("Swimmer", 1, backend="warp", device="cpu")
+    assert torch.equal(one.reset(seed=4)[0][0], observations[2])
+    with pytest.raises(VectorEnvError, match="because jnt_limited differ"):
+        envs.reset(options={"bodies": ["Swimmer", "Swimmer", bound]})

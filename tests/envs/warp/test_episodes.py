@@ -1,0 +1,205 @@
+"""Episodes of worlds: ends, restarts, time limits, seeds, and worlds that diverge."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from gymnasium.vector import AutoresetMode
+
+import shapechanger
+from shapechanger.envs.warp import WarpVectorEnv
+from shapechanger.envs.warp.noise import normals, uniforms
+
+WORLDS = 3
+PUSH = torch.tensor([[3.0], [0.0], [0.0]])
+
+
+def pendulums(mode: str = "NextStep", **arguments: Any) -> WarpVectorEnv:
+    """Return three pendulums; pushed with `PUSH`, the first one falls within some ten steps."""
+    envs = shapechanger.make_vec(
+        "InvertedPendulum",
+        WORLDS,
+        backend="warp",
+        device="cpu",
+        autoreset_mode=mode,
+        **arguments,
+    )
+    envs.reset(seed=0)
+    return envs
+
+
+def until_a_fall(envs: WarpVectorEnv) -> Any:
+    """Push until the first world's episode ends, and return the results of that step."""
+    for _ in range(50):
+        results = envs.step(PUSH)
+        if bool(results[2][0]):
+            return results
+    raise AssertionError("The pendulum does not fall.")
+
+
+def test_next_step_resets_in_the_step_after_the_end() -> None:
+    """The action of that step is ignored, its reward is 0, and its observation is of a start."""
+    envs = pendulums()
+    observations, rewards, terminated, truncated, infos = until_a_fall(envs)
+    assert terminated.tolist() == [True, False, False]
+    assert abs(float(observations[0, 1])) > 0.2
+    assert rewards.tolist() == [0.0, 1.0, 1.0]
+    envs.batches[0].worlds.qvel[0] = 77.0  # Nothing of the old episode is left.
+    nothing = torch.tensor([[np.nan], [0.0], [0.0]])
+    observations, rewards, terminated, truncated, infos = envs.step(nothing)
+    assert observations[0].abs().max() <= 0.01
+    assert rewards.tolist() == [0.0, 1.0, 1.0]
+    assert not terminated.any()
+    assert not truncated.any()
+    assert infos["_reward_survive"].tolist() == [False, True, True]
+
+
+def test_same_step_returns_the_start_and_keeps_the_end() -> None:
+    """The last observation and info of an episode are in the infos, as in Gymnasium."""
+    envs = pendulums("SameStep")
+    observations, rewards, terminated, _, infos = until_a_fall(envs)
+    assert terminated.tolist() == infos["_final_obs"].tolist() == [True, False, False]
+    assert observations[0].abs().max() <= 0.01
+    assert abs(float(infos["final_obs"][0, 1])) > 0.2
+    assert infos["final_info"]["_reward_survive"].tolist() == [True, False, False]
+    assert infos["final_info"]["reward_survive"][0] == rewards[0] == 0.0
+    assert infos["_reward_survive"].tolist() == [False, True, True]
+    assert not envs.step(PUSH)[2].any()
+
+
+def test_nothing_resets_where_that_is_disabled() -> None:
+    """Only a reset with a mask goes on, and it leaves the other worlds alone."""
+    envs = pendulums("Disabled")
+    _, _, terminated, truncated, _ = until_a_fall(envs)
+    with pytest.raises(gym.error.ResetNeeded, match="worlds 0 have ended"):
+        envs.step(PUSH)
+    before = envs.batches[0].worlds.qpos[1:].clone()
+    observations, _ = envs.reset(options={"reset_mask": terminated | truncated})
+    assert observations[0].abs().max() <= 0.01
+    assert torch.equal(envs.batches[0].worlds.qpos[1:], before)
+    assert not envs.step(PUSH)[2].any()
+
+
+def test_infos_of_a_restart_join_those_of_steps() -> None:
+    """Runners tell their place after a restart, in either mode, and their speed after a step."""
+    for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
+        envs = shapechanger.make_vec(
+            "Hopper", 2, backend="warp", device="cpu", autoreset_mode=mode, max_episode_steps=1
+        )
+        envs.reset(seed=0)
+        infos = envs.step(torch.zeros(2, 3))[-1]
+        if mode is AutoresetMode.NEXT_STEP:
+            infos = envs.step(torch.zeros(2, 3))[-1]
+        else:
+            assert infos["final_info"]["_x_velocity"].all()
+        assert infos["_x_position"].all()
+        assert not infos["_x_velocity"].any()
+
+
+def test_time_limits_are_those_of_the_id() -> None:
+    """An episode is truncated after as many steps as the spec says, counted from its start."""
+    assert pendulums().max_episode_steps == 1000
+    envs = pendulums(max_episode_steps=3)
+    ends = [envs.step(torch.zeros(WORLDS, 1))[3].all() for _ in range(8)]
+    # The step that restarts counts for nothing.
+    assert [bool(end) for end in ends] == [False, False, True, False, False, False, True, False]
+
+
+def test_a_seed_gives_the_same_world_anywhere() -> None:
+    """Starts depend on a world's seed and episode alone, not on its place or its neighbours."""
+    envs = pendulums()
+    first, _ = envs.reset(seed=[4, 5, 6])
+    second, _ = envs.reset()
+    other = shapechanger.make_vec("InvertedPendulum", 1, backend="warp", device="cpu")
+    assert torch.equal(other.reset(seed=5)[0][0], first[1])
+    assert torch.equal(other.reset()[0][0], second[1])
+    assert not torch.equal(first, second)
+    # A reset with a mask goes on with the others' seeds.
+    third, _ = envs.reset(seed=[None, 5, None], options={"reset_mask": np.array([0, 1, 0], bool)})
+    assert torch.equal(third[1], first[1])
+    with pytest.raises(ValueError, match="3 envs and 2 seeds"):
+        envs.reset(seed=[1, 2])
+
+
+def test_worlds_without_seeds_differ() -> None:
+    """Without a seed each world of each vector env draws its own."""
+    one, other = (
+        shapechanger.make_vec("InvertedPendulum", 2, backend="warp", device="cpu").reset()[0]
+        for _ in range(2)
+    )
+    assert not torch.equal(one[0], one[1])
+    assert not torch.equal(one, other)
+
+
+def test_the_noise_is_uniform_and_normal() -> None:
+    """Means and variances are those of the distributions, and streams are independent."""
+    seeds, episodes = torch.arange(200), torch.zeros(200, dtype=torch.int64)
+    flat = uniforms(seeds, episodes, 0, 500)
+    assert flat.min() >= 0.0
+    assert flat.max() < 1.0
+    assert abs(float(flat.mean()) - 0.5) < 4e-3
+    assert abs(float(flat.var()) - 1.0 / 12.0) < 2e-3
+    bell = normals(seeds, episodes, 1, 500)
+    assert abs(float(bell.mean())) < 0.02
+    assert abs(float(bell.var()) - 1.0) < 0.02
+    rows = torch.cat([flat, uniforms(seeds, episodes + 1, 0, 500)])
+    assert torch.corrcoef(rows)[0, 1:].abs().max() < 0.2
+
+
+def test_the_noise_never_changes() -> None:
+    """The numbers of a seed stay the same from release to release."""
+    drawn = uniforms(torch.tensor([0, -7]), torch.tensor([0, 3]), 1, 2)
+    expected = torch.tensor(
+        [[0.6524484863740322, 0.7012121095215252], [0.363035577252116, 0.6020647478730022]],
+        dtype=torch.float64,
+    )
+    torch.testing.assert_close(drawn, expected, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_a_world_that_diverges_restarts_alone(mode: str) -> None:
+    """Its reward is 0, its number is true in `diverged`, and the others step as ever."""
+    whole, broken = pendulums(mode), pendulums(mode)
+    still = torch.zeros(WORLDS, 1)
+    broken.batches[0].worlds.qvel[1] = torch.nan
+    expected, found = whole.step(still), broken.step(still)
+    for one, other in zip(found[:4], expected[:4], strict=True):
+        assert torch.equal(one[[0, 2]], other[[0, 2]])
+    observations, rewards, terminated, _, infos = found
+    assert terminated.tolist() == [False, True, False]
+    assert rewards[1] == 0.0
+    assert observations.isfinite().all()
+    final = infos["final_info"] if mode == "SameStep" else infos
+    assert final["diverged"].tolist() == final["_diverged"].tolist() == [False, True, False]
+    if mode == "Disabled":
+        broken.reset(options={"reset_mask": terminated})
+    for _ in range(5):
+        found = broken.step(still)
+        assert "diverged" not in found[-1]
+        assert found[0].isfinite().all()
+
+
+def test_huge_numbers_diverge_too() -> None:
+    """As in MuJoCo, a velocity above 1e10 has diverged."""
+    envs = pendulums()
+    envs.batches[0].worlds.qvel[2] = 1e12
+    *_, infos = envs.step(torch.zeros(WORLDS, 1))
+    assert infos["diverged"].tolist() == [False, False, True]
+
+
+def test_a_closed_or_new_vector_env_does_not_step() -> None:
+    """The error says what to call."""
+    envs = shapechanger.make_vec("InvertedPendulum", 2, backend="warp", device="cpu")
+    with pytest.raises(gym.error.ResetNeeded, match=re.escape("call `reset` first")):
+        envs.step(torch.zeros(2, 1))
+    with pytest.raises(gym.error.ResetNeeded, match="without a mask"):
+        envs.reset(options={"reset_mask": np.array([True, False])})
+    envs.close()
+    for call in (envs.reset, lambda: envs.step(torch.zeros(2, 1))):
+        with pytest.raises(gym.error.ClosedEnvironmentError, match="make another one"):
+            call()

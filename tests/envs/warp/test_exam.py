@@ -1,0 +1,87 @@
+"""Worlds on a device do what CPU envs do, from the same states, within stated tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shapechanger.envs.warp import WarpVectorEnv
+from tests.envs.warp.side_by_side import (
+    BODIES,
+    OBSERVATION_TOLERANCE,
+    REWARD_TOLERANCE,
+    WORLDS,
+    apart,
+    many,
+    set_all,
+    visited,
+)
+
+ROUNDS = 3
+
+
+@pytest.fixture(scope="module", params=BODIES)
+def pair(request: pytest.FixtureRequest) -> Iterator[tuple[WarpVectorEnv, list[Any]]]:
+    """Worlds with the bodies of a family, and the CPU env of each."""
+    worlds, alone = many(request.param)
+    for env in alone:
+        env.reset(seed=0)
+    yield worlds, alone
+    worlds.close()
+    for env in alone:
+        env.close()
+
+
+def test_a_step_from_the_same_state_has_the_same_results(
+    pair: tuple[WarpVectorEnv, list[Any]],
+) -> None:
+    """Observation, reward, each term of it, and the end are those of the CPU env, for each body."""
+    worlds, alone = pair
+    assert len(worlds.batches) == 1
+    rng = np.random.default_rng(0)
+    states = [visited(env, rng, ROUNDS) for env in alone]
+    for place in range(ROUNDS):
+        set_all(worlds, alone, [each[place] for each in states])
+        actions = rng.uniform(-1.0, 1.0, worlds.action_space.shape).astype(np.float32)
+        observations, rewards, terminated, truncated, infos = worlds.step(actions)
+        assert not truncated.any()
+        for i, env in enumerate(alone):
+            observation, reward, ended, _, info = env.step(actions[i])
+            assert apart(observations[i], observation) < OBSERVATION_TOLERANCE
+            assert apart(rewards[i], reward) < REWARD_TOLERANCE
+            assert bool(terminated[i]) == ended
+            assert {name for name in infos if not name.startswith("_")} == set(info)
+            for name, value in info.items():
+                assert apart(infos[name][i], value) < REWARD_TOLERANCE, name
+                assert infos[f"_{name}"].all()
+
+
+def test_starts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> None:
+    """A start state is feasible by the CPU env's rules, and observed as there."""
+    worlds, alone = pair
+    observations, infos = worlds.reset(seed=5)
+    batch = worlds.batches[0]
+    for i, env in enumerate(alone):
+        qpos, qvel = (x[i].double().numpy() for x in (batch.worlds.qpos, batch.worlds.qvel))
+        env.reset()
+        np.testing.assert_allclose(env._start_rules().feasible(qpos, env.data), qpos, atol=2e-6)
+        assert np.abs(qvel).max() < 6.0 * env._reset_noise_scale
+        env.reset()
+        env.set_state(qpos, qvel)
+        assert apart(observations[i], env._get_obs()) < OBSERVATION_TOLERANCE
+        for name, value in env._get_reset_info().items():
+            assert apart(infos[name][i], value) < OBSERVATION_TOLERANCE, name
+
+
+def test_layouts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> None:
+    """Each number has the CPU env's name, and the spaces fit the tensors."""
+    worlds, alone = pair
+    assert worlds.observation_layout == alone[0].observation_layout
+    assert worlds.action_layout == alone[0].action_layout
+    observations, _ = worlds.reset(seed=0)
+    assert observations.shape == worlds.observation_space.shape
+    assert worlds.observation_space.contains(observations.numpy())
+    assert worlds.action_space.shape == (WORLDS, worlds.action_layout.size)
