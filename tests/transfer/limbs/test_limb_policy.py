@@ -146,6 +146,14 @@ def test_a_file_fits_any_body(policy: TrainedPolicy, tmp_path: Path) -> None:
     assert tuned.card.start_log_std is not None
 
 
+def test_a_file_of_bodies_that_differ_can_be_read(tmp_path: Path) -> None:
+    """The card has room for all bodies, also for those that no evaluation has met."""
+    some = ANT.having({"bodies": ["Ant", "ExtendedAnt"], "max_episode_steps": 20})
+    trained = _learner(eval_episodes=1).train(some, 32, 0, on_evaluation=lambda _: None)
+    save_policy(trained, tmp_path / "ants.safetensors")
+    assert load_policy(tmp_path / "ants.safetensors").card.action.size == 12
+
+
 def test_other_families_are_refused(policy: TrainedPolicy) -> None:
     """A policy of ants neither acts in a cheetah nor starts one's training."""
     cheetah = EnvRef("shapechanger/HalfCheetah-v1")

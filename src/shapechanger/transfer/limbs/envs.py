@@ -96,9 +96,9 @@ def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]
         StudyError: If a body has more limbs than room, or an env does not tell its tree.
     """
     bodies = each_body(env)
-    chosen = [bodies[i % len(bodies)] for i in range(count)]
-    room = max(rows.room for rows in rows_of_each(chosen, room))
-    return [LimbEnv(one.make(), room) for one in chosen]
+    # Room for all bodies, also where there are fewer envs.
+    room = rows_of_each(bodies, room)[0].room
+    return [LimbEnv(bodies[i % len(bodies)].make(), room) for i in range(count)]
 
 
 def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
