@@ -184,27 +184,3 @@ def test_a_policy_of_nan_moves_nothing(tmp_path: Path) -> None:
         assert "The policy gave [nan, nan], which is no command." in person.policies.text
         until(lambda: person.ask().message.holder == "")
         assert not _moves(person)
-
-
-@pytest.mark.gl
-@pytest.mark.system
-@pytest.mark.realtime
-def test_a_policy_file_that_changes_while_it_drives(student: Path, tmp_path: Path) -> None:
-    """It drives on, and is refused when it is started again; so is one that came meanwhile."""
-    file = tmp_path / "student.onnx"
-    file.write_bytes(student.read_bytes())
-    with _served(file, "real") as (_, person):
-        until(lambda: _moves(person))
-        file.write_bytes(b"something else")
-        (tmp_path / "late.onnx").write_bytes(b"something else")
-        seen = person.ask().message
-        # With a picture that it had not seen before the change.
-        until(lambda: (now := person.ask().message).seq > seen.seq + 2 and any(now.action_applied))
-        for name in ("", "student", "late"):
-            person.run_policy(name)
-            until(lambda: person.policies is not None and person.policies.running == "")
-            if name:
-                words = f"{name}.onnx is not a cloned policy"
-                until(lambda words=words: words in str(person.policies))
-        until(lambda: person.ask().message.holder == "")
-        assert not _moves(person)
