@@ -28,7 +28,8 @@ _HASH: Final = "sha256"
 _KIND: Final = "kind"
 # A file begins with the length of its JSON header.
 _LENGTH_BYTES: Final = 8
-_MAX_HEADER_BYTES: Final = 2**24
+_MAX_HEADER_BYTES: Final = 2**22  # Parsed JSON takes twenty times as much memory.
+_MAX_BYTES: Final = 2**28
 
 UNREADABLE: Final = (OSError, LookupError, ValueError, SafetensorError, msgspec.MsgspecError)
 """Exceptions of `read_tensors` for files that are missing, damaged or something else."""
@@ -72,11 +73,15 @@ def read_tensors(path: Path, kind: str = "") -> tuple[bytes, dict[str, NDArray[A
         OSError, LookupError, ValueError, SafetensorError, msgspec.MsgspecError: If it cannot be
             read, is of another kind, or has been changed.
     """
-    content = path.read_bytes()
+    content = _content(path)
     length = int.from_bytes(content[:_LENGTH_BYTES], "little")
+    if length > _MAX_HEADER_BYTES:
+        raise ValueError("it is not a safetensors file with a card")
     metadata = _metadata(content[_LENGTH_BYTES : _LENGTH_BYTES + length])
-    if metadata.get(_KIND, "") != kind:
-        raise ValueError(f"it is a {metadata.get(_KIND, 'policy of a study')}")
+    if (found := metadata.get(_KIND, "")) != kind:
+        raise ValueError(f"it is a {found!r}" if found else "it is a policy of a study")
+    if missing := {_CARD, _HASH} - metadata.keys():
+        raise ValueError(f"it lacks {' and '.join(sorted(missing))}")
     tensors = safetensors.load(content)
     card = metadata[_CARD].encode()
     if _digest(kind, card, tensors) != metadata[_HASH]:
@@ -87,6 +92,7 @@ def read_tensors(path: Path, kind: str = "") -> tuple[bytes, dict[str, NDArray[A
 def kind_of(path: Path) -> str | None:
     """Return the kind of a file from its header alone; None if it is missing or something else."""
     try:
+        _require_file(path)
         with path.open("rb") as file:
             length = int.from_bytes(file.read(_LENGTH_BYTES), "little")
             return _metadata(file.read(min(length, _MAX_HEADER_BYTES))).get(_KIND, "")
@@ -94,10 +100,23 @@ def kind_of(path: Path) -> str | None:
         return None
 
 
+def _require_file(path: Path) -> None:
+    """Refuse pipes and devices, which may never end; a missing file is left to who opens it."""
+    if path.exists() and not path.is_file():
+        raise ValueError("it is not a file")
+
+
+def _content(path: Path) -> bytes:
+    _require_file(path)
+    if path.stat().st_size > _MAX_BYTES:
+        raise ValueError(f"it is larger than {_MAX_BYTES >> 20} MiB")
+    return path.read_bytes()
+
+
 def _metadata(header: bytes) -> dict[str, str]:
     try:
         found = json.loads(header)["__metadata__"]
-    except (ValueError, LookupError, TypeError) as error:
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise ValueError("it is not a safetensors file with a card") from error
     return msgspec.convert(found, dict[str, str])
 

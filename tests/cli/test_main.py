@@ -134,6 +134,9 @@ def test_a_misspelt_command_has_a_nearest_spelling(
     ("arguments", "message"),
     [
         (["train", "Car", "--teacher"], "error: --teacher needs a value after it"),
+        (["transfer", "Car", "Tank", "--target-lens"], "error: --target-lens needs a value"),
+        (["transfer", "Car", "Tank", "--arms", "--seeds", "1"], "error: --arms needs a value"),
+        (["robot", "serve", "car", "--twin", "--lens"], "error: --lens needs a value after it"),
         (["train", "Car", "--teacher", "--seed", "1"], "error: --teacher needs a value after it"),
         (["train", "Car", "--teachr", "x"], "matches '--teachr'. Did you mean '--teacher'?"),
         (["demos", "cut", "x", "--frm", "4"], "Did you mean '--from'?"),

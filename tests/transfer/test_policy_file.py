@@ -6,6 +6,7 @@ import json
 import pickle
 import random
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -167,6 +168,79 @@ def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
     path = _changed(tmp_path, {"settings": msgspec.to_builtins(settings)})
     with pytest.raises(CorruptStudy, match=r"other\.safetensors is not a policy") as refusal:
         load_policy(path)
+    assert "\n" not in str(refusal.value)
+
+
+def _rewritten(tmp_path: Path, change: Callable[[dict[str, Any]], None]) -> Path:
+    """Write a policy of the finger with other tensors and their hash."""
+    content = POLICIES["reach"].read_bytes()
+    length = int.from_bytes(content[:8], "little")
+    card = json.loads(content[8 : 8 + length])["__metadata__"]["card"]
+    tensors = safetensors.load(content)
+    change(tensors)
+    path = tmp_path / "other.safetensors"
+    path.write_bytes(tensor_bytes(tensors, card.encode()))
+    return path
+
+
+_BIAS = "policy.action_net.bias"
+_MEAN = "normalisation.observation.mean"
+_LOW = "spaces.observation.low"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: t.update({_BIAS: t[_BIAS] * np.float32(np.nan)}), "must be finite"),
+        (lambda t: t.update({_MEAN: t[_MEAN] * np.inf}), "must be finite"),
+        (lambda t: t.update({_LOW: t[_LOW] * np.float32(np.nan)}), "must be finite"),
+        (lambda t: t.update({_BIAS: t[_BIAS].astype(np.float64)}), "float64, not torch.float32"),
+        (lambda t: t.update({_BIAS: t[_BIAS].astype(np.int32)}), "int32, not torch.float32"),
+        (lambda t: t.update({_LOW: np.zeros(38, np.int8)}), "bounds of the observation are int8"),
+        (lambda t: t.update({_MEAN: np.zeros(3)}), "statistics of the observation"),
+        (lambda t: t.pop(_MEAN), "it lacks 'normalisation.observation.mean'"),
+        (lambda t: t.pop(_LOW), "it lacks 'spaces.observation.low'"),
+        (
+            lambda t: [t.pop(name) for name in [*t] if name.startswith("normalisation")],
+            "it has no statistics",
+        ),
+    ],
+)
+def test_unsuitable_numbers_are_refused(
+    change: Callable[[dict[str, Any]], None], words: str, tmp_path: Path
+) -> None:
+    """A policy of NaN, of other types or without its normalisation would act, and wrongly."""
+    with pytest.raises(CorruptStudy, match="is not a policy") as refusal:
+        load_policy(_rewritten(tmp_path, change))
+    assert words in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"net_arch": [100_000, 100_000]}, "its card needs at least 10003800000 weights"),
+        ({"net_arch": [-1]}, "negative dimension"),
+        ({"n_envs": 10**6, "eval_every": 10**9}, "1000000 envs, more than 4096"),
+        ({"batch_size": -5}, "`batch_size` must be greater than 1"),
+        ({"algorithm": "os:system", "type": "imported"}, "is a function"),
+        (
+            {
+                "algorithm": "stable_baselines3:SAC",
+                "type": "imported",
+                "arguments": {"buffer_size": 10**15},
+            },
+            "llocat",
+        ),
+    ],
+)
+def test_settings_of_a_stranger_are_refused(
+    settings: dict[str, Any], words: str, tmp_path: Path
+) -> None:
+    """They allocate no memory, and call nothing."""
+    known = json.loads(msgspec.json.encode(load_policy(POLICIES["reach"]).card.settings))
+    with pytest.raises(CorruptStudy, match="is not a policy") as refusal:
+        load_policy(_changed(tmp_path, {"settings": known | settings}))
+    assert words in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 

@@ -7,7 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Any, Final, NoReturn, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, NoReturn, get_args, get_type_hints
 
 from shapechanger.errors import MissingExtra, ShapechangerError, StudyError, UnknownName
 
@@ -151,7 +151,8 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
         option = given.replace("_", "-")  # As tyro.
         if option not in options:
             raise UnknownName(f"option of `{said}`", given, sorted(options))
-        takes = option in named and option not in flags and get_origin(named[option]) is not tuple
+        # Without a value, one of several values would mean its default.
+        takes = option in named and option not in flags
         if takes and not equals and value.startswith("--"):
             raise StudyError(f"{given} needs a value after it: see `{said} --help`.")
 

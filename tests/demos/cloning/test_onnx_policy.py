@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,17 @@ def _model(operator: str = "Identity", domain: str = "", card: str = "") -> byte
     return model.SerializeToString()
 
 
+def _compiled() -> bytes:
+    """A network that was compiled for a provider."""
+    make: Any = helper
+    kernel = {"ep_cache_context": "x", "source": "TensorrtExecutionProvider"}
+    node = make.make_node("EPContext", ["x"], ["y"], domain="com.microsoft", **kernel)
+    sides = [make.make_tensor_value_info(name, TensorProto.FLOAT, ["n", 2]) for name in "xy"]
+    graph = make.make_graph([node], "compiled", sides[:1], sides[1:])
+    domains = [make.make_opsetid("", 17), make.make_opsetid("com.microsoft", 1)]
+    return make.make_model(graph, opset_imports=domains, ir_version=8).SerializeToString()
+
+
 def _card(**changes: Any) -> str:
     whole = {"clone": _policy(**changes).card, "body": "", "control_hz": None}
     return msgspec.json.encode(whole).decode()
@@ -107,13 +119,14 @@ def _card(**changes: Any) -> str:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "not a cloned policy"),
-        (b"\x08\x08garbage", "not a cloned policy"),
+        (b"", "it is damaged, or is not an ONNX file"),
+        (b"\x08\x08garbage", "it is damaged, or is not an ONNX file"),
         (_model(), "no card of Shapechanger"),
         (_model(card="{}"), "missing required field"),
         (_model(card=_card()), "its card says"),
         # An operator that only the provider of somebody's accelerator has.
-        (_model("Turbo", domain="com.accelerator"), "com.accelerator"),
+        (_model("Turbo", domain="com.accelerator"), "its operator com.accelerator:Turbo is not"),
+        (_compiled(), "it asks for TensorrtExecutionProvider, and the only one here is CPU"),
     ],
 )
 def test_other_files_are_refused(content: bytes, words: str, tmp_path: Path) -> None:
@@ -124,6 +137,16 @@ def test_other_files_are_refused(content: bytes, words: str, tmp_path: Path) -> 
         OnnxClone(file)
     assert words in str(refusal.value)
     assert "\n" not in str(refusal.value)
+    assert "ONNXRuntimeError" not in str(refusal.value)
+
+
+def test_what_never_ends_is_not_read(tmp_path: Path) -> None:
+    """A pipe that nobody writes to, and a folder."""
+    os.mkfifo(tmp_path / "pipe.onnx")
+    (tmp_path / "folder.onnx").mkdir()
+    for name in ("pipe", "folder"):
+        with pytest.raises(PolicyError, match="it is not a file"):
+            OnnxClone(tmp_path / f"{name}.onnx")
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

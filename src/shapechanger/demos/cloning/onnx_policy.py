@@ -171,6 +171,8 @@ class OnnxClone:
         options.intra_op_num_threads = 1
         options.log_severity_level = 4  # What is wrong is raised, too.
         try:
+            if path.exists() and not path.is_file():  # A pipe would wait for ever.
+                raise ValueError("it is not a file")
             if path.stat().st_size > _MOST_BYTES:
                 raise ValueError(f"it is larger than {_MOST_BYTES >> 20} MB")
             content = path.read_bytes()

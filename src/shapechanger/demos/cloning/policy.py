@@ -34,7 +34,7 @@ KIND: Final = "clone"
 """Kind of the file of a cloned policy, see `shapechanger.tensor_file`."""
 
 # Raised by PyTorch for cards of impossible sizes, and for weights that are not the card's.
-_UNBUILDABLE: Final = (RuntimeError, TypeError, ArithmeticError)
+_UNBUILDABLE: Final = (RuntimeError, TypeError, ArithmeticError, MemoryError)
 _CHUNK: Final = 256  # Examples at a time, to bound the memory.
 
 
@@ -209,7 +209,7 @@ class CameraPolicy:
             raise PolicyError(f"There is no policy file {path}.") from error
         except (*UNREADABLE, CloningError, *_UNBUILDABLE) as error:
             # Messages of PyTorch fill a page; the first line is enough.
-            reason = str(error).strip().partition("\n")[0].rstrip(".:")
+            reason = str(error).strip().partition("\n")[0].rstrip(".:") or type(error).__name__
             raise PolicyError(f"{path} is not a cloned policy: {reason}.") from error
 
 

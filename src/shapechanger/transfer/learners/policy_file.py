@@ -10,6 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -44,6 +45,10 @@ if TYPE_CHECKING:
 _WEIGHTS: Final = "policy."
 _STATISTICS: Final = "normalisation."
 _SPACES: Final = "spaces."
+_MOST_ENVS: Final = 4096
+
+# Raised by Stable-Baselines3 and PyTorch for settings and weights that do not make a model.
+_UNBUILDABLE: Final = (RuntimeError, TypeError, AssertionError, ArithmeticError, MemoryError)
 
 
 class PolicyCard(msgspec.Struct, frozen=True):
@@ -206,14 +211,38 @@ def load_policy(path: Path, function: str = "") -> TrainedPolicy:
     try:
         content, tensors = read_tensors(path)
         card = msgspec.json.decode(content, type=PolicyCard)
-        return TrainedPolicy(_model(card, tensors, function), _read_statistics(tensors), card)
+        _require_numbers(card, tensors)
+        model = _model(card, tensors, function)
+        return TrainedPolicy(model, _read_statistics(card, tensors), card)
     except FileNotFoundError as error:
         raise CorruptStudy(f"There is no policy file {path}.") from error
-    except (*UNREADABLE, RuntimeError) as error:  # Weights of other shapes than the card's.
-        reason = str(error).partition("\n")[0].rstrip(".:")
+    except (*UNREADABLE, *_UNBUILDABLE) as error:
+        reason = str(error).partition("\n")[0].rstrip(".:") or "it needs more memory than there is"
+        if isinstance(error, KeyError):
+            reason = f"it lacks {reason}"
         raise CorruptStudy(
             f"{path} is not a policy that `shapechanger train` or a study has written ({reason})."
         ) from error
+
+
+def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> None:
+    """Refuse numbers that are not finite, and a network that is larger than the file.
+
+    PyTorch fills a network's memory before it compares sizes.
+    """
+    for name, value in tensors.items():
+        is_bound = name.startswith(f"{_SPACES}observation")  # May be infinite.
+        if (np.isnan(value) if is_bound else ~np.isfinite(value)).any():
+            raise ValueError(f"its numbers {name!r} must be finite")
+    settings = card.settings
+    widths = (card.observation.size, *settings.net_arch)
+    weights = sum(before * after for before, after in pairwise(widths))
+    known = sum(value.size for value in tensors.values())
+    # A custom class need not take `net_arch`.
+    if settings.algorithm in {"PPO", "SAC", "TQC"} and weights > known:
+        raise ValueError(f"its card needs at least {weights} weights, and it has {known} numbers")
+    if settings.n_envs > _MOST_ENVS:
+        raise ValueError(f"its card has {settings.n_envs} envs, more than {_MOST_ENVS}")
 
 
 def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], function: str) -> BaseAlgorithm:
@@ -224,6 +253,8 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], function: str)
     spaces: list[gym.spaces.Box] = []
     for side, layout in (("observation", card.observation), ("action", card.action)):
         low, high = (tensors[f"{_SPACES}{side}.{end}"] for end in ("low", "high"))
+        if not {low.dtype, high.dtype} <= {np.dtype(np.float32), np.dtype(np.float64)}:
+            raise ValueError(f"its bounds of the {side} are {low.dtype} and {high.dtype}")
         if low.shape != (layout.size,):
             raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
         spaces.append(gym.spaces.Box(low, high, dtype=low.dtype.type))
@@ -242,21 +273,30 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], function: str)
         for name, value in tensors.items()
         if name.startswith(_WEIGHTS)
     }
+    for name, value in model.policy.state_dict().items():
+        if name in weights and weights[name].dtype != value.dtype:
+            raise ValueError(f"its weights {name} are {weights[name].dtype}, not {value.dtype}")
     model.policy.load_state_dict(weights)
     model.num_timesteps = card.steps
     return model
 
 
-def _read_statistics(tensors: Mapping[str, NDArray[Any]]) -> Normalisation | None:
-    if f"{_STATISTICS}observation.mean" not in tensors:
+def _read_statistics(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> Normalisation | None:
+    if not any(name.startswith(_STATISTICS) for name in tensors):
+        if card.settings.normalise:
+            raise ValueError("its learner normalises, and it has no statistics")
         return None
 
-    def statistics(side: str) -> RunningMeanStd:
+    def statistics(side: str, shape: tuple[int, ...]) -> RunningMeanStd:
         mean, var, count = (
             tensors[f"{_STATISTICS}{side}.{name}"] for name in ("mean", "var", "count")
         )
+        if (mean.shape, var.shape, count.shape) != (shape, shape, ()):
+            raise ValueError(f"its statistics of the {side} have other shapes than its layout")
         result = RunningMeanStd(shape=mean.shape)
         result.mean, result.var, result.count = mean, var, float(count)
         return result
 
-    return Normalisation(statistics("observation"), statistics("reward"))
+    return Normalisation(
+        statistics("observation", (card.observation.size,)), statistics("reward", ())
+    )

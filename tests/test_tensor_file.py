@@ -1,0 +1,135 @@
+"""Files of named arrays whose bytes somebody else wrote."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shapechanger.tensor_file import UNREADABLE, kind_of, read_tensors, tensor_bytes
+
+_GIB = 1 << 30
+_ARRAYS = {"first": np.arange(4, dtype=np.float32), "second": np.ones((2, 2), np.float32)}
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file with two arrays."""
+    made = tmp_path / "policy.safetensors"
+    made.write_bytes(tensor_bytes(_ARRAYS, b"{}", "test"))
+    return made
+
+
+def test_arrays_and_card_are_read(path: Path) -> None:
+    """With their kind."""
+    card, arrays = read_tensors(path, "test")
+    assert card == b"{}"
+    assert kind_of(path) == "test"
+    assert arrays.keys() == _ARRAYS.keys()
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(array, _ARRAYS[name])
+
+
+Header = dict[str, Any]
+
+
+def _with(**fields: object) -> Callable[[Header], object]:
+    return lambda header: header["first"].update(fields)
+
+
+def _metadata(**fields: object) -> Callable[[Header], object]:
+    return lambda header: header["__metadata__"].update(fields)
+
+
+HEADERS: dict[str, Callable[[Header], object]] = {
+    "overlapping arrays": _with(data_offsets=[16, 32]),
+    "offsets beyond the file": _with(data_offsets=[0, 2**62]),
+    "a negative offset": _with(data_offsets=[-1, 15]),
+    "a gap": _with(data_offsets=[4, 16], shape=[3]),
+    "a shape of 2^64 numbers": _with(shape=[2**62, 4]),
+    "another shape": _with(shape=[5]),
+    "numbers of eight bytes": _with(dtype="F64"),
+    "half as many bytes": _with(dtype="BF16"),
+    "another type of as many bytes": _with(dtype="I32"),
+    "an unknown type": _with(dtype="F3"),
+    "a type that is a number": _with(dtype=7),
+    "an array that is a text": lambda header: header.update(first="x"),
+    "a card that is a number": _metadata(card=7),
+    "a card without its hash": _metadata(card="not JSON"),
+    "a wrong hash": _metadata(sha256="0" * 64),
+    "no hash": lambda header: header["__metadata__"].pop("sha256"),
+    "no card": lambda header: header["__metadata__"].pop("card"),
+    "half a character": _metadata(card="\ud800"),
+    "another kind, with a line and a colour": _metadata(kind="a\nb\x1b[31m"),
+    "metadata that are a list": lambda header: header.update(__metadata__=[1]),
+    "no metadata": lambda header: header.pop("__metadata__"),
+}
+
+
+@pytest.mark.parametrize("name", HEADERS)
+def test_a_forged_header_is_refused(path: Path, name: str) -> None:
+    """In one line without control characters."""
+    content = path.read_bytes()
+    length = int.from_bytes(content[:8], "little")
+    header = json.loads(content[8 : 8 + length])
+    HEADERS[name](header)
+    text = json.dumps(header).encode()
+    path.write_bytes(len(text).to_bytes(8, "little") + text + content[8 + length :])
+    _refused(path)
+
+
+def _refused(path: Path) -> str:
+    with pytest.raises(UNREADABLE) as refusal:
+        read_tensors(path, "test")
+    text = str(refusal.value)
+    assert text
+    assert text.isprintable()
+    return text
+
+
+FILES: dict[str, Callable[[bytes], bytes]] = {
+    "nothing": lambda _: b"",
+    "half a length": lambda content: content[:4],
+    "a length alone": lambda content: content[:8],
+    "half a header": lambda content: content[:60],
+    "all but a byte": lambda content: content[:-1],
+    "a byte more": lambda content: content + b"x",
+    "a length of 0": lambda content: bytes(8) + content[8:],
+    "a length beyond the file": lambda content: (2**40).to_bytes(8, "little") + content[8:],
+    "a length of 2^64": lambda content: b"\xff" * 8 + content[8:],
+    "a header that is a list": lambda _: (2).to_bytes(8, "little") + b"[]",
+    "a header nested deeply": lambda _: (10**5).to_bytes(8, "little") + b"[" * 10**5,
+    "a header of 5 MB": lambda _: (5 << 20).to_bytes(8, "little") + b" " * (5 << 20),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_damaged_file_is_refused(path: Path, name: str) -> None:
+    """Its header is never parsed beyond a bound, and its kind is unknown or the old one."""
+    path.write_bytes(FILES[name](path.read_bytes()))
+    _refused(path)
+    assert kind_of(path) in {None, "test"}
+
+
+def test_a_large_file_is_not_read(path: Path) -> None:
+    """It claims 8 GiB, and has no bytes on the disk."""
+    with path.open("wb") as file:
+        file.truncate(8 * _GIB)
+    assert "larger than 256 MiB" in _refused(path)
+
+
+def test_what_never_ends_is_not_read(path: Path) -> None:
+    """A pipe that nobody writes to, and a device."""
+    path.unlink()
+    os.mkfifo(path)
+    assert "not a file" in _refused(path)
+    assert kind_of(path) is None
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    assert "not a file" in _refused(path)
+    assert kind_of(path) is None
