@@ -54,7 +54,15 @@ def test_the_shipped_suites_are_those_of_the_docs() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("seeds = 3\nsed = 4\n", "line 2: a suite has no key 'sed'. Did you mean 'seed'?"),
+        ("seeds = 3\nsed = 4\n", "line 2: No key of a suite matches 'sed'. Did you mean 'seed'?"),
+        (
+            "sources = ['Ant']\ntargets = [\n{env = 'Ant', bdy = 'BigAnt'}]\n",
+            "line 3: No key in targets matches 'bdy'. Did you mean 'body'? There are: env, name,",
+        ),
+        (
+            "sources = ['Ant']\n[sweep]\nfeild = 'factor'\n",
+            "line 3: No key in sweep matches 'feild'. Did you mean 'field'? There are: env, edit,",
+        ),
         ("\nseeds = 'many'\n", "line 2: Expected `int`, got `str`"),
         ("envs = [", "is not valid TOML"),
         ("envs = ['Ant']\nsources = ['Ant']\ntargets = ['BigAnt']\n", "in one way"),

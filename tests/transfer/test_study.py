@@ -205,8 +205,15 @@ def test_a_budget_below_one_evaluation_is_refused(steps: int) -> None:
         StudyError, match=f"{steps} target steps is smaller than one evaluation.*32"
     ):
         tiny_plan(steps=steps)
-    with pytest.raises(StudyError, match="source steps is smaller than one evaluation"):
-        tiny_plan(source_steps=0)
+    with pytest.raises(StudyError, match=rf"of {steps} source steps is smaller.*that\.$"):
+        tiny_plan(source_steps=steps)
+
+
+def test_the_default_of_the_source_is_named_where_it_is_too_small() -> None:
+    """It is half of the target's steps, which the user has not typed."""
+    settings = msgspec.structs.replace(TINY, eval_every=96)
+    with pytest.raises(StudyError, match=r"64 source steps is smaller.*that as source_steps\."):
+        tiny_plan(settings, steps=96)
 
 
 def test_one_seed_is_refused() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 import sys
@@ -146,18 +145,14 @@ def load_suite(name: str) -> SuiteFile:
 
 def _explain(text: str, reason: str) -> str:
     """Locate a mistake in a TOML file and suggest the nearest key."""
-    found = re.search(r"unknown field `(\w+)`", reason) or re.search(r"\$\.(\w+)", reason)
-    if found is None:
-        return f": {reason}."
-    key = found[1]
-    lines = text.splitlines()
-    at = next((i for i, line in enumerate(lines, 1) if re.match(rf"\W*{key}\b", line)), 1)
-    if "unknown field" not in reason:
-        return f", line {at}: {reason}."
-    known = [field.name for field in msgspec.structs.fields(SuiteFile)]
-    close = difflib.get_close_matches(key, known, n=1)
-    meant = f" Did you mean {close[0]!r}?" if close else ""
-    return f", line {at}: a suite has no key {key!r}.{meant} Keys: {', '.join(known)}."
+    unknown = re.search(r"unknown field `(\w+)`(?: - at `\$\.(\w+))?", reason)
+    if unknown is None:
+        return f"{place_of(text, ValueError(reason))}: {reason}."
+    key, table = unknown.groups()
+    kind = {None: SuiteFile, "sweep": _Sweep}.get(table, _Body)
+    known = [field.name for field in msgspec.structs.fields(kind)]
+    error = UnknownName("key of a suite" if table is None else f"key in {table}", key, known)
+    return f"{place_of(text, error)}: {error}"
 
 
 @contextmanager

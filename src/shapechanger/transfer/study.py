@@ -204,8 +204,9 @@ def make_plan(
     wanted = settings.steps if steps is None else steps
     require_budget(wanted, settings, "target")
     budget = settings.whole_updates(wanted)
+    option = "source_steps" if source_steps is None else ""
     if source_steps is None:
-        source_steps = settings.source_steps or budget // 2
+        source_steps = settings.source_steps or settings.whole_updates(budget // 2)
     source_budget = settings.whole_updates(source_steps)
     digest = ""
     if source_policy is not None:
@@ -217,7 +218,7 @@ def make_plan(
             )
         source_budget, digest = origin.steps, _digest(source_policy)
     else:
-        require_budget(source_budget, settings, "source")
+        require_budget(source_steps, settings, "source", option)
     layouts = (
         traits.source.observation_layout,
         traits.target.observation_layout,

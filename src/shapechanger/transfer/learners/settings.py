@@ -306,13 +306,14 @@ Settings = Sb3Settings | CloningSettings
 """The settings of any learner."""
 
 
-def require_budget(steps: int, settings: Settings, which: str = "") -> None:
+def require_budget(steps: int, settings: Settings, which: str = "", option: str = "") -> None:
     """Refuse a budget that ends before the first evaluation.
 
     Args:
         steps: The budget.
         settings: Settings of the learner.
         which: "target" or "source", where there are two budgets.
+        option: What sets the budget, where the user has not.
 
     Raises:
         StudyError: If it does.
@@ -321,5 +322,5 @@ def require_budget(steps: int, settings: Settings, which: str = "") -> None:
         budget = f"{steps} {which} steps" if which else f"{steps} steps"
         raise StudyError(
             f"A budget of {budget} is smaller than one evaluation, which comes every "
-            f"{settings.eval_every} steps: give at least that."
+            f"{settings.eval_every} steps: give at least that{option and f' as {option}'}."
         )
