@@ -47,9 +47,9 @@ def test_pins_fit_every_platform() -> None:
 
 
 def test_all_is_the_sum_of_the_extras_for_users() -> None:
-    """`all` has every extra except `dev` and `ray`, which is 80 MB and needs a cluster."""
+    """`all` has every extra except `dev`, the 0.4 GB of `gpu`, and `ray`, which needs a cluster."""
     (everything,) = map(Requirement, _EXTRAS["all"])
-    assert everything.extras == set(_EXTRAS) - {"all", "dev", "ray"}
+    assert everything.extras == set(_EXTRAS) - {"all", "dev", "gpu", "ray"}
 
 
 def test_stubs_describe_the_pinned_mujoco() -> None:

@@ -140,6 +140,11 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         """Steps after which an episode is truncated; None for never."""
         return self._limit
 
+    @property
+    def episode_steps(self) -> Tensor:
+        """Steps of each world's episode so far, shape (n,); what is written here counts."""
+        return self._elapsed
+
     def reset(
         self,
         *,

@@ -37,7 +37,12 @@ class ThreadVecEnv(DummyVecEnv):
         self, env_id: str, num_envs: int, *, threads: int | None = None, **arguments: Any
     ) -> None:
         self._envs = shapechanger.make_vec(
-            env_id, num_envs, threads=threads, autoreset_mode="SameStep", **arguments
+            env_id,
+            num_envs,
+            backend="threads",
+            threads=threads,
+            autoreset_mode="SameStep",
+            **arguments,
         )
         self.envs = self._envs.envs
         # Not that of DummyVecEnv, which makes envs and buffers of its own.
