@@ -25,6 +25,7 @@ from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.env_ref import EnvRef, env_traits
 from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners.settings import (
+    RslPpoSettings,
     Sb3Settings,
     require_budget,
     resolve_learner,
@@ -100,7 +101,7 @@ class Train:
         with opened(env) as made:
             learner_of(learner, settings).require(env, env_traits(made))
         if self.tensorboard is not None:
-            if not isinstance(settings, Sb3Settings):
+            if not isinstance(settings, Sb3Settings) or isinstance(settings, RslPpoSettings):
                 raise StudyError(f"{learner} has no TensorBoard logs: leave out --tensorboard.")
             try:
                 import_module("torch.utils.tensorboard")
@@ -112,9 +113,17 @@ class Train:
         def training(on_steps: Callable[[int], None]) -> None:
             say(f"{learner}: {tuning_text(learner, env.id)}")
             if isinstance(settings, Sb3Settings):
-                policy = Sb3Learner(
-                    learner, settings, tensorboard=self.tensorboard, threads=None
-                ).train(env, steps, self.seed, on_evaluation=_print_evaluation, on_steps=on_steps)
+                if isinstance(settings, RslPpoSettings):
+                    from shapechanger.transfer.learners.rsl import RslLearner
+
+                    trains: Sb3Learner = RslLearner(learner, settings)
+                else:
+                    trains = Sb3Learner(
+                        learner, settings, tensorboard=self.tensorboard, threads=None
+                    )
+                policy = trains.train(
+                    env, steps, self.seed, on_evaluation=_print_evaluation, on_steps=on_steps
+                )
                 save_policy(policy.described(command=command_line()), out)
                 return
             name = f"{env.id.split('/')[-1]}-{self.seed}.npz"

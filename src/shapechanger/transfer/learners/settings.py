@@ -138,6 +138,24 @@ class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
         return arguments
 
 
+class RslPpoSettings(PpoSettings, frozen=True, kw_only=True, tag="rsl-ppo"):
+    """Settings of rsl-rl's PPO on worlds of one device, under Stable-Baselines3's names.
+
+    Attributes:
+        device: Name of the device, such as `cuda:0` or `cpu`; empty for the first GPU, or the CPU
+            where there is none.
+    """
+
+    device: str = ""
+
+    @property
+    def model_arguments(self) -> dict[str, Any]:
+        """Arguments of Stable-Baselines3's class, which holds the policy between updates."""
+        arguments = super().model_arguments
+        del arguments["device"]
+        return arguments
+
+
 class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
     """Settings of SAC of Stable-Baselines3, or TQC of sb3-contrib, under their names.
 
@@ -276,7 +294,7 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
         return tuple(budget for budget in self.budgets if budget <= steps)
 
 
-Sb3Settings = PpoSettings | OffPolicySettings | ImportedSettings
+Sb3Settings = PpoSettings | RslPpoSettings | OffPolicySettings | ImportedSettings
 """The settings of any learner of Stable-Baselines3."""
 
 Settings = Sb3Settings | CloningSettings
@@ -340,6 +358,18 @@ LEARNERS: Final[dict[str, Settings]] = {
         eval_every=3072,
     ),
     "ppo-run": PpoSettings(
+        n_envs=64,
+        n_steps=128,
+        batch_size=2048,
+        n_epochs=10,
+        learning_rate=3e-4,
+        log_std_init=-1.0,
+        normalise=True,
+        steps=1_048_576,
+        eval_every=65_536,
+    ),
+    # The numbers of `ppo-run`, for which no GPU was there to tune others.
+    "rsl-ppo": RslPpoSettings(
         n_envs=64,
         n_steps=128,
         batch_size=2048,
@@ -453,6 +483,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "cloning": ("Car", "Tank", "Truck", "Boat"),
     "waypoint": ("CarWaypoint", "TankWaypoint", "TruckWaypoint"),
     "sac-balance": ("InvertedPendulum",),
+    "rsl-ppo": (),
     "sac": (),
     "tqc": (),
 }
