@@ -27,7 +27,12 @@ from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners.presets import resolve_learner, tuning_text
-from shapechanger.transfer.learners.settings import LimbSettings, Sb3Settings, require_budget
+from shapechanger.transfer.learners.settings import (
+    LimbSettings,
+    RslPpoSettings,
+    Sb3Settings,
+    require_budget,
+)
 
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Evaluation
@@ -117,7 +122,7 @@ class Train:
         with opened(each_body(env)[0]) as made:
             learner_of(learner, settings).require(env, env_traits(made))
         if self.tensorboard is not None:
-            if not isinstance(settings, Sb3Settings):
+            if not isinstance(settings, Sb3Settings) or isinstance(settings, RslPpoSettings):
                 raise StudyError(f"{learner} has no TensorBoard logs: leave out --tensorboard.")
             try:
                 import_module("torch.utils.tensorboard")
@@ -129,9 +134,17 @@ class Train:
         def training(on_steps: Callable[[int], None]) -> None:
             say(f"{learner}: {tuning_text(learner, env.id)}")
             if isinstance(settings, Sb3Settings):
-                policy = Sb3Learner(
-                    learner, settings, tensorboard=self.tensorboard, threads=None
-                ).train(env, steps, self.seed, on_evaluation=_print_evaluation, on_steps=on_steps)
+                if isinstance(settings, RslPpoSettings):
+                    from shapechanger.transfer.learners.rsl import RslLearner
+
+                    trains: Sb3Learner = RslLearner(learner, settings)
+                else:
+                    trains = Sb3Learner(
+                        learner, settings, tensorboard=self.tensorboard, threads=None
+                    )
+                policy = trains.train(
+                    env, steps, self.seed, on_evaluation=_print_evaluation, on_steps=on_steps
+                )
                 save_policy(policy.described(command=command_line()), out)
                 return
             name = f"{env.id.split('/')[-1]}-{self.seed}.npz"

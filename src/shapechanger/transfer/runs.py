@@ -25,7 +25,7 @@ from shapechanger.transfer.learners.evaluation import (
     zero_actions,
 )
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
-from shapechanger.transfer.learners.settings import Sb3Settings, Settings
+from shapechanger.transfer.learners.settings import RslPpoSettings, Sb3Settings, Settings
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 
@@ -56,6 +56,10 @@ def learner_of(name: str, settings: Settings) -> Learner:
         name: Name of the learner.
         settings: Its settings.
     """
+    if isinstance(settings, RslPpoSettings):
+        from shapechanger.transfer.learners.rsl import RslLearner
+
+        return RslLearner(name, settings)
     if isinstance(settings, Sb3Settings):
         return Sb3Learner(name, settings)
     return CloneLearner(name, settings)

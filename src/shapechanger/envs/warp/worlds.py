@@ -179,7 +179,8 @@ class Worlds:
                 self._warm = True
                 return
             if self._graph is None:
-                with wp.ScopedCapture() as capture:
+                # Torch's usual stream is CUDA's legacy one, which cannot be captured.
+                with wp.ScopedStream(wp.Stream(self.device)), wp.ScopedCapture() as capture:
                     self._step()
                 self._graph = capture.graph
             wp.capture_launch(self._graph)

@@ -18,6 +18,7 @@ from shapechanger.transfer.learners.settings import (
     LimbSettings,
     OffPolicySettings,
     PpoSettings,
+    RslPpoSettings,
     Settings,
 )
 
@@ -72,6 +73,18 @@ LEARNERS: Final[dict[str, Settings]] = {
         eval_every=3072,
     ),
     "ppo-run": PpoSettings(
+        n_envs=64,
+        n_steps=128,
+        batch_size=2048,
+        n_epochs=10,
+        learning_rate=3e-4,
+        log_std_init=-1.0,
+        normalise=True,
+        steps=1_048_576,
+        eval_every=65_536,
+    ),
+    # The numbers of `ppo-run`, for which no GPU was there to tune others.
+    "rsl-ppo": RslPpoSettings(
         n_envs=64,
         n_steps=128,
         batch_size=2048,
@@ -190,6 +203,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "cloning": ("Car", "Tank", "Truck", "Boat"),
     "waypoint": ("CarWaypoint", "TankWaypoint", "TruckWaypoint"),
     "sac-balance": ("InvertedPendulum",),
+    "rsl-ppo": (),
     "sac": (),
     "tqc": (),
 }

@@ -161,6 +161,24 @@ class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
         return arguments
 
 
+class RslPpoSettings(PpoSettings, frozen=True, kw_only=True, tag="rsl-ppo"):
+    """Settings of rsl-rl's PPO on worlds of one device, under Stable-Baselines3's names.
+
+    Attributes:
+        device: Name of the device, such as `cuda:0` or `cpu`; empty for the first GPU, or the CPU
+            where there is none.
+    """
+
+    device: str = ""
+
+    @property
+    def model_arguments(self) -> dict[str, Any]:
+        """Arguments of Stable-Baselines3's class, which holds the policy between updates."""
+        arguments = super().model_arguments
+        del arguments["device"]
+        return arguments
+
+
 class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
     """Settings of SAC of Stable-Baselines3, or TQC of sb3-contrib, under their names.
 
@@ -299,7 +317,7 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
         return tuple(budget for budget in self.budgets if budget <= steps)
 
 
-Sb3Settings = PpoSettings | LimbSettings | OffPolicySettings | ImportedSettings
+Sb3Settings = PpoSettings | LimbSettings | RslPpoSettings | OffPolicySettings | ImportedSettings
 """The settings of any learner of Stable-Baselines3."""
 
 Settings = Sb3Settings | CloningSettings

@@ -1,0 +1,359 @@
+"""PPO of rsl-rl on many worlds of one device, with policies as those of Stable-Baselines3.
+
+Everything that learns is on the device: worlds, networks, statistics and batches. A training begins
+with the network of Stable-Baselines3's PPO of the same settings, and its weights go back there
+for evaluations, which the CPU env does, and into files. So cards, curves, transplants and exports
+are the same as those of other learners.
+"""
+
+# The learner of Stable-Baselines3 has what both need.
+# pyright: reportPrivateUsage=false, reportMissingTypeStubs=false
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, cast
+
+import numpy as np
+
+import shapechanger
+from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef, layouts_of
+from shapechanger.transfer.learners import DemonstrationFile, ignore
+from shapechanger.transfer.learners import sb3 as _sb3
+from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model
+from shapechanger.transfer.learners.evaluation import (
+    EVALUATION_SEED,
+    Evaluation,
+    evaluate,
+    evaluation_envs,
+)
+from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy, actor
+from shapechanger.transfer.learners.sb3 import Sb3Learner
+from shapechanger.transfer.learners.settings import RslPpoSettings, require_budget
+
+try:
+    import torch
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+    from torch import Tensor
+except ImportError as error:
+    raise MissingExtra("stable-baselines3", "learn") from error
+try:
+    from rsl_rl.algorithms import PPO
+    from rsl_rl.env import VecEnv
+    from rsl_rl.models import MLPModel
+    from rsl_rl.storage import RolloutStorage
+    from tensordict import TensorDict
+except ImportError as error:
+    raise MissingExtra("rsl-rl-lib", "gpu") from error
+
+# The group of observations that actor and critic read.
+_GROUP: Final = "policy"
+# Stable-Baselines3's, for both.
+_VALUE_WEIGHT: Final = 0.5
+_LONGEST_GRADIENT: Final = 0.5
+_ADAMS_EPSILON: Final = 1e-5
+_CLIPPED_REWARD: Final = 10.0
+
+
+class RslVecEnv(VecEnv):
+    """Worlds of `shapechanger.make_vec(backend="warp")` as rsl-rl's learners take them.
+
+    Observations are in the group `policy`. A world whose episode has ended starts again in the same
+    step, and `time_outs` says where only the time limit ended it. Actions outside the action space
+    are moved to its edge, as Stable-Baselines3 does.
+
+    Args:
+        envs: The worlds, with the autoreset mode `SameStep`; they are reset.
+        seed: Seed of the first world; None for seeds of the system.
+
+    Raises:
+        StudyError: If the worlds have another autoreset mode or several spaces.
+    """
+
+    def __init__(self, envs: Any, seed: int | None = None) -> None:
+        if envs.metadata["autoreset_mode"].value != "SameStep":
+            raise StudyError("rsl-rl takes worlds with autoreset_mode='SameStep'.")
+        if len(envs.batches) > 1 and isinstance(envs.reset(seed=seed)[0], tuple):
+            raise StudyError(
+                "rsl-rl takes worlds of one pair of spaces: make one vector env for each."
+            )
+        self.envs = envs
+        self.num_envs = envs.num_envs
+        self.num_actions = envs.action_layout.size
+        self.max_episode_length = envs.max_episode_steps or 0
+        self.device = envs.device
+        self.cfg = {}
+        space = envs.single_action_space
+        self._low = torch.as_tensor(space.low, device=self.device)
+        self._high = torch.as_tensor(space.high, device=self.device)
+        self._observations: Tensor = envs.reset(seed=seed)[0]
+
+    @property
+    def episode_length_buf(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Steps of each world's episode so far, shape (n,)."""
+        return self.envs.episode_steps
+
+    @episode_length_buf.setter
+    def episode_length_buf(self, steps: Tensor) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        self.envs.episode_steps[:] = steps
+
+    def get_observations(self) -> TensorDict:
+        """Return the present observations."""
+        return TensorDict({_GROUP: self._observations}, batch_size=[self.num_envs])
+
+    def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
+        """Take one step in each world.
+
+        Args:
+            actions: Shape (n, num_actions).
+
+        Returns:
+            Observations, rewards, ends, and `time_outs` among the extras.
+        """
+        moved = actions.clamp(self._low, self._high)
+        self._observations, rewards, terminated, truncated, _ = self.envs.step(moved)
+        ends = terminated | truncated
+        return self.get_observations(), rewards, ends, {"time_outs": truncated & ~terminated}
+
+
+class RslLearner(Sb3Learner):
+    """PPO of rsl-rl on a device: a `shapechanger.transfer.learners.Learner`.
+
+    Args:
+        name: Name of the learner, for the cards of its policies.
+        settings: Its settings.
+    """
+
+    def __init__(self, name: str, settings: RslPpoSettings) -> None:
+        super().__init__(name, settings)
+        self._ppo = settings
+
+    def train(
+        self,
+        env: EnvRef,
+        steps: int,
+        seed: int,
+        *,
+        demonstrations: DemonstrationFile | None = None,
+        start: TrainedPolicy | None = None,
+        body_map: BodyMap | None = None,
+        only_last: bool = False,
+        callback: Any = None,
+        rehearsal: Any = None,
+        on_evaluation: Callable[[Evaluation], None],
+        on_steps: Callable[[int], None] = lambda steps: None,
+    ) -> TrainedPolicy:
+        """Train a policy, evaluating it before the first step, along the way, and at the end.
+
+        Raises:
+            StudyError: If `steps` is smaller than one evaluation, a callback or a rehearsal is
+                given, or the training diverges.
+            VectorEnvError: If the task has no functions for a device.
+        """
+        del demonstrations, only_last
+        if callback is not None or rehearsal is not None:
+            raise StudyError(f"{self._name} takes no callback and rehearses no demonstrations.")
+        settings = self._ppo
+        require_budget(steps, settings)
+        eval_envs = evaluation_envs(env, settings)
+        worlds = shapechanger.make_vec(
+            env.id,
+            settings.n_envs,
+            backend="warp",
+            device=settings.device or None,
+            autoreset_mode="SameStep",
+            **env.kwargs,
+        )
+        try:
+            one: Any = eval_envs[0]
+            spaces = SpacesOnly(one.observation_space, one.action_space)
+            envs: Any = DummyVecEnv([lambda: spaces])
+            if settings.normalise:
+                envs = VecNormalize(envs, gamma=settings.gamma)
+            single = settings.for_one_env()
+            explores: tuple[float, ...] | None = None
+            if start is None or body_map is None:
+                model: Any = build_model(single, envs, seed)
+            else:
+                model = _sb3._transplanted_model(envs, single, seed, None, start, body_map)
+                explores = _sb3._explore(model, settings)
+            training = _Training(RslVecEnv(worlds, seed), model, envs, settings)
+
+            def evaluated(done: int) -> None:
+                _sb3._require_finite(model, self._name)
+                act = actor(model, _sb3._statistics(envs))
+                episodes = settings.eval_episodes
+                on_evaluation(evaluate(act, eval_envs, EVALUATION_SEED, done, episodes=episodes))
+
+            whole, done = settings.whole_updates(steps), 0
+            following = np.inf if on_evaluation is ignore else settings.eval_every
+            if on_evaluation is not ignore:
+                evaluated(0)
+            while done < whole:
+                training.update(done, on_steps)
+                done += settings.update_steps
+                if following <= done < whole:
+                    training.write_back()
+                    evaluated(done)
+                    following += settings.eval_every
+            training.write_back()
+            evaluated(done)
+            model.num_timesteps = done
+            card = PolicyCard(
+                env,
+                *layouts_of(one),
+                self._name,
+                settings,
+                done,
+                seed,
+                shapechanger.__version__,
+                start_log_std=explores,
+            )
+            return TrainedPolicy(model, _sb3._statistics(envs), card)
+        finally:
+            worlds.close()
+            for one in eval_envs:
+                one.close()
+
+
+class _Training:
+    """rsl-rl's PPO with the weights and statistics of a model of Stable-Baselines3.
+
+    Args:
+        envs: The worlds.
+        model: The model, which `write_back` updates.
+        statistics: Envs with its statistics, or without any.
+        settings: The settings.
+    """
+
+    def __init__(
+        self, envs: RslVecEnv, model: Any, statistics: Any, settings: RslPpoSettings
+    ) -> None:
+        self._envs = envs
+        self._model = model
+        self._statistics = statistics if isinstance(statistics, VecNormalize) else None
+        self._settings = settings
+        device = envs.device
+        seen = envs.get_observations()
+        groups = {"actor": [_GROUP], "critic": [_GROUP]}
+        shape: dict[str, Any] = {
+            "hidden_dims": settings.net_arch,
+            "activation": "tanh",  # Stable-Baselines3's.
+            "obs_normalization": settings.normalise,
+        }
+        self._actor: Any = cast("Any", MLPModel)(
+            seen,
+            groups,
+            "actor",
+            envs.num_actions,
+            **shape,
+            distribution_cfg={
+                "class_name": "rsl_rl.modules.distribution:GaussianDistribution",
+                "std_type": "log",
+            },
+        )
+        self._critic: Any = cast("Any", MLPModel)(seen, groups, "critic", 1, **shape)
+        self._read()
+        storage = cast("Any", RolloutStorage)(
+            "rl", envs.num_envs, settings.n_steps, seen, [envs.num_actions], device
+        )
+        self._ppo: Any = cast("Any", PPO)(
+            self._actor,
+            self._critic,
+            storage,
+            num_learning_epochs=settings.n_epochs,
+            num_mini_batches=max(1, settings.update_steps // settings.batch_size),
+            clip_param=settings.clip_range,
+            gamma=settings.gamma,
+            lam=settings.gae_lambda,
+            value_loss_coef=_VALUE_WEIGHT,
+            entropy_coef=settings.ent_coef,
+            learning_rate=settings.learning_rate,
+            max_grad_norm=_LONGEST_GRADIENT,
+            use_clipped_value_loss=False,
+            schedule="fixed",
+            normalize_advantage_per_mini_batch=True,
+            device=device,
+        )
+        for group in self._ppo.optimizer.param_groups:
+            group["eps"] = _ADAMS_EPSILON
+        self._ppo.train_mode()
+        self._seen = seen
+        self._returns = torch.zeros(envs.num_envs, device=device)
+
+    def update(self, done: int, on_steps: Callable[[int], None]) -> None:
+        """Collect the steps of an update, and learn from them.
+
+        Args:
+            done: Steps before this update.
+            on_steps: Called with the steps so far.
+        """
+        with torch.inference_mode():
+            for step in range(self._settings.n_steps):
+                actions = self._ppo.act(self._seen)
+                self._seen, rewards, ends, extras = self._envs.step(actions)
+                scaled = self._scaled(rewards, ends)
+                self._ppo.process_env_step(self._seen, scaled, ends, extras)
+                on_steps(done + (step + 1) * self._envs.num_envs)
+            self._ppo.compute_returns(self._seen)
+        self._ppo.update()
+
+    def _scaled(self, rewards: Tensor, ends: Tensor) -> Tensor:
+        """Divide rewards by the deviation of the discounted return, as `VecNormalize` does."""
+        statistics: Any = self._statistics
+        if statistics is None:
+            return rewards
+        self._returns = self._returns * self._settings.gamma + rewards
+        found = self._returns.double()
+        statistics.ret_rms.update_from_moments(
+            float(found.mean()), float(found.var(unbiased=False)), found.numel()
+        )
+        self._returns[ends] = 0.0
+        scale = float(np.sqrt(statistics.ret_rms.var + statistics.epsilon))
+        return (rewards / scale).clamp(-_CLIPPED_REWARD, _CLIPPED_REWARD)
+
+    def _pairs(self) -> list[tuple[Any, Any]]:
+        """Return the layers of rsl-rl's networks, each with that of Stable-Baselines3's policy."""
+        policy = self._model.policy
+        extractor = policy.mlp_extractor
+        pairs: list[tuple[Any, Any]] = []
+        for network, hidden, head in (
+            (self._actor, extractor.policy_net, policy.action_net),
+            (self._critic, extractor.value_net, policy.value_net),
+        ):
+            ours = [layer for layer in network.mlp if isinstance(layer, torch.nn.Linear)]
+            theirs = [layer for layer in hidden if isinstance(layer, torch.nn.Linear)]
+            pairs += zip(ours, [*theirs, head], strict=True)
+        return pairs
+
+    def _read(self) -> None:
+        """Take weights and statistics from the model."""
+        with torch.no_grad():
+            for ours, theirs in self._pairs():
+                ours.load_state_dict(theirs.state_dict())
+            self._actor.distribution.log_std_param.copy_(self._model.policy.log_std)
+            if self._statistics is not None:
+                found: Any = self._statistics.obs_rms
+                for network in (self._actor, self._critic):
+                    normaliser = network.obs_normalizer
+                    # rsl-rl adds its epsilon to the deviation, Stable-Baselines3 to the variance.
+                    deviation = np.sqrt(found.var + self._statistics.epsilon) - normaliser.eps
+                    normaliser._std.copy_(torch.as_tensor(deviation.clip(min=0.0)))
+                    normaliser._var.copy_(normaliser._std.square())
+                    normaliser._mean.copy_(torch.as_tensor(found.mean))
+                    normaliser.count.fill_(int(found.count))
+
+    def write_back(self) -> None:
+        """Give the model the present weights and statistics."""
+        with torch.no_grad():
+            for ours, theirs in self._pairs():
+                theirs.load_state_dict(cast("dict[str, Any]", ours.state_dict()))
+            self._model.policy.log_std.copy_(self._actor.distribution.log_std_param)
+        if self._statistics is not None:
+            normaliser, found = self._actor.obs_normalizer, cast("Any", self._statistics.obs_rms)
+            found.mean = normaliser._mean[0].double().cpu().numpy()
+            deviation = normaliser._std[0].double() + normaliser.eps
+            found.var = deviation.square().cpu().numpy() - self._statistics.epsilon
+            found.count = float(normaliser.count)
