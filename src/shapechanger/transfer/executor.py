@@ -61,7 +61,7 @@ class Executor(Protocol):
         ...
 
 
-class Schedule:
+class JobSchedule:
     """Jobs that wait, have ended and have failed, in order of their dependencies.
 
     A job that fails does not stop the others, except those that need its result. One whose process
@@ -166,7 +166,7 @@ class Serial:
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         """Run all jobs; see `Executor.run`."""
-        schedule = Schedule(jobs)
+        schedule = JobSchedule(jobs)
         while ready := schedule.start(1):
             job = ready[0]
 
@@ -194,13 +194,13 @@ class Processes:
         self._workers = workers or os.cpu_count() or 1
 
     def run(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
-        """Run all jobs; see `Executor.run` and `Schedule`.
+        """Run all jobs; see `Executor.run` and `JobSchedule`.
 
         Raises:
             FailedRuns: If jobs have failed; all others are complete.
             OutputError: If a job could not write its result; the others are ended.
         """
-        schedule = Schedule(jobs)
+        schedule = JobSchedule(jobs)
         idle: list[_Worker] = []
         busy: dict[Connection, _Worker] = {}
         try:

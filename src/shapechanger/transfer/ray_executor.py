@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from shapechanger.errors import MissingExtra, ShapechangerError, StudyError
-from shapechanger.transfer.executor import Job, OnProgress, Schedule, throttled
+from shapechanger.transfer.executor import Job, OnProgress, JobSchedule, throttled
 
 # Set before Ray is imported; otherwise Ray reports usage statistics.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -37,7 +37,7 @@ _ray: Any = ray
 class RayCluster:
     """Runs jobs on the nodes of a Ray cluster, one job per core.
 
-    A job whose worker or node is lost is repeated on another; see `Schedule`.
+    A job whose worker or node is lost is repeated on another; see `JobSchedule`.
 
     Args:
         address: Address of a running cluster, such as `10.0.0.1:6379`, or "auto" for the one that
@@ -107,7 +107,7 @@ class _Session:
 
     def __init__(self, jobs: Sequence[Job], on_progress: OnProgress) -> None:
         self._on_progress = on_progress
-        self._schedule = Schedule(jobs)
+        self._schedule = JobSchedule(jobs)
         self._running: dict[Any, Job] = {}
         self._steps: dict[str, int] = {}
         self._board: Any = _new_board()
