@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from shapechanger.errors import MissingExtra, ShapechangerError, StudyError
-from shapechanger.transfer.executor import Job, OnProgress, JobSchedule, throttled
+from shapechanger.transfer.executor import Job, JobSchedule, OnProgress, throttled
 
 # Set before Ray is imported; otherwise Ray reports usage statistics.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
