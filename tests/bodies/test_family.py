@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -10,7 +11,7 @@ import pytest
 
 from shapechanger.bodies import Family
 from shapechanger.bodies.ant import ANT
-from shapechanger.bodies.families import HOPPER
+from shapechanger.bodies.families import HOPPER, Axis
 from shapechanger.errors import MorphologyError, UnknownName
 from shapechanger.morphology import AddSegment, Body, Cut, Friction, Mass, Stretch, to_json
 from shapechanger.morphology.certificate import certify
@@ -117,6 +118,14 @@ def test_drawn_bodies_compile_stand_and_differ(env: str, split: str) -> None:
             with gym.make(f"shapechanger/{env}-v1", body=body) as drawn:
                 assert cast("Any", drawn.unwrapped).standing_height > 0.1
                 assert certify(cast("Any", own), cast("Any", drawn)).changes
+
+
+def test_extrapolation_is_outside_where_most_draws_are_not() -> None:
+    """Draws within the range to learn in are drawn again."""
+    axis = Axis("length", partial(Stretch, "thigh"), 0.5, 2.0, 0.49, 2.05)
+    for body in Family("Leg", {"Leg": ()}, axes=(axis,)).sample(20, 0, "extrapolation"):
+        (edit,) = body
+        assert not 0.5 <= cast("Stretch", edit).factor <= 2.0
 
 
 def test_a_body_at_named_values() -> None:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
-import torch
 
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
@@ -34,13 +32,7 @@ _FRAMING = TINY_CLONING.clone.framing
 _LEARNER = CloneLearner("cloning", TINY_CLONING)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def one_thread() -> Iterator[None]:
-    """Limit PyTorch to one thread."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 def _plan(*more: str) -> Plan:

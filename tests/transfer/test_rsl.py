@@ -39,9 +39,9 @@ def worlds(**arguments: Any) -> Any:
     )
 
 
+@pytest.mark.usefixtures("one_thread")
 def test_a_short_training_balances_longer(tmp_path: Path) -> None:
     """The return rises, and the policy in the file acts as the trained one, on the CPU env."""
-    torch.set_num_threads(1)
     found: list[Evaluation] = []
     counted: list[int] = []
     learner = learner_of("rsl-ppo", SETTINGS)

@@ -181,18 +181,20 @@ class Family:
         parts = {place: str(rng.choice(list(self.parts[place]))) for place in chosen}
         while True:
             values = {
-                axis.name: math.exp(
-                    rng.uniform(math.log(axis.lowest), math.log(axis.highest))
-                    if split == "extrapolation"
-                    else rng.uniform(math.log(axis.low), math.log(axis.high))
+                # Rounded so that the edits can be read.
+                axis.name: round(
+                    math.exp(
+                        rng.uniform(math.log(axis.lowest), math.log(axis.highest))
+                        if split == "extrapolation"
+                        else rng.uniform(math.log(axis.low), math.log(axis.high))
+                    ),
+                    4,
                 )
                 for axis in self.axes
             }
             outside = any(not a.low <= values[a.name] <= a.high for a in self.axes)
             if outside == (split == "extrapolation"):
-                # Rounded so that the edits can be read; log and exp may leave the range by an ulp.
-                rounded = {name: round(value, 4) for name, value in values.items()}
-                return self.body_at(rounded, parts)
+                return self.body_at(values, parts)
 
 
 def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, ...]:

@@ -1,6 +1,6 @@
 """The kinematic tree of a body: its trunk, its limbs, and numbers that describe each.
 
-A policy for many bodies reads them beside what it senses: A. Bohlinger and others, One Policy to
+A policy for many bodies reads them beside what it senses: N. Bohlinger and others, One Policy to
 Run Them All, CoRL 2024, and A. Gupta and others, MetaMorph, ICLR 2022.
 """
 

@@ -25,6 +25,8 @@ from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 ANT, EXTENDED = EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1")
 FEW: Final = ANT.having({"bodies": {"count": 2}, "max_episode_steps": 20})
 TINY: Final = LimbSettings(
@@ -154,6 +156,25 @@ def test_a_file_of_bodies_that_differ_can_be_read(tmp_path: Path) -> None:
     assert load_policy(tmp_path / "ants.safetensors").card.action.size == 12
 
 
+def test_a_training_keeps_the_scale_of_its_rewards(policy: TrainedPolicy) -> None:
+    """Fine-tuning goes on with the statistics of the source, which its critic has learned with."""
+    assert policy.normalisation is not None
+    scale = policy.normalisation.reward
+    tuned = _learner().train(
+        FEW, 32, 1, start=policy, body_map=_NO_MAP, on_evaluation=lambda _: None
+    )
+    assert tuned.normalisation is not None
+    # Its own 32 steps are added to those of the source.
+    assert tuned.normalisation.reward.count == pytest.approx(scale.count + 32)
+
+
+def test_training_and_acting_see_the_same_rows(policy: TrainedPolicy) -> None:
+    """Rows are scaled already: no running statistics change them in training alone."""
+    assert policy.normalisation is not None
+    assert not policy.normalisation.observation.mean.any()
+    assert (policy.normalisation.observation.var == 1.0).all()
+
+
 def test_other_families_are_refused(policy: TrainedPolicy) -> None:
     """A policy of ants neither acts in a cheetah nor starts one's training."""
     cheetah = EnvRef("shapechanger/HalfCheetah-v1")
@@ -182,7 +203,7 @@ def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
         msgspec.structs.replace(TINY, network="padded")
 
 
-def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path) -> None:
+def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is evaluated before the first target step, and then learns there."""
     short = {"max_episode_steps": 20}
     task = TransferTask(ANT.having(short), EXTENDED.having(short))
@@ -195,7 +216,17 @@ def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path) -> None:
         seeds=2,
         arms=("scratch", "generalist"),
     )
+    trained: list[EnvRef] = []
+    train = Sb3Learner.train
+
+    def recorded(self: Sb3Learner, env: EnvRef, *arguments: Any, **more: Any) -> TrainedPolicy:
+        trained.append(env)
+        return train(self, env, *arguments, **more)
+
+    monkeypatch.setattr(Sb3Learner, "train", recorded)
     study = run_study(plan, tmp_path / "study", executor=Serial())
+    many = task.source.having({"bodies": {"split": "train", "count": 32, "seed": 0}})
+    assert [trained.count(env) for env in (many, task.target)] == [2, 4]
     curve = study.of("generalist")[0].curve
     assert [evaluation.steps for evaluation in curve] == [0, 64]
     assert curve[0].mean_return != study.of("scratch")[0].curve[0].mean_return

@@ -1,9 +1,10 @@
 """A policy for any number of limbs, as a class of policies of Stable-Baselines3.
 
-The network is that of N. Bohlinger and others, One Policy to Run Them All: an End-to-end Learning
-Approach to Multi-Embodiment Locomotion, CoRL 2024 (URMA). Each limb is encoded by the same network;
-weights that follow from its description alone add the codes up, whatever their number; and the same
-network decodes the action of each limb from the sum, its code and its description.
+The network follows URMA (N. Bohlinger and others, One Policy to Run Them All, CoRL 2024), without
+its learned temperature and layer normalisation, and with one standard deviation for all actions.
+Each limb is encoded by the same network; weights that follow from its description alone add the
+codes up, whatever their number; and the same network decodes the action of each limb from the sum,
+its code and its description.
 """
 
 from __future__ import annotations
