@@ -220,7 +220,7 @@ def _scratch_row(found: list[Scores], split: str, alone: list[float]) -> Row:
     return Row(
         f"{SCRATCH_BODIES} ants, {split}: zero-shot over scratch in the body itself",
         f"{limbs.mean():.2f} and {np.mean(alone):.2f} m/s",
-        f"scratch learns for {SHARE:,} steps, what each body to learn in has had",
+        f"scratch learns for {SHARE:,} steps, what each training body has had",
         "zero-shot is faster",
         bool(limbs.mean() > np.mean(alone)),
     )

@@ -34,9 +34,9 @@ BodyLike = str | Edit | Iterable[Edit]
 """A body as users give it: its name, edits as JSON, one edit, or several."""
 
 Split = Literal["train", "interpolation", "extrapolation", "composition"]
-"""Parts of a family that bodies are drawn from: one to learn in, three to be judged in."""
+"""Splits of a family: one for training, three for evaluation."""
 
-# Share of the bodies to learn in that have one of the family's parts.
+# Share of the training bodies that have one of the family's parts.
 _WITH_PART: Final = 0.5
 
 
@@ -47,8 +47,8 @@ class Axis:
     Attributes:
         name: Its name, such as "length of shank_4".
         edit: Makes the edit of a value.
-        low: Smallest value of the bodies to learn in.
-        high: Largest value of the bodies to learn in.
+        low: Smallest value of the training bodies.
+        high: Largest value of the training bodies.
         lowest: Smallest value of all bodies.
         highest: Largest value of all bodies.
         unit: Its unit; "1" for a ratio to the model's own value.
@@ -138,11 +138,11 @@ class Family:
     def sample(self, n: int, seed: int = 0, split: Split = "train") -> list[Body]:
         """Draw bodies; the first ones are the same whatever the number is.
 
-        - "train": each axis within the range to learn in, drawn uniformly in its logarithm, and in
+        - "train": each axis within its training range, drawn uniformly in its logarithm, and in
           half of the bodies one part.
         - "interpolation": other bodies of the same distribution.
-        - "extrapolation": each axis within its whole range, at least one outside the range to
-          learn in; parts as in "train".
+        - "extrapolation": each axis within its whole range, at least one outside its training
+          range; parts as in "train".
         - "composition": axes as in "train", and parts at two places or more.
 
         The bodies depend on the version of Shapechanger, since its axes may change.
@@ -202,8 +202,8 @@ def length_axes(bodies: Iterable[str], low: float, high: float) -> tuple[Axis, .
 
     Args:
         bodies: Names of bodies.
-        low: Smallest ratio to learn in; the smallest of all is 0.3 below it.
-        high: Largest ratio to learn in; the largest of all is 0.4 above it.
+        low: Smallest ratio in training; the smallest of all is 0.3 below it.
+        high: Largest ratio in training; the largest of all is 0.4 above it.
     """
     return tuple(
         Axis(f"length of {body}", partial(Stretch, body), low, high, low - 0.3, high + 0.4)

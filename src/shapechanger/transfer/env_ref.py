@@ -248,7 +248,7 @@ class KinematicTree(Protocol):
 
 @runtime_checkable
 class HasTree(Protocol):
-    """An env that tells how its body is built."""
+    """An env that describes the kinematic tree of its body."""
 
     @property
     def tree(self) -> KinematicTree:

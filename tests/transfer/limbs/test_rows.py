@@ -12,7 +12,7 @@ from shapechanger.errors import LayoutError, StudyError, TransplantError, Unknow
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.transfer.env_ref import EnvRef, each_body
 from shapechanger.transfer.limbs.envs import LimbEnv, LimbVecEnv, fitted, limb_envs, rows_of_each
-from shapechanger.transfer.limbs.rows import DESCRIBED, require_same_places, rows_of
+from shapechanger.transfer.limbs.rows import DESCRIBED, require_same_columns, rows_of
 
 ANT = EnvRef("shapechanger/Ant-v1")
 # Two of these have a foot, each on another leg, and two are of one layout.
@@ -26,19 +26,19 @@ def _limb_env(env: EnvRef = ANT, room: int = 0) -> LimbEnv:
 @pytest.mark.parametrize(
     "env", ["Ant", "ExtendedAnt", "HalfCheetah", "Humanoid", "InvertedPendulum"]
 )
-def test_every_number_has_one_place(env: str) -> None:
-    """Each observation is placed in one number of a row, which is named after its part."""
+def test_every_number_has_one_column(env: str) -> None:
+    """Each observation has one column of one row, which is named after its part."""
     with gym.make(f"shapechanger/{env}-v1") as made:
         rows = rows_of(made)
         names = rows.layouts()[0].names
         inner: Any = made.unwrapped
-        assert rows.place.sum(axis=1).tolist() == [1.0] * inner.observation_layout.size
-        for feature, place in zip(
-            inner.observation_layout.features, rows.place.argmax(axis=1), strict=True
+        assert rows.selection.sum(axis=1).tolist() == [1.0] * inner.observation_layout.size
+        for feature, column in zip(
+            inner.observation_layout.features, rows.selection.argmax(axis=1), strict=True
         ):
             if feature.element.kind == "joint" and feature.element.name in rows.limbs:
                 quantity = feature.name.partition("/")[2]
-                assert names[place] == f"{feature.element.name}: {quantity}"
+                assert names[column] == f"{feature.element.name}: {quantity}"
 
 
 def test_a_pushed_joint_moves_its_row_only() -> None:
@@ -47,11 +47,11 @@ def test_a_pushed_joint_moves_its_row_only() -> None:
     inner: Any = env.unwrapped
     env.reset(seed=0)
     inner.data.qvel[:] = 0.0
-    before = env.rows.of(inner._get_obs()).reshape(-1, env.rows.places.width)
+    before = env.rows.of(inner._get_obs()).reshape(-1, env.rows.columns.width)
     joint = inner.model.joint("ankle_3")
     inner.data.qpos[joint.qposadr[0]] += 0.2
     inner.data.qvel[joint.dofadr[0]] = 3.0
-    after = env.rows.of(inner._get_obs()).reshape(-1, env.rows.places.width)
+    after = env.rows.of(inner._get_obs()).reshape(-1, env.rows.columns.width)
     moved = np.flatnonzero((before != after).any(axis=1)).tolist()
     assert moved == [1 + env.rows.limbs.index("ankle_3")]
     row, old = after[moved[0]], before[moved[0]]
@@ -154,7 +154,7 @@ def test_what_does_not_fit_is_refused() -> None:
         rows_of_each([ANT, EnvRef("shapechanger/HalfCheetah-v1")])
     with pytest.raises(TransplantError, match="another family than that of shapechanger/HalfChe"):
         fitted(gym.make("shapechanger/HalfCheetah-v1"), _limb_env().observation_layout)
-    require_same_places(
+    require_same_columns(
         _limb_env().observation_layout,
         _limb_env(EnvRef("shapechanger/ExtendedAnt-v1")).observation_layout,
         "shapechanger/ExtendedAnt-v1",
@@ -176,7 +176,7 @@ def test_strange_layouts_are_refused() -> None:
     wing = Feature("wing/angle", "rad", element=Element("body", "wing"))
     motor = Feature("flap/motor", "1", -1.0, 1.0, Element("actuator", "flap"))
     hip = Feature("hip_1/motor", "1", -1.0, 1.0, Element("actuator", "hip_1"))
-    assert rows_of(_Strange(ANT.make(), goal, hip)).places.trunk == ("goal/x",)
+    assert rows_of(_Strange(ANT.make(), goal, hip)).columns.trunk == ("goal/x",)
     with pytest.raises(LayoutError, match="wing/angle belongs to no limb of the body"):
         rows_of(_Strange(ANT.make(), wing, hip))
     with pytest.raises(LayoutError, match="the action 'flap' moves no limb"):

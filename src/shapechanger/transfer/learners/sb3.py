@@ -46,7 +46,7 @@ from shapechanger.transfer.learners.settings import (
 )
 from shapechanger.transfer.learners.vec_env import training_vec_env
 from shapechanger.transfer.limbs.envs import LimbVecEnv, rows_of_each
-from shapechanger.transfer.limbs.rows import require_same_places
+from shapechanger.transfer.limbs.rows import require_same_columns
 from shapechanger.transfer.transplant import transplant
 
 try:
@@ -154,7 +154,7 @@ class Sb3Learner:
             elif isinstance(settings, LimbSettings):
                 model = build_model(settings, envs, seed, self._tensorboard)
                 rows, _ = layouts_of(eval_envs[0])
-                require_same_places(start.card.observation, rows, env.id)
+                require_same_columns(start.card.observation, rows, env.id)
                 _take_weights(model, envs, start)
                 explores = _explore(model, settings)
             else:
@@ -198,7 +198,7 @@ class Sb3Learner:
         """Evaluate a policy through the body map, which a policy of limbs does not need."""
         envs: list[gym.Env[Any, Any]] = evaluation_envs(env, self._settings)
         if isinstance(self._settings, LimbSettings):
-            require_same_places(policy.card.observation, layouts_of(envs[0])[0], env.id)
+            require_same_columns(policy.card.observation, layouts_of(envs[0])[0], env.id)
         else:
             envs = [MappedEnv(one, body_map) for one in envs]
         try:

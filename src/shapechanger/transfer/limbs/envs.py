@@ -13,7 +13,7 @@ from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import EnvRef, each_body
 from shapechanger.transfer.learners.vec_env import training_vec_env
-from shapechanger.transfer.limbs.rows import LimbRows, require_same_places, rows_of
+from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns, rows_of
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -25,7 +25,7 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
     """An env that is observed and moved by rows of its limbs.
 
     Args:
-        env: The env; it tells its body's kinematic tree.
+        env: An env that describes its kinematic tree.
         room: Limbs to have rows for; 0 for as many as the body has.
 
     Attributes:
@@ -34,7 +34,7 @@ class LimbEnv(gym.Wrapper[Any, Any, Any, Any]):
         action_layout: Meaning of each action, from -1 to 1.
 
     Raises:
-        StudyError: If the body has more limbs than room, or the env does not tell its tree.
+        StudyError: If the body has more limbs than room, or the env does not describe its tree.
         LayoutError: If an observation or an action belongs to no part of the body.
     """
 
@@ -93,7 +93,7 @@ def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]
         room: Limbs to have rows for; 0 for as many as the bodies have.
 
     Raises:
-        StudyError: If a body has more limbs than room, or an env does not tell its tree.
+        StudyError: If a body has more limbs than room, or an env does not describe its tree.
     """
     bodies = each_body(env)
     # Room for all bodies, also where there are fewer envs.
@@ -115,7 +115,7 @@ def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
     """
     limbs = LimbEnv(env, room)
     name = env.spec.id if env.spec else type(env.unwrapped).__name__
-    require_same_places(rows, limbs.observation_layout, name)
+    require_same_columns(rows, limbs.observation_layout, name)
     return limbs
 
 
@@ -268,7 +268,7 @@ class _Group:
     def rows(self, observations: NDArray[Any]) -> NDArray[np.float32]:
         """Return the rows of all envs; observations have the shape (envs, observations)."""
         scaled = observations * self._scale + self._offset
-        return (scaled @ self.each[0].place + self._constant).astype(np.float32)
+        return (scaled @ self.each[0].selection + self._constant).astype(np.float32)
 
     def actions(self, limbs: NDArray[Any]) -> NDArray[Any]:
         """Return the actions of all envs; `limbs` has the shape (envs, room)."""
@@ -292,7 +292,7 @@ def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:
             own.append(rows_of(made, room))
         finally:
             made.close()
-    if others := [rows.places for rows in own if rows.places != own[0].places]:
-        raise StudyError(f"These bodies sense different things: {own[0].places} and {others[0]}.")
+    if others := [rows.columns for rows in own if rows.columns != own[0].columns]:
+        raise StudyError(f"These bodies sense different things: {own[0].columns} and {others[0]}.")
     room = max(rows.room for rows in own)
     return [rows.with_room(room) for rows in own]

@@ -37,11 +37,11 @@ def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, pat
     rows = fitted(env, policy.card.observation, settings.room).rows
     graph = OnnxGraph()
     last = graph.apply("Add", graph.apply("Mul", "observation", rows.scale), rows.offset)
-    last = graph.apply("Add", graph.apply("MatMul", last, rows.place), rows.constant)
+    last = graph.apply("Add", graph.apply("MatMul", last, rows.selection), rows.constant)
     last = graph.as_float(last)
     net: Any = policy.model.policy
     if isinstance(net.actor_net, LimbNetwork):
-        shape = np.array([-1, rows.room + 1, rows.places.width])
+        shape = np.array([-1, rows.room + 1, rows.columns.width])
         last = _limb_actions(graph, graph.apply("Reshape", last, shape), net.actor_net)
     else:
         last = _layers(graph, last, net.actor_net.layers)

@@ -105,7 +105,7 @@ class PaddedNetwork(nn.Module):
 
 
 class LimbPolicy(ActorCriticPolicy):
-    """Actor and critic on rows; limbs without a motor count in no probability.
+    """Actor and critic on rows; the probability of an action leaves out limbs without a motor.
 
     Args:
         observation_space: Rows, flattened.

@@ -1,6 +1,6 @@
 """Observations and actions of any body as rows: one of the trunk, and one of each limb.
 
-A row holds what its part senses and the numbers that describe it, in places that are the same for
+A row holds what its part senses and the numbers that describe it, in columns that are the same for
 all bodies of a family. So one network fits every body of the family.
 """
 
@@ -21,18 +21,18 @@ from shapechanger.transfer.env_ref import HasTree, layouts_of
 _Floats = NDArray[np.float64]
 
 NUMBERS: Final = 20
-"""Places of a row for the numbers that describe a trunk or a limb."""
+"""Columns of a row for the numbers that describe a trunk or a limb."""
 
 DESCRIBED: Final = 2 + NUMBERS
-"""Places of a row before those of what is sensed: it exists, it has a motor, and the numbers."""
+"""Columns of a row before those of what is sensed: it exists, it has a motor, and the numbers."""
 
 # Brings each number of a row to about 1: runners turn their joints at about 10 rad/s and move at 3
 # m/s. Contact forces are clipped to 1 by the envs.
 _SCALES: Final = {"rad/s": 0.1, "m/s": 0.3}
 
 
-class Places(msgspec.Struct, frozen=True):
-    """The places of a row, the same for all bodies of a family.
+class Columns(msgspec.Struct, frozen=True):
+    """The columns of a row, the same for all bodies of a family.
 
     Attributes:
         trunk: Names of what a trunk senses.
@@ -56,27 +56,27 @@ class Places(msgspec.Struct, frozen=True):
 class LimbRows:
     """Map between a body's own observations and actions, and rows.
 
-    Rows are `(observations * scale + offset) @ place + constant`, flattened.
+    Rows are `(observations * scale + offset) @ selection + constant`, flattened.
 
     Attributes:
-        places: The places of each row.
+        columns: The columns of each row.
         limbs: Names of the joints, in the order of the rows.
         names: Names of the body's own observations and actions.
         scale: Shape (observations,).
         offset: Shape (observations,).
-        place: Shape (observations, (room + 1) * width), of zeros and ones.
+        selection: Shape (observations, (room + 1) * width), of zeros and ones.
         constant: Shape ((room + 1) * width,).
         actuators: For each action the limb that takes it.
         low: Smallest of each action.
         high: Largest of each action.
     """
 
-    places: Places
+    columns: Columns
     limbs: tuple[str, ...]
     names: tuple[tuple[str, ...], tuple[str, ...]]
     scale: _Floats
     offset: _Floats
-    place: _Floats
+    selection: _Floats
     constant: _Floats
     actuators: NDArray[np.intp]
     low: _Floats
@@ -91,7 +91,7 @@ class LimbRows:
         Returns:
             Shape (..., (room + 1) * width).
         """
-        rows = (observation * self.scale + self.offset) @ self.place + self.constant
+        rows = (observation * self.scale + self.offset) @ self.selection + self.constant
         return rows.astype(np.float32)
 
     def actions(self, limbs: NDArray[Any]) -> NDArray[Any]:
@@ -109,14 +109,14 @@ class LimbRows:
     @property
     def room(self) -> int:
         """Limbs that there are rows for."""
-        return len(self.constant) // self.places.width - 1
+        return len(self.constant) // self.columns.width - 1
 
     def with_room(self, room: int) -> LimbRows:
         """Return the same with rows for more limbs."""
-        more = (room - self.room) * self.places.width
+        more = (room - self.room) * self.columns.width
         return replace(
             self,
-            place=np.pad(self.place, ((0, 0), (0, more))),
+            selection=np.pad(self.selection, ((0, 0), (0, more))),
             constant=np.pad(self.constant, (0, more)),
         )
 
@@ -126,7 +126,7 @@ class LimbRows:
         names += [f"no limb {i}" for i in range(len(self.limbs), self.room)]
         features: list[Feature] = []
         for i, name in enumerate(names):
-            own = _filled(self.places, trunk=i == 0)
+            own = _filled(self.columns, trunk=i == 0)
             element = Element("joint", name) if 0 < i <= len(self.limbs) else None
             features += [Feature(f"{name}: {what}", "1", element=element) for what in own]
         actions = [Feature(f"{name}: action", "1", -1.0, 1.0) for name in names[1:]]
@@ -141,7 +141,7 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
         room: Limbs to have rows for; 0 for as many as the body has.
 
     Raises:
-        StudyError: If the env does not tell its body's kinematic tree, or has more limbs than room.
+        StudyError: If the env does not describe its kinematic tree, or has more limbs than room.
         LayoutError: If an observation or an action belongs to no part of the body.
     """
     inner = env.unwrapped
@@ -163,21 +163,21 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     limb_of_body = {body: i for i, limb in enumerate(tree.limbs) for body in limb.bodies}
     found: list[tuple[int, str]] = []
     for feature in observation.features:
-        found.append(_place(feature, limb_of, limb_of_body, tree.trunk))
-    places = Places(
+        found.append(_column(feature, limb_of, limb_of_body, tree.trunk))
+    columns = Columns(
         tuple(dict.fromkeys(what for row, what in found if row == 0)),
         tuple(dict.fromkeys(what for row, what in found if row > 0)),
         tree.trunk_numbers,
         tree.limb_numbers,
     )
-    if max(len(places.trunk_numbers), len(places.limb_numbers)) > NUMBERS:
+    if max(len(columns.trunk_numbers), len(columns.limb_numbers)) > NUMBERS:
         raise StudyError(f"{name} describes a limb by more than {NUMBERS} numbers.")
-    width = places.width
-    place = np.zeros((observation.size, (room + 1) * width))
+    width = columns.width
+    selection = np.zeros((observation.size, (room + 1) * width))
     scale, offset = np.ones(observation.size), np.zeros(observation.size)
     for i, (row, what) in enumerate(found):
-        senses = places.limb if row else places.trunk
-        place[i, row * width + DESCRIBED + senses.index(what)] = 1.0
+        senses = columns.limb if row else columns.trunk
+        selection[i, row * width + DESCRIBED + senses.index(what)] = 1.0
         scale[i], offset[i] = _scaling(observation.features[i])
     constant = np.zeros((room + 1, width))
     constant[0, 0] = 1.0
@@ -190,12 +190,12 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     if lost := [owner for owner in owners if owner not in limb_of_actuator]:
         raise LayoutError(f"{name}: the action {lost[0]!r} moves no limb of the body.")
     return LimbRows(
-        places,
+        columns,
         tuple(limb_of),
         (observation.names, action.names),
         scale,
         offset,
-        place,
+        selection,
         constant.ravel(),
         np.array([limb_of_actuator[owner] for owner in owners], np.intp),
         action.low.astype(np.float64),
@@ -203,7 +203,7 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
     )
 
 
-def require_same_places(trained: Layout, present: Layout, env: str) -> None:
+def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
     """Refuse a body whose rows mean something else than those that a policy has learned from.
 
     Args:
@@ -233,24 +233,24 @@ def _meanings(layout: Layout) -> tuple[str, ...]:
     return (*rows["trunk"], *limb)
 
 
-def _filled(places: Places, *, trunk: bool) -> list[str]:
+def _filled(columns: Columns, *, trunk: bool) -> list[str]:
     """Return the name of each number of a row."""
     numbers, senses = (
-        (places.trunk_numbers, places.trunk) if trunk else (places.limb_numbers, places.limb)
+        (columns.trunk_numbers, columns.trunk) if trunk else (columns.limb_numbers, columns.limb)
     )
     names = ["exists", "has a motor", *numbers]
     names += [f"number {k}" for k in range(len(names), DESCRIBED)]
     names += senses
-    return names + [f"number {k}" for k in range(len(names), places.width)]
+    return names + [f"number {k}" for k in range(len(names), columns.width)]
 
 
-def _place(
+def _column(
     feature: Feature,
     limb_of: dict[str, int],
     limb_of_body: dict[str, int],
     trunk: tuple[str, ...],
 ) -> tuple[int, str]:
-    """Return the row of a feature, and the name of its place there.
+    """Return the row of a feature, and the name of its column.
 
     What the parts of one limb sense, such as contact, is added up.
     """
