@@ -7,6 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from typing import Annotated, Any, Final, NoReturn, get_args, get_type_hints
 
 from shapechanger.errors import MissingExtra, ShapechangerError, StudyError, UnknownName
@@ -28,6 +29,7 @@ try:
 
     from shapechanger.cli.console import Interrupted
     from shapechanger.cli.demos import Demos
+    from shapechanger.cli.doctor import ExamineMachine
     from shapechanger.cli.envs import Envs
     from shapechanger.cli.finger import Finger
     from shapechanger.cli.play import Play
@@ -51,6 +53,7 @@ _Command = (
     | Annotated[Robot, tyro.conf.subcommand("robot")]
     | Annotated[Demos, tyro.conf.subcommand("demos")]
     | Annotated[Finger, tyro.conf.subcommand("finger")]
+    | Annotated[ExamineMachine, tyro.conf.subcommand("doctor")]
 )
 
 
@@ -70,6 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             stream.reconfigure(errors="replace")
     try:
         given = sys.argv[1:] if arguments is None else arguments
+        if list(given) == ["--version"]:
+            print(f"shapechanger {version('shapechanger')}")
+            return
         said, leaf_class = _require_commands(given)
         if leaf_class is not None:
             _require_options(given, said, leaf_class)

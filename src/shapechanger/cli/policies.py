@@ -136,7 +136,10 @@ class ListPolicies:
                 continue
             table.add_row(name, *(lines[each] for each in ("env", "learner", "steps", "seed")))
         if not table.rows:
-            raise StudyError(f"There is no policy in {self.folder}: train one, or name a folder.")
+            raise StudyError(
+                f"There is no policy in {self.folder}: train one, name a folder, or give "
+                "--references for those that ship."
+            )
         print_table(table, _FILE_WIDTH)
 
     def _print_references(self) -> None:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 import tyro
 
-from shapechanger.cli.console import say
+from shapechanger.cli.console import say, say_findings
 from shapechanger.cli.robot.key import how_to_remember, robot_at, shown_credentials
 from shapechanger.errors import RobotError, ShapechangerError, UnknownName
 from shapechanger.remote.known_robots import check_name, remember
@@ -374,9 +374,6 @@ class Install:
         return unit
 
 
-_MARKS = {"good": "good   ", "missing": "MISSING", "unknown": "?      "}
-
-
 @dataclass(frozen=True)
 class Doctor:
     """Check a robot's computer, wiring and settings, without moving it."""
@@ -411,12 +408,7 @@ class Doctor:
             profile=profile.path.absolute(),
             motors_off=self.motors_off,
         )
-        for finding in findings:
-            say(f"{_MARKS[finding.level]}  {finding.check}: {finding.sentence}")
-        missing = sum(finding.level == "missing" for finding in findings)
-        if missing:
-            say(f"\n{missing} of {len(findings)} to fix.")
-            sys.exit(1)
+        say_findings(findings)
 
 
 _LAST_PORT: Final = 65535

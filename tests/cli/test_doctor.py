@@ -1,0 +1,116 @@
+"""The command `shapechanger doctor`."""
+
+from __future__ import annotations
+
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.cli.doctor import examine_machine
+from shapechanger.robot.setup.doctor import Finding
+
+REQUIREMENTS = (
+    "core-package>=2",
+    'learner<3,>=1; extra == "learn"',
+    'pins>=1; (sys_platform == "nothing") and extra == "robot"',
+    'shapechanger[learn]; extra == "all"',
+)
+
+
+def findings(installed: dict[str, str], dev: Path = Path("/nowhere")) -> dict[str, Finding]:
+    """Return the results of a machine with some packages, by the names of their checks."""
+
+    def version_of(package: str) -> str:
+        if package not in installed:
+            raise PackageNotFoundError(package)
+        return installed[package]
+
+    return {each.check: each for each in examine_machine(REQUIREMENTS, version_of, dev)}
+
+
+def test_an_extra_that_is_not_installed_is_named_with_its_command() -> None:
+    """What is missing is optional, and the core is there."""
+    results = findings({"core-package": "2.5"})
+    assert results["core"].level == "good"
+    assert results["extra learn"].level == "unknown"
+    assert "Without learner" in results["extra learn"].sentence
+    assert "pip install --upgrade 'shapechanger[learn]'" in results["extra learn"].sentence
+
+
+def test_versions_out_of_range_are_to_be_mended() -> None:
+    """A package that is too old or too new."""
+    results = findings({"core-package": "1.9", "learner": "3.0"})
+    assert results["core"].level == "missing"
+    assert "core-package is 1.9 and not >=2" in results["core"].sentence
+    assert results["extra learn"].level == "missing"
+
+
+def test_packages_of_another_system_are_not_asked_for() -> None:
+    """An extra whose packages are for other systems is complete without them."""
+    assert findings({"core-package": "2"})["extra robot"].level == "good"
+
+
+def test_the_extra_of_all_is_not_listed() -> None:
+    """It only repeats the others."""
+    assert "extra all" not in findings({"core-package": "2"})
+
+
+def test_pins_that_may_not_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The user is not in the group of the pins."""
+    (tmp_path / "gpiochip0").touch()
+    assert findings({}, tmp_path)["pins"].level == "good"
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    refused = findings({}, tmp_path)["pins"]
+    assert refused.level == "missing"
+    assert "usermod -aG gpio" in refused.sentence
+
+
+def test_a_renderer_that_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A crash of the driver ends its own process only."""
+    died = SimpleNamespace(returncode=-11, stdout="", stderr="")
+    monkeypatch.setattr(subprocess, "run", lambda *command, **options: died)
+    assert findings({"mujoco": "4.0.0"})["pictures"] == Finding(
+        "pictures", "missing", "exit status -11"
+    )
+
+
+def test_the_reason_of_a_renderer_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`MUJOCO_GL` has a value that MuJoCo does not know."""
+    monkeypatch.setenv("MUJOCO_GL", "vulkan")
+    drawn = findings({"mujoco": "4.0.0"})["pictures"]
+    assert drawn.level == "missing"
+    assert drawn.sentence.startswith("With MUJOCO_GL=vulkan nothing can be drawn: set it to one of")
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("one_thread")
+def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
+    """The development environment has all extras, and draws."""
+    main(["doctor"])
+    lines = capsys.readouterr().out.splitlines()
+    assert f"good     machine: shapechanger {version('shapechanger')}" in lines[0]
+    assert any(line.startswith("good     pictures: Drew 480 x 480 with") for line in lines)
+    assert not any("MISSING" in line for line in lines)
+
+
+def test_something_to_mend_is_an_exit_status(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Scripts can rely on it."""
+    broken: list[Any] = [Finding("core", "missing", "Gone.")]
+    monkeypatch.setattr("shapechanger.cli.doctor.examine_machine", lambda: broken)
+    with pytest.raises(SystemExit) as stop:
+        main(["doctor"])
+    assert stop.value.code == 1
+    assert "1 of 1 to fix." in capsys.readouterr().out
+
+
+def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:
+    """`shapechanger --version`."""
+    main(["--version"])
+    assert capsys.readouterr().out == f"shapechanger {version('shapechanger')}\n"
