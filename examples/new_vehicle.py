@@ -1,0 +1,74 @@
+"""A new vehicle is a profile: a tracked one with two motors, tried on its twin.
+
+The twin runs the real programs of the robot on simulated pins, so a swapped motor shows here first.
+"""
+
+import os
+import tempfile
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+
+import shapechanger  # noqa: F401  # Registers the ids.
+from shapechanger.robot.guard.plan import output_values
+from shapechanger.robot.profile import load_profile
+from shapechanger.twin.robot import run_robot
+
+STEPS = int(os.environ.get("STEPS", "40"))
+
+PROFILE = """
+[robot]
+name = "snowcat"
+body = "tank"
+
+[action.steering]
+propels = true          # It turns the same motors.
+
+[action.throttle]
+propels = true
+slew_per_s = 4.0
+
+[output.left]
+driver = "hbridge"
+part = "left track"
+forward = 17            # BCM numbers.
+backward = 27
+mix = { throttle = 1.0, steering = 1.0 }
+
+[output.right]
+driver = "hbridge"
+part = "right track"
+forward = 23
+backward = 24
+mix = { throttle = 1.0, steering = -1.0 }
+
+[limits]
+deadline_ms = 300       # A command that is older stops it.
+arming = "anyone"       # A program may arm it; the default is a person.
+"""
+
+with tempfile.TemporaryDirectory() as folder:
+    path = Path(folder, "snowcat.toml")
+    path.write_text(PROFILE)
+    profile = load_profile(path)  # Every mistake is an error with its line.
+    for steering, throttle in ((0.0, 1.0), (1.0, 0.0), (-0.5, 0.5)):
+        left, right = output_values(profile.guard_plan(), [steering, throttle])
+        print(f"steering {steering:4}, throttle {throttle}: tracks {left:5.2f} and {right:5.2f}")
+
+    with run_robot(profile, clock="twin", arguments=("--world", "room")) as robot:
+        env = gym.make(
+            "shapechanger/RemoteVehicle-v1",
+            robot=robot.known.address,
+            key=robot.known.key,
+            fingerprint=robot.known.fingerprint,
+            pace="lockstep",
+        )
+        with robot.operator() as operator:
+            env.reset(seed=0)
+            start = operator.where()
+            for _ in range(STEPS):
+                env.step(np.array([0.0, 1.0], np.float32))
+            end = operator.where()
+        print(f"driven {end.travelled_m - start.travelled_m:.2f} m in {STEPS / 20:.1f} s")
+        env.close()

@@ -1,0 +1,61 @@
+"""The same script in simulation and on a robot: go where the floor reaches furthest.
+
+    python examples/simulation_and_robot.py                        # the simulated car
+    python examples/simulation_and_robot.py --robot my-car         # a real one, or its twin
+
+`shapechanger robot serve my-car.toml --twin --arm-by-program` serves a twin. A robot that only a
+person may arm waits for `shapechanger robot drive my-car` in another terminal: E, then P.
+"""
+
+import argparse
+import os
+
+import gymnasium as gym
+import numpy as np
+
+import shapechanger  # noqa: F401  # Registers the ids.
+
+STEPS = int(os.environ.get("STEPS", "400"))
+
+
+def drive(picture: np.ndarray) -> np.ndarray:
+    """Return steering and throttle from a picture: go where the floor reaches furthest.
+
+    Args:
+        picture: RGB, (height, width, 3). -1 steers left.
+    """
+    height, width, _ = picture.shape
+    rows = picture[: int(0.85 * height)].astype(float)  # Below is the car itself.
+    colour = rows / (rows.sum(axis=2, keepdims=True) + 1.0)
+    floor = colour[-6:, width // 3 : 2 * width // 3].mean(axis=(0, 1))
+    is_floor = np.abs(colour - floor).sum(axis=2) < 0.06
+    depth = np.argmin(is_floor[::-1], axis=0) / len(rows)  # How high the floor reaches, by column.
+    depth = np.convolve(depth, np.full(21, 1 / 21), "same")
+    columns = np.linspace(-1.0, 1.0, width)
+    heading = float((columns * depth**4).sum() / ((depth**4).sum() + 1e-9))
+    ahead = float(depth[2 * width // 5 : 3 * width // 5].mean())
+    if ahead < 0.1:
+        return np.array([0.0, -0.5], np.float32)
+    return np.array([np.clip(2.5 * heading, -1.0, 1.0), 0.3 + 0.4 * ahead], np.float32)
+
+
+parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+parser.add_argument("--robot", default="", help="name of a known robot, or its address")
+robot = parser.parse_args().robot
+env = (
+    gym.make("shapechanger/RemoteVehicle-v1", robot=robot)
+    if robot
+    else gym.make("shapechanger/Car-v1")
+)
+picture, info = env.reset(seed=0)
+total, collisions = 0.0, 0
+for _ in range(STEPS):
+    picture, reward, terminated, truncated, info = env.step(drive(picture))
+    total += float(reward)
+    collisions += terminated
+    if truncated:
+        print(info.get("truncated_because", "The time is up."))
+    if terminated or truncated:
+        picture, info = env.reset()
+env.close()
+print(f"a return of {total:.1f} in {STEPS} steps, {collisions} collisions")
