@@ -35,3 +35,16 @@ def test_floor_textures_keep_their_size() -> None:
     flat = model.tex_type == mujoco.mjtTexture.mjTEXTURE_2D
     assert model.tex_width[flat].tolist() == [100]
     assert model.tex_width[~flat].tolist() == [50, 63]
+
+
+def test_floors_are_quiet_and_lights_follow_high_above() -> None:
+    """Tiles of two greys without mirror images, and a light above the largest body."""
+    with gym.make("shapechanger/Humanoid-v1") as env:
+        model: Any = env.unwrapped.model
+    (floor,) = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_2D)
+    start = int(model.tex_adr[floor])
+    tiles = model.tex_data[start : start + 100 * 100 * 3]
+    assert 90 < tiles.min() < tiles.max() < 170
+    assert not model.mat_reflectance.any()
+    assert model.light_pos[0, 2] >= 4.0
+    assert model.light_mode[0] == mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM

@@ -12,6 +12,7 @@ from shapechanger.morphology.pose import (
     Lift,
     StartRules,
     standing_height,
+    standing_pose,
     start_pose,
     trunk_joint,
     trunk_lift,
@@ -265,3 +266,24 @@ def test_the_distance_from_the_limits_can_be_given() -> None:
     place = model.joint("leg").qposadr[0]
     starts = [np.rad2deg(start_pose(model, inside)[place]) for inside in (0.0, 0.1, 0.5)]
     assert starts == pytest.approx([-30.0, -42.0, -90.0])
+
+
+def test_a_standing_pose_touches_the_floor() -> None:
+    """A trunk that hangs is lowered, one in the floor is raised, and joints keep their places."""
+    model = ant()
+    for height in (2.0, 0.1):
+        pose = model.qpos0.copy()
+        pose[2] = height
+        standing = standing_pose(model, pose)
+        data = mujoco.MjData(model)
+        data.qpos[:] = standing
+        mujoco.mj_kinematics(model, data)
+        assert StartRules(model).floor_gap(data) == pytest.approx(0.0, abs=1e-9)
+        np.testing.assert_array_equal(standing[3:], pose[3:])
+        assert pose[2] == height
+
+
+def test_without_a_lift_or_a_floor_a_standing_pose_is_the_pose() -> None:
+    """A pendulum stands nowhere, and a ball above nothing stays where it is."""
+    for model in (pendulum(), _ball("")):
+        np.testing.assert_array_equal(standing_pose(model, model.qpos0), model.qpos0)

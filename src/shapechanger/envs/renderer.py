@@ -137,6 +137,13 @@ _FARTHEST: Final = 1.0
 _BACKGROUND: Final = 235
 # Largest width and height, pixels; GPUs do not draw much larger images.
 _LARGEST: Final = 8192
+# Tiles of floors, red, green and blue.
+_DARK_TILE: Final = [0.42, 0.45, 0.48]
+_LIGHT_TILE: Final = [0.54, 0.57, 0.6]
+# Higher than any body of the catalogue reaches, m.
+_LIGHT_HEIGHT_M: Final = 4.0
+# Half the width of shadow maps, in extents of the model.
+_SHADOW_CLIP: Final = 0.3
 
 
 def body_reach(model: mujoco.MjModel, pose: NDArray[np.float64]) -> float:
@@ -225,11 +232,24 @@ def _geoms(
     return middle, places, model.geom_rbound[of_body]
 
 
-def light_up(spec: mujoco.MjSpec) -> None:
-    """Give a model without lights a brighter headlight, and a sky unless it has one.
+def prepare_scene(spec: mujoco.MjSpec) -> None:
+    """Make a model's floor, lights and sky fit to look at; nothing of this moves a body.
 
-    The pendulums' models have neither: their frames would be dark shapes on black.
+    Gymnasium's floors are black and white and mirror half of the light: they draw the eye from the
+    body, and flicker towards the horizon. Its lights hang lower than large bodies stand, and their
+    shadow maps, which stay behind a body that walks, leave dark stripes far from it. The pendulums'
+    models have neither a light nor a sky: their frames would be dark shapes on black.
     """
+    for texture in spec.textures:
+        if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:
+            texture.rgb1, texture.rgb2 = _DARK_TILE, _LIGHT_TILE
+    for material in spec.materials:
+        material.reflectance = 0.0
+    for light in spec.lights:
+        if light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
+            light.pos = [light.pos[0], light.pos[1], max(light.pos[2], _LIGHT_HEIGHT_M)]
+            light.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM
+    spec.visual.map.shadowclip = _SHADOW_CLIP
     if spec.lights:
         return
     spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [_HEADLIGHT] * 3

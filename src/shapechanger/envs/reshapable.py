@@ -24,13 +24,20 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 from shapechanger.bodies.families import BodyLike, Family, Split
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
-from shapechanger.envs.renderer import Renderer, body_reach, draw, halve_textures, light_up
+from shapechanger.envs.renderer import (
+    Renderer,
+    body_reach,
+    draw,
+    halve_textures,
+    prepare_scene,
+)
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
 from shapechanger.morphology.certificate import Certificate, Wrapped, certify
 from shapechanger.morphology.pose import (
     StartRules,
     standing_height,
+    standing_pose,
     start_pose,
     travelling_body,
 )
@@ -176,9 +183,8 @@ class Reshapable(MujocoEnv):
     def _load_family(self) -> mujoco.MjSpec:
         """Return the family's model, with smaller textures if the env never renders."""
         spec = self.family.load(self.fullpath)
-        if self._draws:
-            light_up(spec)
-        else:
+        prepare_scene(spec)
+        if not self._draws:
             halve_textures(spec)
         return spec
 
@@ -419,7 +425,7 @@ class Reshapable(MujocoEnv):
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
-        """Return an image of the body at its start, shape (height, width, 3).
+        """Return an image of the body in its first pose, on the floor, shape (height, width, 3).
 
         Args:
             width: Width in pixels.
@@ -429,7 +435,8 @@ class Reshapable(MujocoEnv):
         Raises:
             RenderError: If nothing can be drawn here.
         """
-        return draw(self.model, self.init_qpos, width, height, reach or self.reach)
+        pose = standing_pose(self.model, self.init_qpos)
+        return draw(self.model, pose, width, height, reach or self.reach)
 
 
 def _check_arguments(env: type[Any], family: str, arguments: Mapping[str, Any]) -> None:

@@ -111,6 +111,21 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
     return pose
 
 
+def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
+    """Return a pose with the trunk lowered or raised until the lowest point touches the floor.
+
+    Args:
+        model: The body.
+        pose: A pose, (nq,). It is returned as it is where nothing raises the trunk or no floor is
+            below it.
+    """
+    rules = StartRules(model)
+    pose = pose.copy()
+    if rules.lift is not None and (gap := rules.floor_gap(_posed(model, pose))) < _FAR_M:
+        rules.lift.raise_by(pose, -gap)
+    return pose
+
+
 def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float | None:
     """Return the height of the trunk's origin when the lowest point touches the floor, m.
 
