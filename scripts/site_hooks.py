@@ -32,6 +32,7 @@ ALWAYS: Final = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 _LOG: Final = logging.getLogger("mkdocs.hooks.shapechanger")
 _LINK: Final = re.compile(r"(\]\()([^)\s]+)(\))")
 _FENCE: Final = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.DOTALL | re.MULTILINE)
+_SEARCH: Final = '<div class="md-search" data-md-component="search" role="dialog"'
 _SCHEME: Final = re.compile(r"[a-z]+:")
 
 
@@ -94,6 +95,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Rewrite the links of a page to files outside `docs`, and those of such files."""
     return rewritten(markdown, origin_of(page.file.src_uri))
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Name the theme's search dialog for screen readers."""
+    return output.replace(_SEARCH, f'{_SEARCH} aria-label="Search"', 1)
 
 
 def origin_of(src_uri: str) -> str:

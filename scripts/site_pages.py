@@ -312,7 +312,7 @@ def wiring_pages() -> list[SitePage]:
             "Drawn from the shipped profile. Read [what must be wired](../hardware.md"
             "#safety-what-must-be-wired) before you connect a motor; the circuit follows data "
             "sheets and has not been built.",
-            draw_wiring(profile, name),
+            f'<div class="diagram">\n{draw_wiring(profile, name)}\n</div>',
             "## Pins",
             pin_table(profile),
             "## Parts",
