@@ -90,7 +90,7 @@ def _environment_page(env_id: str) -> SitePage:
         else:
             pictures[f"environments/{short}.jpg"] = picture
             parts.append(f"![{short} at the start of an episode]({short}.jpg)")
-    parts.append(_table(("", ""), _facts(env_id, spec, entry_point)))
+    parts.append(_table(("property", "value"), _facts(env_id, spec, entry_point)))
     parts += [_docstring(kind), _class_link(entry_point)]
     if env is None:
         parts.append(
@@ -181,8 +181,10 @@ def _docstring(kind: Any) -> str:
     """Return the docstring of an env as Markdown, with its arguments as a table."""
     import griffe
 
+    from scripts.site_docstrings import fenced
+
     parts: list[str] = []
-    doc = griffe.Docstring(inspect.getdoc(kind) or "")
+    doc = griffe.Docstring(fenced(inspect.getdoc(kind) or ""))
     for section in griffe.parse_google(doc, warnings=False):
         if section.kind is griffe.DocstringSectionKind.text:
             parts.append(cast("str", section.value).replace("\n## ", "\n### "))
@@ -307,6 +309,7 @@ def wiring_pages() -> list[SitePage]:
         about = _about(path)
         rows.append((f"[`{name}`]({name}.md)", _cell(about)))
         parts = [
+            "---\nhide:\n  - toc\n---",  # Room for the diagram.
             f"# Wiring of `{name}`",
             about,
             "Drawn from the shipped profile. Read [what must be wired](../hardware.md"
@@ -385,19 +388,16 @@ def _exported(path: Path) -> tuple[str, ...]:
 def api_pages() -> list[SitePage]:
     """Return a page for each public package and module, and their index."""
     homes = _homes()
-    pages = [_api_page(name, homes) for name in (*public_packages(), *MODULES)]
-    rows = [
-        (f"[`{page.title}`]({page.path.rpartition('/')[2]})", _first_line(page.title))
-        for page in sorted(pages, key=lambda page: page.title)
-    ]
+    names = sorted((*public_packages(), *MODULES))
+    rows = [(f"[`{name}`]({name}.md)", _first_line(name)) for name in names]
     index = [
         "# API reference",
         "Every name that a package exports, with shapes, units and errors. The names of "
         "`shapechanger` itself are imported on first use.",
-        _table(("package", ""), rows),
+        _table(("package", "what it has"), rows),
     ]
-    ordered = sorted(pages, key=lambda page: page.title)
-    return [SitePage("api/index.md", "API", "\n\n".join(index)), *ordered]
+    pages = [_api_page(name, homes) for name in names]
+    return [SitePage("api/index.md", "API", "\n\n".join(index)), *pages]
 
 
 def _homes() -> dict[tuple[str, str], str]:
@@ -441,19 +441,28 @@ def _api_page(name: str, homes: dict[tuple[str, str], str]) -> SitePage:
             if homes[definition] == name:
                 members.append(exported)
             else:
-                elsewhere.append(f"[`{exported}`][{_path(homes[definition], definition[1])}]")
+                elsewhere.append(
+                    f"[`{exported}`][{reference_path(homes[definition], definition[1])}]"
+                )
     options.append(f"  members: [{', '.join(members)}]")
     parts = [f"# `{name}`", "\n".join([f"::: {name}", *(f"    {line}" for line in options)])]
     # A module hides what it defines under its own name.
     parts += [
-        f"::: {_path(name, one)}" for one in members if _path(name, one).endswith(f".{one}.{one}")
+        f"::: {reference_path(name, one)}"
+        for one in members
+        if reference_path(name, one).endswith(f".{one}.{one}")
     ]
     if elsewhere:
         parts += ["## Exported from elsewhere", ", ".join(elsewhere) + "."]
-    return SitePage(path, name, "\n\n".join(parts))
+    return SitePage(path, _listed(name), "\n\n".join(parts))
 
 
-def _path(package: str, name: str) -> str:
+def _listed(name: str) -> str:
+    """Return how the navigation lists a package."""
+    return name.removeprefix("shapechanger.")
+
+
+def reference_path(package: str, name: str) -> str:
     """Return the path by which the reference knows an exported name."""
     module = SRC / package.replace(".", "/") / f"{name}.py"
     return f"{package}.{name}.{name}" if module.exists() else f"{package}.{name}"
