@@ -24,7 +24,7 @@ INSTALLED_DEV := $(VENV)/.installed-dev
 # Tests of one module mostly stay on one worker, so that its fixtures are made once.
 PYTEST := $(RUN) -m pytest -n $(JOBS) --dist worksteal
 # The theme would advertise its successor at each build.
-SITE := NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet
+SITE := NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
 # Tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml). Tracing
 # slows the others down by a third, and they add nothing to it.
 COVERING := test_architecture.py test_errors.py test_layout.py envs/stepping envs/vector identify laws \
@@ -76,7 +76,7 @@ bench: $(INSTALLED_DEV)  ## measure every number that the documentation states
 	$(RUN) -m benchmarks.run
 
 docs: $(INSTALLED_DEV)  ## check the documentation, and build its site into site/
-	$(PYTEST) -m "not system" tests/test_docs.py
+	$(PYTEST) -m "not system" tests/test_docs.py tests/test_documented_commands.py tests/test_site.py
 	$(SITE)
 
 clean:  ## remove build products and environments; keep results/

@@ -581,7 +581,7 @@ def _draw_load(drawing: _Drawing, load: Load, y: float) -> None:
 def _draw_header(drawing: _Drawing) -> None:
     """Draw the header's 40 positions, with the used ones in the colours of their wires."""
     drawing.text(_HEADER_X + 8, _TOP - 10, "Header", "middle", bold=True)
-    rails = dict.fromkeys(_GROUNDS, "currentColor")
+    rails: dict[int, str] = dict.fromkeys(_GROUNDS, "currentColor")
     for position in range(1, 41):
         row, right = divmod(position - 1, 2)
         x, y = _HEADER_X + 17 * right, _TOP + _HEADER_PITCH * (row + 0.6)

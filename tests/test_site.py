@@ -23,8 +23,15 @@ from playwright.sync_api import Browser
 
 from scripts.site_docstrings import fenced
 from scripts.site_hooks import in_site, links_of, origin_of, rewritten
-from scripts.site_pages import MODULES, api_pages, public_packages, reference_path
+from scripts.site_pages import (
+    MODULES,
+    api_pages,
+    environment_page,
+    public_packages,
+    reference_path,
+)
 from scripts.wiring_diagrams import devices_of, draw_wiring, part_list, pin_table
+from shapechanger.errors import RenderError
 from shapechanger.robot.guard.plan import driven_pins
 from shapechanger.robot.profile import Profile, load_profile, shipped_profiles
 from shapechanger.robot.profile.pins import BCM_OF_BOARD
@@ -156,6 +163,26 @@ def test_every_exported_name_is_in_the_reference() -> None:
         path for path in re.findall(r"^::: (\S+)", "\n".join(pages.values()), re.MULTILINE)
     }
     assert linked <= described
+
+
+def test_a_page_without_picture_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing renders, the page comes without picture, with a note; on CI it fails."""
+
+    def fail(*_: object) -> bytes:
+        raise RenderError("Nothing renders here.")
+
+    monkeypatch.setattr("scripts.site_pages._picture", fail)
+    monkeypatch.setenv("CI", "false")
+    page = environment_page("shapechanger/BigAnt-v1")
+    assert page.notes == (
+        "The page of shapechanger/BigAnt-v1 has no picture: Nothing renders here.",
+    )
+    assert page.pictures == {}
+    for part in ("all shanks twice as long", "`hip_4/motor`", "length 0.5657 m -> 1.131 m"):
+        assert part in page.content
+    monkeypatch.setenv("CI", "true")
+    with pytest.raises(RenderError):
+        environment_page("shapechanger/BigAnt-v1")
 
 
 @contextmanager
