@@ -32,6 +32,7 @@ ALWAYS: Final = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 _LOG: Final = logging.getLogger("mkdocs.hooks.shapechanger")
 _LINK: Final = re.compile(r"(\]\()([^)\s]+)(\))")
 _FENCE: Final = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.DOTALL | re.MULTILINE)
+_MERMAID: Final = re.compile(r"^```mermaid\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _SEARCH: Final = '<div class="md-search" data-md-component="search" role="dialog"'
 _SCHEME: Final = re.compile(r"[a-z]+:")
 
@@ -94,7 +95,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Rewrite the links of a page to files outside `docs`, and those of such files."""
-    return rewritten(markdown, origin_of(page.file.src_uri))
+    return rewritten(_MERMAID.sub(_graph_as_table, markdown), origin_of(page.file.src_uri))
+
+
+def _graph_as_table(match: re.Match[str]) -> str:
+    """Return a graph of Mermaid, which browsers would load from another server, as a table."""
+    arrows = [line.split("-->") for line in match[1].splitlines() if "-->" in line]
+    rows = [f"| {one.strip()} | {', '.join(others.split('&'))} |" for one, others in arrows]
+    return "\n".join(["| from | to |", "|---|---|", *rows])
 
 
 def on_post_page(output: str, **_: Any) -> str:

@@ -88,7 +88,7 @@ def devices_of(profile: Profile) -> list[Device]:
     for first in range(0, len(bridges), 2):
         found.append(_bridge(bridges[first : first + 2], profile))
     if profile.enable_pin is not None:
-        found.append(_one_shot(profile.enable_pin, bool(bridges)))
+        found.append(_one_shot(profile.enable_pin, profile.enable_hold_ms, bool(bridges)))
     found += [_direct(one) for one in profile.outputs if one.settings.get("over") in _DIRECT]
     found += [_SENSORS[one.driver](one) for one in profile.sensors if one.driver in _ON_PINS]
     if profile.stop_pin is not None:
@@ -164,21 +164,22 @@ def _bridge(outputs: list[OutputPlan], profile: Profile) -> Device:
     return Device("H-bridge", note, tuple(terminals), tuple(loads), parts)
 
 
-def _one_shot(pin: int, for_bridges: bool) -> Device:
+def _one_shot(pin: int, hold_ms: int, for_bridges: bool) -> Device:
+    resistor = f"{float(f'{hold_ms / _HOLD_OF_KOHM_MS:.2g}'):g}"
     wires = (
         Terminal("2B", pin, pull=GROUND),
         Terminal("2A", GROUND),
         Terminal("2RD", LOGIC),
-        Terminal("2RCext", f"220 kΩ to {LOGIC}"),
+        Terminal("2RCext", f"{resistor} kΩ to {LOGIC}"),
         Terminal("2Cext", "1 µF to 2RCext"),
     )
     parts = (
         ("74HC123", 1, "one-shot in the enable line"),
-        ("resistor 220 kOhm", 1, "its time: 0.1 s"),
+        (f"resistor {resistor} kOhm", 1, f"its time: {hold_ms} ms"),
         ("film or ceramic capacitor 1 uF", 1, "its time"),
     )
     load = Load("2Q", ENABLE if for_bridges else "MOSFET in the motors' supply", "net")
-    return Device("One-shot 74HC123", "falls 0.1 s after the guard", wires, (load,), parts)
+    return Device("One-shot 74HC123", f"falls {hold_ms} ms after the guard", wires, (load,), parts)
 
 
 def _direct(output: OutputPlan) -> Device:
@@ -311,6 +312,9 @@ def _as5600(sensor: SensorPlan) -> Device:
     )
     return Device("TCA9548A", f"address {settings['mux']:#x}", wires, loads, parts)
 
+
+# K of t = K R C at 1 uF, ms per kOhm; docs/hardware.md says where it comes from.
+_HOLD_OF_KOHM_MS: Final = 0.45
 
 _SENSORS: Final[dict[str, Callable[[SensorPlan], Device]]] = {
     "encoder": _encoder,
@@ -515,12 +519,16 @@ def _draw_device(drawing: _Drawing, device: Device, top: float) -> float:
 def _draw_wire(drawing: _Drawing, wire: Terminal, y: float) -> None:
     drawing.text(_BOX_X + 8, y, wire.label)
     if isinstance(wire.source, str):
-        drawing.line((_FLAG_X + 8, y), (_BOX_X, y))
+        start = _PULL_X - 10 if wire.pull else _FLAG_X + 8
+        drawing.line((start, y), (_BOX_X, y))
+        if wire.pull:
+            drawing.dot(_PULL_X, y, "currentColor")
+            drawing.resistor(_PULL_X, y, wire.pull, "10 kΩ")
         if wire.source == GROUND:
             drawing.line((_FLAG_X + 8, y), (_FLAG_X + 8, y + 4))
             drawing.ground(_FLAG_X + 8, y + 4)
         else:
-            drawing.text(_FLAG_X + 2, y, wire.source, "end")
+            drawing.text(start - 6, y, wire.source, "end")
         return
     pin, colour = wire.source, drawing.colour(wire.source)
     start = _PI_EDGE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,21 @@ def test_links_to_files_exist(page: Path) -> None:
     """Relative links lead to files of the project."""
     for target in re.findall(r"\]\((?!http)([^)#]+)\)", page.read_text()):
         assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_names_of_modules_and_functions_exist(page: Path) -> None:
+    """Each dotted name of Shapechanger in inline code leads to something."""
+    names = set(re.findall(r"`(shapechanger(?:\.\w+)+)", page.read_text()))
+    for name in names - {"shapechanger.methods"}:  # A group of entry points.
+        module, found = name, None
+        while found is None:
+            try:
+                found = importlib.import_module(module)
+            except ModuleNotFoundError:
+                module = module.rpartition(".")[0]
+        for part in name[len(module) :].split(".")[1:]:
+            found = getattr(found, part)
 
 
 def test_the_map_of_the_guide_is_valid() -> None:

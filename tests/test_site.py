@@ -33,17 +33,24 @@ from scripts.site_pages import (
 from scripts.wiring_diagrams import devices_of, draw_wiring, part_list, pin_table
 from shapechanger.errors import RenderError
 from shapechanger.robot.guard.plan import driven_pins
-from shapechanger.robot.profile import Profile, load_profile, shipped_profiles
+from shapechanger.robot.profile import Profile, load_profile, read_profile, shipped_profiles
 from shapechanger.robot.profile.pins import BCM_OF_BOARD
 from tests.drawing import missing
+from tests.robot.profile.texts import EVERYTHING, HOVERCRAFT
 
 ROOT: Final = Path(__file__).parents[1]
 POSITIONS: Final = {pin: position for position, pin in BCM_OF_BOARD.items()}
 
 
-@pytest.fixture(params=sorted(shipped_profiles()))
+OTHERS: Final = {"rover": EVERYTHING, "skimmer": HOVERCRAFT}
+"""Profiles with drivers that no shipped one has."""
+
+
+@pytest.fixture(params=sorted([*shipped_profiles(), *OTHERS]))
 def profile(request: pytest.FixtureRequest) -> Profile:
-    """A shipped profile."""
+    """A shipped profile, or one with other drivers."""
+    if request.param in OTHERS:
+        return read_profile(OTHERS[request.param], Path(f"{request.param}.toml"))
     return load_profile(shipped_profiles()[request.param])
 
 
@@ -102,17 +109,21 @@ def test_boxes_do_not_overlap(profile: Profile) -> None:
 
 def test_pulled_pins_are_those_that_move_something(profile: Profile) -> None:
     """Each pin of a motor driver has a resistor, as the page on safety demands."""
-    pulled = {
-        wire.source: wire.pull
-        for device in devices_of(profile)
-        for wire in device.terminals
-        if wire.pull and isinstance(wire.source, int)
-    }
+    wires = [wire for device in devices_of(profile) for wire in device.terminals if wire.pull]
+    pulled = {wire.source: wire.pull for wire in wires}
     assert set(driven_pins(profile)) <= set(pulled)
     enables = {one.settings.get("output_enable", -1) for one in profile.outputs} - {-1}
     assert {pin for pin, net in pulled.items() if net == "3.3 V"} == enables
     if pulled:
-        assert f"| resistor 10 kOhm | {len(pulled)} |" in part_list(profile)
+        assert f"| resistor 10 kOhm | {len(wires)} |" in part_list(profile)
+    assert draw_wiring(profile, "it").count(">10 kΩ<") == len(wires)
+
+
+def test_the_one_shot_has_the_time_of_the_profile() -> None:
+    """Its resistor is that of docs/hardware.md for 100 ms, and half of it for 50 ms."""
+    assert "220 kΩ to 3.3 V" in draw_wiring(load_profile(shipped_profiles()["car"]), "car")
+    assert "R = 220 kOhm" in (ROOT / "docs" / "hardware.md").read_text()
+    assert "110 kΩ to 3.3 V" in draw_wiring(read_profile(EVERYTHING, Path("rover.toml")), "rover")
 
 
 def test_the_guide_of_the_car_has_its_pins() -> None:
