@@ -16,6 +16,7 @@ from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 import pytest
 
 from benchmarks.run import SUITES
+from shapechanger.cli.env_arguments import env_ref
 from shapechanger.cli.main import find_command, options_of, parse
 from shapechanger.errors import ShapechangerError
 
@@ -88,11 +89,15 @@ def leaves() -> dict[tuple[str, ...], type]:
 
 
 def refusal(words: list[str]) -> str:
-    """Return why a command line is refused; "" if it is a command."""
+    """Return why a command line is refused; "" if it is a command, with envs that exist."""
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            parse(words)
+            command = parse(words)
+        for name in ("env", "source", "target"):
+            env_id = getattr(command, name, "")
+            if isinstance(env_id, str) and env_id and not env_id.isupper():  # A placeholder.
+                env_ref(env_id)
     except ShapechangerError as error:
         return str(error)
     except SystemExit as stop:
@@ -163,10 +168,10 @@ def test_inline_commands_parse(page: Path) -> None:
 def _refusal_of_inline(words: list[str]) -> str:
     """Return why a command is refused however it is completed; "" if it is a command."""
     try:
-        reasons = [refusal(one) for one in completed(words)]
+        attempts = completed(words)
     except ShapechangerError as error:
         return str(error)
-    return reasons[0] if all(reasons) else ""
+    return "" if any(not refusal(one) for one in attempts) else refusal(attempts[0])
 
 
 def _readings(span: str) -> Iterator[list[str]]:
@@ -218,6 +223,7 @@ def test_a_wrong_command_is_found() -> None:
     assert len([span for span in spans(ROOT / "docs" / "build.md") if [*_readings(span)]]) > 10
     assert refusal(["suite", "run", "ants"]) == ""
     assert "no-such" in refusal(["suite", "no-such"])
+    assert "Antt" in refusal(["transfer", "Ant", "Antt"])
     assert "--sedes" in refusal(["suite", "run", "ants", "--sedes", "3"])
     assert refusal(["suite", "run", "ants", "--seeds", "many"]) != ""
     assert refusal(["robot", "serve"]) != ""  # Its profile is missing.
