@@ -13,8 +13,14 @@ _EXAMPLE: Final = re.compile(r"(?:^>>> .*\n?(?:^(?!$).*\n?)*)+", re.MULTILINE)
 class FencedExamples(griffe.Extension):
     """Put the examples of docstrings into fences; in Markdown `>>>` would quote them."""
 
-    def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Rewrite the docstring of an object that Griffe has loaded."""
+    def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
+        """Rewrite the docstrings of a package that Griffe has loaded, and of all that is in it."""
+        self._rewrite(pkg)
+
+    def _rewrite(self, obj: griffe.Object) -> None:
+        for member in obj.members.values():
+            if not isinstance(member, griffe.Alias):
+                self._rewrite(member)
         if obj.docstring is not None:
             obj.docstring.value = fenced(obj.docstring.value)
 

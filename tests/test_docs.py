@@ -44,6 +44,13 @@ def test_links_to_files_exist(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_blocks_in_lists_are_indented_by_four(page: Path) -> None:
+    """Blocks inside list items have four spaces; fewer do for code hosts, but not for MkDocs."""
+    fences = re.findall(r"^( +)```", page.read_text(), re.MULTILINE)
+    assert {len(spaces) % 4 for spaces in fences} <= {0}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_names_of_modules_and_functions_exist(page: Path) -> None:
     """Each dotted name of Shapechanger in inline code leads to something."""
     names = set(re.findall(r"`(shapechanger(?:\.\w+)+)", page.read_text()))

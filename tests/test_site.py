@@ -250,6 +250,7 @@ def test_the_site(tmp_path: Path, chromium: Browser) -> None:
                 f'id="{reference_path(package, name)}"' in page or f"<code>{name}</code>" in page
             )
             assert described, f"{package}.{name}"
+        assert "<blockquote>" not in page, f"{package}: an example that no fence holds"
     for env_id in gym.registry:
         if env_id.startswith("shapechanger/"):
             assert (site / "environments" / f"{env_id[13:-3]}.html").exists(), env_id
