@@ -32,6 +32,8 @@ ALWAYS: Final = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 _LOG: Final = logging.getLogger("mkdocs.hooks.shapechanger")
 _LINK: Final = re.compile(r"(\]\()([^)\s]+)(\))")
 _FENCE: Final = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.DOTALL | re.MULTILINE)
+# Words for the site alone: they link to pages that no code host has.
+_ONLY_HERE: Final = re.compile(r"<!-- site: (.*?) -->", re.DOTALL)
 _MERMAID: Final = re.compile(r"^```mermaid\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _SEARCH: Final = '<div class="md-search" data-md-component="search" role="dialog"'
 _SCHEME: Final = re.compile(r"[a-z]+:")
@@ -95,7 +97,15 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Rewrite the links of a page to files outside `docs`, and those of such files."""
-    return rewritten(_MERMAID.sub(_graph_as_table, markdown), origin_of(page.file.src_uri))
+    origin = origin_of(page.file.src_uri)
+    markdown = _ONLY_HERE.sub(lambda match: _to_made_pages(match[1], origin), markdown)
+    return rewritten(_MERMAID.sub(_graph_as_table, markdown), origin)
+
+
+def _to_made_pages(words: str, origin: str) -> str:
+    """Return words whose links are given from the root of the site, for the page at `origin`."""
+    here = posixpath.dirname(in_site(origin)) or "."
+    return _LINK.sub(lambda link: f"{link[1]}{posixpath.relpath(link[2], here)}{link[3]}", words)
 
 
 def _graph_as_table(match: re.Match[str]) -> str:

@@ -15,13 +15,11 @@ from contextlib import contextmanager
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium as gym
 import pytest
-from playwright.sync_api import Browser
 
-from scripts.site_docstrings import fenced
 from scripts.site_hooks import in_site, links_of, origin_of, rewritten
 from scripts.site_pages import (
     MODULES,
@@ -37,6 +35,9 @@ from shapechanger.robot.profile import Profile, load_profile, read_profile, ship
 from shapechanger.robot.profile.pins import BCM_OF_BOARD
 from tests.drawing import missing
 from tests.robot.profile.texts import EVERYTHING, HOVERCRAFT
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 ROOT: Final = Path(__file__).parents[1]
 POSITIONS: Final = {pin: position for position, pin in BCM_OF_BOARD.items()}
@@ -154,6 +155,9 @@ def test_links_that_leave_docs_lead_to_copies() -> None:
 
 def test_examples_of_docstrings_are_fenced() -> None:
     """Examples become blocks, with their output and without what follows them."""
+    _require("griffe")
+    from scripts.site_docstrings import fenced
+
     text = "Sum.\n\n>>> 1 + 1\n2\n>>> 2 + 2\n4\n\nMore."
     assert fenced(text) == "Sum.\n\n```pycon\n>>> 1 + 1\n2\n>>> 2 + 2\n4\n```\n\nMore."
 
@@ -178,6 +182,7 @@ def test_every_exported_name_is_in_the_reference() -> None:
 
 def test_a_page_without_picture_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing renders, the page comes without picture, with a note; on CI it fails."""
+    _require("griffe")
 
     def fail(*_: object) -> bytes:
         raise RenderError("Nothing renders here.")
@@ -227,15 +232,19 @@ LOOKED_AT: Final = (
 )
 
 
+def _require(*packages: str) -> None:
+    for package in packages:
+        if importlib.util.find_spec(package) is None:
+            missing(f"The package {package} is not installed")
+
+
 @pytest.mark.system
 def test_the_site(tmp_path: Path, chromium: Browser) -> None:
     """The site builds strictly, has every public name and env, loads nothing, and is accessible.
 
     One test, so that the site is built once.
     """
-    for package in ("material", "mkdocstrings", "axe_playwright_python"):
-        if importlib.util.find_spec(package) is None:
-            missing(f"The package {package} is not installed")
+    _require("material", "mkdocstrings", "axe_playwright_python")
     site = tmp_path / "site"
     subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(site)],
@@ -254,6 +263,8 @@ def test_the_site(tmp_path: Path, chromium: Browser) -> None:
     for env_id in gym.registry:
         if env_id.startswith("shapechanger/"):
             assert (site / "environments" / f"{env_id[13:-3]}.html").exists(), env_id
+    # From a comment of docs/build.md, which a code host hides.
+    assert 'href="wiring/car.html"' in (site / "build.html").read_text()
     with _served(site) as address:
         for page, scheme, width in LOOKED_AT:
             _look(chromium, address, page, scheme, width)
