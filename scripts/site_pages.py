@@ -64,14 +64,23 @@ def environment_pages() -> list[SitePage]:
     """Return a page for each env that `import shapechanger` registers, and their index."""
     ids = [env_id for env_id in gym.registry if env_id.startswith(f"{NAMESPACE}/")]
     pages = [environment_page(env_id) for env_id in ids]
-    rows = [f"| [`{env_id}`]({_short(env_id)}.md) | {_summary(env_id)} |" for env_id in ids]
+    rows = [
+        (_thumbnail(page), f"[`{env_id}`]({page.title}.md)", _summary(env_id))
+        for env_id, page in zip(ids, pages, strict=True)
+    ]
     index = [
         "# Environments",
         "`import shapechanger` registers these ids with Gymnasium. Their pages are made from the "
         "registry, the docstrings, the layouts, the certificates and the models of this version.",
-        "\n".join(["| id | body |", "|---|---|", *rows]),
+        _table(("picture", "id", "body"), rows),
     ]
     return [SitePage("environments/index.md", "Environments", "\n\n".join(index)), *pages]
+
+
+def _thumbnail(page: SitePage) -> str:
+    """Return a small picture that leads to a page; "" for a page without one."""
+    shape = "{ width=96 height=72 loading=lazy }"
+    return f"[![{page.title}]({page.title}.jpg){shape}]({page.title}.md)" if page.pictures else ""
 
 
 def environment_page(env_id: str) -> SitePage:
@@ -145,7 +154,7 @@ def _facts(env_id: str, spec: Any, entry_point: str) -> list[tuple[str, str]]:
         given = ", ".join(f"{name}={value!r}" for name, value in spec.kwargs.items())
         rows.append(("with", f"`{given}`"))
     steps = spec.max_episode_steps
-    rows.append(("truncated after", f"{steps:,} steps" if steps else "no number of steps"))
+    rows.append(("time limit", f"{steps:,} steps" if steps else "none"))
     if spec.reward_threshold is not None:
         rows.append(("solved at a return of", f"{spec.reward_threshold:,.0f}"))
     if env_id in CATALOGUE:
