@@ -276,7 +276,7 @@ def _compared(env_id: str) -> tuple[EnvRef | None, str]:
         heavier = '[{"edit":"mass","element":"*","scale":1.2}]'
         return (
             EnvRef(env_id, {"body": heavier}),
-            f"The unedited body of its family. From the same body with 1.2 times its mass "
+            "The unedited body of its family. Changes from a body of 1.2 times its mass "
             f"(`shapechanger envs compare {name} {name} --source-body '{heavier}'`):",
         )
     if env_id in VEHICLE_ENVS and name != "Car":
@@ -298,7 +298,7 @@ def _compared(env_id: str) -> tuple[EnvRef | None, str]:
 
 
 def _command(source: str, target: str) -> str:
-    return f"From {source}: `shapechanger envs compare {source} {target}`."
+    return f"Changes from {source} (`shapechanger envs compare {source} {target}`):"
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
@@ -324,7 +324,7 @@ def wiring_pages() -> list[SitePage]:
         rows.append((f"[`{name}`]({name}.md)", _cell(about)))
         parts = [
             "---\nhide:\n  - toc\n---",  # Room for the diagram.
-            f"# Wiring of `{name}`",
+            f"# Wiring of the `{name}` profile",
             about,
             "Drawn from the shipped profile. Read [what must be wired](../hardware.md"
             "#safety-what-must-be-wired) before you connect a motor; the circuit follows data "
@@ -415,7 +415,7 @@ def api_pages() -> list[SitePage]:
         "# API reference",
         "Every name that a package exports, with shapes, units and errors. The names of "
         "`shapechanger` itself are imported on first use.",
-        _table(("package", "what it has"), rows),
+        _table(("package", "contents"), rows),
     ]
     pages = [_api_page(name, homes) for name in names]
     return [SitePage("api/index.md", "API", "\n\n".join(index)), *pages]
@@ -474,7 +474,7 @@ def _api_page(name: str, homes: dict[tuple[str, str], str]) -> SitePage:
         if reference_path(name, one).endswith(f".{one}.{one}")
     ]
     if elsewhere:
-        parts += ["## Exported from elsewhere", ", ".join(elsewhere) + "."]
+        parts += ["## Re-exported", ", ".join(elsewhere) + "."]
     return SitePage(path, _listed(name), "\n\n".join(parts))
 
 

@@ -95,7 +95,7 @@ def devices_of(profile: Profile) -> list[Device]:
         wire = Terminal("contact", profile.stop_pin)
         parts = (("push button", 1, "emergency stop in the guard"),)
         found.append(
-            Device("Emergency button", "the Pi pulls up", (wire, _GROUND_WIRE), parts=parts)
+            Device("Emergency button", "pull-up in the Pi", (wire, _GROUND_WIRE), parts=parts)
         )
     boards: dict[tuple[int, int], list[OutputPlan]] = {}
     for output in profile.outputs:
@@ -115,7 +115,7 @@ def devices_of(profile: Profile) -> list[Device]:
     speeds = any(one.driver == "esc" for one in profile.outputs)
     if speeds or any(one.source == MOTORS for device in found for one in device.terminals):
         parts = (
-            ("battery of the motors, with a fuse", 1, "never the Pi's 5 V"),
+            ("motor battery, with a fuse", 1, "never the Pi's 5 V"),
             ("latching switch", 1, "in the motors' supply: emergency stop without software"),
         )
         measured = any(one.driver == "ina219" for one in profile.sensors)
@@ -179,7 +179,7 @@ def _one_shot(pin: int, hold_ms: int, for_bridges: bool) -> Device:
         ("film or ceramic capacitor 1 uF", 1, "its time"),
     )
     load = Load("2Q", ENABLE if for_bridges else "MOSFET in the motors' supply", "net")
-    return Device("One-shot 74HC123", f"falls {hold_ms} ms after the guard", wires, (load,), parts)
+    return Device("One-shot 74HC123", f"drops after {hold_ms} ms", wires, (load,), parts)
 
 
 def _direct(output: OutputPlan) -> Device:
@@ -194,10 +194,10 @@ def _direct(output: OutputPlan) -> Device:
         loads = (Load("motor wires", output.name, "motor"),)
         parts = (("speed controller (ESC) with its motor", 1, output.name),)
         wires = (signal, Terminal("battery +", MOTORS), Terminal("GND", GROUND))
-        return Device(f"ESC of {output.name}", "BEC feeds the servos", wires, loads, parts)
+        return Device(f"ESC ({output.name})", "BEC powers the servos", wires, loads, parts)
     wires = (signal, Terminal("V+", "5 to 6 V"), Terminal("GND", GROUND))
     parts = (("servo", 1, output.name),)
-    return Device(f"Servo of {output.name}", "V+ is never the Pi's", wires, parts=parts)
+    return Device(f"Servo ({output.name})", "V+ not from the Pi", wires, parts=parts)
 
 
 def _servo_board(outputs: list[OutputPlan]) -> Device:
@@ -210,7 +210,7 @@ def _servo_board(outputs: list[OutputPlan]) -> Device:
     loads = tuple(
         Load(
             f"{one.settings['channel']}",
-            f"ESC of {one.name}, + V MOTOR" if one.driver == "esc" else f"servo of {one.name}",
+            f"ESC ({one.name}), + V MOTOR" if one.driver == "esc" else f"servo ({one.name})",
         )
         for one in outputs
     )
@@ -222,7 +222,7 @@ def _servo_board(outputs: list[OutputPlan]) -> Device:
             * bool(motors)
         ),
         *((("servo", servos, "its channels"),) * bool(servos)),
-        *((("supply of the servos, 5 to 6 V", 1, "V+ of the board"),) * (not motors)),
+        *((("servo supply, 5 to 6 V", 1, "V+ of the board"),) * (not motors)),
     )
     return Device("PCA9685", f"address {settings['address']:#x}", wires, loads, parts)
 
@@ -249,16 +249,16 @@ def _servo_bus(servos: list[OutputPlan]) -> Device:
         ("USB adapter of the servo bus", 1, "with a latency timer of 1 ms"),
         (f"servo {model}", len(servos), "tendons"),
         ("spool", len(servos), f"radius {1e3 * servos[0].settings['spool_radius_m']:g} mm"),
-        ("supply of the servos, by their data sheet", 1, "never the Pi's 5 V"),
+        ("servo supply, by the data sheet", 1, "never the Pi's 5 V"),
     )
-    return Device("Servo bus", "one chain of servos", wires, loads, parts)
+    return Device("Servo bus", "daisy chain", wires, loads, parts)
 
 
 def _encoder(sensor: SensorPlan) -> Device:
     channels = {"A": sensor.settings["a"], "B": sensor.settings["b"]}
     wires = [Terminal(name, pin) for name, pin in channels.items() if pin != _NO_PIN]
     parts = (("wheel encoder, open collector or 3.3 V", 1, sensor.name),)
-    return Device(f"Encoder {sensor.name}", "3.3 V at most", (*wires, *_LOGIC_WIRES), parts=parts)
+    return Device(f"Encoder ({sensor.name})", "3.3 V maximum", (*wires, *_LOGIC_WIRES), parts=parts)
 
 
 def _switch(sensor: SensorPlan) -> Device:
@@ -267,8 +267,8 @@ def _switch(sensor: SensorPlan) -> Device:
     up = sensor.settings["pull"] == "up"
     wires.append(Terminal("other side", GROUND if up else LOGIC))
     parts = (("switch", len(pins), f"{sensor.name}, in front"),)
-    note = f"the Pi pulls {sensor.settings['pull']}"
-    return Device(f"Switches {sensor.name}", note, tuple(wires), parts=parts)
+    note = f"pull-{sensor.settings['pull']} in the Pi"
+    return Device(f"Switches ({sensor.name})", note, tuple(wires), parts=parts)
 
 
 def _hcsr04(sensor: SensorPlan) -> Device:
@@ -362,7 +362,7 @@ def _listed(numbers: Iterable[int]) -> str:
 def part_list(profile: Profile) -> str:
     """Return a Markdown table of the parts of a robot."""
     counts: dict[str, tuple[int, list[str]]] = {
-        "Raspberry Pi 3B+ or newer, with a supply of its own": (1, ["computer"])
+        "Raspberry Pi 3B+ or newer, with its own supply": (1, ["computer"])
     }
     found = devices_of(profile)
     pulls = sum(bool(wire.pull) for device in found for wire in device.terminals)

@@ -104,7 +104,10 @@ def test_boxes_do_not_overlap(profile: Profile) -> None:
         for box in root.iter("{http://www.w3.org/2000/svg}rect")
         if box.attrib["x"] == "500"
     ]
-    assert len(boxes) == len(devices_of(profile))
+    devices = devices_of(profile)
+    assert len(boxes) == len(devices)
+    # Texts fit into the boxes of 190 pixels.
+    assert max(len(words) for one in devices for words in (one.title, one.note)) <= 25
     assert all(y + h < below for (y, h), (below, _) in pairwise(boxes))
 
 
