@@ -23,6 +23,8 @@ INSTALLED_ALL := $(VENV)/.installed-all
 INSTALLED_DEV := $(VENV)/.installed-dev
 # Tests of one module mostly stay on one worker, so that its fixtures are made once.
 PYTEST := $(RUN) -m pytest -n $(JOBS) --dist worksteal
+# The theme would advertise its successor at each build.
+SITE := NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
 # Tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml). Tracing
 # slows the others down by a third, and they add nothing to it.
 COVERING := test_architecture.py test_errors.py test_layout.py envs/stepping envs/vector identify laws \
@@ -73,11 +75,12 @@ check: $(INSTALLED_DEV)  ## check format, lint and types
 bench: $(INSTALLED_DEV)  ## measure every number that the documentation states
 	$(RUN) -m benchmarks.run
 
-docs: $(INSTALLED_DEV)  ## run the examples of the documentation and follow its links
-	$(PYTEST) tests/test_docs.py
+docs: $(INSTALLED_DEV)  ## check the documentation, and build its site into site/
+	$(PYTEST) -m "not system" tests/test_docs.py tests/test_documented_commands.py tests/test_site.py
+	$(SITE)
 
 clean:  ## remove build products and environments; keep results/
-	rm -rf $(VENV) $(LEROBOT_VENV) build dist htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \
+	rm -rf $(VENV) $(LEROBOT_VENV) build dist site htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \
 		MUJOCO_LOG.TXT
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

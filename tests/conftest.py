@@ -1,4 +1,4 @@
-"""Settings of all tests, and fixtures for rendering."""
+"""Settings of all tests, and fixtures for rendering and for browsing."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
 from tests.drawing import draws, missing
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 # Processes started in the background, such as by `nohup`, ignore SIGINT, and so do their children;
 # some tests interrupt theirs.
@@ -44,6 +48,21 @@ def one_thread() -> Iterator[None]:
     torch.set_num_threads(1)
     yield
     torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    """A headless browser, which ends with the module, as does Playwright's event loop."""
+    from playwright.sync_api import sync_playwright
+
+    path = shutil.which("chromium") or shutil.which("google-chrome")
+    if path is None:
+        missing("There is no Chromium")
+    with sync_playwright() as playwright:
+        arguments = ["--no-sandbox", "--disable-gpu"]
+        browser = playwright.chromium.launch(executable_path=path, args=arguments)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="session")

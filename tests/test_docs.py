@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from pathlib import Path
 from typing import Any
@@ -38,8 +39,31 @@ def test_examples_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_links_to_files_exist(page: Path) -> None:
     """Relative links lead to files of the project."""
-    for target in re.findall(r"\]\((?!http)([^)#]+)\)", page.read_text()):
+    text = re.sub(r"<!-- .*? -->", "", page.read_text(), flags=re.DOTALL)  # For the site alone.
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", text):
         assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_blocks_in_lists_are_indented_by_four(page: Path) -> None:
+    """Blocks inside list items have four spaces; fewer do for code hosts, but not for MkDocs."""
+    fences = re.findall(r"^( +)```", page.read_text(), re.MULTILINE)
+    assert {len(spaces) % 4 for spaces in fences} <= {0}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_names_of_modules_and_functions_exist(page: Path) -> None:
+    """Each dotted name of Shapechanger in inline code leads to something."""
+    names = set(re.findall(r"`(shapechanger(?:\.\w+)+)", page.read_text()))
+    for name in names - {"shapechanger.methods"}:  # A group of entry points.
+        module, found = name, None
+        while found is None:
+            try:
+                found = importlib.import_module(module)
+            except ModuleNotFoundError:
+                module = module.rpartition(".")[0]
+        for part in name[len(module) :].split(".")[1:]:
+            found = getattr(found, part)
 
 
 def test_the_map_of_the_guide_is_valid() -> None:

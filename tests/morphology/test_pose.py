@@ -270,7 +270,7 @@ def test_the_distance_from_the_limits_can_be_given() -> None:
 
 def test_a_standing_pose_touches_the_floor() -> None:
     """A trunk that hangs is lowered, one in the floor is raised, and joints keep their places."""
-    model = ant()
+    model = built(ant())
     for height in (2.0, 0.1):
         pose = model.qpos0.copy()
         pose[2] = height
@@ -285,5 +285,5 @@ def test_a_standing_pose_touches_the_floor() -> None:
 
 def test_without_a_lift_or_a_floor_a_standing_pose_is_the_pose() -> None:
     """A pendulum stands nowhere, and a ball above nothing stays where it is."""
-    for model in (pendulum(), _ball("")):
+    for model in (built(pendulum()), _ball("")):
         np.testing.assert_array_equal(standing_pose(model, model.qpos0), model.qpos0)

@@ -26,7 +26,7 @@ def test_the_examples_drive_a_robot(
     remember(dataclasses.replace(robot.known, name="new-bright"))
     names: dict[str, Any] = {"__name__": "__main__"}
     blocks = re.findall(r"```(?:py|python)\n(.*?)```", PAGE.read_text(), re.DOTALL)
-    assert len(blocks) == 5
+    assert len(blocks) == 4
     for block in blocks:
         exec(compile(block, str(PAGE), "exec"), names)
         if "env" in names:

@@ -76,19 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if list(given) == ["--version"]:
             print(f"shapechanger {version('shapechanger')}")
             return
-        said, leaf_class = _require_commands(given)
-        if leaf_class is not None:
-            _require_options(given, said, leaf_class)
-        _require_single(given)
-        command = tyro.cli(
-            _Command,
-            prog="shapechanger",
-            description="Learn a skill in one body, move it to another, and measure the gain.",
-            args=arguments,
-            config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
-        )
-        leaf: Any = getattr(command, "command", command)  # A group holds its subcommand.
-        leaf.run()
+        parse(given).run()
         sys.stdout.flush()
     except ShapechangerError as error:
         _stop(f"error: {error}", _WRONG_USAGE)
@@ -112,7 +100,29 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _stop(f"error: Not everything could be printed: {error.strerror}.", _WRONG_USAGE)
 
 
-def _require_commands(arguments: Sequence[str]) -> tuple[str, type | None]:
+def parse(arguments: Sequence[str]) -> Any:
+    """Return the command that a command line names, which its `run` executes.
+
+    Raises:
+        UnknownName: If there is no such command or option.
+        StudyError: If an option lacks its value, or is given twice.
+        SystemExit: If an argument is missing or has another type, or help was asked for.
+    """
+    said, leaf_class = find_command(arguments)
+    if leaf_class is not None:
+        _require_options(arguments, said, leaf_class)
+    _require_single(arguments)
+    command = tyro.cli(
+        _Command,
+        prog="shapechanger",
+        description="Learn a skill in one body, move it to another, and measure the gain.",
+        args=arguments,
+        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
+    )
+    return getattr(command, "command", command)  # A group holds its subcommand.
+
+
+def find_command(arguments: Sequence[str]) -> tuple[str, type | None]:
     """Return the words of the command and its class; None if it has no subcommand yet.
 
     Raises:
@@ -132,6 +142,19 @@ def _require_commands(arguments: Sequence[str]) -> tuple[str, type | None]:
     return said, None
 
 
+def options_of(kind: type) -> dict[str, Any]:
+    """Return the options of a command by their names, such as `--out`, with their types."""
+    named: dict[str, Any] = {}
+    for field, hint in get_type_hints(kind, include_extras=True).items():
+        settings = getattr(hint, "__metadata__", ())
+        if tyro.conf.Positional not in settings:
+            # An option may have another name than its field, such as `from`.
+            other = next((name for one in settings if (name := getattr(one, "name", None))), None)
+            plain = get_args(hint)[0] if settings else hint
+            named["--" + (other or field).replace("_", "-")] = plain
+    return named
+
+
 def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
     """Raise an error of one sentence for an option that no parser can read.
 
@@ -139,15 +162,7 @@ def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
         UnknownName: If the command has no such option.
         StudyError: If its value is missing.
     """
-    hints = get_type_hints(kind, include_extras=True)
-    named: dict[str, Any] = {}
-    for field, hint in hints.items():
-        settings = getattr(hint, "__metadata__", ())
-        if tyro.conf.Positional not in settings:
-            # An option may have another name than its field, such as `from`.
-            other = next((name for one in settings if (name := getattr(one, "name", None))), None)
-            plain = get_args(hint)[0] if settings else hint
-            named["--" + (other or field).replace("_", "-")] = plain
+    named = options_of(kind)
     flags = [name for name, hint in named.items() if hint is bool]
     options = [*named, *(name.replace("--", "--no-", 1) for name in flags), "--help"]
     for word, value in zip(arguments, [*arguments[1:], "--"], strict=True):

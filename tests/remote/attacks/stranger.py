@@ -1,4 +1,4 @@
-"""A client written from docs/remote.md alone: sockets, TLS, WebSocket frames and plain msgpack.
+"""A client written from docs/wire.md alone: sockets, TLS, WebSocket frames and plain msgpack.
 
 It shares no code with Shapechanger, so that it can also send what a right client never would.
 """

@@ -16,8 +16,6 @@ from shapechanger.twin.signals import Transition
 from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import until
 
-CHROMIUM_ARGUMENTS: Final = ["--no-sandbox", "--disable-gpu"]
-
 DESK: Final[dict[str, Any]] = {"viewport": {"width": 1280, "height": 800}}
 PHONE: Final[dict[str, Any]] = {
     "viewport": {"width": 390, "height": 844},

@@ -1,32 +1,18 @@
-"""Fixtures with Chromium and a served twin."""
+"""Fixtures with a served twin and its console."""
 
 from __future__ import annotations
 
 import contextlib
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Literal
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser
 
 from shapechanger.twin.robot import RunningRobot, run_robot
-from tests.drawing import missing
-from tests.robot.console.browser import CHROMIUM_ARGUMENTS, Console
+from tests.robot.console.browser import Console
 from tests.robots import CAR, IN_A_ROOM, write_profile
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    """A headless browser, which ends with the module, as does Playwright's event loop."""
-    path = shutil.which("chromium") or shutil.which("google-chrome")
-    if path is None:
-        missing("There is no Chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM_ARGUMENTS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")

@@ -190,7 +190,7 @@ def read(text: str = EVERYTHING) -> Profile:
 
 
 _LENGTH = 'control = "length"\nlongest_m = 0.012\nshortest_m = -0.03\n'
-_GUIDE = Path(__file__).parents[3] / "docs" / "finger.md"
+_GUIDE = Path(__file__).parents[3] / "docs" / "finger-rig.md"
 
 
 def finger_text(family: str) -> str:

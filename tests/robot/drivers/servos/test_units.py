@@ -74,7 +74,7 @@ def test_a_known_spool_of_a_feetech_servo() -> None:
 
 
 def test_the_numbers_of_the_guide() -> None:
-    """docs/finger.md states these of an STS3215 on a spool of 10 mm."""
+    """docs/finger-rig.md states these of an STS3215 on a spool of 10 mm."""
     one, radius = feetech("FDP", spool_radius_m=0.010), 0.010
     assert one.newton_per_goal == pytest.approx(0.19, abs=5e-3)
     assert one.tension_n(1) == pytest.approx(0.5, abs=0.05)

@@ -1,0 +1,230 @@
+"""Commands that README, docs and examples show, checked by the real parser and not run."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import importlib.util
+import io
+import re
+import shlex
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
+
+import pytest
+
+from benchmarks.run import SUITES
+from shapechanger.cli.env_arguments import env_ref
+from shapechanger.cli.main import find_command, options_of, parse
+from shapechanger.errors import ShapechangerError
+
+ROOT: Final = Path(__file__).parents[1]
+PAGES: Final = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "src").rglob("*.md")),
+    *sorted((ROOT / "examples").rglob("*.md")),
+    *sorted((ROOT / "examples").rglob("*.py")),
+]
+FOREIGN: Final = {
+    *("--cov", "--fps"),
+    *("--system-site-packages", "--head", "--port", "--block"),
+    *("--robot", "--teleop", "--dataset"),
+}
+"""Options of other programs that pages name by themselves."""
+
+_FENCE: Final = re.compile(r"^( *)```(\w*)\n(.*?)^\1```", re.DOTALL | re.MULTILINE)
+_SPAN: Final = re.compile(r"(?<!`)`([^`\n]+(?:\n[^`\n]+)?)`(?!`)")
+_PYTHON: Final = ("py", "python")  # Those run, in test_docs.py.
+_OURS: Final = re.compile(r"(?:^|[\s/;&|])shapechanger (?=[a-z])")
+_NO_COMMANDS: Final = {"shapechanger link 1"}  # A text of the link's proof.
+
+
+def shell_commands(page: Path) -> list[str]:
+    """Return the commands `shapechanger ...` of a page's blocks."""
+    text = page.read_text()
+    blocks = [body for _, language, body in _FENCE.findall(text) if language not in _PYTHON]
+    outside = _FENCE.sub("", text).splitlines()
+    # Blocks that are indented in place of fenced, and the comments of scripts.
+    lines = [line for line in outside if line.startswith(("    ", "#")) and "`" not in line]
+    return [command for part in (*blocks, *lines) for command in _commands_in(part)]
+
+
+def _commands_in(block: str) -> list[str]:
+    joined = block.replace("\\\n", " ")
+    return [
+        re.split(r" (?:&&|\||;|>) ", line[match.end() :])[0]
+        for line in joined.splitlines()
+        for match in _OURS.finditer(line)
+    ]
+
+
+def spans(page: Path) -> list[str]:
+    """Return the inline code of a page, each on one line."""
+    return [" ".join(span.split()) for span in _SPAN.findall(_FENCE.sub("", page.read_text()))]
+
+
+@cache
+def leaves() -> dict[tuple[str, ...], type]:
+    """Return the class of every command by its words."""
+    found: dict[tuple[str, ...], type] = {}
+
+    def walk(words: tuple[str, ...]) -> None:
+        try:
+            find_command([*words, "no-such-command"])
+        except ShapechangerError as error:
+            names = str(error).partition("There are: ")[2].rstrip(".").split(", ")
+        else:
+            kind = find_command(words)[1]
+            assert kind is not None
+            found[words] = kind
+            return
+        for name in names:
+            walk((*words, name))
+
+    walk(())
+    return found
+
+
+def refusal(words: list[str]) -> str:
+    """Return why a command line is refused; "" if it is a command, with envs that exist."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            command = parse(words)
+        for name in ("env", "source", "target"):
+            env_id = getattr(command, name, "")
+            if isinstance(env_id, str) and env_id and not env_id.isupper():  # A placeholder.
+                env_ref(env_id)
+    except ShapechangerError as error:
+        return str(error)
+    except SystemExit as stop:
+        return "" if stop.code in (None, 0) else said.getvalue()
+    return ""
+
+
+def completed(words: list[str]) -> list[list[str]]:
+    """Return command lines in which what an inline command leaves out is filled in."""
+    _, kind = find_command(words)
+    if kind is None:
+        return [[*words, "--help"]]
+    options = options_of(kind)
+    filled: list[str] = []
+    for word, following in zip(words, [*words[1:], "--"], strict=True):
+        filled.append(word)
+        takes = options.get(word, bool) is not bool
+        if takes and following.startswith("--"):
+            filled += _value(options[word])
+    hints = get_type_hints(kind)
+    for field in dataclasses.fields(kind):
+        name = "--" + field.name.replace("_", "-")
+        required = field.default is dataclasses.MISSING
+        if required and field.default_factory is dataclasses.MISSING and name in options:
+            filled += [] if name in words else [name, *_value(hints[field.name])]
+    depth = next(n for n in range(len(words), 0, -1) if tuple(words[:n]) in leaves())
+    return [[*filled[:depth], *["X"] * n, *filled[depth:]] for n in range(4)]
+
+
+def _value(hint: Any) -> list[str]:
+    """Return a value of a type."""
+    if get_origin(hint) is Literal:
+        return [str(get_args(hint)[0])]
+    if get_origin(hint) is tuple:
+        kinds = [one for one in get_args(hint) if one is not Ellipsis]
+        return [word for kind in kinds for word in _value(kind)]
+    kinds = {hint, *get_args(hint)}
+    return ["1"] if kinds & {int, float} else ["X"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_shell_commands_parse(page: Path) -> None:
+    """Each `shapechanger ...` of a block is a complete command with options that exist."""
+    wrong: dict[str, str] = {}
+    for command in shell_commands(page):
+        words = shlex.split(command.replace("…", "X"), comments=True)
+        if why := refusal(words):
+            wrong[command] = why
+    assert wrong == {}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_inline_commands_parse(page: Path) -> None:
+    """Each inline command exists, with its options and their values; it may leave out the rest."""
+    wrong: dict[str, list[str]] = {}
+    for span in spans(page):
+        if span in _NO_COMMANDS:
+            continue
+        readings = list(_readings(span))
+        if not readings:
+            continue
+        reasons = [_refusal_of_inline(words) for words in readings]
+        if all(reasons):
+            wrong[span] = reasons
+    assert wrong == {}
+
+
+def _refusal_of_inline(words: list[str]) -> str:
+    """Return why a command is refused however it is completed; "" if it is a command."""
+    try:
+        attempts = completed(words)
+    except ShapechangerError as error:
+        return str(error)
+    return "" if any(not refusal(one) for one in attempts) else refusal(attempts[0])
+
+
+def _readings(span: str) -> Iterator[list[str]]:
+    """Yield the command lines that a span can mean; none if it is no command."""
+    try:
+        words = shlex.split(span)
+    except ValueError:
+        return
+    if not words:
+        return
+    if words[0] == "shapechanger" and len(words) > 1:
+        yield words[1:]
+        return
+    tops = {path[0] for path in leaves()}
+    if words[0] in tops and len(words) > 1:
+        yield words
+    elif any(word.startswith("--") for word in words[1:]):
+        yield from ([*path[:-1], *words] for path in leaves() if path[-1] == words[0])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_inline_options_exist(page: Path) -> None:
+    """Each option that a page names by itself is one of a command."""
+    known = {name for kind in leaves().values() for name in options_of(kind)}
+    named = {re.split(r"[ =.]", span)[0] for span in spans(page) if span.startswith("--")}
+    assert named - known - FOREIGN - {"--help"} == set()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_other_commands_exist(page: Path) -> None:
+    """Targets of make, rows of the benchmarks, scripts and modules exist."""
+    text = page.read_text()
+    code = [*(body for _, _, body in _FENCE.findall(text)), *spans(page)]
+    makefile = (ROOT / "Makefile").read_text()
+    for part in code:
+        for target in re.findall(r"^make(?: [A-Z]+=\S+)* ([a-z-]+)", part, re.MULTILINE):
+            assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+        for rows in re.findall(r"python -m benchmarks\.run((?: [a-z-]+)*)", part):
+            assert set(rows.split()) <= set(SUITES), rows
+        for script in re.findall(r"python (\S+\.py)", part):
+            assert (ROOT / script).exists() or page.suffix == ".py", script
+        for module in re.findall(r"python -m (shapechanger[\w.]*)", part):
+            assert importlib.util.find_spec(module), module
+
+
+def test_a_wrong_command_is_found() -> None:
+    """A command, an option and a value that do not exist are refused; commands are found."""
+    assert len(shell_commands(ROOT / "README.md")) > 20
+    assert len([span for span in spans(ROOT / "docs" / "build.md") if [*_readings(span)]]) > 10
+    assert refusal(["suite", "run", "ants"]) == ""
+    assert "no-such" in refusal(["suite", "no-such"])
+    assert "Antt" in refusal(["transfer", "Ant", "Antt"])
+    assert "--sedes" in refusal(["suite", "run", "ants", "--sedes", "3"])
+    assert refusal(["suite", "run", "ants", "--seeds", "many"]) != ""
+    assert refusal(["robot", "serve"]) != ""  # Its profile is missing.
+    assert not all(refusal(one) for one in completed(["robot", "serve"]))

@@ -1,0 +1,303 @@
+"""The site: its wiring diagrams, links and API reference, and whether all people can use it."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import threading
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import gymnasium as gym
+import pytest
+
+from scripts.site_hooks import in_site, links_of, origin_of, rewritten
+from scripts.site_pages import (
+    MODULES,
+    api_pages,
+    environment_page,
+    public_packages,
+    reference_path,
+)
+from scripts.wiring_diagrams import devices_of, draw_wiring, part_list, pin_table
+from shapechanger.errors import RenderError
+from shapechanger.robot.guard.plan import driven_pins
+from shapechanger.robot.profile import Profile, load_profile, read_profile, shipped_profiles
+from shapechanger.robot.profile.pins import BCM_OF_BOARD
+from tests.drawing import missing
+from tests.robot.profile.texts import EVERYTHING, HOVERCRAFT
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+ROOT: Final = Path(__file__).parents[1]
+POSITIONS: Final = {pin: position for position, pin in BCM_OF_BOARD.items()}
+
+
+OTHERS: Final = {"rover": EVERYTHING, "skimmer": HOVERCRAFT}
+"""Profiles with drivers that no shipped one has."""
+
+
+@pytest.fixture(params=sorted([*shipped_profiles(), *OTHERS]))
+def profile(request: pytest.FixtureRequest) -> Profile:
+    """A shipped profile, or one with other drivers."""
+    if request.param in OTHERS:
+        return read_profile(OTHERS[request.param], Path(f"{request.param}.toml"))
+    return load_profile(shipped_profiles()[request.param])
+
+
+def pins_of(profile: Profile) -> set[int]:
+    """Return the BCM pins of a profile's outputs, sensors and buttons, read from its settings."""
+    found = set(driven_pins(profile))
+    for sensor in profile.sensors:
+        settings = sensor.settings
+        found |= {settings[key] for key in ("a", "b", "trigger", "echo") if key in settings}
+        found |= set(settings.get("pins", ()))
+    for output in profile.outputs:
+        found.add(output.settings.get("output_enable", -1))
+    devices = [*profile.outputs, *profile.sensors]
+    if any("bus" in device.settings for device in devices):
+        found |= {2, 3}
+    return (found | ({profile.stop_pin} if profile.stop_pin is not None else set())) - {-1}
+
+
+def test_diagrams_show_every_pin_of_a_profile(profile: Profile) -> None:
+    """A diagram, and the table below it, have each pin of the profile, and no other."""
+    picture = draw_wiring(profile, "it")
+    shown = {int(pin) for pin in re.findall(r"GPIO(\d+) ", picture)}
+    assert shown == pins_of(profile)
+    table = pin_table(profile)
+    assert {int(pin) for pin in re.findall(r"^\| GPIO(\d+) ", table, re.MULTILINE)} == shown
+    for pin in shown:
+        assert f"GPIO{pin}  ({POSITIONS[pin]})" in picture
+        assert f"| GPIO{pin} | {POSITIONS[pin]} |" in table
+
+
+def test_diagrams_are_pictures_with_names(profile: Profile) -> None:
+    """A diagram is well-formed, has a title, and draws nothing outside itself."""
+    root = ET.fromstring(draw_wiring(profile, "it"))
+    space = "{http://www.w3.org/2000/svg}"
+    assert root.get("role") == "img"
+    assert "Wiring of it" in str(root.findtext(f"{space}title"))
+    _, _, width, height = map(float, root.attrib["viewBox"].split())
+    for box in root.iter(f"{space}rect"):
+        x, y, w, h = (float(box.attrib[name]) for name in ("x", "y", "width", "height"))
+        assert min(x, y) >= 0.0
+        assert x + w <= width
+        assert y + h <= height
+
+
+def test_boxes_do_not_overlap(profile: Profile) -> None:
+    """No device is drawn over another one."""
+    root = ET.fromstring(draw_wiring(profile, "it"))
+    boxes = [
+        (float(box.attrib["y"]), float(box.attrib["height"]))
+        for box in root.iter("{http://www.w3.org/2000/svg}rect")
+        if box.attrib["x"] == "500"
+    ]
+    devices = devices_of(profile)
+    assert len(boxes) == len(devices)
+    # Texts fit into the boxes of 190 pixels.
+    assert max(len(words) for one in devices for words in (one.title, one.note)) <= 25
+    assert all(y + h < below for (y, h), (below, _) in pairwise(boxes))
+
+
+def test_pulled_pins_are_those_that_move_something(profile: Profile) -> None:
+    """Each pin of a motor driver has a resistor, as the page on safety demands."""
+    wires = [wire for device in devices_of(profile) for wire in device.terminals if wire.pull]
+    pulled = {wire.source: wire.pull for wire in wires}
+    assert set(driven_pins(profile)) <= set(pulled)
+    enables = {one.settings.get("output_enable", -1) for one in profile.outputs} - {-1}
+    assert {pin for pin, net in pulled.items() if net == "3.3 V"} == enables
+    if pulled:
+        assert f"| resistor 10 kOhm | {len(wires)} |" in part_list(profile)
+    assert draw_wiring(profile, "it").count(">10 kΩ<") == len(wires)
+
+
+def test_the_one_shot_has_the_time_of_the_profile() -> None:
+    """Its resistor is that of docs/hardware.md for 100 ms, and half of it for 50 ms."""
+    assert "220 kΩ to 3.3 V" in draw_wiring(load_profile(shipped_profiles()["car"]), "car")
+    assert "R = 220 kOhm" in (ROOT / "docs" / "hardware.md").read_text()
+    assert "110 kΩ to 3.3 V" in draw_wiring(read_profile(EVERYTHING, Path("rover.toml")), "rover")
+
+
+def test_the_guide_of_the_car_has_its_pins() -> None:
+    """The table of docs/build.md has the pins of the shipped car, and its resistors."""
+    text = (ROOT / "docs" / "build.md").read_text()
+    car = load_profile(shipped_profiles()["car"])
+    for pin in pins_of(car):
+        assert f"| GPIO{pin} | {POSITIONS[pin]} |" in text
+    for device in devices_of(car):
+        for wire in device.terminals:
+            if device.title == "H-bridge" and isinstance(wire.source, int):
+                row = rf"\| GPIO{wire.source} \| \d+ \| bridge {wire.label} .*10 kOhm to ground"
+                assert re.search(row, text)
+
+
+def test_links_that_leave_docs_lead_to_copies() -> None:
+    """A link to a file outside docs leads to its copy in the site, from either side."""
+    assert links_of("[a](../CONTRIBUTING.md#x)", "docs/atlas.md") == {"CONTRIBUTING.md"}
+    assert rewritten("[a](../CONTRIBUTING.md#x)", "docs/a.md") == "[a](project/CONTRIBUTING.md#x)"
+    assert rewritten("[a](docs/atlas.md)", "README.md") == "[a](atlas.md)"
+    assert rewritten("[a](docs/atlas.md#b)", "CONTRIBUTING.md") == "[a](../atlas.md#b)"
+    assert rewritten("[a](gone.md)", "README.md") == "[a](gone.md)"
+    assert rewritten("```\n[a](docs/atlas.md)\n```\n", "README.md").count("docs/atlas.md") == 1
+    assert rewritten("[a](https://b.c/docs)", "README.md") == "[a](https://b.c/docs)"
+    for path in ("README.md", "docs/atlas.md", "src/shapechanger/x/README.md"):
+        assert origin_of(in_site(path)) == path
+
+
+def test_examples_of_docstrings_are_fenced() -> None:
+    """Examples become blocks, with their output and without what follows them."""
+    _require("griffe")
+    from scripts.site_docstrings import fenced
+
+    text = "Sum.\n\n>>> 1 + 1\n2\n>>> 2 + 2\n4\n\nMore."
+    assert fenced(text) == "Sum.\n\n```pycon\n>>> 1 + 1\n2\n>>> 2 + 2\n4\n```\n\nMore."
+
+
+def test_every_exported_name_is_in_the_reference() -> None:
+    """The page of a package describes each name that it exports, or links to its description."""
+    pages = {page.path: page.content for page in api_pages()}
+    described: set[str] = set()
+    linked: set[str] = set()
+    for name in (*public_packages(), *MODULES):
+        page = pages[f"api/{name}.md"]
+        members = re.findall(r"members: \[(.*)\]", page)[0].split(", ")
+        described |= {f"{name}.{member}" for member in members}
+        linked |= set(re.findall(r"\]\[(.+?)\]", page))
+        for exported in public_packages().get(name, ()):
+            assert exported in members or f"[`{exported}`][" in page, f"{name}.{exported}"
+    described |= {
+        path for path in re.findall(r"^::: (\S+)", "\n".join(pages.values()), re.MULTILINE)
+    }
+    assert linked <= described
+
+
+def test_a_page_without_picture_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing renders, the page comes without picture, with a note; on CI it fails."""
+    _require("griffe")
+
+    def fail(*_: object) -> bytes:
+        raise RenderError("Nothing renders here.")
+
+    monkeypatch.setattr("scripts.site_pages._picture", fail)
+    monkeypatch.setenv("CI", "false")
+    page = environment_page("shapechanger/BigAnt-v1")
+    assert page.notes == (
+        "The page of shapechanger/BigAnt-v1 has no picture: Nothing renders here.",
+    )
+    assert page.pictures == {}
+    for part in ("all shanks twice as long", "`hip_4/motor`", "length 0.5657 m -> 1.131 m"):
+        assert part in page.content
+    monkeypatch.setenv("CI", "true")
+    with pytest.raises(RenderError):
+        environment_page("shapechanger/BigAnt-v1")
+
+
+@contextmanager
+def _served(folder: Path) -> Iterator[str]:
+    """Serve a folder, and yield its address."""
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_: Any) -> None:
+            pass
+
+    handler = functools.partial(Quiet, directory=str(folder))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}/"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+LOOKED_AT: Final = (
+    # Page, scheme and width of the window, pixels.
+    ("index.html", "light", 1280),
+    ("index.html", "dark", 390),
+    ("studies.html", "light", 390),
+    ("environments/ExtendedAnt.html", "light", 390),
+    ("wiring/lab-car.html", "dark", 1280),
+    ("wiring/lab-car.html", "light", 390),
+    ("api/shapechanger.morphology.html", "dark", 1280),
+)
+
+
+def _require(*packages: str) -> None:
+    for package in packages:
+        if importlib.util.find_spec(package) is None:
+            missing(f"The package {package} is not installed")
+
+
+@pytest.mark.system
+def test_the_site(tmp_path: Path, chromium: Browser) -> None:
+    """The site builds strictly, has every public name and env, loads nothing, and is accessible.
+
+    One test, so that the site is built once.
+    """
+    _require("material", "mkdocstrings", "axe_playwright_python")
+    site = tmp_path / "site"
+    subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(site)],
+        cwd=ROOT,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        check=True,
+    )
+    for package, names in public_packages().items():
+        page = (site / "api" / f"{package}.html").read_text()
+        for name in names:
+            described = (
+                f'id="{reference_path(package, name)}"' in page or f"<code>{name}</code>" in page
+            )
+            assert described, f"{package}.{name}"
+        assert "<blockquote>" not in page, f"{package}: an example that no fence holds"
+    for env_id in gym.registry:
+        if env_id.startswith("shapechanger/"):
+            assert (site / "environments" / f"{env_id[13:-3]}.html").exists(), env_id
+    # From a comment of docs/build.md, which a code host hides.
+    assert 'href="wiring/car.html"' in (site / "build.html").read_text()
+    with _served(site) as address:
+        for page, scheme, width in LOOKED_AT:
+            _look(chromium, address, page, scheme, width)
+
+
+def _look(chromium: Browser, address: str, path: str, scheme: Any, width: int) -> None:
+    """Check a page as people see it."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    where = f"{path}, {scheme}, {width} pixels"
+    requested: list[str] = []
+    errors: list[str] = []
+    context = chromium.new_context(
+        viewport={"width": width, "height": 900}, color_scheme=scheme, reduced_motion="reduce"
+    )
+    try:
+        page = context.new_page()
+        page.on("request", lambda request: requested.append(request.url))
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(address + path)
+        page.wait_for_load_state("networkidle")
+        wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth"
+        assert not page.evaluate(wider), f"{where}: the page scrolls sideways"
+        found = [
+            (one["id"], [node["target"] for node in one["nodes"]])
+            for one in Axe().run(page).response["violations"]
+            if one["impact"] in ("serious", "critical")
+        ]
+        assert (where, found, errors) == (where, [], [])
+        others = [url for url in requested if not url.startswith((address, "data:", "blob:"))]
+        assert (where, others) == (where, [])
+    finally:
+        context.close()
