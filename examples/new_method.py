@@ -1,9 +1,8 @@
-r"""A transfer method of one's own, compared with scratch and fine-tuning on two poles.
+"""A transfer method of one's own, compared with scratch and fine-tuning on two poles.
 
 It freezes everything but the last layer. With the installed command, from this folder:
 
-    shapechanger transfer InvertedPendulum BigInvertedPendulum \
-        --arms scratch fine-tune new_method:last-layer
+    shapechanger transfer InvertedPendulum BigInvertedPendulum --arms scratch new_method:last-layer
 """
 
 import os
