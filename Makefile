@@ -37,7 +37,7 @@ VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # Two installations at once would interfere.
-.PHONY: help setup demo test test-system test-all test-matrix test-lerobot check bench docs clean
+.PHONY: help setup demo test test-system test-all test-matrix release test-lerobot check bench docs clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
@@ -62,6 +62,9 @@ test-all: $(INSTALLED_DEV)  ## run all tests, including the slow ones
 
 test-matrix: $(INSTALLED_DEV)  ## run the fast tests against other versions and installations
 	$(RUN) scripts/test_matrix.py
+
+release: $(INSTALLED_DEV)  ## build wheel and sdist into dist/, and test them on each Python here; an hour
+	$(RUN) scripts/test_matrix.py --release
 
 test-lerobot: $(INSTALLED_LEROBOT)  ## test our robots in LeRobot; installs 6 GB
 	$(RUN) -m pyright -p $(LEROBOT)
