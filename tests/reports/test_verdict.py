@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.reports.verdict import Direction, caveats, direction, is_flat, verdict
+from shapechanger.reports.verdict import (
+    Direction,
+    caveats,
+    direction,
+    is_flat,
+    machine_text,
+    verdict,
+)
 from shapechanger.transfer.metrics import Estimate
 from shapechanger.transfer.study import Study
 from tests.reports.studies import make_study, rising
@@ -76,3 +84,19 @@ def test_caveats_name_limits_of_the_study() -> None:
     assert len(caveats(make_study())) == 1
     assert caveats(make_study(source_steps=0)) == ()
     assert "only the jumpstart is meaningful" in caveats(make_study(source_steps=10_240))[0]
+
+
+def test_runs_on_different_devices_are_a_caveat() -> None:
+    """Each device is named with what learned on it; runs that learned nothing name none."""
+    study = make_study(source_steps=0)
+    assert machine_text([study]) == study.machine
+    places = {"scratch": "CPU", "fine-tune": "NVIDIA H100"}
+    runs = tuple(
+        msgspec.structs.replace(run, device=places.get(run.run.kind, "")) for run in study.runs
+    )
+    mixed = msgspec.structs.replace(study, runs=runs)
+    (text,) = caveats(mixed)
+    assert "on CPU scratch; on NVIDIA H100 fine-tune" in text
+    assert machine_text([study, mixed]).endswith("; learned on CPU, NVIDIA H100")
+    one = tuple(msgspec.structs.replace(run, device="CPU") for run in study.runs)
+    assert caveats(msgspec.structs.replace(study, runs=one)) == ()

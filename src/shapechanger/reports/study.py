@@ -21,6 +21,7 @@ from shapechanger.reports.verdict import (
     MeasureRow,
     arm_rows,
     caveats,
+    machine_text,
     measure_rows,
     verdict,
 )
@@ -85,7 +86,7 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
             (name, _setting(value)) for name, value in msgspec.structs.asdict(plan.settings).items()
         ],
         command=study.command,
-        machine=study.machine,
+        machine=machine_text([study]),
         wall_time=_duration(sum(result.wall_s for result in study.runs)),
         runs=[
             (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import StudyError
 from shapechanger.reports.numbers import count, estimate_text, number
 from shapechanger.reports.page import jpeg_uri, render, svg_uri
-from shapechanger.reports.verdict import direction, finals, is_flat, verdict
+from shapechanger.reports.verdict import direction, finals, is_flat, machine_text, verdict
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.metrics import (
     Estimate,
@@ -284,7 +284,7 @@ def _settings(studies: Mapping[str, Study]) -> list[tuple[str, str]]:
         ("Target steps", _listed([plan.steps for plan in plans])),
         ("Source steps", _listed([plan.source_steps for plan in plans])),
         ("Seed", _listed([plan.seed for plan in plans])),
-        ("Machine", first.machine),
+        ("Machine", machine_text(studies.values())),
         ("Time", f"{number(hours, 1)} h for all runs; those that studies share count in each"),
         ("Runs", count(sum(len(study.runs) for study in studies.values()))),
         ("Versions", ", ".join(f"{name} {version}" for name, version in plans[0].versions.items())),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -374,6 +375,31 @@ def source_takes_all(summary: Summary) -> bool:
     return summary.source_steps >= summary.horizon
 
 
+def devices_of(study: Study) -> dict[str, list[str]]:
+    """Return the kinds of runs that learned on each device; runs of old studies name none.
+
+    Args:
+        study: The study.
+    """
+    devices: dict[str, list[str]] = {}
+    for result in study.runs:
+        if result.device and result.run.kind not in devices.setdefault(result.device, []):
+            devices[result.device].append(result.run.kind)
+    return devices
+
+
+def machine_text(studies: Iterable[Study]) -> str:
+    """Return the machine of the first study, and the devices that any of them learned on.
+
+    Args:
+        studies: Studies, at least one.
+    """
+    first, *rest = studies
+    devices = dict.fromkeys(device for study in (first, *rest) for device in devices_of(study))
+    learned = f"; learned on {', '.join(devices)}" if devices else ""
+    return f"{first.machine}{learned}"
+
+
 def caveats(study: Study) -> tuple[str, ...]:
     """Limits of the numbers, one or two sentences each."""
     summary = next(iter(study.summaries.values()))
@@ -399,6 +425,12 @@ def caveats(study: Study) -> tuple[str, ...]:
         sentences.append(
             f"Each seed has its own target, whose {study.plan.individual} is the index of the "
             "seed: the intervals are over these, too."
+        )
+    if len(devices := devices_of(study)) > 1:
+        named = "; ".join(f"on {device} {', '.join(kinds)}" for device, kinds in devices.items())
+        sentences.append(
+            f"Not all runs learned on the same device ({named}): worlds on a GPU start and round "
+            "differently, so a difference between arms may be one between devices."
         )
     if len(study.looks) > 1:
         looks = " and ".join(map(str, study.looks))

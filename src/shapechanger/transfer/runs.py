@@ -41,12 +41,14 @@ class RunResult(msgspec.Struct, frozen=True):
         seed: Its seed.
         curve: Its evaluations, by steps.
         wall_s: Duration, s; the only number here that another machine would not reproduce.
+        device: Where it learned: "CPU", or the name of a GPU; empty if it did not learn.
     """
 
     run: Run
     seed: int
     curve: tuple[Evaluation, ...]
     wall_s: float
+    device: str = ""
 
 
 def learner_of(name: str, settings: Settings) -> Learner:
@@ -63,6 +65,20 @@ def learner_of(name: str, settings: Settings) -> Learner:
     if isinstance(settings, Sb3Settings):
         return Sb3Learner(name, settings)
     return CloneLearner(name, settings)
+
+
+def device_of(settings: Settings) -> str:
+    """Return where a learner learns: "CPU", or the name of a GPU.
+
+    Args:
+        settings: The learner's settings.
+    """
+    if not isinstance(settings, RslPpoSettings):
+        return "CPU"
+    import torch
+
+    device = settings.device or ("cuda" if torch.cuda.is_available() else "cpu")
+    return "CPU" if device == "cpu" else torch.cuda.get_device_name(device)
 
 
 def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
@@ -155,7 +171,9 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
             policy = load_method(run.kind).learn(context)
         if policy is not None:
             context.save(policy)
-    result = RunResult(run, plan.seed_of(run), tuple(curve), time.monotonic() - began)
+    device = "" if policy is None else device_of(plan.settings)
+    wall_s = time.monotonic() - began
+    result = RunResult(run, plan.seed_of(run), tuple(curve), wall_s, device)
     write_json(folder / _RESULT, result)
 
 
