@@ -8,6 +8,7 @@ import secrets
 import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,7 +19,23 @@ from shapechanger.demos.episodes.files import (
     read_file,
 )
 from shapechanger.demos.jpeg import decode_picture, picture_size
-from shapechanger.errors import DemosError, OutputError
+from shapechanger.errors import DemosError, MissingExtra, OutputError
+
+
+def library(name: str, extra: str = "data") -> Any:
+    """Import a module of a package that an extra installs.
+
+    Args:
+        name: Dotted name of the module.
+        extra: Name of the extra.
+
+    Raises:
+        MissingExtra: If it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingExtra(name.split(".")[0], extra) from error
 
 
 @contextmanager
