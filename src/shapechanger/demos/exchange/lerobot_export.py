@@ -79,7 +79,7 @@ _LEVELS: Final = 256
 _LARGE_PICTURE: Final = 300
 _THINNED_PICTURE: Final = 150
 
-_Stats = dict[str, NDArray[np.float64]]
+_Stats = dict[str, NDArray[Any]]
 
 
 def write_lerobot(
@@ -364,7 +364,7 @@ class _Dataset:
         frames = np.arange(start, start + count)
         done = [[step.terminated or step.truncated] for step in steps]
         columns: dict[str, NDArray[Any]] = {
-            ACTION: np.array([step.action for step in steps], np.float32),
+            ACTION: _in_32_bits([step.action for step in steps]),
             DONE: np.array(done),
             TERMINATED: np.array([[step.terminated] for step in steps]),
             "timestamp": (frames / float(self._rate)).astype(np.float32)[:, None],
@@ -377,9 +377,9 @@ class _Dataset:
             states = np.array([step.state for step in steps])
             middles = np.repeat([f.middle for f in self._states], [f.size for f in self._states])
             states = np.where(np.isfinite(states), states, middles)
-            columns[STATE] = states.astype(np.float32)
+            columns[STATE] = _in_32_bits(states)
         if self._rewarded:
-            columns[REWARD] = np.array([[step.reward] for step in steps], np.float32)
+            columns[REWARD] = _in_32_bits([[step.reward] for step in steps])
         for key, values in columns.items():
             if not np.isfinite(values).all():
                 raise DemosError(
@@ -412,12 +412,18 @@ class _Dataset:
                 arrays.append(arrow.array(values, column.type))
         self._table.write_table(arrow.Table.from_arrays(arrays, schema=self._schema))
         written.steps += count
-        written.drivers += [step.driver for step in steps]
+        written.drivers.extend(step.driver for step in steps)
         return shown
 
     def _write_json(self, name: str, value: Any) -> None:
         text = json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False)
         (self._folder / name).write_text(text, encoding="utf-8", errors="replace")
+
+
+def _in_32_bits(values: Any) -> NDArray[np.float32]:
+    """Round numbers; what is too large becomes infinite, and is refused then."""
+    with np.errstate(over="ignore"):
+        return np.asarray(values, np.float64).astype(np.float32)
 
 
 def _vector(layout: Layout) -> dict[str, Any]:
@@ -519,7 +525,7 @@ def _combined(episodes: Sequence[Mapping[str, _Stats]], key: str) -> _Stats:
     counts = np.array([found["count"][0] for found in stats], np.float64)
     weights = counts / counts.sum()
 
-    def mean(values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def mean(values: Sequence[NDArray[Any]]) -> NDArray[Any]:
         return np.tensordot(weights, np.stack(values), axes=1)
 
     centre = mean([found["mean"] for found in stats])

@@ -283,10 +283,12 @@ def _own_header(
             f"{where} is of another dataset, with other actions, states or pictures: remove the "
             "file if the dataset was edited."
         )
-    drivers = chain.from_iterable(repeat(cast("Driver", driver), count) for driver, count in runs)
+    known = cast("list[tuple[Driver, int]]", runs)
+    rest: Iterator[Driver] = repeat("person")
+    drivers = chain(*(repeat(driver, count) for driver, count in known), rest)
     # The steps come back without their times.
     header = replace(header, clock="none", notes=found.notes | header.notes)
-    return header, chain(drivers, repeat("person")), str(plain.get("outcome", ""))
+    return header, drivers, str(plain.get("outcome", ""))
 
 
 def _tasks(folder: Path) -> list[str]:
