@@ -348,9 +348,9 @@ class Export:
     """The folder to make; it must not exist yet. For minari its name ends in a version, as in
     drive-v0."""
     to: str
-    """Format to write: minari, lerobot, csv, 2017 or tub."""
+    """Format to write: minari, lerobot, csv, mcap, 2017 or tub."""
     dropped: bool = False
-    """Write dropped steps too, marked as such; only minari and csv can."""
+    """Write dropped steps too, marked as such; only minari, csv and mcap can."""
     task: str = ""
     """What the robot does, in words, for policies that follow language; lerobot only."""
     images: bool = False
@@ -368,7 +368,7 @@ class Export:
             f"{counted(done.episodes, 'episode')}"
         )
         if done.left_out:
-            where = "; --dropped includes them" if done.format in {"minari", "csv"} else ""
+            where = "; --dropped includes them" if done.format in {"minari", "csv", "mcap"} else ""
             say(f"left out {done.left_out} dropped steps{where}")
         if done.format == "lerobot":
             say(f"load it with LeRobotDataset({self.out.name!r}, root={str(self.out)!r})")

@@ -24,6 +24,7 @@ from shapechanger.demos.exchange.files import cannot_read, new_folder
 from shapechanger.demos.exchange.keys_2017 import LABELS, is_2017, read_2017, write_2017
 from shapechanger.demos.exchange.lerobot_export import INFO, write_lerobot
 from shapechanger.demos.exchange.lerobot_import import is_lerobot, read_lerobot
+from shapechanger.demos.exchange.mcap_export import write_mcap
 from shapechanger.demos.exchange.minari_export import (
     METADATA,
     is_minari,
@@ -35,7 +36,7 @@ from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episo
 from shapechanger.demos.exchange.tub import MANIFEST, is_tub, read_tub, write_tub
 from shapechanger.errors import DemosError, OutputError, UnknownName
 
-Format = Literal["2017", "tub", "minari", "lerobot", "csv"]
+Format = Literal["2017", "tub", "minari", "lerobot", "csv", "mcap"]
 
 
 _DETECT: Final[dict[Format, Callable[[Path], bool]]] = {
@@ -52,10 +53,10 @@ _READ: Final[dict[Format, Callable[[Path], Iterator[ExchangeEpisode]]]] = {
     "lerobot": read_lerobot,
     "csv": read_csv,
 }
-_MARKS_DROPPED: Final = ("minari", "csv")
+_MARKS_DROPPED: Final = ("minari", "csv", "mcap")
 
-FORMATS: Final = tuple(_READ)
-"""Names of the formats."""
+FORMATS: Final[tuple[Format, ...]] = (*_READ, "mcap")
+"""Names of the formats; mcap can only be exported."""
 
 _EXPECTED: Final = (
     f"{LABELS} beside JPEGs (2017), {MANIFEST} or record_0.json (tub), data/{METADATA} (minari), "
@@ -112,7 +113,7 @@ def export_recording(
         data: A recording, or one episode; it is not changed.
         out: The folder to create, atomically.
         format: One of the `FORMATS`.
-        dropped: Whether to export excluded steps too, marked as such; minari and csv only.
+        dropped: Whether to export excluded steps too, marked as such; minari, csv and mcap only.
         task: What the robot does, in words, for policies that follow language; lerobot only.
         images: Whether to store pictures as they were recorded, in place of video; lerobot only.
 
@@ -127,8 +128,8 @@ def export_recording(
         raise UnknownName("format", format, FORMATS)
     if dropped and format not in _MARKS_DROPPED:
         raise DemosError(
-            f"The format {format} cannot mark excluded steps: export to minari or csv, or leave "
-            "the excluded steps out."
+            f"The format {format} cannot mark excluded steps: export to minari, csv or mcap, "
+            "or leave the excluded steps out."
         )
     if (task or images) and format != "lerobot":
         raise DemosError(f"Tasks and the choice of images are of lerobot, and not of {format}.")
@@ -157,6 +158,8 @@ def export_recording(
                     )
                 case "csv":
                     steps = write_csv(episodes, folder)
+                case "mcap":
+                    steps = write_mcap(episodes, folder)
         except OutputError:  # Already worded, and a subclass of OSError.
             raise
         except OSError as error:
@@ -256,8 +259,8 @@ def _require_format(name: str, path: Path) -> Format:
     """Return the named format, or the detected one for "auto"."""
     if name == "auto":
         return find_format(path)
-    if name not in FORMATS:
-        raise UnknownName("format", name, ("auto", *FORMATS))
+    if name not in _READ:
+        raise UnknownName("format", name, ("auto", *_READ))
     _require_folder(path)
     if not _DETECT[name](path):
         raise DemosError(f"{path} is not {name}: expected {_EXPECTED}; or omit --format.")

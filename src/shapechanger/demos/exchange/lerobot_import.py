@@ -283,12 +283,19 @@ def _own_header(
             f"{where} is of another dataset, with other actions, states or pictures: remove the "
             "file if the dataset was edited."
         )
-    known = cast("list[tuple[Driver, int]]", runs)
-    rest: Iterator[Driver] = repeat("person")
-    drivers = chain(*(repeat(driver, count) for driver, count in known), rest)
     # The steps come back without their times.
     header = replace(header, clock="none", notes=found.notes | header.notes)
+    drivers = _drivers(cast("list[tuple[Driver, int]]", runs))
     return header, drivers, str(plain.get("outcome", ""))
+
+
+def _drivers(runs: Sequence[tuple[Driver, int]]) -> Iterator[Driver]:
+    """Yield the driver of each step."""
+    for driver, count in runs:
+        for _ in range(count):
+            yield driver
+    while True:
+        yield "person"
 
 
 def _tasks(folder: Path) -> list[str]:
