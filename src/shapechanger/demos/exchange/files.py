@@ -39,12 +39,12 @@ def library(name: str, extra: str = "data") -> Any:
 
 
 @contextmanager
-def new_folder(out: Path, source: Path) -> Generator[Path]:
+def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
     """Create a folder that is renamed to `out` on success and removed on failure.
 
     Args:
         out: The folder to create; it must not exist.
-        source: The folder that is read meanwhile; `out` must not lie in it.
+        source: The folder that is read meanwhile, if any; `out` must not lie in it.
 
     Yields:
         A hidden folder beside `out` to write to.
@@ -55,7 +55,7 @@ def new_folder(out: Path, source: Path) -> Generator[Path]:
     """
     if os.path.lexists(out):
         raise DemosError(f"{out} exists already: choose another name, or move it away.")
-    if out.resolve().is_relative_to(source.resolve()):
+    if source is not None and out.resolve().is_relative_to(source.resolve()):
         raise DemosError(f"{out} lies in {source}, which is never changed: choose another place.")
     made = [parent for parent in out.absolute().parents if not parent.exists()]
     part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
