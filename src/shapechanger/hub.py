@@ -85,7 +85,7 @@ def push(
         HubError: If the Hub refuses, or the repository holds something else.
         MissingExtra: If huggingface_hub is not installed.
     """
-    hub = _library()
+    hub, errors = _library(), _errors()
     repo_type = _TYPES[kind]
     about = {
         name: {"bytes": path.stat().st_size, "sha256": sha256_of(path)}
@@ -97,13 +97,14 @@ def push(
         try:
             found = api.repo_info(repo, repo_type=repo_type)
             there = {file.rfilename for file in found.siblings or ()}
-        except hub.errors.RepositoryNotFoundError:
+        except errors.RepositoryNotFoundError:
             api.create_repo(repo, repo_type=repo_type, private=not public, exist_ok=True)
             there = set[str]()
-        if _LIST not in there and there - {".gitattributes", _CARD}:
+        strange = there - {".gitattributes", _CARD}
+        if strange and _LIST not in there:
             raise HubError(
-                f"{repo} holds files that Shapechanger did not push, such as {min(there)}: choose "
-                "another name."
+                f"{repo} holds files that Shapechanger did not push, such as {min(strange)}: "
+                "choose another name."
             )
         add = hub.CommitOperationAdd
         operations: list[Any] = [add(name, str(path)) for name, path in files.items()]
@@ -231,16 +232,20 @@ def _library() -> Any:
     except ImportError as error:
         raise MissingExtra("huggingface_hub", "hub") from error
     # Our errors are one sentence, and its warnings would stand beside it.
-    hub.utils.logging.set_verbosity_error()
-    hub.utils.disable_progress_bars()
-    import_module("huggingface_hub.errors")
+    utilities = import_module("huggingface_hub.utils")
+    utilities.logging.set_verbosity_error()
+    utilities.disable_progress_bars()
     return hub
+
+
+def _errors() -> Any:
+    return import_module("huggingface_hub.errors")
 
 
 @contextmanager
 def _answers(repo: str, kind: Kind) -> Generator[None]:
     """Turn what the Hub answers, and errors of the transport, into sentences."""
-    errors = import_module("huggingface_hub.errors")
+    errors = _errors()
     try:
         yield
     except ShapechangerError:

@@ -163,8 +163,8 @@ def _described_policy(file: Path) -> dict[str, Any]:
             "seed": ", ".join(map(str, clone.seeds)),
             "version": clone.version,
             "command": clone.command,
-            "observation": clone.state_layout,
-            "action": clone.action_layout,
+            "observation": _features(clone.state_layout, f"picture ({clone.eyes})"),
+            "action": _features(clone.action_layout, "steering, throttle"),
         }
     card = load_policy(file).card
     return {
@@ -174,9 +174,16 @@ def _described_policy(file: Path) -> dict[str, Any]:
         "seed": card.seed,
         "version": card.version,
         "command": card.command,
-        "observation": card.observation,
-        "action": card.action,
+        "observation": _features(card.observation),
+        "action": _features(card.action),
     }
+
+
+def _features(layout: Layout | None, more: str = "") -> str:
+    """Return the features of a layout with their units, in Markdown; `more` stands in for none."""
+    if layout is None:
+        return more
+    return f"{layout.size} numbers: " + ", ".join(f"`{feature}`" for feature in layout)
 
 
 def _policy_card(file: Path, repo: str) -> str:
@@ -215,12 +222,13 @@ def _recording_card(episodes: list[Episode], hashes: dict[str, str], repo: str) 
     shown = list(hashes.items())[:_MOST_HASHES]
     rows |= {f"SHA-256 of {name}": digest for name, digest in shown}
     state = Layout.from_json(header.state_layout) if header.state_layout else None
+    action = Layout.from_json(header.action_layout)
     return _card(
         repo,
         ["demonstrations"],
         "Demonstrations, recorded with Shapechanger.",
         rows,
-        {"State": state, "Action": Layout.from_json(header.action_layout)},
+        {"State": _features(state, "none"), "Action": _features(action)},
         header.source,
         f"shapechanger demos pull {repo} --out data",
     )
@@ -231,7 +239,7 @@ def _card(
     tags: list[str],
     lead: str,
     rows: dict[str, object],
-    layouts: dict[str, Layout | None],
+    layouts: dict[str, str],
     command: str,
     usage: str,
 ) -> str:
@@ -245,10 +253,7 @@ def _card(
         lead,
         f"| | |\n| --- | --- |\n{table}",
     ]
-    for name, layout in layouts.items():
-        if layout is not None:
-            features = ", ".join(f"`{feature}`" for feature in layout)
-            parts.append(f"**{name}** ({layout.size} numbers): {features}")
+    parts += [f"**{name}**: {features}" for name, features in layouts.items()]
     if command:
         indented = "\n".join(f"    {line}" for line in command.splitlines())
         parts.append(f"Made by\n\n{indented}")
