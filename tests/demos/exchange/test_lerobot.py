@@ -329,7 +329,7 @@ def longer(folder: Path) -> None:
         ),
         (
             lambda f: edit_features(f, action={"dtype": "float32", "shape": [3]}),
-            "'action' does not have 3 numbers",
+            "'action' does not have 3 numbers in each row",
         ),
         (
             lambda f: edit_features(f, **{"observation.x": {"dtype": "int64", "shape": [1]}}),

@@ -13,8 +13,9 @@ kept. Numbers have 32 bits. A state that nothing measured is the middle of its r
 NaN would make all statistics of a dataset NaN.
 
 Statistics have LeRobot's keys and its way to combine episodes (`compute_stats.py` of lerobot
-0.4.4), with two differences: quantiles are exact where LeRobot's come from a histogram, and all
-pictures of an episode count, not a sample.
+0.4.4), with three differences: quantiles are exact where LeRobot's come from a histogram, all
+pictures of an episode count, not a sample, and their standard deviation is the true one, where
+LeRobot's squares overflow 8 bits.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import chain, repeat
@@ -44,8 +44,12 @@ _NUMBERS: Final = re.compile(r"bool|u?int(8|16|32|64)|float(16|32|64)")
 _UNIT_UNKNOWN: Final = "?"
 _MAX_FEATURES: Final = 512  # A larger vector becomes one array feature.
 _MAX_VALUES: Final = 1 << 17
-_ROWS: Final = 32  # In memory at once, because they may hold pictures.
-_MAX_ROW_GROUP: Final = 1 << 30  # Bytes, unpacked.
+_ROWS: Final = 256  # In memory at once; fewer if the values of a column are large.
+# A few bytes of Parquet can claim any number of values. Of what is read, bytes at once, and the
+# largest share of unpacked bytes to those of the file.
+_MAX_UNPACKED: Final = 64 << 20
+_MAX_PACKED: Final = 64
+_MAX_TEXT: Final = 4096  # Characters of a task.
 _PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}")
 _JPEG: Final = b"\xff\xd8"
 _PNG: Final = b"\x89PNG"
@@ -95,6 +99,7 @@ def read_lerobot(folder: Path, camera: str = "") -> Iterator[ExchangeEpisode]:
     tasks = _tasks(folder)
     episodes = _episodes(folder, kept)
     own = _own_headers(folder, len(episodes))
+    unpacked: dict[Path, int] = {}
     for number, place in enumerate(episodes):
         about = header
         task = place.get("tasks")
@@ -107,7 +112,7 @@ def read_lerobot(folder: Path, camera: str = "") -> Iterator[ExchangeEpisode]:
             about, drivers, outcome = _own_header(own[number], about, folder, number)
         yield ExchangeEpisode(
             header=about,
-            rows=_rows(folder, info, place, kept, about, drivers),
+            rows=_rows(folder, info, place, kept, about, drivers, unpacked),
             name=f"{folder}, episode {number}",
             outcome=outcome,
         )
@@ -324,7 +329,15 @@ def _episodes(folder: Path, kept: _Kept) -> list[dict[str, Any]]:
             if missing := sorted(column for column in columns if row.get(column) is None):
                 raise DemosError(f"{path} has no {missing[0]!r}.")
             found.append(row)
-    return sorted(found, key=lambda row: int(row["episode_index"]))
+    try:
+        for row in found:
+            row |= {key: int(row[key]) for key in columns if key.endswith(("index", "length"))}
+    except (TypeError, ValueError) as error:
+        raise DemosError(f"{folder / names.EPISODES} has an index that is no number.") from error
+    found.sort(key=lambda row: row["episode_index"])
+    if [row["episode_index"] for row in found] != list(range(len(found))):
+        raise DemosError(f"{folder / names.EPISODES} does not number the episodes from 0.")
+    return found
 
 
 def _inside(folder: Path, name: str, named_by: Path) -> Path:
@@ -353,24 +366,56 @@ def _place(template: object, info_path: Path, values: dict[str, Any]) -> str:
 def _parquet(path: Path) -> Generator[Any]:
     """Open a Parquet file as a `pyarrow.parquet.ParquetFile`."""
     arrow = library("pyarrow", "lerobot")
+    parquet = library("pyarrow.parquet", "lerobot")
     try:
-        with library("pyarrow.parquet", "lerobot").ParquetFile(path) as file:
-            found = file.metadata
-            groups = [found.row_group(n).total_byte_size for n in range(found.num_row_groups)]
-            if found.num_rows > path.stat().st_size or max(groups, default=0) > _MAX_ROW_GROUP:
-                raise DemosError(f"{path} claims more than it holds: {found.num_rows} rows.")
+        # Without `buffer_size` a whole row group is in memory, which may be an episode of pictures.
+        with parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20) as file:
+            size = path.stat().st_size
+            columns = list(_columns_of(file, range(file.metadata.num_row_groups)))
+            claimed = sum(max(c.total_uncompressed_size, 8 * c.num_values) for c in columns)
+            if claimed > _MAX_UNPACKED + _MAX_PACKED * size or file.metadata.num_rows > size:
+                raise DemosError(f"{path} has {size} bytes, but claims {claimed}.")
             yield file
     except (arrow.ArrowException, OSError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
         raise DemosError(f"{path} is not an intact Parquet file: {reason}.") from error
 
 
+def _columns_of(file: Any, groups: Iterable[int]) -> Iterator[Any]:
+    """Yield the metadata of each column of some row groups."""
+    for number in groups:
+        group = file.metadata.row_group(number)
+        yield from (group.column(n) for n in range(group.num_columns))
+
+
+def _batches(file: Any, columns: Sequence[str], groups: Sequence[int]) -> Iterator[Any]:
+    """Yield the rows of some row groups, a few at a time."""
+    # Many rows may share one large value, which is in memory once for each.
+    sizes = (max(c.total_uncompressed_size, 8 * c.num_values) for c in _columns_of(file, groups))
+    largest = max(sizes, default=1)
+    rows = max(1, min(_ROWS, _MAX_UNPACKED // max(1, largest)))
+    return file.iter_batches(rows, row_groups=groups, columns=columns)
+
+
 def _table(path: Path, columns: set[str] | None) -> list[dict[str, Any]]:
-    """Return the rows of a small table."""
+    """Return the rows of a table of `meta/`."""
+    found: list[dict[str, Any]] = []
     with _parquet(path) as file:
         known = set(file.schema_arrow.names)
-        wanted = None if columns is None else sorted(columns & known)
-        return cast("list[dict[str, Any]]", file.read(columns=wanted).to_pylist())
+        wanted = sorted(known if columns is None else columns & known)
+        for batch in _batches(file, wanted, range(file.metadata.num_row_groups)):
+            for row in cast("list[dict[str, Any]]", batch.to_pylist()):
+                if any(len(text) > _MAX_TEXT for text in _texts(row)):
+                    raise DemosError(f"{path} has a text of more than {_MAX_TEXT} characters.")
+                found.append(row)
+    return found
+
+
+def _texts(row: dict[str, Any]) -> Iterator[str]:
+    """Yield the texts of a row, also those in lists."""
+    for value in row.values():
+        values = cast("list[Any]", value) if isinstance(value, list) else [value]
+        yield from (text for text in values if isinstance(text, str))
 
 
 def _rows(
@@ -380,17 +425,19 @@ def _rows(
     kept: _Kept,
     header: EpisodeHeader,
     drivers: Iterator[Driver],
+    unpacked: dict[Path, int],
 ) -> Iterator[ExchangeStep]:
+    """Yield the steps of an episode; `unpacked` counts the bytes of pictures of each file."""
     path = folder / names.INFO
-    number, length = int(place["episode_index"]), int(place["length"])
-    indexes = {key: int(place[f"data/{key}"]) for key in ("chunk_index", "file_index")}
+    number, length = place["episode_index"], place["length"]
+    indexes = {key: place[f"data/{key}"] for key in ("chunk_index", "file_index")}
     data = _inside(folder, _place(info.get("data_path"), path, indexes), path)
     pictures = Pictures(header.image_size)
     frames: Iterator[NDArray[np.uint8]] | None = None
     picture = kept.picture
     if picture is not None and picture.kind == "video":
         key = f"videos/{picture.key}"
-        indexes = {name: int(place[f"{key}/{name}"]) for name in indexes}
+        indexes = {name: place[f"{key}/{name}"] for name in indexes}
         video = _place(info.get("video_path"), path, {"video_key": picture.key, **indexes})
         frames = read_video(
             _inside(folder, video, path),
@@ -399,7 +446,8 @@ def _rows(
             header.control_hz,
             cast("tuple[int, int]", header.image_size),
         )
-    steps = 0
+    steps, shown = 0, b""
+    most = _MAX_UNPACKED + _MAX_PACKED * data.stat().st_size
     for row in _numbers(data, number, kept):
         where = f"of step {steps} of episode {number} in {data}"
         if steps >= length:
@@ -410,7 +458,12 @@ def _rows(
                 raise DemosError(f"There is no picture {where}.")
             jpeg = encode_picture(pixels)
         elif picture is not None:
-            jpeg = _stored_jpeg(row[picture.key], pictures, where)
+            stored = _stored(row[picture.key], where)
+            if stored != shown:  # Else the steps share a picture.
+                jpeg, shown = _as_jpeg(stored, pictures, where), stored
+                unpacked[data] = unpacked.get(data, 0) + len(stored)
+                if unpacked[data] > most:  # One picture can stand in any number of rows.
+                    raise DemosError(f"{data} unpacks to more than {most} bytes of pictures.")
         reward = float(row[names.REWARD][0]) if names.REWARD in row else math.nan
         done = names.DONE in row and bool(row[names.DONE][0])
         ended = bool(row[names.TERMINATED][0]) if names.TERMINATED in row else done
@@ -443,15 +496,11 @@ def _numbers(path: Path, episode: int, kept: _Kept) -> Iterator[dict[str, Any]]:
     with _parquet(path) as file:
         if missing := [key for key in wanted if key not in file.schema_arrow.names]:
             raise DemosError(f"{path} has no column {missing[0]!r}, which meta/info.json names.")
-        groups = _groups_of(file, episode)
-        for batch in file.iter_batches(_ROWS, row_groups=groups, columns=wanted):
-            numbers: dict[str, NDArray[np.float64]] = {}
-            for key, size in vectors.items():
-                values = batch.column(key).to_pylist()
-                try:
-                    numbers[key] = np.array(values, np.float64).reshape(len(values), size)
-                except (TypeError, ValueError) as error:
-                    raise DemosError(f"{path}: {key!r} does not have {size} numbers.") from error
+        for batch in _batches(file, wanted, _groups_of(file, episode)):
+            numbers = {
+                key: _vectors(batch.column(key), size, f"{path}: {key!r}")
+                for key, size in vectors.items()
+            }
             pictures = {key: batch.column(key) for key in stored}
             for row, owner in enumerate(batch.column(index).to_pylist()):
                 if owner == episode:
@@ -460,25 +509,45 @@ def _numbers(path: Path, episode: int, kept: _Kept) -> Iterator[dict[str, Any]]:
                     }
 
 
+def _vectors(column: Any, size: int, what: str) -> NDArray[np.float64]:
+    """Return the numbers of a column, shape (n, size)."""
+    types = library("pyarrow.types", "lerobot")
+    rows = len(column)
+    values: Any = getattr(column, "storage", column)  # Of arrays in an extension type.
+    even = not types.is_list(values.type) or len(np.unique(values.value_lengths())) == 1
+    while types.is_list(values.type) or types.is_fixed_size_list(values.type):
+        values = values.flatten()
+    if even and len(values) == rows * size:
+        try:
+            return np.asarray(values.to_numpy(zero_copy_only=False), np.float64).reshape(rows, size)
+        except (TypeError, ValueError) as error:
+            raise DemosError(f"{what} is not numeric ({error}).") from error
+    raise DemosError(f"{what} does not have {size} numbers in each row.")
+
+
 def _groups_of(file: Any, episode: int) -> list[int]:
     """Return the row groups that may hold steps of an episode, by their statistics."""
     found: list[int] = []
     for number in range(file.metadata.num_row_groups):
-        group = file.metadata.row_group(number)
-        columns = (group.column(n) for n in range(group.num_columns))
+        columns = _columns_of(file, [number])
         about = next((c.statistics for c in columns if c.path_in_schema == "episode_index"), None)
         if about is None or not about.has_min_max or about.min <= episode <= about.max:
             found.append(number)
     return found
 
 
-def _stored_jpeg(stored: Any, pictures: Pictures, where: str) -> bytes:
-    """Return a picture of a table as JPEG."""
+def _stored(stored: Any, where: str) -> bytes:
+    """Return the bytes of a picture of a table."""
     data = cast("dict[str, Any]", stored).get("bytes") if isinstance(stored, dict) else None
     if not isinstance(data, bytes) or not data:
         raise DemosError(f"The picture {where} is not in the table.")
     if len(data) > MAX_PICTURE_BYTES:
         raise DemosError(f"The picture {where} has more than {MAX_PICTURE_BYTES} bytes.")
+    return data
+
+
+def _as_jpeg(data: bytes, pictures: Pictures, where: str) -> bytes:
+    """Return a picture as JPEG."""
     if data.startswith(_JPEG):
         pictures.check(data, where)
         return data
