@@ -86,6 +86,7 @@ def push(
         MissingExtra: If huggingface_hub is not installed.
     """
     hub, errors = _library(), _errors()
+    _require_name(repo)
     repo_type = _TYPES[kind]
     about = {
         name: {"bytes": path.stat().st_size, "sha256": sha256_of(path)}
@@ -138,6 +139,7 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
         MissingExtra: If huggingface_hub is not installed.
     """
     hub = _library()
+    _require_name(repo)
     repo_type = _TYPES[kind]
     with _answers(repo, kind):
         found = hub.HfApi().repo_info(repo, repo_type=repo_type, revision=revision or None)
@@ -166,6 +168,18 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
                 _fetch(chunks(name), file, f"{name} of {repo}", size, digest)
             paths.append(path)
     return Pulled(commit, tuple(paths))
+
+
+def _require_name(repo: str) -> None:
+    """Refuse a name without an owner, an address, or a path."""
+    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo, re.ASCII):
+        raise _no_name(repo)
+
+
+def _no_name(repo: str) -> HubError:
+    return HubError(
+        f"{repo!r} is no name of a repository: give its owner and its name, such as ada/ant."
+    )
 
 
 def _fetch(chunks: Generator[bytes], file: Any, name: str, size: int, digest: str) -> None:
@@ -215,7 +229,7 @@ def _listed(plain: Any, repo: str, kind: Kind, max_bytes: int) -> dict[str, tupl
         raise HubError(f"{_LIST} of {repo} does not list its files.") from error
     for name in listed:
         if not _NAMES[kind].fullmatch(name):
-            raise HubError(f"{_LIST} of {repo} names {name[:80]!r}, which is no file of a {kind}.")
+            raise HubError(f"{_LIST} of {repo} names {name[:80]!r}, which is no {kind} file.")
     sizes = [size for size, _ in listed.values()]
     if not sizes or min(sizes) < 0:
         raise HubError(f"{_LIST} of {repo} does not list its files.")
@@ -251,9 +265,7 @@ def _answers(repo: str, kind: Kind) -> Generator[None]:
     except ShapechangerError:
         raise
     except errors.HFValidationError as error:
-        raise HubError(
-            f"{repo!r} is no name of a repository: expected one such as ada/ant."
-        ) from error
+        raise _no_name(repo) from error
     except errors.RevisionNotFoundError as error:
         raise HubError(f"{repo} has no such revision.") from error
     except errors.RepositoryNotFoundError as error:

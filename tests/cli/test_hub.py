@@ -136,7 +136,7 @@ def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, f
     assert out.read_bytes() == file.read_bytes()
     assert next(reversed(repository.commits)) in output
     assert not any("evil" in request for request in hub.requests)
-    pinned = tmp_path / "pinned.safetensors"
+    pinned = tmp_path / "folder" / "pinned.safetensors"
     assert first in run(
         "policies", "pull", "ada/reach", "--out", pinned, "--revision", first
     )[1]  # fmt: skip
@@ -178,7 +178,8 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
     # A token that no header can carry must not be part of the error.
     answer = run(*push, token="hf_söcret")
     assert "söcret" not in refused(answer)
-    assert "no name of a repository" in refused(run("policies", "pull", "a/b/c", "--out", out))
+    for name in ("ant", "a/b/c", "https://huggingface.co/ada/ant", "ada/..", "ada/-ant"):
+        assert "no name of a repository" in refused(run("policies", "pull", name, "--out", out))
     hub.repositories["models/ada/other"] = Repository()
     hub.repositories["models/ada/other"].commit({"model.bin": b"1"})
     assert "did not push, such as model.bin" in refused(
@@ -223,8 +224,8 @@ ZERO = "0" * 64
         (b"abc", listing({NAME: (2, ZERO)}), "larger than the 2 bytes"),
         (b"abc", listing({NAME: (5, ZERO)}), "was cut after 3 of 5 bytes"),
         (b"abc", listing({NAME: (3, ZERO)}), "does not have the SHA-256"),
-        (b"abc", listing({"../../x": (3, ZERO)}), "names '../../x', which is no file"),
-        (b"abc", listing({"model.pkl": (3, ZERO)}), "names 'model.pkl', which is no file"),
+        (b"abc", listing({"../../x": (3, ZERO)}), "names '../../x', which is no policy file"),
+        (b"abc", listing({"model.pkl": (3, ZERO)}), "names 'model.pkl', which is no policy file"),
         (b"abc", listing({NAME: (-3, ZERO)}), "does not list its files"),
         (b"abc", listing({}), "does not list its files"),
         (b"abc", listing({NAME: (3, ZERO)}, "demonstrations"), "and not 'policy'"),

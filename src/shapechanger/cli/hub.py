@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final
 import tyro
 
 from shapechanger.cli.console import counted, say
+from shapechanger.cli.env_arguments import require_file
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.errors import HubError, StudyError
 from shapechanger.layout import Layout
@@ -75,6 +76,7 @@ class PullPolicy:
                 raise HubError(
                     str(error).replace(str(path), f"{path.name} of {self.repo}")
                 ) from error
+            require_file(self.out)
             write_atomic(self.out, path.read_bytes())
         say(f"wrote {self.out}: {described['env']}, revision {pulled.revision}")
 

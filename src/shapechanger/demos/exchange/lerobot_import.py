@@ -374,7 +374,7 @@ def _parquet(path: Path) -> Generator[Any]:
             columns = list(_columns_of(file, range(file.metadata.num_row_groups)))
             claimed = sum(max(c.total_uncompressed_size, 8 * c.num_values) for c in columns)
             if claimed > _MAX_UNPACKED + _MAX_PACKED * size or file.metadata.num_rows > size:
-                raise DemosError(f"{path} has {size} bytes, but claims {claimed}.")
+                raise DemosError(f"{path} has {size} bytes, but claims to unpack to {claimed}.")
             yield file
     except (arrow.ArrowException, OSError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
