@@ -33,7 +33,7 @@ class PushPolicy:
     repo: _Repo
     """Name of the repository, such as ada/ant; it is made if there is none."""
     public: bool = False
-    """Let everybody read a new repository; only you can, if not given."""
+    """Let everybody read a new repository; it is private, if not given."""
 
     def run(self) -> None:
         """Check the policy, upload it, and print where it is."""
@@ -90,7 +90,7 @@ class PushDemonstrations:
     repo: _Repo
     """Name of the repository, such as ada/drive; it is made if there is none."""
     public: bool = False
-    """Let everybody read a new repository; only you can, if not given."""
+    """Let everybody read a new repository; it is private, if not given."""
 
     def run(self) -> None:
         """Check and pack the episodes, upload them, and print where they are."""
