@@ -29,7 +29,7 @@ def smooth(number: int, width: int = 64, height: int = 48) -> np.ndarray:
     return np.broadcast_to(ramp + 5.0 * number, (height, width, 3)).astype(np.uint8)
 
 
-def smooth_drive(data: Path, count: int, hz: float) -> None:
+def smooth_drive(data: Path, count: int, hz: float, *, rewarded: bool = True) -> None:
     """Record an episode with such pictures."""
     rng = np.random.default_rng(count)
     steps = [
@@ -38,7 +38,7 @@ def smooth_drive(data: Path, count: int, hz: float) -> None:
                 action=tuple(rng.uniform(-1, 1, 2)),
                 driver="person",
                 state=tuple(rng.normal(size=2)),
-                reward=n / 3,
+                reward=n / 3 if rewarded else None,
                 terminated=n == count - 1,
             ),
             encode_picture(smooth(n)),
@@ -168,14 +168,49 @@ def test_we_read_what_lerobot_writes(tmp_path: Path, kind: str) -> None:
             assert np.abs(seen - pixels).mean() < (1.0 if kind == "image" else 2.5)
 
 
-def test_an_export_can_be_continued_elsewhere(tmp_path: Path) -> None:
-    """`info.json` has the keys that LeRobot writes itself."""
+@pytest.mark.parametrize("images", [False, True])
+def test_lerobot_continues_an_export(tmp_path: Path, images: bool) -> None:
+    """LeRobot adds an episode to ours; without our own file, both are imported."""
+    # LeRobot 0.4.4 cannot add a number of 32 bits that is no part of a vector.
+    smooth_drive(tmp_path / "data", 5, 20.0, rewarded=False)
+    export_recording(tmp_path / "data", tmp_path / "set", "lerobot", task="A.", images=images)
+    resume = getattr(LeRobotDataset, "resume", LeRobotDataset)  # The former in 0.6.
+    dataset = resume("ours/set", root=tmp_path / "set")
+    for n in range(4):
+        dataset.add_frame(
+            {
+                "action": np.array([n, 0.5], np.float32),
+                "observation.state": np.zeros(2, np.float32),
+                CAMERA: smooth(n),
+                "next.done": np.array([n == 3]),
+                "next.terminated": np.array([False]),
+                "task": "B.",
+            }
+        )
+    dataset.save_episode()
+    dataset.finalize()
+    again = LeRobotDataset("ours/set", root=tmp_path / "set", video_backend=READER)
+    assert (len(again), again.num_episodes) == (9, 2)
+    assert again[8]["task"] == "B."
+    assert again.meta.stats["action"]["count"].tolist() == [9]
+    (tmp_path / "set/meta/shapechanger.json").unlink()
+    assert import_recording(tmp_path / "set", tmp_path / "back").steps == 9
+    last = all_of(tmp_path / "back")[1]
+    assert last.header.notes["task"] == "B."
+    assert [step.action[0] for step in last.steps] == [0.0, 1.0, 2.0, 3.0]
+    seen = [decode_picture(last.jpeg(step) or b"", "").astype(float) for step in last.steps]
+    assert all(np.abs(pixels - smooth(n)).mean() < 2.5 for n, pixels in enumerate(seen))
+
+
+def test_the_keys_of_info(tmp_path: Path) -> None:
+    """`info.json` has the keys and the paths that LeRobot writes itself."""
     smooth_drive(tmp_path / "data", 5, 20.0)
     export_recording(tmp_path / "data", tmp_path / "ours", "lerobot")
-    theirs = LeRobotDataset.create(
+    LeRobotDataset.create(
         "theirs/set", fps=20, features={}, root=tmp_path / "theirs", use_videos=True
     )
-    info = json.loads((tmp_path / "ours/meta/info.json").read_text())
-    assert info.keys() == theirs.meta.info.keys()
-    assert info["data_path"] == theirs.meta.info["data_path"]
-    assert info["video_path"] == theirs.meta.info["video_path"]
+    ours, theirs = (
+        json.loads((tmp_path / name / "meta/info.json").read_text()) for name in ("ours", "theirs")
+    )
+    assert ours.keys() == theirs.keys()
+    assert (ours["data_path"], ours["video_path"]) == (theirs["data_path"], theirs["video_path"])
