@@ -105,7 +105,7 @@ def test_long_episodes_and_many_files(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(lerobot_export, "_VIDEO_FILE_S", 1.0)
     monkeypatch.setattr(lerobot_export, "_DATA_FILE_MB", 0)
     monkeypatch.setattr(lerobot_export, "_FILES_PER_CHUNK", 2)
-    for count in (600, 3, 30, 25):
+    for count in (300, 3, 30, 25):
         drive(tmp_path / "data", count)
     export_recording(tmp_path / "data", tmp_path / "out", "lerobot")
     assert len(list((tmp_path / "out/videos").rglob("*.mp4"))) == 3
@@ -219,11 +219,19 @@ def test_options_of_lerobot_alone(tmp_path: Path) -> None:
         import_recording(tmp_path / "csv", tmp_path / "back", camera="front")
 
 
-@pytest.fixture
-def dataset(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A dataset of one episode with a video."""
-    smooth_drive(tmp_path / "data", 12)
-    export_recording(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive home.")
+    place = tmp_path_factory.mktemp("exported")
+    smooth_drive(place / "data", 12)
+    export_recording(place / "data", place / "set", "lerobot", task="Drive home.")
+    return place / "set"
+
+
+@pytest.fixture
+def dataset(exported: Path, tmp_path: Path) -> Path:
+    """A copy of it, to change."""
+    shutil.copytree(exported, tmp_path / "set")
     return tmp_path / "set"
 
 
