@@ -78,10 +78,12 @@ _RULES = {
     # Observations and actions, not sockets or pins.
     "teleop": _Rule(_names("errors layout demos"), never=_HARDWARE | _HEAVY | {"socket"}),
     "demos": _Rule(_names("errors layout tensor_file"), never=_HARDWARE | _SIMULATORS | {"socket"}),
+    # Files in a repository of the Hugging Face Hub; what they hold is others' business.
+    "hub": _Rule(_names("errors"), _names("huggingface_hub")),
     # The command line composes everything, and nothing imports it.
     "cli": _Rule(
         _names("errors layout link morphology bodies tasks envs transfer robot remote twin")
-        | _names("teleop demos reports testing shapechanger rendering worlds identify")
+        | _names("teleop demos reports testing shapechanger rendering worlds identify hub")
     ),
     "identify": _Rule(
         _names("errors layout morphology bodies tasks"),

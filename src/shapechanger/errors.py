@@ -25,6 +25,7 @@ ShapechangerError
 ├── LinkError (ConnectionError)     robot that cannot be reached or breaks the protocol
 │   ├── RobotRefused                the robot refuses, with its reason
 │   └── StaleObservation            newest observation too old to act on
+├── HubError (ConnectionError)       repository on the Hub that cannot be reached or is refused
 ├── RobotError (RuntimeError)       error on the robot, such as a device that does not respond
 │   └── ProfileError (ValueError)   invalid profile, with the line
 ├── OutputError (OSError)           file or folder that cannot be written
@@ -157,6 +158,10 @@ class RobotRefused(LinkError):
 
 class StaleObservation(LinkError):
     """The newest observation is too old to act on."""
+
+
+class HubError(ShapechangerError, ConnectionError):
+    """Repository on the Hugging Face Hub that cannot be reached, or whose files are refused."""
 
 
 class RobotError(ShapechangerError, RuntimeError):

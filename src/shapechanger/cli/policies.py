@@ -1,4 +1,4 @@
-"""`shapechanger policies`: list, show, play, evaluate, export and convert policies."""
+"""`shapechanger policies`: list, show, play, evaluate, export, convert and share policies."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from rich.table import Table
 
 from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import Body, EnvId, driven, env_ref, opened
+from shapechanger.cli.hub import PullPolicy, PushPolicy
 from shapechanger.cli.play import Watching
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
@@ -469,7 +470,7 @@ def _settings(model: Any) -> Sb3Settings:
 
 @dataclass(frozen=True)
 class Policies:
-    """List, inspect, watch, evaluate, export and convert policies."""
+    """List, inspect, watch, evaluate, export, convert and share policies."""
 
     command: (
         Annotated[ListPolicies, tyro.conf.subcommand("list")]
@@ -478,4 +479,6 @@ class Policies:
         | Annotated[EvaluatePolicy, tyro.conf.subcommand("evaluate")]
         | Annotated[ExportPolicy, tyro.conf.subcommand("export")]
         | Annotated[Convert, tyro.conf.subcommand("convert")]
+        | Annotated[PushPolicy, tyro.conf.subcommand("push")]
+        | Annotated[PullPolicy, tyro.conf.subcommand("pull")]
     )

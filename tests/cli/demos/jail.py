@@ -16,6 +16,7 @@ from pathlib import Path
 
 import h5py  # noqa: F401
 import minari  # noqa: F401
+import pyarrow.parquet  # noqa: F401
 import simplejpeg  # noqa: F401
 
 from shapechanger.cli import main

@@ -41,3 +41,16 @@ def test_an_unknown_format(tmp_path: Path) -> None:
     """The error suggests the nearest format."""
     with pytest.raises(UnknownName, match="Did you mean 'minari'"):
         Export(drive(tmp_path / "data"), tmp_path / "out", "mniari").run()
+
+
+def test_lerobot_and_mcap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """How to load a LeRobot dataset is printed, and what takes dropped steps."""
+    drop(drive(tmp_path / "data"), 0, 0, "bad")
+    Export(tmp_path / "data", tmp_path / "set", "lerobot", task="Drive.", images=True).run()
+    output = capsys.readouterr().out
+    assert "4 steps of 1 episode\nleft out 1 dropped steps\n" in output
+    assert f"LeRobotDataset('set', root='{tmp_path / 'set'}')" in output
+    Import(tmp_path / "set", tmp_path / "back", camera="camera").run()
+    assert "(lerobot): 1 episode, 4 steps, 4 pictures" in capsys.readouterr().out
+    Export(tmp_path / "data", tmp_path / "logs", "mcap").run()
+    assert "left out 1 dropped steps; --dropped includes them" in capsys.readouterr().out

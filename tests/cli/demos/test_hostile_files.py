@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from shapechanger.demos.episodes.records import decode_line, encode_line
@@ -309,6 +311,88 @@ def test_a_csv_that_returns_to_a_picture_is_refused(tmp_path: Path, jail: Jail) 
     edit(tmp_path / "csv/steps.csv", "000002.jpg", "000000.jpg")
     text = refuse(jail("import", tmp_path / "csv", "--out", tmp_path / "out"))
     assert "returns to the picture" in text
+
+
+ROWS = "data/chunk-000/file-000.parquet"
+PLACES = "meta/episodes/chunk-000/file-000.parquet"
+CAMERA = "observation.images.camera"
+
+
+def column(name: str, key: str, values: Callable[[int], object]) -> Callable[[Path], None]:
+    """Return a change of a column of a Parquet file, which is then packed as far as possible."""
+
+    def change(folder: Path) -> None:
+        table = pq.read_table(folder / name)
+        place = table.schema.get_field_index(key)
+        array = pa.array(values(len(table)), table.schema.field(place).type)
+        table = table.set_column(place, key, array)
+        pq.write_table(table, folder / name, compression="zstd", data_page_size=1 << 30)
+
+    return change
+
+
+def many_rows(folder: Path) -> None:
+    """Repeat a row a million times, in a few kilobytes."""
+    table = pq.read_table(folder / ROWS).take([0])
+    part = pa.concat_tables([table] * 1000).combine_chunks()
+    repeated = pa.concat_tables([part] * 1000)
+    pq.write_table(repeated, folder / ROWS, compression="zstd", row_group_size=len(repeated))
+
+
+def two_pictures(count: int) -> list[dict[str, object]]:
+    """Return two large pictures that alternate, so that each row is a new one."""
+    jpegs = [picture(n, 40, 32) + bytes(15 << 20) for n in (0, 1)]
+    return [{"bytes": jpegs[n % 2], "path": ""} for n in range(count)]
+
+
+LEROBOTS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "a task of 96 MiB": (
+        column(PLACES, "tasks", lambda n: [["x" * (96 << 20)], *[["x"]] * (n - 1)]),
+        "bytes, but claims",
+    ),
+    "a task of 8 MiB": (
+        column(PLACES, "tasks", lambda n: [["x" * (8 << 20)]] * n),
+        "a text of more than 4096 characters",
+    ),
+    "a picture of 128 MiB": (
+        column(ROWS, CAMERA, lambda n: [{"bytes": bytes((n == 0) << 27)} for n in range(n)]),
+        "bytes, but claims",
+    ),
+    "two pictures of 15 MiB in all rows": (column(ROWS, CAMERA, two_pictures), "unpacks to more"),
+    "a million rows": (many_rows, "bytes, but claims"),
+    "an episode twice": (
+        column(PLACES, "episode_index", lambda n: [0] * n),
+        "does not number the episodes",
+    ),
+    "an action of 10^9 values": (
+        lambda f: edit(f / "meta/info.json", "2\n            ],", "1000000000\n            ],"),
+        "has the shape",
+    ),
+    "a file elsewhere": (
+        lambda f: edit(f / "meta/info.json", "data/chunk", "../secret/chunk"),
+        "leaves the folder",
+    ),
+    "rows that are a pipe": (lambda f: pipe(f / ROWS), "There is no"),
+    "metadata of 8 GiB": (lambda f: sparse(f / PLACES, 8 * GIB), "not an intact Parquet file"),
+    "metadata nested deeply": (
+        lambda f: (f / "meta/info.json").write_text("[" * 100_000),
+        "is not valid JSON",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LEROBOTS)
+def test_a_hostile_lerobot_dataset_is_refused(tmp_path: Path, jail: Jail, name: str) -> None:
+    """A few kilobytes of Parquet can claim any number of rows, values and bytes."""
+    (tmp_path / "secret").mkdir()
+    for count in (30, 2):
+        drive(tmp_path / "data", count)
+    export_recording(tmp_path / "data", tmp_path / "set", "lerobot", images=True)
+    (tmp_path / "set/meta/shapechanger.json").unlink()
+    spoil, words = LEROBOTS[name]
+    spoil(tmp_path / "set")
+    assert words in refuse(jail("import", tmp_path / "set", "--out", tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
 
 
 REWARDS = "episode_0/rewards"

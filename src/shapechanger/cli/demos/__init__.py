@@ -1,4 +1,4 @@
-"""`shapechanger demos`: record, inspect, edit and learn from demonstrations."""
+"""`shapechanger demos`: record, inspect, edit, share and learn from demonstrations."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ from shapechanger.cli.demos.recordings import (
 )
 from shapechanger.cli.demos.replay import Replay
 from shapechanger.cli.demos.train import Evaluate, TrainClone
+from shapechanger.cli.hub import PullDemonstrations, PushDemonstrations
 
 __all__ = ["Demos"]
 
 
 @dataclass(frozen=True)
 class Demos:
-    """Record, inspect and edit demonstrations, and learn from them."""
+    """Record, inspect, edit and share demonstrations, and learn from them."""
 
     command: (
         Annotated[RecordDemonstrations, tyro.conf.subcommand("record")]
@@ -43,6 +44,8 @@ class Demos:
         | Annotated[Replay, tyro.conf.subcommand("replay")]
         | Annotated[Import, tyro.conf.subcommand("import")]
         | Annotated[Export, tyro.conf.subcommand("export")]
+        | Annotated[PushDemonstrations, tyro.conf.subcommand("push")]
+        | Annotated[PullDemonstrations, tyro.conf.subcommand("pull")]
         | Annotated[TrainClone, tyro.conf.subcommand("train")]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     )

@@ -323,13 +323,15 @@ class Import:
     out: Path
     """The recording to make; it must not exist yet."""
     format: str = "auto"
-    """Format of the folder: 2017, tub, minari or csv; auto detects it."""
+    """Format of the folder: 2017, tub, minari, lerobot or csv; auto detects it."""
+    camera: str = ""
+    """Which camera to take from a LeRobot dataset that has several, such as front."""
 
     def run(self) -> None:
         """Import and print a summary."""
         from shapechanger.demos.exchange import import_recording
 
-        done = import_recording(self.source, self.out, self.format)
+        done = import_recording(self.source, self.out, self.format, camera=self.camera)
         say(
             f"read {self.source} ({done.format}): {counted(done.episodes, 'episode')}, "
             f"{counted(done.steps, 'step')}, {counted(done.pictures, 'picture')}\nwrote {self.out}"
@@ -346,22 +348,30 @@ class Export:
     """The folder to make; it must not exist yet. For minari its name ends in a version, as in
     drive-v0."""
     to: str
-    """Format to write: minari, csv, 2017 or tub."""
+    """Format to write: minari, lerobot, csv, mcap, 2017 or tub."""
     dropped: bool = False
-    """Write dropped steps too, marked as such; only minari and csv can."""
+    """Write dropped steps too, marked as such; only minari, csv and mcap can."""
+    task: str = ""
+    """What the robot does, in words, for policies that follow language; lerobot only."""
+    images: bool = False
+    """Store pictures as they were recorded, in place of video; lerobot only."""
 
     def run(self) -> None:
         """Export and print a summary."""
         from shapechanger.demos.exchange import export_recording
 
-        done = export_recording(self.data, self.out, self.to, dropped=self.dropped)
+        done = export_recording(
+            self.data, self.out, self.to, dropped=self.dropped, task=self.task, images=self.images
+        )
         say(
             f"wrote {self.out} ({done.format}): {counted(done.steps, 'step')} of "
             f"{counted(done.episodes, 'episode')}"
         )
         if done.left_out:
-            where = "; --dropped includes them" if done.format in {"minari", "csv"} else ""
+            where = "; --dropped includes them" if done.format in {"minari", "csv", "mcap"} else ""
             say(f"left out {done.left_out} dropped steps{where}")
+        if done.format == "lerobot":
+            say(f"load it with LeRobotDataset({self.out.name!r}, root={str(self.out)!r})")
         if done.format == "minari":
             say(
                 f"load it with MINARI_DATASETS_PATH={self.out.absolute().parent} and "

@@ -4,7 +4,9 @@
 2017     a folder with labels.csv and JPEGs: which of four keys was held    in and out
 tub      Donkeycar tubs, version 2 and the older version 1                  in; version 2 out
 minari   datasets of the Gymnasium family                                   in and out
+lerobot  datasets of LeRobot, version 3: Parquet and video                  in and out
 csv      steps.csv, header.json and frames/                                 in and out
+mcap     a log of messages for each episode                                 out
 ```
 
 Sources are never changed, and targets appear atomically.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Final, Literal
@@ -21,6 +22,9 @@ from shapechanger.demos.episodes.files import cannot_write, is_episode
 from shapechanger.demos.exchange.csv_files import TABLE, is_csv, read_csv, write_csv
 from shapechanger.demos.exchange.files import cannot_read, new_folder
 from shapechanger.demos.exchange.keys_2017 import LABELS, is_2017, read_2017, write_2017
+from shapechanger.demos.exchange.lerobot_export import INFO, write_lerobot
+from shapechanger.demos.exchange.lerobot_import import is_lerobot, read_lerobot
+from shapechanger.demos.exchange.mcap_export import write_mcap
 from shapechanger.demos.exchange.minari_export import (
     METADATA,
     is_minari,
@@ -32,29 +36,31 @@ from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episo
 from shapechanger.demos.exchange.tub import MANIFEST, is_tub, read_tub, write_tub
 from shapechanger.errors import DemosError, OutputError, UnknownName
 
-Format = Literal["2017", "tub", "minari", "csv"]
+Format = Literal["2017", "tub", "minari", "lerobot", "csv", "mcap"]
 
 
 _DETECT: Final[dict[Format, Callable[[Path], bool]]] = {
     "2017": is_2017,
     "tub": is_tub,
     "minari": is_minari,
+    "lerobot": is_lerobot,
     "csv": is_csv,
 }
 _READ: Final[dict[Format, Callable[[Path], Iterator[ExchangeEpisode]]]] = {
     "2017": read_2017,
     "tub": read_tub,
     "minari": read_minari,
+    "lerobot": read_lerobot,
     "csv": read_csv,
 }
-_MARKS_DROPPED: Final = ("minari", "csv")
+_MARKS_DROPPED: Final = ("minari", "csv", "mcap")
 
-FORMATS: Final = tuple(_READ)
-"""Names of the formats."""
+FORMATS: Final[tuple[Format, ...]] = (*_READ, "mcap")
+"""Names of the formats; mcap can only be exported."""
 
 _EXPECTED: Final = (
     f"{LABELS} beside JPEGs (2017), {MANIFEST} or record_0.json (tub), data/{METADATA} (minari), "
-    f"or {TABLE} (csv)"
+    f"{INFO} (lerobot), or {TABLE} (csv)"
 )
 
 
@@ -92,14 +98,24 @@ class Imported:
     pictures: int
 
 
-def export_recording(data: Path, out: Path, format: str, *, dropped: bool = False) -> Exported:
+def export_recording(
+    data: Path,
+    out: Path,
+    format: str,
+    *,
+    dropped: bool = False,
+    task: str = "",
+    images: bool = False,
+) -> Exported:
     """Export a recording.
 
     Args:
         data: A recording, or one episode; it is not changed.
         out: The folder to create, atomically.
         format: One of the `FORMATS`.
-        dropped: Whether to export excluded steps too, marked as such; minari and csv only.
+        dropped: Whether to export excluded steps too, marked as such; minari, csv and mcap only.
+        task: What the robot does, in words, for policies that follow language; lerobot only.
+        images: Whether to store pictures as they were recorded, in place of video; lerobot only.
 
     Raises:
         DemosError: If the recording is damaged or does not fit the format, or `out` exists or lies
@@ -112,9 +128,11 @@ def export_recording(data: Path, out: Path, format: str, *, dropped: bool = Fals
         raise UnknownName("format", format, FORMATS)
     if dropped and format not in _MARKS_DROPPED:
         raise DemosError(
-            f"The format {format} cannot mark excluded steps: export to minari or csv, or leave "
-            "the excluded steps out."
+            f"The format {format} cannot mark excluded steps: export to minari, csv or mcap, "
+            "or leave the excluded steps out."
         )
+    if (task or images) and format != "lerobot":
+        raise DemosError(f"Tasks and the choice of images are of lerobot, and not of {format}.")
     if format == "minari":
         require_dataset_name(out)
     read = [read_episode(path) for path in episodes_of(data)]
@@ -130,8 +148,18 @@ def export_recording(data: Path, out: Path, format: str, *, dropped: bool = Fals
                     steps = write_tub(episodes, folder)
                 case "minari":
                     steps = write_minari(episodes, folder, out.name)
+                case "lerobot":
+                    steps = write_lerobot(
+                        episodes,
+                        folder,
+                        task=task,
+                        images=images,
+                        rewarded=all(s.reward is not None for one in read for s in one.kept),
+                    )
                 case "csv":
                     steps = write_csv(episodes, folder)
+                case "mcap":
+                    steps = write_mcap(episodes, folder)
         except OutputError:  # Already worded, and a subclass of OSError.
             raise
         except OSError as error:
@@ -166,13 +194,14 @@ def import_episodes(
         yield episode.header, ((replace(step, index=n), jpeg) for n, (step, jpeg) in kept)
 
 
-def import_recording(path: Path, out: Path, format: str = "auto") -> Imported:
+def import_recording(path: Path, out: Path, format: str = "auto", *, camera: str = "") -> Imported:
     """Import a recording.
 
     Args:
         path: A folder in one of the `FORMATS`; it is not changed.
         out: The recording to create, atomically.
         format: One of the formats, or "auto" to detect it.
+        camera: Which camera of a LeRobot dataset to take, such as "front"; "" for the only one.
 
     Raises:
         DemosError: If `path` is damaged, or `out` exists or lies in it.
@@ -181,10 +210,13 @@ def import_recording(path: Path, out: Path, format: str = "auto") -> Imported:
         MissingExtra: If a package that the format needs is not installed.
     """
     found = _require_format(format, path)
+    if camera and found != "lerobot":
+        raise DemosError(f"A camera is chosen among those of lerobot, and {path} is {found}.")
+    read = partial(read_lerobot, camera=camera) if camera else _READ[found]
     began = datetime.now(UTC)
     episodes = steps = pictures = 0
     with new_folder(out, path) as folder:
-        for episode in _READ[found](path):
+        for episode in read(path):
             added, shown = _write(episode, folder, began)
             episodes, steps, pictures = episodes + 1, steps + added, pictures + shown
         if not episodes:
@@ -227,8 +259,8 @@ def _require_format(name: str, path: Path) -> Format:
     """Return the named format, or the detected one for "auto"."""
     if name == "auto":
         return find_format(path)
-    if name not in FORMATS:
-        raise UnknownName("format", name, ("auto", *FORMATS))
+    if name not in _READ:
+        raise UnknownName("format", name, ("auto", *_READ))
     _require_folder(path)
     if not _DETECT[name](path):
         raise DemosError(f"{path} is not {name}: expected {_EXPECTED}; or omit --format.")

@@ -26,7 +26,7 @@ from shapechanger.demos.exchange.files import (
     read_text,
     resolve_file,
 )
-from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
+from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep, value_names
 from shapechanger.errors import DemosError, LayoutError, UnknownName
 from shapechanger.layout import Layout
 
@@ -112,23 +112,14 @@ def _tables_of(folder: Path) -> list[Path]:
 
 def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
     """Return the names of the columns of each field of a step, in order."""
-    of_action = _places(header.action_layout)
-    of_state = _places(header.state_layout) if header.state_layout else []
+    of_action = value_names(Layout.from_json(header.action_layout))
+    of_state = value_names(Layout.from_json(header.state_layout)) if header.state_layout else []
     vectors = {
         name: [f"{name}/{place}" for place in (of_state if name == "state" else of_action)]
         for name in _VECTORS
     }
     before = {name: [name] for name in _BEFORE_VECTORS}
     return before | vectors | {name: [name] for name in (*_AFTER_VECTORS, *_AFTER_STEP)}
-
-
-def _places(layout: str) -> list[str]:
-    """Return a name for each value of a layout."""
-    return [
-        feature.name if not feature.shape else f"{feature.name}[{place}]"
-        for feature in Layout.from_json(layout)
-        for place in range(feature.size)
-    ]
 
 
 def _write(episode: ExchangeEpisode, folder: Path) -> int:

@@ -8,6 +8,7 @@ import secrets
 import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,16 +19,32 @@ from shapechanger.demos.episodes.files import (
     read_file,
 )
 from shapechanger.demos.jpeg import decode_picture, picture_size
-from shapechanger.errors import DemosError, OutputError
+from shapechanger.errors import DemosError, MissingExtra, OutputError
+
+
+def library(name: str, extra: str = "data") -> Any:
+    """Import a module of a package that an extra installs.
+
+    Args:
+        name: Dotted name of the module.
+        extra: Name of the extra.
+
+    Raises:
+        MissingExtra: If it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingExtra(name.split(".")[0], extra) from error
 
 
 @contextmanager
-def new_folder(out: Path, source: Path) -> Generator[Path]:
+def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
     """Create a folder that is renamed to `out` on success and removed on failure.
 
     Args:
         out: The folder to create; it must not exist.
-        source: The folder that is read meanwhile; `out` must not lie in it.
+        source: The folder that is read meanwhile, if any; `out` must not lie in it.
 
     Yields:
         A hidden folder beside `out` to write to.
@@ -38,7 +55,7 @@ def new_folder(out: Path, source: Path) -> Generator[Path]:
     """
     if os.path.lexists(out):
         raise DemosError(f"{out} exists already: choose another name, or move it away.")
-    if out.resolve().is_relative_to(source.resolve()):
+    if source is not None and out.resolve().is_relative_to(source.resolve()):
         raise DemosError(f"{out} lies in {source}, which is never changed: choose another place.")
     made = [parent for parent in out.absolute().parents if not parent.exists()]
     part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")

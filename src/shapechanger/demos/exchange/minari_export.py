@@ -26,9 +26,8 @@ import copy
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import version
 from itertools import chain, islice
 from pathlib import Path
@@ -39,11 +38,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from shapechanger.demos.episodes import EpisodeHeader
-from shapechanger.demos.exchange.files import Pictures
-from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
+from shapechanger.demos.exchange.files import Pictures, library
+from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep, require_alike
 from shapechanger.demos.jpeg import decode_picture, is_grey, picture_size
-from shapechanger.errors import DemosError, MissingExtra
+from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
 DATA: Final = "data"
@@ -70,18 +68,6 @@ _BRIGHTEST: Final = 255
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 256  # Steps in memory at once.
 _OBSERVATIONS: Final = "observations"
-
-
-def library(name: str) -> Any:
-    """Import a module of h5py or Minari.
-
-    Raises:
-        MissingExtra: If it is not installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise MissingExtra(name.split(".")[0], "data") from error
 
 
 def data_folder(folder: Path) -> Path | None:
@@ -146,7 +132,7 @@ def write_minari(episodes: Sequence[ExchangeEpisode], folder: Path, name: str) -
     """
     h5py = library("h5py")
     storages = library("minari.dataset.minari_storage")
-    _require_alike(episodes)
+    require_alike(episodes, "a Minari dataset")
     begun = [(episode, rows) for episode in episodes if (rows := _begun(episode.rows)) is not None]
     if not begun:
         raise DemosError("There are no steps to export.")
@@ -186,33 +172,6 @@ def _begun(rows: Iterable[ExchangeStep]) -> tuple[ExchangeStep, Iterator[Exchang
     iterator = iter(rows)
     first = next(iterator, None)
     return None if first is None else (first, iterator)
-
-
-def _require_alike(episodes: Sequence[ExchangeEpisode]) -> None:
-    """Refuse episodes that do not fit into one dataset."""
-    first = episodes[0]
-    for episode in episodes[1:]:
-        for what, described in _DESCRIPTIONS.items():
-            ours, theirs = described(first.header), described(episode.header)
-            if ours != theirs:
-                raise DemosError(
-                    f"{first.name} has {what} {ours}, and {episode.name} {theirs}: a Minari "
-                    "dataset has one kind of episode, so export each kind to a dataset of its own."
-                )
-
-
-def _described_layout(layout: str) -> str:
-    return ", ".join(map(str, Layout.from_json(layout))) if layout else "none"
-
-
-_DESCRIPTIONS: Final[dict[str, Callable[[EpisodeHeader], str]]] = {
-    "the actions": lambda header: _described_layout(header.action_layout),
-    "the state": lambda header: _described_layout(header.state_layout),
-    "pictures of": lambda header: (
-        "no size" if header.image_size is None else "{} x {}".format(*header.image_size)
-    ),
-    "steps a second:": lambda header: f"{header.control_hz:g}",
-}
 
 
 def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str]) -> dict[str, Any]:

@@ -27,12 +27,13 @@ from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.exchange import minari_export as names
 from shapechanger.demos.exchange.files import (
     Pictures,
+    library,
     parse_json,
     parse_json_object,
     read_text,
     resolve_file,
 )
-from shapechanger.demos.exchange.minari_export import library, stored_as_jpeg
+from shapechanger.demos.exchange.minari_export import stored_as_jpeg
 from shapechanger.demos.exchange.recorded import DEFAULT_HZ, ExchangeEpisode, ExchangeStep
 from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
 from shapechanger.errors import DemosError, MissingExtra, UnknownName

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
 from shapechanger.demos.episodes import Episode, EpisodeHeader, Step
 from shapechanger.errors import DemosError
+from shapechanger.layout import Layout
 
 DEFAULT_HZ: Final = 20.0
 """Steps per second of an episode without any information on its rate, Hz."""
@@ -74,6 +75,50 @@ def kept_steps(rows: Iterable[ExchangeStep]) -> Iterator[tuple[Step, bytes | Non
         picture = picture if row.jpeg is None else row.jpeg
         if row.dropped is None:
             yield row.step, picture
+
+
+def value_names(layout: Layout) -> list[str]:
+    """Return a name for each value of a layout; those of a block are numbered, as in `map[3]`."""
+    return [
+        feature.name if not feature.shape else f"{feature.name}[{place}]"
+        for feature in layout
+        for place in range(feature.size)
+    ]
+
+
+def require_alike(episodes: Sequence[ExchangeEpisode], dataset: str) -> None:
+    """Refuse episodes that do not fit into one dataset.
+
+    Args:
+        episodes: The episodes.
+        dataset: How to name the dataset in errors, such as "a Minari dataset".
+
+    Raises:
+        DemosError: If their actions, states, picture sizes or rates differ.
+    """
+    first = episodes[0]
+    for episode in episodes[1:]:
+        for what, described in _DESCRIPTIONS.items():
+            ours, theirs = described(first.header), described(episode.header)
+            if ours != theirs:
+                raise DemosError(
+                    f"{first.name} has {what} {ours}, and {episode.name} {theirs}: {dataset} "
+                    "has one kind of episode, so export each kind to a dataset of its own."
+                )
+
+
+def _described_layout(layout: str) -> str:
+    return ", ".join(map(str, Layout.from_json(layout))) if layout else "none"
+
+
+_DESCRIPTIONS: Final[dict[str, Callable[[EpisodeHeader], str]]] = {
+    "the actions": lambda header: _described_layout(header.action_layout),
+    "the state": lambda header: _described_layout(header.state_layout),
+    "pictures of": lambda header: (
+        "no size" if header.image_size is None else "{} x {}".format(*header.image_size)
+    ),
+    "steps a second:": lambda header: f"{header.control_hz:g}",
+}
 
 
 def _rows(episode: Episode, *, dropped: bool) -> Iterator[ExchangeStep]:

@@ -1,0 +1,269 @@
+"""`shapechanger policies push | pull` and `demos push | pull`: the Hugging Face Hub."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import tyro
+
+from shapechanger.cli.console import counted, say
+from shapechanger.cli.env_arguments import require_file
+from shapechanger.demos.episodes import Episode, episodes_of, read_episode
+from shapechanger.errors import HubError, StudyError
+from shapechanger.layout import Layout
+from shapechanger.reports.numbers import duration_text, shares_text
+from shapechanger.transfer.files import write_atomic
+
+_MAX_POLICY_BYTES: Final = 256 << 20  # As for the files of policies.
+_GIB: Final = 1 << 30
+_MOST_HASHES: Final = 50
+_Repo = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="REPO")]
+
+
+@dataclass(frozen=True)
+class PushPolicy:
+    """Upload a policy to the Hugging Face Hub, with a card that says what it is."""
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A policy, or a clone."""
+    repo: _Repo
+    """Name of the repository, such as ada/ant; it is made if there is none."""
+    public: bool = False
+    """Let everybody read a new repository; it is private, if not given."""
+
+    def run(self) -> None:
+        """Check the policy, upload it, and print where it is."""
+        from shapechanger import hub
+
+        card = _policy_card(self.file, self.repo)
+        address = hub.push({hub.POLICY: self.file}, card, self.repo, "policy", public=self.public)
+        say(f"pushed {self.file} to {address}")
+
+
+@dataclass(frozen=True)
+class PullPolicy:
+    """Download a policy from the Hugging Face Hub; nothing else of the repository is read."""
+
+    repo: _Repo
+    """Name of a repository that `policies push` has filled, such as ada/ant."""
+    out: Path
+    """The file to write, such as ant.safetensors; it must not exist yet."""
+    revision: str = ""
+    """Commit, branch or tag; the newest commit if not given."""
+
+    def run(self) -> None:
+        """Download the policy, check it, and print its revision."""
+        from shapechanger import hub
+
+        if self.out.exists():
+            raise HubError(f"{self.out} exists already: choose another name, or move it away.")
+        with tempfile.TemporaryDirectory() as folder:
+            pulled = hub.pull(
+                self.repo,
+                "policy",
+                Path(folder),
+                revision=self.revision,
+                max_bytes=_MAX_POLICY_BYTES,
+            )
+            (path,) = pulled.paths
+            try:
+                described = _described_policy(path)
+            except StudyError as error:
+                raise HubError(
+                    str(error).replace(str(path), f"{path.name} of {self.repo}")
+                ) from error
+            require_file(self.out)
+            write_atomic(self.out, path.read_bytes())
+        say(f"wrote {self.out}: {described['env']}, revision {pulled.revision}")
+
+
+@dataclass(frozen=True)
+class PushDemonstrations:
+    """Upload a recording to the Hugging Face Hub, with a card that says what it is."""
+
+    data: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DATA")]
+    """A recording, or one episode of it."""
+    repo: _Repo
+    """Name of the repository, such as ada/drive; it is made if there is none."""
+    public: bool = False
+    """Let everybody read a new repository; it is private, if not given."""
+
+    def run(self) -> None:
+        """Check and pack the episodes, upload them, and print where they are."""
+        from shapechanger import hub
+        from shapechanger.demos.exchange.archive import pack_episode
+
+        with tempfile.TemporaryDirectory() as folder:
+            files: dict[str, Path] = {}
+            episodes: list[Episode] = []
+            for path in episodes_of(self.data):
+                archive = Path(folder) / f"{path.resolve().name}.tar"
+                pack_episode(path, archive)
+                files[f"{hub.EPISODES}/{archive.name}"] = archive
+                episodes.append(read_episode(path))
+            hashes = {name: hub.sha256_of(path) for name, path in files.items()}
+            card = _recording_card(episodes, hashes, self.repo)
+            address = hub.push(files, card, self.repo, "demonstrations", public=self.public)
+        say(f"pushed {counted(len(files), 'episode')} of {self.data} to {address}")
+
+
+@dataclass(frozen=True)
+class PullDemonstrations:
+    """Download a recording from the Hugging Face Hub; nothing else of the repository is read."""
+
+    repo: _Repo
+    """Name of a repository that `demos push` has filled, such as ada/drive."""
+    out: Path
+    """The recording to make; it must not exist yet."""
+    revision: str = ""
+    """Commit, branch or tag; the newest commit if not given."""
+    max_gib: float = 16.0
+    """Largest recording to download, GiB."""
+
+    def run(self) -> None:
+        """Download, check and unpack the episodes, and print their revision."""
+        from shapechanger import hub
+        from shapechanger.demos.exchange.archive import unpack_episodes
+        from shapechanger.demos.exchange.files import new_folder
+
+        if not 0.0 < self.max_gib < float("inf"):
+            raise HubError(f"--max-gib is more than 0, got {self.max_gib}.")
+        with (
+            new_folder(self.out) as folder,
+            tempfile.TemporaryDirectory(dir=folder) as place,
+        ):
+            pulled = hub.pull(
+                self.repo,
+                "demonstrations",
+                Path(place),
+                revision=self.revision,
+                max_bytes=round(self.max_gib * _GIB),
+            )
+            steps = unpack_episodes(pulled.paths, folder)
+        say(
+            f"wrote {self.out}: {counted(len(pulled.paths), 'episode')}, {counted(steps, 'step')}, "
+            f"revision {pulled.revision}"
+        )
+
+
+def _described_policy(file: Path) -> dict[str, Any]:
+    """Load a policy, which checks its hash, and return what its card says."""
+    from shapechanger.demos.cloning.policy import CameraPolicy
+    from shapechanger.transfer.learners.cloning import is_clone
+    from shapechanger.transfer.learners.policy_file import load_policy
+
+    if is_clone(file):
+        clone = CameraPolicy.load(file).card
+        return {
+            "env": clone.data.get("env", "recorded"),
+            "learner": "cloning",
+            "steps": clone.steps,
+            "seed": ", ".join(map(str, clone.seeds)),
+            "version": clone.version,
+            "command": clone.command,
+            "observation": _features(clone.state_layout, f"picture ({clone.eyes})"),
+            "action": _features(clone.action_layout, "steering, throttle"),
+        }
+    card = load_policy(file).card
+    return {
+        "env": card.env,
+        "learner": card.learner,
+        "steps": card.steps,
+        "seed": card.seed,
+        "version": card.version,
+        "command": card.command,
+        "observation": _features(card.observation),
+        "action": _features(card.action),
+    }
+
+
+def _features(layout: Layout | None, more: str = "") -> str:
+    """Return the features of a layout with their units, in Markdown; `more` stands in for none."""
+    if layout is None:
+        return more
+    return f"{layout.size} numbers: " + ", ".join(f"`{feature}`" for feature in layout)
+
+
+def _policy_card(file: Path, repo: str) -> str:
+    """Return the README of a policy."""
+    from shapechanger import hub
+
+    about = _described_policy(file)
+    rows = {name: about[name] for name in ("env", "learner", "steps", "seed", "version")}
+    rows["SHA-256"] = hub.sha256_of(file)
+    return _card(
+        repo,
+        ["reinforcement-learning"],
+        f"A policy of Shapechanger for `{about['env']}`.",
+        rows,
+        {"Observation": about["observation"], "Action": about["action"]},
+        str(about["command"]),
+        f"shapechanger policies pull {repo} --out policy.safetensors\n"
+        "shapechanger policies play policy.safetensors",
+    )
+
+
+def _recording_card(episodes: list[Episode], hashes: dict[str, str], repo: str) -> str:
+    """Return the README of a recording."""
+    header = episodes[0].header
+    drivers = Counter(str(step.driver) for one in episodes for step in one.kept)
+    size = "none" if header.image_size is None else "{} x {}".format(*header.image_size)
+    rows: dict[str, object] = {
+        "recorded in": header.env or header.robot or header.body or "unknown",
+        "episodes": len(episodes),
+        "steps": sum(len(one.steps) for one in episodes),
+        "duration": duration_text(sum(one.seconds for one in episodes)),
+        "drivers": shares_text(dict(drivers.most_common())),
+        "pictures": size,
+        "steps per second": f"{header.control_hz:g}",
+    }
+    shown = list(hashes.items())[:_MOST_HASHES]
+    rows |= {f"SHA-256 of {name}": digest for name, digest in shown}
+    state = Layout.from_json(header.state_layout) if header.state_layout else None
+    action = Layout.from_json(header.action_layout)
+    return _card(
+        repo,
+        ["demonstrations"],
+        "Demonstrations, recorded with Shapechanger.",
+        rows,
+        {"State": _features(state, "none"), "Action": _features(action)},
+        header.source,
+        f"shapechanger demos pull {repo} --out data",
+    )
+
+
+def _card(
+    repo: str,
+    tags: list[str],
+    lead: str,
+    rows: dict[str, object],
+    layouts: dict[str, str],
+    command: str,
+    usage: str,
+) -> str:
+    """Return a README of the Hub, whose head is YAML."""
+    table = "\n".join(f"| {name} | {_cell(value)} |" for name, value in rows.items())
+    parts = [
+        "---\nlibrary_name: shapechanger\ntags:\n"
+        + "".join(f"- {tag}\n" for tag in ("shapechanger", "robotics", *tags))
+        + "---",
+        f"# {repo}",
+        lead,
+        f"| | |\n| --- | --- |\n{table}",
+    ]
+    parts += [f"**{name}**: {features}" for name, features in layouts.items()]
+    if command:
+        indented = "\n".join(f"    {line}" for line in command.splitlines())
+        parts.append(f"Made by\n\n{indented}")
+    indented = "\n".join(f"    {line}" for line in usage.splitlines())
+    parts.append(f"Use it\n\n{indented}")
+    return "\n\n".join(parts) + "\n"
+
+
+def _cell(value: object) -> str:
+    """Return a value as a cell of a Markdown table."""
+    return " ".join(str(value).replace("|", "\\|").split())

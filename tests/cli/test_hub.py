@@ -1,0 +1,339 @@
+"""`policies push | pull` and `demos push | pull`, as processes, against a local Hub."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tarfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.demos.episodes import drop
+from shapechanger.demos.exchange.archive import pack_episode
+from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.envs.vehicle.drivers import CLONES
+from tests.demos.exchange.small import all_of, content_of, drive
+from tests.hub_server import OWNER, READER, FakeHub, Repository, serve_hub
+
+pytestmark = [pytest.mark.system, pytest.mark.realtime]
+
+PROGRAM = "from shapechanger.cli import main; main()"
+
+# Runs commands one after another, because each start takes seconds.
+PROGRAMS = """
+import contextlib, io, json, os, sys
+from shapechanger.cli import main
+
+for line in sys.stdin:
+    arguments, os.environ["HF_TOKEN"] = json.loads(line)
+    output, errors, code = io.StringIO(), io.StringIO(), 0
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+        try:
+            main(arguments)
+        except SystemExit as stop:
+            code = stop.code
+    print(json.dumps([code, output.getvalue(), errors.getvalue()]), flush=True)
+"""
+POLICY = POLICIES["reach"]
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[FakeHub]:
+    """A Hub for all tests."""
+    with serve_hub() as server:
+        yield server
+
+
+@pytest.fixture
+def hub(served: FakeHub) -> FakeHub:
+    """The Hub, empty."""
+    served.repositories.clear()
+    served.requests.clear()
+    served.cut.clear()
+    served.endless.clear()
+    served.sent = 0
+    return served
+
+
+@pytest.fixture(scope="module")
+def environment(served: FakeHub, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Variables of a process that uses this Hub, and no login of the machine."""
+    inherited = {key: value for key, value in os.environ.items() if not key.startswith("HF_")}
+    return inherited | {
+        "HF_ENDPOINT": served.address,
+        "HF_HOME": str(tmp_path_factory.mktemp("home")),
+        "HF_TOKEN": OWNER,
+        # The fake stores large files as Git LFS does.
+        "HF_HUB_DISABLE_XET": "1",
+        "NO_PROXY": "127.0.0.1",
+        "OMP_NUM_THREADS": "1",
+    }
+
+
+@pytest.fixture(scope="module")
+def run(environment: dict[str, str]) -> Iterator[Run]:
+    """Run the command; returns the exit code, the output and the errors."""
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAMS],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment,
+    ) as process:
+
+        def command(*arguments: object, token: str = OWNER) -> tuple[int, str, str]:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            process.stdin.write(json.dumps([[*map(str, arguments)], token]) + "\n")
+            process.stdin.flush()
+            code, output, errors = json.loads(process.stdout.readline())
+            assert OWNER not in output + errors
+            return code, output, errors
+
+        yield command
+        process.kill()
+
+
+def refused(answer: tuple[int, str, str]) -> str:
+    """Return the sentence of a refusal."""
+    code, output, errors = answer
+    assert code == 2, errors
+    assert output == ""
+    assert errors.startswith("error: ")
+    assert errors.endswith(".\n")
+    assert errors.count("\n") == 1
+    return errors
+
+
+@pytest.mark.parametrize("file", [POLICY, CLONES["car"]])
+def test_a_policy_is_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path, file: Path) -> None:
+    """The file comes back byte by byte; the card says what it is and how to get it."""
+    code, output, errors = run("policies", "push", file, "ada/reach")
+    assert (code, errors) == (0, "")
+    assert f"{hub.address}/ada/reach/commit/" in output
+    repository = hub.repositories["models/ada/reach"]
+    assert repository.private
+    assert set(repository.files) == {"README.md", "shapechanger.json", "policy.safetensors"}
+    card = repository.files["README.md"].decode()
+    listed = json.loads(repository.files["shapechanger.json"])["files"]["policy.safetensors"]
+    for part in ("library_name: shapechanger", "**Action**", listed["sha256"], "policies pull"):
+        assert part in card
+    # What lies beside is neither read nor fetched.
+    first = next(iter(repository.commits))
+    repository.commit(repository.files | {"evil.pkl": pickle.dumps(print)})
+    out = tmp_path / "pulled.safetensors"
+    code, output, errors = run("policies", "pull", "ada/reach", "--out", out)
+    assert (code, errors) == (0, "")
+    assert out.read_bytes() == file.read_bytes()
+    assert next(reversed(repository.commits)) in output
+    assert not any("evil" in request for request in hub.requests)
+    pinned = tmp_path / "folder" / "pinned.safetensors"
+    assert first in run(
+        "policies", "pull", "ada/reach", "--out", pinned, "--revision", first
+    )[1]  # fmt: skip
+    assert "exists already" in refused(run("policies", "pull", "ada/reach", "--out", out))
+
+
+def test_demonstrations_are_pushed_and_pulled(run: Run, hub: FakeHub, tmp_path: Path) -> None:
+    """Episodes come back as they were, with what was dropped; a second push replaces the first."""
+    drop(drive(tmp_path / "data", 5), 1, 2, "bad")
+    second = drive(tmp_path / "data", 3)
+    assert run("demos", "push", tmp_path / "data", "ada/drive", "--public")[0] == 0
+    repository = hub.repositories["datasets/ada/drive"]
+    assert not repository.private
+    card = repository.files["README.md"].decode()
+    assert "`speed [m/s]`" in card
+    assert "| episodes | 2 |" in card
+    code, output, _ = run("demos", "pull", "ada/drive", "--out", tmp_path / "back")
+    assert code == 0
+    assert "2 episodes, 8 steps" in output
+    before, after = all_of(tmp_path / "data"), all_of(tmp_path / "back")
+    assert [e.path.name for e in after] == [e.path.name for e in before]
+    assert [content_of(e) for e in after] == [content_of(e) for e in before]
+    assert {path.name for path in (tmp_path / "back").iterdir()} == {e.path.name for e in before}
+    assert run("demos", "push", second, "ada/drive")[0] == 0
+    names = [name for name in repository.files if name.startswith("episodes/")]
+    assert names == [f"episodes/{second.name}.tar"]
+
+
+def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
+    """Unknown names, revisions and repositories; no token, a wrong one, and one that only reads."""
+    out = tmp_path / "out"
+    pull = ("policies", "pull", "ada/none", "--out", out)
+    push = ("policies", "push", POLICY, "ada/new")
+    assert "no model ada/none on the Hub, or it is private" in refused(run(*pull))
+    assert "hf auth login" in refused(run(*pull, token=""))
+    assert "wants to know who asks" in refused(run(*push, token=""))
+    assert "wants to know who asks" in refused(run(*push, token="hf_wrong"))
+    assert "forbids this for ada/new" in refused(run(*push, token=READER))
+    # A token that no header can carry must not be part of the error.
+    answer = run(*push, token="hf_söcret")
+    assert "söcret" not in refused(answer)
+    for name in ("ant", "a/b/c", "https://huggingface.co/ada/ant", "ada/..", "ada/-ant"):
+        assert "no name of a repository" in refused(run("policies", "pull", name, "--out", out))
+    hub.repositories["models/ada/other"] = Repository()
+    hub.repositories["models/ada/other"].commit({"model.bin": b"1"})
+    assert "did not push, such as model.bin" in refused(
+        run("policies", "push", POLICY, "ada/other")
+    )
+    assert "has no shapechanger.json" in refused(run("policies", "pull", "ada/other", "--out", out))
+    assert "no such revision" in refused(
+        run("policies", "pull", "ada/other", "--out", out, "--revision", "v9")
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_hub(environment: dict[str, str], tmp_path: Path) -> None:
+    """A Hub that cannot be reached."""
+    with serve_hub() as gone:
+        address = gone.address
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, "policies", "pull", "ada/x", "--out", tmp_path / "out"],
+        env=environment | {"HF_ENDPOINT": address},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    answer = refused((done.returncode, done.stdout, done.stderr))
+    assert "The connection to the Hub failed" in answer
+
+
+def listing(files: dict[str, tuple[int, str]], kind: str = "policy") -> bytes:
+    """Return a `shapechanger.json`."""
+    about = {name: {"bytes": size, "sha256": digest} for name, (size, digest) in files.items()}
+    return json.dumps({"format": 1, "kind": kind, "files": about}).encode()
+
+
+NAME = "policy.safetensors"
+ZERO = "0" * 64
+
+
+@pytest.mark.parametrize(
+    ("content", "listed", "message"),
+    [
+        (b"abc", listing({NAME: (1 << 30, ZERO)}), "more than the limit of 268435456"),
+        (b"abc", listing({NAME: (2, ZERO)}), "larger than the 2 bytes"),
+        (b"abc", listing({NAME: (5, ZERO)}), "was cut after 3 of 5 bytes"),
+        (b"abc", listing({NAME: (3, ZERO)}), "does not have the SHA-256"),
+        (b"abc", listing({"../../x": (3, ZERO)}), "names '../../x', which is no policy file"),
+        (b"abc", listing({"model.pkl": (3, ZERO)}), "names 'model.pkl', which is no policy file"),
+        (b"abc", listing({NAME: (-3, ZERO)}), "does not list its files"),
+        (b"abc", listing({}), "does not list its files"),
+        (b"abc", listing({NAME: (3, ZERO)}, "demonstrations"), "and not 'policy'"),
+        (b"abc", b'{"format": 2}', "another version"),
+        (b"abc", b"[" * 10**6, "not valid JSON"),
+        (
+            b"abc",
+            listing({
+                NAME: (3, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad")
+            }),
+            "policy.safetensors of ada/x is not a policy",
+        ),
+    ],
+)  # fmt: skip
+def test_files_that_are_refused(
+    run: Run, hub: FakeHub, tmp_path: Path, content: bytes, listed: bytes, message: str
+) -> None:
+    """Sizes, hashes, names and kinds are checked; nothing is left behind."""
+    hub.repositories["models/ada/x"] = Repository()
+    hub.repositories["models/ada/x"].commit({NAME: content, "shapechanger.json": listed})
+    before = sorted(tmp_path.iterdir())
+    assert message in refused(run("policies", "pull", "ada/x", "--out", tmp_path / "out"))
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_cut_and_endless_transfers(run: Run, hub: FakeHub, tmp_path: Path) -> None:
+    """A transfer that ends early is refused, one that never ends is left early."""
+    repository = hub.repositories["models/ada/x"] = Repository()
+    content = POLICY.read_bytes()
+    repository.commit({NAME: content, "shapechanger.json": listing({NAME: (len(content), ZERO)})})
+    hub.cut[NAME] = 1000
+    pull = ("policies", "pull", "ada/x", "--out", tmp_path / "out")
+    assert "connection to the Hub failed" in refused(run(*pull))
+    hub.endless.add(NAME)
+    assert "larger than" in refused(run(*pull))
+    assert hub.sent < len(content) + (16 << 20)  # What the sockets and buffers hold beside it.
+    assert not (tmp_path / "out").exists()
+
+
+def tar_of(**members: Any) -> bytes:
+    """Return an archive; a value is content, or a `tarfile.TarInfo`."""
+    file = io.BytesIO()
+    with tarfile.open(fileobj=file, mode="w:") as archive:
+        for name, content in members.items():
+            if isinstance(content, bytes):
+                member = tarfile.TarInfo(name)
+                member.size = len(content)
+                archive.addfile(member, io.BytesIO(content))
+            else:
+                archive.addfile(content)
+    return file.getvalue()
+
+
+def linked(name: str, target: str) -> tarfile.TarInfo:
+    """Return a symbolic link."""
+    member = tarfile.TarInfo(name)
+    member.type, member.linkname = tarfile.SYMTYPE, target
+    return member
+
+
+@pytest.mark.parametrize(
+    ("archive", "message"),
+    [
+        (tar_of(**{"../../evil": b"x"}), "'../../evil', which is no file of an episode"),
+        (tar_of(**{"/tmp/evil": b"x"}), "'/tmp/evil', which is no file of an episode"),
+        (tar_of(x=linked("steps.jsonl", "/etc/passwd")), "'steps.jsonl', which is no file"),
+        (tar_of(**{"frames/x.pkl": b"x"}), "'frames/x.pkl', which is no file"),
+        (b"not a tar" * 200, "not an intact tar archive"),
+        (tar_of(**{"steps.jsonl": b""}), "is not an episode"),
+    ],
+)
+def test_archives_that_are_refused(
+    run: Run, hub: FakeHub, tmp_path: Path, archive: bytes, message: str
+) -> None:
+    """Archives hold the files of an episode and nothing else."""
+    import hashlib
+
+    name = "episodes/one.tar"
+    listed = listing({name: (len(archive), hashlib.sha256(archive).hexdigest())}, "demonstrations")
+    hub.repositories["datasets/ada/x"] = Repository()
+    hub.repositories["datasets/ada/x"].commit({name: archive, "shapechanger.json": listed})
+    assert message in refused(run("demos", "pull", "ada/x", "--out", tmp_path / "out"))
+    assert list(tmp_path.iterdir()) == []
+    refused(run("demos", "pull", "ada/x", "--out", tmp_path / "out", "--max-gib", "1e-9"))
+
+
+def test_an_interrupted_pull_leaves_nothing(
+    hub: FakeHub, environment: dict[str, str], tmp_path: Path
+) -> None:
+    """Ctrl-C during a transfer."""
+    drive(tmp_path / "data", 3)
+    pack_episode(all_of(tmp_path / "data")[0].path, tmp_path / "one.tar")
+    name = "episodes/one.tar"
+    listed = listing({name: (1 << 33, ZERO)}, "demonstrations")
+    hub.repositories["datasets/ada/x"] = Repository()
+    hub.repositories["datasets/ada/x"].commit({name: b"x", "shapechanger.json": listed})
+    hub.endless.add(name)
+    before = {path.name for path in tmp_path.iterdir()}
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "demos", "pull", "ada/x", "--out", "out"],
+        cwd=tmp_path,
+        env=environment | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        while hub.sent < 1 << 20 and process.poll() is None:
+            pass
+        process.send_signal(signal.SIGINT)
+        errors = process.communicate()[1]
+    assert (process.returncode, errors) == (130, "Stopped.\n")
+    assert {path.name for path in tmp_path.iterdir()} == before
