@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Hashable, Iterable
-from typing import Any, Final, cast
+from typing import Any, Final, TypeVar, cast
 
 import msgspec
 import mujoco
@@ -19,6 +19,8 @@ from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError,
 from shapechanger.morphology.edits.edit import Edit, Vector
 from shapechanger.morphology.edits.joints import JointRange, Lock
 from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
+from shapechanger.morphology.edits.places import PlaceBody, PlaceGeom, TotalMass
+from shapechanger.morphology.edits.rigging import AddFloor, AddFreeJoint, AddMotor
 from shapechanger.morphology.edits.values import (
     Damping,
     Density,
@@ -40,9 +42,32 @@ EDITS: Final[tuple[type[Edit], ...]] = (
     *(Stretch, Radius, Cut, Remove, Split, AddSegment, AddLimb),
     *(Mass, Density, Gear, Damping, Stiffness, Friction),
     *(JointRange, Lock, Gravity, StartHeight),
+    *(PlaceBody, PlaceGeom, TotalMass),
+    *(AddMotor, AddFreeJoint, AddFloor),
 )
+"""The edits of Shapechanger; `register_edit` adds others."""
 
-_TAGS: Final = {str(edit.__struct_config__.tag): edit for edit in EDITS}
+_TAGS: Final[dict[str, type[Edit]]] = {str(edit.__struct_config__.tag): edit for edit in EDITS}
+
+_E = TypeVar("_E", bound=type[Edit])
+
+
+def register_edit(kind: _E) -> _E:
+    """Let JSON name an edit of your own, as worker processes and files need; a class decorator.
+
+    Args:
+        kind: A frozen subclass of `Edit`; its name in JSON follows from its class.
+
+    Raises:
+        MorphologyError: If another edit has this name in JSON.
+    """
+    tag = str(kind.__struct_config__.tag)
+    known = _TAGS.get(tag)
+    # A module that is imported again defines its classes again.
+    if (known is not None and known.__qualname__ != kind.__qualname__) or known in EDITS:
+        raise MorphologyError(f"There is an edit {tag!r} already: give {kind.__name__} a new name.")
+    _TAGS[tag] = kind
+    return kind
 
 
 def to_json(body: Iterable[Edit]) -> str:
