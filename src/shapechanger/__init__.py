@@ -35,6 +35,7 @@ from shapechanger.layout import Element, Feature, Layout
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset, load_dataset
+    from shapechanger.envs.own import from_mjcf
     from shapechanger.identify import load_log
     from shapechanger.morphology import (
         AddLimb,
@@ -97,6 +98,7 @@ __all__ = [
     "certify",
     "compile_body",
     "examine",
+    "from_mjcf",
     "interpolate",
     "load_dataset",
     "load_log",
@@ -113,6 +115,7 @@ __version__: Final = version("shapechanger")
 
 _MODULES: Final = {
     "demos.dataset": ("Dataset", "load_dataset"),
+    "envs.own": ("from_mjcf",),
     "identify": ("load_log",),
     "morphology": (
         *("AddLimb", "AddSegment", "Cut", "Damping", "Density", "Friction", "Gear", "Gravity"),

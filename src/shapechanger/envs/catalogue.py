@@ -25,6 +25,8 @@ REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
 REMOTE_WAYPOINT: Final = "shapechanger/RemoteWaypoint-v1"
 """Id of the env of a vehicle on the network with the camera and the action of all vehicles."""
 
+OWN_ROBOT: Final = "shapechanger/OwnRobot-v1"
+"""Id of the env of a robot and a task of the user's own, from a file."""
 
 VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {
@@ -167,6 +169,7 @@ _TASK_IDS: Final = (
     *FINGER_ENVS,
     REMOTE_FINGER,
     REMOTE_FINGER_TRACK,
+    OWN_ROBOT,
 )
 _EPISODE_STEPS: Final = 1000
 _RANGES_STEPS: Final = 400  # A learner meets more courses.
@@ -188,6 +191,12 @@ def register_all() -> None:
             disable_env_checker=entry.family in _TUNED,
             kwargs={"body": entry.body} if entry.body else {},
         )
+    _register(
+        OWN_ROBOT,
+        "shapechanger.envs.own:OwnRobotEnv",
+        _EPISODE_STEPS,
+        vector_entry_point="shapechanger.envs.vector.entry_points:OwnRobot",
+    )
     for envs, kind, limit in (
         (VEHICLE_ENVS, "VehicleEnv", _EPISODE_STEPS),
         (RANGES_ENVS, "RangesEnv", _RANGES_STEPS),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Mapping
 from typing import Any, Final, TypeVar, cast
 
 import msgspec
@@ -103,6 +103,8 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
         return (value,)
     given: Any = value  # Not checked at run time.
     edits = list(cast("Iterable[Any]", given)) if isinstance(given, Iterable) else [given]
+    # JSON that is parsed already, as of options that hold a body.
+    edits = [_edit(edit) if isinstance(edit, Mapping) else edit for edit in edits]
     for edit in edits:
         if not isinstance(edit, Edit):
             raise MorphologyError(
@@ -113,9 +115,9 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
 
 def _edit(item: Any) -> Edit:
     """Return an edit from its parsed JSON."""
-    if not isinstance(item, dict) or "edit" not in item:
+    if not isinstance(item, Mapping) or "edit" not in item:
         raise MorphologyError(f'An edit is an object with the key "edit", got {item!r}.')
-    fields = cast("dict[str, Any]", item)
+    fields = dict(cast("Mapping[str, Any]", item))
     kind = _TAGS.get(str(fields["edit"]))
     if kind is None:
         raise UnknownName("edit", str(fields["edit"]), _TAGS)
@@ -231,6 +233,11 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
     except (ValueError, mujoco.FatalError) as error:
         if isinstance(error, ShapechangerError):
             raise
-        lines = [" ".join(line.split()) for line in str(error).splitlines()]
-        reason = "; ".join(filter(None, lines)).removeprefix("Error: ").removesuffix(".")
-        raise BrokenModel(f"MuJoCo does not compile the body {to_json(body)}: {reason}.") from error
+        text = f"MuJoCo does not compile the body {to_json(body)}: {reason_of(error)}."
+        raise BrokenModel(text) from error
+
+
+def reason_of(error: BaseException) -> str:
+    """Return the message of an error of MuJoCo, which may have several lines, for a sentence."""
+    lines = [" ".join(line.split()) for line in str(error).splitlines()]
+    return "; ".join(filter(None, lines)).removeprefix("Error: ").removesuffix(".")
