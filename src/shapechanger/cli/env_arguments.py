@@ -16,6 +16,7 @@ import tyro
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
+    ODRL_ENVS,
     OWN_ROBOT,
     RANGES_ENVS,
     REMOTE_FINGER,
@@ -90,7 +91,7 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
             raise
         allow_own_modules(env_id)
         full = env_id
-    if body and full not in CATALOGUE and full != OWN_ROBOT:
+    if body and full not in {*CATALOGUE, *ODRL_ENVS, OWN_ROBOT}:
         raise MorphologyError(f"{full} takes no body; these do: {', '.join(CATALOGUE)}.")
     return EnvRef(full, {"body": body} if body else {})
 
@@ -120,7 +121,7 @@ def default_learner(env: EnvRef) -> str:
         return "ppo-drive"
     if env.id in (REMOTE_FINGER, REMOTE_FINGER_TRACK):
         return "ppo-rig"
-    entry = CATALOGUE.get(env.id) or FINGER_ENVS.get(env.id)
+    entry = CATALOGUE.get(env.id) or ODRL_ENVS.get(env.id) or FINGER_ENVS.get(env.id)
     return entry.learner if entry else "ppo-run"
 
 

@@ -23,6 +23,8 @@ from shapechanger.cli.env_arguments import (
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
+    ODRL_ENVS,
+    OWN_ROBOT,
     RANGES_ENVS,
     VEHICLE_ENVS,
     WAYPOINT_ENVS,
@@ -35,9 +37,17 @@ from shapechanger.transfer.env_ref import EnvRef, layouts_of
 class ListEnvs:
     """List all envs."""
 
+    odrl: bool = False
+    """List the bodies of ODRL one by one, instead of in one row."""
+
     def run(self) -> None:
         """Print a table of the catalogue."""
         table = Table("id", "body", box=None, pad_edge=False)
+        if self.odrl:
+            for entry in ODRL_ENVS.values():
+                table.add_row(entry.id, entry.family)
+            print_table(table)
+            return
         for entry in CATALOGUE.values():
             table.add_row(entry.id, entry.summary)
         vehicles = (VEHICLE_ENVS, RANGES_ENVS, WAYPOINT_ENVS)
@@ -45,6 +55,13 @@ class ListEnvs:
             table.add_row(env_id, f"{vehicle}: {summary}")
         for env_id, task in FINGER_ENVS.items():
             table.add_row(env_id, task.summary)
+        table.add_row(OWN_ROBOT, "an MJCF or URDF file of yours: give FILE or FILE@TASK as ENV")
+        robots = len({entry.family for entry in ODRL_ENVS.values()})
+        targets = len(ODRL_ENVS) - robots
+        table.add_row(
+            "shapechanger/odrl-ROBOT-SHIFT-LEVEL-v1",
+            f"{targets} targets of ODRL and their {robots} sources: `envs list --odrl`",
+        )
         print_table(table)
 
 
