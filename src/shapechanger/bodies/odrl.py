@@ -81,7 +81,10 @@ def _each(make: Callable[..., Body], *values: tuple[float, ...]) -> tuple[Body, 
     return easy, medium, hard
 
 
-_PER_SHARE: Final = tuple((share,) for share in _SHARES)
+def _shares(make: Callable[[float], Body]) -> tuple[Body, Body, Body]:
+    """Edits of the three levels, from the share that each leaves."""
+    easy, medium, hard = map(make, _SHARES)
+    return easy, medium, hard
 
 
 def _ankles(share: float) -> Body:
@@ -96,15 +99,14 @@ def _ankles(share: float) -> Body:
 ANT: Final = _shifts(
     _all_friction,
     {
-        "kinematic-anklejnt": _each(_ankles, *_PER_SHARE),
-        "kinematic-hipjnt": _each(
+        "kinematic-anklejnt": _shares(_ankles),
+        "kinematic-hipjnt": _shares(
             lambda share: (
                 JointRange("hip_*", math.radians(-30.0 * share), math.radians(30.0 * share)),
-            ),
-            *_PER_SHARE,
+            )
         ),
-        "morph-alllegs": _each(lambda share: (Stretch("shank_*", share),), *_PER_SHARE),
-        "morph-halflegs": _each(lambda share: (Stretch("shank_[12]", share),), *_PER_SHARE),
+        "morph-alllegs": _shares(lambda share: (Stretch("shank_*", share),)),
+        "morph-halflegs": _shares(lambda share: (Stretch("shank_[12]", share),)),
     },
 )
 
@@ -137,11 +139,11 @@ def _cheetah_thigh(back_x: float, back_z: float, front_x: float, front_z: float)
 HALF_CHEETAH: Final = _shifts(
     _all_friction,
     {
-        "kinematic-footjnt": _each(
-            lambda share: _narrowed(share, bfoot=(-0.4, 0.785), ffoot=(-0.5, 0.5)), *_PER_SHARE
+        "kinematic-footjnt": _shares(
+            lambda share: _narrowed(share, bfoot=(-0.4, 0.785), ffoot=(-0.5, 0.5))
         ),
-        "kinematic-thighjnt": _each(
-            lambda share: _narrowed(share, bthigh=(-0.52, 1.05), fthigh=(-1.0, 0.7)), *_PER_SHARE
+        "kinematic-thighjnt": _shares(
+            lambda share: _narrowed(share, bthigh=(-0.52, 1.05), fthigh=(-1.0, 0.7))
         ),
         "morph-thigh": _each(
             _cheetah_thigh,
@@ -171,12 +173,11 @@ HOPPER: Final = _shifts(
     # The floor keeps its friction of 1, and MuJoCo takes the larger one of two geoms.
     lambda factor: (Friction("*_geom", scale=factor),),
     {
-        "kinematic-footjnt": _each(
-            lambda share: _narrowed(share, foot_joint=(math.radians(-45.0), math.radians(45.0))),
-            *_PER_SHARE,
+        "kinematic-footjnt": _shares(
+            lambda share: _narrowed(share, foot_joint=(math.radians(-45.0), math.radians(45.0)))
         ),
-        "kinematic-legjnt": _each(
-            lambda share: _narrowed(share, leg_joint=(math.radians(-150.0), 0.0)), *_PER_SHARE
+        "kinematic-legjnt": _shares(
+            lambda share: _narrowed(share, leg_joint=(math.radians(-150.0), 0.0))
         ),
         "morph-foot": _each(
             _hopper_foot,
@@ -209,21 +210,19 @@ def _walker_legs(knee: float) -> Body:
 WALKER2D: Final = _shifts(
     _all_friction,
     {
-        "kinematic-footjnt": _each(
+        "kinematic-footjnt": _shares(
             lambda share: _narrowed(
                 share,
                 foot_joint=(math.radians(-45.0), math.radians(45.0)),
                 foot_left_joint=(math.radians(-45.0), math.radians(45.0)),
-            ),
-            *_PER_SHARE,
+            )
         ),
-        "kinematic-thighjnt": _each(
+        "kinematic-thighjnt": _shares(
             lambda share: _narrowed(
                 share,
                 thigh_joint=(math.radians(-150.0), 0.0),
                 thigh_left_joint=(math.radians(-150.0), 0.0),
-            ),
-            *_PER_SHARE,
+            )
         ),
         "morph-leg": _each(_walker_legs, (-0.55,), (-0.7,), (-0.85,)),
         "morph-torso": _TORSOS,
