@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import gymnasium as gym
 import mujoco
@@ -58,10 +59,11 @@ def main(steps: int = 200) -> None:
         gym.make("shapechanger/Ant-v1") as plain,
         gym.make("shapechanger/Ant-v1", body=body) as env,
     ):
-        print(plain.unwrapped.certify_shift(plain, env))
+        inner: Any = env.unwrapped
+        print(inner.certify_shift(plain, env))
         # The body halfway, at a reset.
         env.reset(seed=0, options={"body": interpolate((), body, 0.5)})
-        print("halfway:", env.unwrapped.model.joint("ankle_1").axis.round(3))
+        print("halfway:", inner.model.joint("ankle_1").axis.round(3))
         env.action_space.seed(0)
         for _ in range(steps):
             _, _, terminated, truncated, _ = env.step(env.action_space.sample())

@@ -83,7 +83,7 @@ def main(steps: int = 200_000) -> None:
     file = Path(tempfile.mkdtemp()) / "dog.xml"
     file.write_text(DOG)
     env = shapechanger.from_mjcf(file, Trot, max_episode_steps=300)
-    print("observes", ", ".join(map(str, env.unwrapped.observation_layout)))
+    print("observes", ", ".join(map(str, env.get_wrapper_attr("observation_layout"))))
     model = PPO("MlpPolicy", env, n_steps=min(steps, 2048), seed=0).learn(steps)
     for name, body in {
         "the same dog": (),

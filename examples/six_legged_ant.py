@@ -26,10 +26,8 @@ SHANKS = ("shank_1", "shank_2", "shank_3", "shank_4", "shank_1_5", "shank_2_6")
 
 SIX_LEGGED = Family(
     name="SixLeggedAnt",
-    bodies={
-        "SixLeggedAnt": SIX_LEGS,
-        "FiveAndAHalf": (*SIX_LEGS, Cut("shank_1_5", 0.5)),
-    },
+    bodies={"SixLeggedAnt": (), "FiveAndAHalf": (Cut("shank_1_5", 0.5),)},
+    rig=SIX_LEGS,  # What all its bodies have, before their own edits.
     bodies_by_joint={f"ankle_{leg}": f"shank_{leg}" for leg in (1, 2, 3, 4)},
     # What `Family.sample`, `train --bodies` and the arm `generalist` draw from.
     axes=length_axes(SHANKS, 0.6, 1.5) + strength_axes("torso"),
@@ -75,7 +73,9 @@ def main(steps: int = 200_000) -> None:
         if terminated or truncated:
             break
     print(f"six legs came {info['x_position']:.2f} m far")
-    print("another body of the family:", SIX_LEGGED.sample(1, seed=1, split="train")[0])
+    for body in ("FiveAndAHalf", SIX_LEGGED.sample(1, seed=1)[0]):
+        six.reset(options={"body": body})
+        print("another body of the family:", body)
 
 
 if __name__ == "__main__":

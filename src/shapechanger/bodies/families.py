@@ -29,6 +29,7 @@ from shapechanger.morphology import (
     Stretch,
     as_body,
     name_elements,
+    reshape,
 )
 
 BodyLike = str | Edit | Iterable[Edit]
@@ -76,6 +77,7 @@ class Family:
         parts: Parts that a place, such as a leg, can have instead of the model's own, by the name
             of the place and of the part.
         published: Edits of bodies that others have published, by name.
+        rig: Edits that come before those of any body, such as two more legs.
     """
 
     name: str
@@ -84,12 +86,17 @@ class Family:
     axes: tuple[Axis, ...] = ()
     parts: Mapping[str, Mapping[str, Body]] = field(default_factory=dict[str, Mapping[str, Body]])
     published: Mapping[str, Body] = field(default_factory=dict[str, Body])
+    rig: Body = ()
 
     def load(self, path: str | Path) -> mujoco.MjSpec:
-        """Load the model at `path`, and name all its elements."""
+        """Load the model at `path` with the rig, and name all its elements.
+
+        Raises:
+            MorphologyError: If the rig does not fit it.
+        """
         spec = mujoco.MjSpec.from_file(str(path))
         name_elements(spec, self.bodies_by_joint)
-        return spec
+        return reshape(spec, self.rig) if self.rig else spec
 
     def body(self, value: BodyLike) -> Body:
         """Edits of a body.

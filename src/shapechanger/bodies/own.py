@@ -26,11 +26,9 @@ class OwnFamily(Family):
 
     Attributes:
         path: The file; the family is the same only for the same file and rig.
-        rig: Edits that come before those of any body: motors, a floor, a free joint.
     """
 
     path: Path = Path()
-    rig: Body = ()
 
     @property
     def key(self) -> str:
