@@ -45,19 +45,23 @@ def test_a_geom_is_placed_by_its_ends() -> None:
         np.testing.assert_array_equal(tip(after, site), tip(before, site))
 
 
-@pytest.mark.parametrize("geom", ["turned", "ended"])
-def test_halfway_lies_between(geom: str) -> None:
-    """Of a geom given by its ends, and of one given by a pose, whose ends have no order."""
-    model = limb(
-        '<geom name="turned" type="capsule" size=".1 .2" pos="0 0 .3"/>'
-        '<geom name="ended" type="capsule" size=".1" fromto="0 0 .5 0 0 .1"/>'
-    )
-    half = built(model, PlaceGeom(geom, (0.0, 0.0, 0.1), (0.0, 0.0, 0.9), amount=0.5))
-    whole = built(model, PlaceGeom(geom, (0.0, 0.0, 0.1), (0.0, 0.0, 0.9)))
-    assert whole.geom(geom).size[1] == pytest.approx(0.4)
-    if geom == "turned":
-        assert half.geom(geom).size[1] == pytest.approx(0.3)
-        assert half.geom(geom).pos[2] == pytest.approx(0.4)
+@pytest.mark.parametrize("ends", [(0.1, 0.9), (0.9, 0.1)])
+def test_halfway_lies_between(ends: tuple[float, float]) -> None:
+    """The ends of a geom given by its pose have no order: each goes to the nearer new one."""
+    model = limb('<geom name="rod" type="capsule" size=".1 .2" pos="0 0 .3"/>')
+    start, end = ((0.0, 0.0, height) for height in ends)
+    whole = built(model, PlaceGeom("rod", start, end))
+    assert whole.geom("rod").size[1] == pytest.approx(0.4)
+    half = built(model, PlaceGeom("rod", start, end, amount=0.5))
+    assert half.geom("rod").size[1] == pytest.approx(0.3)
+    assert half.geom("rod").pos[2] == pytest.approx(0.4)
+
+
+def test_ends_that_are_written_have_an_order() -> None:
+    """Halfway, the geom has turned about its middle."""
+    model = limb('<geom name="rod" type="capsule" size=".1" fromto="0 0 .2 0 0 .6"/>')
+    half = built(model, PlaceGeom("rod", (0.4, 0.0, 0.4), (-0.4, 0.0, 0.4), amount=0.5))
+    assert half.geom("rod").size[1] == pytest.approx(0.5 * math.hypot(0.4, 0.2))
 
 
 def test_a_geom_is_moved_by_its_middle() -> None:
