@@ -20,7 +20,18 @@ from shapechanger.errors import (
     TaskError,
     UnknownName,
 )
-from shapechanger.morphology import AddFloor, AddFreeJoint, AddMotor, Lock, Mass, Stretch, to_json
+from shapechanger.morphology import (
+    AddFloor,
+    AddFreeJoint,
+    AddLimb,
+    AddMotor,
+    AddSegment,
+    Edit,
+    Lock,
+    Mass,
+    Stretch,
+    to_json,
+)
 from shapechanger.tasks.measure import FORWARD_SPEED, RETURN
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, env_traits
@@ -79,6 +90,21 @@ def test_a_robot_starts_at_home(dog: Path) -> None:
     assert _inner(env).standing_height == pytest.approx(_inner(env).data.qpos[2])
 
 
+@pytest.mark.parametrize(
+    ("body", "angles"),
+    [
+        (AddSegment("front", "toe", (0.1, 0.0, 0.0), lower=-1.0, upper=0.0), [0.2, -0.1, -0.2]),
+        (Lock("front"), [-0.2]),
+        (AddLimb("front", "_2", 1.0), [0.2, -0.2, 0.0]),
+    ],
+)
+def test_a_home_is_kept_joint_by_joint(dog: Path, body: Edit, angles: list[float]) -> None:
+    """Where edits add or remove joints; MuJoCo fills a keyframe at its end."""
+    env = shapechanger.from_mjcf(dog, body=body, reset_noise_scale=0.0)
+    env.reset(seed=0)
+    np.testing.assert_allclose(_inner(env).data.qpos[7:], angles)
+
+
 def test_without_a_home_joints_start_inside_their_limits(dog: Path) -> None:
     """At the model's own pose."""
     dog.write_text(DOG[: DOG.index("  <keyframe>")] + "</mujoco>")
@@ -123,11 +149,12 @@ def test_an_up_axis_is_that_of_the_start(tmp_path: Path) -> None:
 
 
 def test_a_diverging_simulation_is_reported(dog: Path) -> None:
-    """As in every env of Shapechanger."""
-    env = shapechanger.from_mjcf(dog)
+    """It ends the episode without a reward, and is not blamed on the task."""
+    env = shapechanger.from_mjcf(dog, Nonsense())
     env.reset(seed=0)
     _inner(env).data.qvel[:] = 1e12
-    assert env.step(np.zeros(2))[4]["diverged"]
+    _, reward, terminated, _, info = env.step(np.zeros(2))
+    assert (reward, terminated, info["diverged"]) == (0.0, True, True)
 
 
 def test_a_robot_is_made_again_from_its_spec(dog: Path) -> None:
@@ -343,5 +370,5 @@ def test_models_that_do_not_compile_are_refused(dog: Path) -> None:
     dog.write_text(
         DOG.replace('name="front" pos', 'name="paw" pos').replace(' mass="3"', ' mass="0"')
     )
-    with pytest.raises(BrokenModel, match="mass and inertia of moving bodies"):
+    with pytest.raises(BrokenModel, match=r"compile dog\.xml: mass and inertia of moving bodies"):
         shapechanger.from_mjcf(dog)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from os import fspath
 from pathlib import Path
 from typing import Any, Final, cast
@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.errors import EnvArgumentError, MissingExtra, UnknownName
+from shapechanger.errors import BrokenModel, EnvArgumentError, MissingExtra, UnknownName
 
 try:
     import mujoco
@@ -27,7 +27,7 @@ from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
-from shapechanger.morphology import as_body, to_json
+from shapechanger.morphology import as_body, reason_of, to_json
 from shapechanger.morphology.pose import (
     StartRules,
     standing_height,
@@ -57,8 +57,9 @@ class _TaskEnv(MujocoEnv, EzPickle):
         before = own.trunk_place()
         cast("Any", self).do_simulation(action, self.frame_skip)
         robot = own.seen(np.asarray(action), before)
-        terms = reward_terms(own.task, own.task_name, robot)
-        terminated = has_ended(own.task, own.task_name, robot)
+        # A state that is huge or not finite is no fault of the task, and is not its business.
+        terms = {} if own.diverged else reward_terms(own.task, own.task_name, robot)
+        terminated = own.diverged or has_ended(own.task, own.task_name, robot)
         info = {
             "x_position": float(robot.place[0]),
             "y_position": float(robot.place[1]),
@@ -95,7 +96,9 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
       and gains.
     - **Reward**: the sum of the terms that the task returns, which `info` lists as `reward_...`.
     - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
-      at least a tenth of its range inside its limits; the feet stand above the floor.
+      at least a tenth of its range inside its limits; the feet stand above the floor. The standing
+      height is that of this pose.
+    - **End**: where the task ends it, and where the simulation diverges, with a reward of 0.
 
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`.
@@ -140,9 +143,10 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         self.reset_noise_scale = float(reset_noise_scale)
         self.family = self._file = own_family(path, as_body(rig))
         self._begin(body, arguments)
+        spec = self.family.load(self._file.path)
+        self._home = _home_of(spec, self._file.path)
         if frame_skip is None:
-            timestep = self.family.load(self._file.path).option.timestep
-            frame_skip = max(1, round(_CONTROL_STEP_S / timestep))
+            frame_skip = max(1, round(_CONTROL_STEP_S / spec.option.timestep))
         if frame_skip < 1:
             raise EnvArgumentError(f"frame_skip must be at least 1, got {frame_skip}.")
         # Gymnasium compares the rate of its frames, which it expects in the class, with the model.
@@ -172,12 +176,14 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         return model, data
 
     def _start_and_height(self, model: mujoco.MjModel) -> tuple[_Floats, float | None]:
-        home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, _HOME)
-        if home < 0:
-            return start_pose(model), standing_height(model)
-        rules, data = StartRules(model), mujoco.MjData(model)
-        # Lifted to the floor if the robot has grown since.
-        pose = rules.feasible(model.key_qpos[home], data)
+        pose = start_pose(model)
+        if self._home:
+            for joint, place, size in _places_of_joints(model):
+                if joint in self._home:
+                    pose[place : place + size] = self._home[joint]
+            # Lifted to the floor if the robot has grown since.
+            pose = StartRules(model).feasible(pose, mujoco.MjData(model))
+        # In the middle of their ranges many legs are folded.
         return pose, standing_height(model, pose)
 
     def _follow_body(self) -> None:
@@ -260,6 +266,36 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         return self._file.key
 
 
+_SIZES: Final = {_J.mjJNT_FREE: 7, _J.mjJNT_BALL: 4, _J.mjJNT_SLIDE: 1, _J.mjJNT_HINGE: 1}
+
+
+def _places_of_joints(model: mujoco.MjModel) -> Iterator[tuple[str, int, int]]:
+    """Yield name, first index in qpos and count of numbers of each joint."""
+    for j in range(model.njnt):
+        yield model.joint(j).name, int(model.jnt_qposadr[j]), _SIZES[_J(model.jnt_type[j])]
+
+
+def _home_of(spec: mujoco.MjSpec, path: Path) -> dict[str, _Floats]:
+    """Return the pose of the keyframe `home` by joint, because edits add and remove joints.
+
+    Args:
+        spec: The unedited robot.
+        path: Its file.
+
+    Raises:
+        BrokenModel: If it does not compile.
+    """
+    try:
+        model = spec.copy().compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise BrokenModel(f"MuJoCo does not compile {path.name}: {reason_of(error)}.") from error
+    home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, _HOME)
+    if home < 0:
+        return {}
+    pose = model.key_qpos[home]
+    return {name: pose[at : at + size].copy() for name, at, size in _places_of_joints(model)}
+
+
 def _place_on_floor(model: mujoco.MjModel) -> set[int]:
     """Return the indices in qpos of the coordinates that move the trunk over the floor."""
     trunk, lift = travelling_body(model), trunk_lift(model)
@@ -314,7 +350,10 @@ def from_mjcf(
         MorphologyError: If it is no robot that can be controlled.
         TaskError: If the task cannot be made or does not fit the robot.
     """
-    given: dict[str, Any] = {"path": fspath(path), "task": reference(task)}
+    file = Path(path).expanduser()
+    # A spec then makes the same env wherever the program has gone.
+    where = str(file.resolve()) if file.is_file() else fspath(path)
+    given: dict[str, Any] = {"path": where, "task": reference(task)}
     given |= {"body": to_json(as_body(body))} if body else {}
     given |= {"rig": to_json(as_body(rig))} if rig else {}
     given |= {"task_options": dict(task_options)} if task_options else {}
