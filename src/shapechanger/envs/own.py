@@ -124,7 +124,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __init__(
         self,
-        path: str | Path,
+        path: str | Path = "",
         task: Any = "walk",
         task_options: Mapping[str, Any] | None = None,
         body: BodyLike = (),
@@ -133,6 +133,8 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         reset_noise_scale: float = 0.05,
         **arguments: Any,
     ) -> None:
+        if not str(path):
+            raise EnvArgumentError(f"{OWN_ROBOT} needs the file of a robot, as path=FILE.")
         self.task, self.task_name = as_task(task, task_options)
         self._observed = observed(self.task)
         self.measures = getattr(self.task, "measures", (RETURN,))
