@@ -69,7 +69,7 @@ class _TaskEnv(MujocoEnv, EzPickle):
         }
         if self.render_mode == "human":
             self.render()
-        return own.observation(), sum(terms.values(), 0.0), terminated, False, info
+        return self._get_obs(), sum(terms.values(), 0.0), terminated, False, info
 
     def reset_model(self) -> _Floats:
         """Draw a start state around the start pose."""
@@ -78,7 +78,10 @@ class _TaskEnv(MujocoEnv, EzPickle):
         place = self.init_qpos + self.np_random.uniform(-scale, scale, self.model.nq)
         speed = self.init_qvel + scale * self.np_random.standard_normal(self.model.nv)
         cast("Any", self).set_state(place, speed)
-        return own.observation()
+        return self._get_obs()
+
+    def _get_obs(self) -> _Floats:
+        return cast("OwnRobotEnv", self).observed_numbers()
 
     def _get_reset_info(self) -> dict[str, Any]:
         place = cast("OwnRobotEnv", self).trunk_place()
@@ -190,7 +193,9 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def _follow_body(self) -> None:
         model = self.model
-        self._trunk = travelling_body(model) or min(1, model.nbody - 1)
+        travelling = travelling_body(model)
+        self._can_travel = travelling is not None
+        self._trunk = travelling or min(1, model.nbody - 1)
         super()._follow_body()
         data = mujoco.MjData(model)
         data.qpos[:] = self.init_qpos
@@ -214,7 +219,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         self._place_of = {name: place for place, name in enumerate(names)}
         return [features[place] for place in places]
 
-    def observation(self) -> _Floats:
+    def observed_numbers(self) -> _Floats:
         """Return the present observation."""
         return self._all_numbers(self._contacts_observed)[self._places]
 
@@ -253,7 +258,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
             action,
             (action - self._middle) / self._half_range,
             self.standing_height,
-            travelling_body(self.model) is not None,
+            self._can_travel,
             self._number,
         )
 
