@@ -85,6 +85,7 @@ def test_a_task_is_found_by_name_class_function_or_object() -> None:
         ("walk", {"speed": 1.0}, TaskError, "The task 'walk' cannot be made: .*'speed'"),
         (climb, {"speed": 1.0}, TaskError, "'climb' is no class, so it takes no options"),
         (f"{__name__}:NOTHING", None, TaskError, "has no method `reward"),
+        ("subprocess:Popen", {"args": ["false"]}, TaskError, "'subprocess:Popen' has no method"),
         (object(), None, TaskError, "The task 'object' has no method `reward"),
     ],
 )

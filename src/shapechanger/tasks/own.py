@@ -153,7 +153,7 @@ class Walk:
         return self._terminate and not self.healthy(robot)
 
 
-BUILT_IN: Final[Mapping[str, Callable[..., OwnTask]]] = {"walk": Walk}
+BUILT_IN: Final[Mapping[str, type[OwnTask]]] = {"walk": Walk}
 """Tasks by name."""
 
 
@@ -179,7 +179,10 @@ def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTas
     """
     found = _found(task) if isinstance(task, str) else task
     name = task if isinstance(task, str) else getattr(task, "__qualname__", type(task).__qualname__)
-    if isinstance(found, type) or found in BUILT_IN.values():
+    if isinstance(found, type):
+        # Checked first: a name from a file must not make just any object, such as a process.
+        if not callable(getattr(found, "reward", None)):
+            raise _without_reward(name)
         try:
             found = found(**(options or {}))
         except TypeError as error:
@@ -190,7 +193,11 @@ def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTas
         return cast("OwnTask", found), name
     if callable(found):
         return _OfFunction(cast("Any", found)), name
-    raise TaskError(
+    raise _without_reward(name)
+
+
+def _without_reward(name: str) -> TaskError:
+    return TaskError(
         f"The task {name!r} has no method `reward(robot)` that returns a dict of reward terms."
     )
 
