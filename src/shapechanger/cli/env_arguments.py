@@ -96,6 +96,18 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
     return EnvRef(full, {"body": body} if body else {})
 
 
+def short_name(env_id: str) -> str:
+    """Return the name of an env as a part of a folder's name.
+
+    Args:
+        env_id: As of `env_ref`.
+    """
+    file, _, own_task = env_id.partition("@")
+    if file.endswith(_MODEL_FILES):
+        return "-".join(filter(None, (Path(file).stem, own_task.rpartition(":")[2])))
+    return env_id.replace("odrl/", "odrl-").rpartition("/")[2].removesuffix("-v1")
+
+
 def allow_own_modules(*names: str | None) -> None:
     """Let names such as `my_methods:warm-start` import modules of the current folder.
 
