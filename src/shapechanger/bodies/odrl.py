@@ -4,19 +4,20 @@ ODRL publishes one model file per task; the names are those of its files. These 
 that move equally: masses, inertias, joints, geoms, limits, frictions and gravity agree to 1e-12, in
 the world's frame at the start pose. The origins of some bodies, which move nothing, lie elsewhere.
 
-Sources of the numbers, read on 2026-11-25:
+ODRL's own files of these robots were not at hand; all 80 targets were read on 2026-11-25 in two
+conversions by others, which agree where both were read:
 
-- `envs/mujoco/call_mujoco_env.py` of github.com/OffDynamicsRL/off-dynamics-rl, commit d1a69cd: the
-  tasks and their levels.
-- `comp_flow_jax/envs/assets_v3/*.xml` of github.com/xingcw/CompositeFlow, commit 322fe9a: all files
-  of ODRL as MuJoCo 2.3.3 has written them, with six digits. Of the hopper and the walker they had
-  `coordinate="global"`, which MuJoCo has removed since.
+- `comp_flow_jax/envs/assets_v3/*.xml` of github.com/xingcw/CompositeFlow, commit 322fe9a: ODRL's
+  files as MuJoCo 2.3.3 has written them, with six digits (ants, half cheetahs, and some of the
+  other two). Of the hopper and the walker ODRL's have `coordinate="global"`, which MuJoCo has
+  removed since.
 - `env/mujoco/assets/{hopper,walker2d}_*.xml` of
-  github.com/shivambhagat79/off-dynamics-explorative-rl, commit b13843f: the same two robots,
-  converted to local coordinates by someone else, in round numbers.
+  github.com/shivambhagat79/off-dynamics-explorative-rl, commit b13843f: hoppers and walkers in
+  local coordinates and round numbers.
 
-Where the first has six digits, such as a half-length of 0.0777817, the round ends that give it,
-(0, 0, 0) and (0.11, 0, -0.11), are meant.
+The tasks and their levels are those of `envs/mujoco/call_mujoco_env.py` of
+github.com/OffDynamicsRL/off-dynamics-rl, commit d1a69cd. Where only six digits are known, such as a
+half-length of 0.0777817, the round ends that give it, (0, 0, 0) and (0.11, 0, -0.11), are meant.
 """
 
 from __future__ import annotations
