@@ -18,6 +18,9 @@ conversions by others, which agree where both were read:
 The tasks and their levels are those of `envs/mujoco/call_mujoco_env.py` of
 github.com/OffDynamicsRL/off-dynamics-rl, commit d1a69cd. Where only six digits are known, such as a
 half-length of 0.0777817, the round ends that give it, (0, 0, 0) and (0.11, 0, -0.11), are meant.
+That every half cheetah weighs 14 kg is the setting `settotalmass` of Gym's file, which a file that
+MuJoCo has written lacks; `envs/mujoco/assets/halfcheetah_morph_easy.xml` of
+github.com/shivambhagat79/off-dynamics-rl, commit 995bf26, a changed thigh of ODRL, has kept it.
 """
 
 from __future__ import annotations
