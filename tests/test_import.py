@@ -12,6 +12,8 @@ import shapechanger
 from shapechanger.envs import CATALOGUE, register_all
 from shapechanger.envs.catalogue import (
     FINGER_ENVS,
+    ODRL_ENVS,
+    OWN_ROBOT,
     REMOTE_FINGER,
     REMOTE_FINGER_TRACK,
     REMOTE_VEHICLE,
@@ -90,7 +92,7 @@ def test_import_registers_ids_without_a_simulator() -> None:
     assert loaded == ""
     vehicles = (*_VEHICLES, *_MORE_VEHICLES)
     remote = (REMOTE_FINGER, REMOTE_FINGER_TRACK, REMOTE_VEHICLE, REMOTE_WAYPOINT)
-    assert tuple(ids.split()) == (*_IDS, *vehicles, *_FINGERS, *remote)
+    assert tuple(ids.split()) == (*_IDS, *ODRL_ENVS, OWN_ROBOT, *vehicles, *_FINGERS, *remote)
     assert (tuple(VEHICLE_ENVS), tuple(FINGER_ENVS)) == (_VEHICLES, _FINGERS)
 
 

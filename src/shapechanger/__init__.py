@@ -12,10 +12,12 @@ The names below are the public interface; each is imported on first use and may 
 
 - Layouts: `Layout`, `Feature`, `Element` name the numbers that a robot senses and moves.
 - Body edits: `Stretch`, `Radius`, `Cut`, `Remove`, `Split`, `AddSegment`, `AddLimb`, `Mass`,
-  `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity` and
-  `StartHeight` are values; `reshape` and `compile_body` apply them, `interpolate` goes from one
-  body to another, and `certify` proves what a shift changes.
-- Envs: `make_vec` makes many at once; `examine` runs the exam that every env passes.
+  `Density`, `Gear`, `Damping`, `Stiffness`, `Friction`, `JointRange`, `Lock`, `Gravity`,
+  `StartHeight`, `PlaceBody`, `PlaceGeom`, `TotalMass`, `AddMotor`, `AddFreeJoint` and `AddFloor`
+  are values; `reshape` and `compile_body` apply them, `interpolate` goes from one body to another,
+  `certify` proves what a shift changes, and `register_edit` adds an edit of your own.
+- Envs: `from_mjcf` makes one of a robot and a task of your own, `make_vec` many at once; `examine`
+  runs the exam that every env passes.
 - Transfer: `BodyMap` maps one body's numbers to another's, `transplant` moves a policy's weights,
   `TransferTask`, `make_plan` and `run_study` measure what a transfer is worth, `load_policy` and
   `save_policy` store policies.
@@ -35,9 +37,13 @@ from shapechanger.layout import Element, Feature, Layout
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset, load_dataset
+    from shapechanger.envs.own import from_mjcf
     from shapechanger.identify import load_log
     from shapechanger.morphology import (
+        AddFloor,
+        AddFreeJoint,
         AddLimb,
+        AddMotor,
         AddSegment,
         Cut,
         Damping,
@@ -48,14 +54,18 @@ if TYPE_CHECKING:
         JointRange,
         Lock,
         Mass,
+        PlaceBody,
+        PlaceGeom,
         Radius,
         Remove,
         Split,
         StartHeight,
         Stiffness,
         Stretch,
+        TotalMass,
         compile_body,
         interpolate,
+        register_edit,
         reshape,
     )
     from shapechanger.morphology.certificate import Certificate, certify
@@ -67,7 +77,10 @@ if TYPE_CHECKING:
     from shapechanger.transfer.transplant import transplant
 
 __all__ = [
+    "AddFloor",
+    "AddFreeJoint",
     "AddLimb",
+    "AddMotor",
     "AddSegment",
     "BodyMap",
     "Certificate",
@@ -84,6 +97,8 @@ __all__ = [
     "Layout",
     "Lock",
     "Mass",
+    "PlaceBody",
+    "PlaceGeom",
     "Radius",
     "Remove",
     "RobotClient",
@@ -92,17 +107,20 @@ __all__ = [
     "StartHeight",
     "Stiffness",
     "Stretch",
+    "TotalMass",
     "TransferTask",
     "__version__",
     "certify",
     "compile_body",
     "examine",
+    "from_mjcf",
     "interpolate",
     "load_dataset",
     "load_log",
     "load_policy",
     "make_plan",
     "make_vec",
+    "register_edit",
     "reshape",
     "run_study",
     "save_policy",
@@ -113,11 +131,14 @@ __version__: Final = version("shapechanger")
 
 _MODULES: Final = {
     "demos.dataset": ("Dataset", "load_dataset"),
+    "envs.own": ("from_mjcf",),
     "identify": ("load_log",),
     "morphology": (
         *("AddLimb", "AddSegment", "Cut", "Damping", "Density", "Friction", "Gear", "Gravity"),
         *("JointRange", "Lock", "Mass", "Radius", "Remove", "Split", "StartHeight", "Stiffness"),
         *("Stretch", "compile_body", "interpolate", "reshape"),
+        *("PlaceBody", "PlaceGeom", "TotalMass", "AddMotor", "AddFreeJoint", "AddFloor"),
+        "register_edit",
     ),
     "morphology.certificate": ("Certificate", "certify"),
     "remote.client": ("RobotClient",),

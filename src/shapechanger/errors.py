@@ -13,6 +13,7 @@ ShapechangerError
 ├── VectorEnvError (ValueError)     vector env that cannot be made as requested
 ├── FingerError (ValueError)        finger that cannot be built or moved as requested
 ├── WorldError (ValueError)         world that cannot be laid out as requested
+├── TaskError (ValueError)          task of the user's own that cannot be used
 ├── PathError (ValueError)          fingertip path that cannot be made as requested
 ├── MapError (ValueError)           body map that cannot be built, inverted or composed
 ├── TransplantError (ValueError)    policy whose weights cannot be transplanted
@@ -110,6 +111,10 @@ class FingerError(ShapechangerError, ValueError):
 
 class WorldError(ShapechangerError, ValueError):
     """World that cannot be laid out as requested."""
+
+
+class TaskError(ShapechangerError, ValueError):
+    """Task of the user's own that cannot be used; the message names it."""
 
 
 class PathError(ShapechangerError, ValueError):

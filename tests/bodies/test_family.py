@@ -13,7 +13,17 @@ from shapechanger.bodies import Family
 from shapechanger.bodies.ant import ANT
 from shapechanger.bodies.families import HOPPER, Axis
 from shapechanger.errors import MorphologyError, UnknownName
-from shapechanger.morphology import AddSegment, Body, Cut, Friction, Mass, Stretch, to_json
+from shapechanger.morphology import (
+    AddLimb,
+    AddSegment,
+    Body,
+    Cut,
+    Friction,
+    Mass,
+    Stretch,
+    compile_body,
+    to_json,
+)
 from shapechanger.morphology.certificate import certify
 from tests.morphology.models import LEG
 
@@ -150,3 +160,20 @@ def test_what_cannot_be_drawn_is_refused() -> None:
         FAMILY.sample(1)
     with pytest.raises(MorphologyError, match="Hopper has no parts to combine: its splits are tr"):
         HOPPER.sample(1, 0, "composition")
+
+
+def test_a_rig_comes_before_the_edits_of_every_body(tmp_path: Path) -> None:
+    """All bodies of the family have it, also those that are drawn."""
+    path = tmp_path / "leg.xml"
+    path.write_text(LEG)
+    family = Family("TwoLegs", {"TwoLegs": ()}, rig=(AddLimb("thigh", "_2", 1.0),))
+    assert family.load(path).compile().nu == 4
+    assert compile_body(family.load(path), (Cut("thigh_2", 0.5),)).nu == 3
+
+
+def test_published_bodies_have_names() -> None:
+    """As the family's own; an unknown name is refused with those of both."""
+    family = Family("Leg", {"Leg": ()}, published={"odrl-leg": (Stretch("thigh", 0.5),)})
+    assert family.body("odrl-leg") == (Stretch("thigh", 0.5),)
+    with pytest.raises(UnknownName, match="Did you mean 'odrl-leg'"):
+        family.body("odrl-lge")

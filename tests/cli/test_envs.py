@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import gymnasium as gym
@@ -11,8 +12,9 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.envs import CATALOGUE
-from shapechanger.envs.catalogue import VEHICLE_ENVS
+from shapechanger.envs.catalogue import ODRL_ENVS, VEHICLE_ENVS
 from shapechanger.layout import Element, Feature, Layout
+from tests.envs.own_robots import DOG
 
 
 def output_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -150,3 +152,51 @@ def test_an_unknown_command_lists_the_commands(capsys: pytest.CaptureFixture[str
     """The exit code is 2."""
     assert "compare" in refused(capsys, "envs", "shwo")
     assert "transfer" in refused(capsys, "trasnfer")
+
+
+def test_the_bodies_of_odrl_are_one_row(capsys: pytest.CaptureFixture[str]) -> None:
+    """Unless asked for: 84 ids would drown the others."""
+    text = output_of(capsys, "envs", "list")
+    assert "80 targets of ODRL" in text
+    assert "odrl-hopper-friction-0.1" not in text
+    text = output_of(capsys, "envs", "list", "--odrl")
+    assert all(env_id in text for env_id in ODRL_ENVS)
+
+
+def test_bodies_of_odrl_have_short_names(capsys: pytest.CaptureFixture[str]) -> None:
+    """With a slash or a hyphen; issue 8 of ODRL is refused, and a typing mistake named."""
+    text = output_of(capsys, "envs", "compare", "odrl/hopper", "odrl-hopper-friction-0.5")
+    assert "floor + foot_geom: contact friction 2 each -> 1 each (x0.5)" in text
+    names = ("odrl/hopper-friction-0.1", "odrl/hopper-friction-0.5")
+    assert "nothing to transfer across" in refused(capsys, "envs", "compare", *names)
+    assert "Did you mean 'odrl-ant-morph-alllegs-easy'" in refused(
+        capsys, "envs", "show", "odrl/ant-morph-all-legs-easy"
+    )
+
+
+def test_a_file_is_an_env(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the built-in task, one of a module beside it, a body, and options."""
+    (tmp_path / "dog.xml").write_text(DOG)
+    (tmp_path / "tricks.py").write_text(
+        "class Sit:\n    observe = ['back/angle']\n"
+        "    def __init__(self, weight=1.0):\n        self.weight = weight\n"
+        "    def reward(self, robot):\n        return {'sit': -self.weight * robot.height}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    assert "back/target" in output_of(capsys, "envs", "show", "dog.xml")
+    text = output_of(capsys, "envs", "show", "dog.xml@tricks:Sit")
+    assert "observation: 1 numbers" in text
+    options = '{"task_options": {"weight": 2.0}}'
+    text = output_of(capsys, "envs", "check", "dog.xml@tricks:Sit", "--options", options)
+    assert "The reward is the sum of the terms" in text
+    edit = '[{"edit":"stretch","body":"front","factor":1.5}]'
+    text = output_of(capsys, "envs", "compare", "dog.xml", "dog.xml", "--target-body", edit)
+    assert "dog behaves differently from dog" in text
+    options = '{"frame_skip": 8}'
+    compared = ("envs", "compare", "dog.xml", "dog.xml", "--target-options", options)
+    assert "observations part" in output_of(capsys, *compared)
+    assert "Did you mean 'dog.xml'" in refused(capsys, "envs", "show", "dgo.xml")
+    assert "Did you mean 'walk'" in refused(capsys, "envs", "show", "dog.xml@wlk")

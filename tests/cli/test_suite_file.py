@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.env_arguments import driven, env_ref
+from shapechanger.cli.env_arguments import driven, env_ref, short_name
 from shapechanger.cli.suite import load_suite, shipped_suites, suite_tasks
 from shapechanger.transfer.plan import TransferTask
 
@@ -107,3 +107,18 @@ def test_a_mistake_in_a_file_gives_one_sentence(
     assert words in message
     assert message.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("env_id", "name"),
+    [
+        ("shapechanger/BigAnt-v1", "BigAnt"),
+        ("odrl/hopper-gravity-0.5", "odrl-hopper-gravity-0.5"),
+        ("shapechanger/odrl-hopper-v1", "odrl-hopper"),
+        ("robots/dog.xml@tricks.dogs:Sit", "dog-Sit"),
+        ("dog.urdf", "dog"),
+    ],
+)
+def test_folders_are_named_after_envs(env_id: str, name: str) -> None:
+    """Without characters that other systems refuse."""
+    assert short_name(env_id) == name

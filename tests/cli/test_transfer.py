@@ -18,6 +18,7 @@ import pytest
 from shapechanger.cli import main, pictures
 from shapechanger.errors import OutputError
 from shapechanger.transfer.learners.policy_file import load_policy
+from tests.envs.own_robots import DOG
 
 pytestmark = pytest.mark.system
 
@@ -351,3 +352,24 @@ def test_a_missing_extra_is_named_with_its_command(
     assert done.returncode != 0
     assert f"pip install 'shapechanger[{extra}]'" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_robot_and_a_task_of_ones_own_are_studied(tmp_path: Path) -> None:
+    """Files and a module of the current folder, in worker processes, in two bodies."""
+    (tmp_path / "dog.xml").write_text(DOG)
+    (tmp_path / "tricks.py").write_text(
+        "class Rise:\n    def reward(self, robot):\n        return {'height': robot.height}\n"
+    )
+    longer = '[{"edit":"stretch","body":"front","factor":1.3}]'
+    small = ("n_steps=64", "n_envs=1", "batch_size=64", "eval_every=64", "eval_episodes=1")
+    budget = ("--seeds", "2", "--steps", "128", "--source-steps", "64", "--set", *small)
+    done = run(
+        *("transfer", "dog.xml@tricks:Rise", "dog.xml@tricks:Rise", "--target-body", longer),
+        *(*budget, "--arms", "scratch", "zero-shot", "fine-tune", "evolution"),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    study = json.loads((tmp_path / "results" / "dog-to-dog" / "study.json").read_text())
+    source = study["plan"]["task"]["source"]
+    assert source["kwargs"] == {"path": "dog.xml", "task": "tricks:Rise"}
+    assert "reward_height" in json.dumps(study)

@@ -6,15 +6,24 @@ import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import gymnasium.envs.mujoco as mujoco_assets
 import numpy as np
 import pytest
 from stable_baselines3.common.env_checker import check_env
 
 from shapechanger.envs import CATALOGUE
-from shapechanger.envs.catalogue import FINGER_ENVS, RANGES_ENVS, VEHICLE_ENVS, WAYPOINT_ENVS
+from shapechanger.envs.catalogue import (
+    FINGER_ENVS,
+    OWN_ROBOT,
+    RANGES_ENVS,
+    VEHICLE_ENVS,
+    WAYPOINT_ENVS,
+)
+from shapechanger.tasks.own import RobotState
 from shapechanger.testing import PROMISES, MakeEnv, examine
 
 # Bodies without an id, and arguments that change a space.
@@ -33,6 +42,22 @@ _VARIANTS: dict[str, MakeEnv] = {
         ' {"edit": "lock", "joint": "ankle_3"}]',
     ),
 }
+# Robots of a file, with the built-in task and one of the user's own.
+_FILE = str(Path(mujoco_assets.__file__).parent / "assets" / "humanoid.xml")
+_OWN: dict[str, MakeEnv] = {
+    "a file": partial(gym.make, OWN_ROBOT, path=_FILE),
+    "a file and a task": partial(gym.make, OWN_ROBOT, path=_FILE, task=f"{__name__}:Roll"),
+}
+
+
+class Roll:
+    """Roll over."""
+
+    def reward(self, robot: RobotState) -> dict[str, float]:
+        """Return one term."""
+        return {"turn": 1.0 - robot.up}
+
+
 _MAKERS: dict[str, MakeEnv] = {env_id: partial(gym.make, env_id) for env_id in CATALOGUE}
 # Without images, no renderer is needed. A truck's default world is so open that its sensors read
 # the same at each start.
@@ -55,7 +80,7 @@ _FINGERS: dict[str, MakeEnv] = {
     "another path each time": partial(gym.make, _TRACK, path="random"),
     "an eight": partial(gym.make, _TRACK, path={"kind": "figure-eight", "hz": 0.25}),
 }
-_ALL = _MAKERS | _VARIANTS | _BLIND | _RANGES | _FINGERS
+_ALL = _MAKERS | _VARIANTS | _OWN | _BLIND | _RANGES | _FINGERS
 _SMALL = (32, 24)
 _SEEING: dict[str, MakeEnv] = {
     **{env_id: partial(gym.make, env_id, size=_SMALL) for env_id in VEHICLE_ENVS},

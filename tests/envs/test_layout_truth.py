@@ -15,6 +15,7 @@ from shapechanger.envs import CATALOGUE
 from shapechanger.layout import Feature
 from shapechanger.morphology import AddLimb, Lock, Split, to_json
 from shapechanger.morphology.pose import trunk_lift
+from tests.morphology.scenes import ASSETS
 
 _PLACE = {"exclude_current_positions_from_observation": False}
 _NO_CONTACTS = {"include_cfrc_ext_in_observation": False}
@@ -53,6 +54,7 @@ _CASES: dict[str, tuple[str, dict[str, Any]]] = {
         "shapechanger/ExtendedAnt-v1",
         {"actuated_extension": False},
     ),
+    "an ant of a file": ("shapechanger/OwnRobot-v1", {"path": ASSETS + "/ant.xml"}),
     "five legs, a stiff ankle and a shin": (
         "shapechanger/Ant-v1",
         {"body": to_json(_OTHER_BODY)} | _PLACE,

@@ -14,7 +14,10 @@ from hypothesis import given, settings
 
 from shapechanger.morphology import (
     EDITS,
+    AddFloor,
+    AddFreeJoint,
     AddLimb,
+    AddMotor,
     AddSegment,
     Cut,
     Damping,
@@ -26,12 +29,15 @@ from shapechanger.morphology import (
     JointRange,
     Lock,
     Mass,
+    PlaceBody,
+    PlaceGeom,
     Radius,
     Remove,
     Split,
     StartHeight,
     Stiffness,
     Stretch,
+    TotalMass,
     as_body,
     from_json,
     interpolate,
@@ -337,6 +343,26 @@ _ANY_EDIT: dict[type[Edit], st.SearchStrategy[Any]] = {
     Lock: st.builds(Lock, _NAMES, st.none() | NUMBERS, amount=_AMOUNTS),
     Gravity: st.builds(Gravity, _VECTORS, amount=_AMOUNTS),
     StartHeight: st.builds(StartHeight, _NAMES, st.floats(-100.0, 100.0), amount=_AMOUNTS),
+    PlaceBody: st.builds(PlaceBody, _NAMES, _VECTORS, amount=_AMOUNTS),
+    PlaceGeom: st.builds(
+        PlaceGeom,
+        _NAMES,
+        middle=_VECTORS,
+        radius=st.none() | _ABOVE_ZERO,
+        amount=_AMOUNTS,
+    )
+    | st.builds(
+        PlaceGeom,
+        _NAMES,
+        start=st.just((0.0, 0.0, 0.0)),
+        end=_VECTORS,
+        radius=st.none() | _ABOVE_ZERO,
+        amount=_AMOUNTS,
+    ),
+    TotalMass: st.builds(TotalMass, _ABOVE_ZERO, amount=_AMOUNTS),
+    AddMotor: st.builds(AddMotor, _NAMES, _GEARS, amount=_AMOUNTS),
+    AddFreeJoint: st.builds(AddFreeJoint, _NAMES, amount=_AMOUNTS),
+    AddFloor: st.builds(AddFloor, _ABOVE_ZERO, SMALL, amount=_AMOUNTS),
 }
 
 

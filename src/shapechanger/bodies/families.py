@@ -17,6 +17,7 @@ from typing import Final, Literal, get_args
 import mujoco
 import numpy as np
 
+from shapechanger.bodies import odrl
 from shapechanger.errors import MorphologyError, UnknownName
 from shapechanger.morphology import (
     Body,
@@ -28,6 +29,7 @@ from shapechanger.morphology import (
     Stretch,
     as_body,
     name_elements,
+    reshape,
 )
 
 BodyLike = str | Edit | Iterable[Edit]
@@ -74,6 +76,8 @@ class Family:
         axes: The numbers by which its bodies differ; none for a family that cannot be sampled.
         parts: Parts that a place, such as a leg, can have instead of the model's own, by the name
             of the place and of the part.
+        published: Edits of bodies that others have published, by name.
+        rig: Edits that come before those of any body, such as two more legs.
     """
 
     name: str
@@ -81,12 +85,18 @@ class Family:
     bodies_by_joint: Mapping[str, str] = field(default_factory=dict[str, str])
     axes: tuple[Axis, ...] = ()
     parts: Mapping[str, Mapping[str, Body]] = field(default_factory=dict[str, Mapping[str, Body]])
+    published: Mapping[str, Body] = field(default_factory=dict[str, Body])
+    rig: Body = ()
 
     def load(self, path: str | Path) -> mujoco.MjSpec:
-        """Load the model at `path`, and name all its elements."""
+        """Load the model at `path` with the rig, and name all its elements.
+
+        Raises:
+            MorphologyError: If the rig does not fit it.
+        """
         spec = mujoco.MjSpec.from_file(str(path))
         name_elements(spec, self.bodies_by_joint)
-        return spec
+        return reshape(spec, self.rig) if self.rig else spec
 
     def body(self, value: BodyLike) -> Body:
         """Edits of a body.
@@ -99,9 +109,10 @@ class Family:
             MorphologyError: If `value` is not a valid body.
         """
         if isinstance(value, str) and not value.lstrip().startswith(("[", "{")):
-            if value not in self.bodies:
-                raise UnknownName(f"body of the family {self.name}", value, self.bodies)
-            return self.bodies[value]
+            named = {**self.bodies, **self.published}
+            if value not in named:
+                raise UnknownName(f"body of the family {self.name}", value, named)
+            return named[value]
         return as_body(value)
 
     def body_at(self, values: Mapping[str, float], parts: Mapping[str, str] | None = None) -> Body:
@@ -240,12 +251,15 @@ def _plain(name: str) -> Family:
     return Family(name, {name: ()})
 
 
-def _runner(name: str, legs: Mapping[str, tuple[str, str, str]]) -> Family:
+def _runner(
+    name: str, legs: Mapping[str, tuple[str, str, str]], bodies_of_odrl: Mapping[str, Body]
+) -> Family:
     """Family of runners in a plane, whose parts are feet cut short.
 
     Args:
         name: Its name.
         legs: Thigh, shank and foot of each leg.
+        bodies_of_odrl: Bodies of ODRL.
     """
     limbs = [limb for leg in legs.values() for limb in leg]
     return Family(
@@ -253,20 +267,23 @@ def _runner(name: str, legs: Mapping[str, tuple[str, str, str]]) -> Family:
         {name: ()},
         axes=length_axes(limbs, 0.7, 1.4) + strength_axes("torso"),
         parts={leg: {"stump": (Cut(limbs[-1], 0.4),)} for leg, limbs in legs.items()},
+        published=odrl.published(name.lower(), bodies_of_odrl),
     )
 
 
 HALF_CHEETAH: Final = _runner(
     "HalfCheetah",
     {"back leg": ("bthigh", "bshin", "bfoot"), "front leg": ("fthigh", "fshin", "ffoot")},
+    odrl.HALF_CHEETAH,
 )
-HOPPER: Final = _runner("Hopper", {"leg": ("thigh", "leg", "foot")})
+HOPPER: Final = _runner("Hopper", {"leg": ("thigh", "leg", "foot")}, odrl.HOPPER)
 WALKER2D: Final = _runner(
     "Walker2d",
     {
         "right leg": ("thigh", "leg", "foot"),
         "left leg": ("thigh_left", "leg_left", "foot_left"),
     },
+    odrl.WALKER2D,
 )
 SWIMMER: Final = _plain("Swimmer")
 HUMANOID: Final = _plain("Humanoid")

@@ -16,6 +16,8 @@ import tyro
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
+    ODRL_ENVS,
+    OWN_ROBOT,
     RANGES_ENVS,
     REMOTE_FINGER,
     REMOTE_FINGER_TRACK,
@@ -35,6 +37,10 @@ EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]
 """Argument: the id of an env."""
 Body = Annotated[str, tyro.conf.arg(help="Another body of the family: its name, or edits as JSON.")]
 """Option: the body of an env."""
+EnvOptions = Annotated[
+    str, tyro.conf.arg(help="More arguments of the env as JSON, such as '{\"frame_skip\": 4}'.")
+]
+"""Option: more arguments of an env."""
 ExecutorKind = Annotated[
     Literal["processes", "ray"],
     tyro.conf.arg(help="Where runs run: in processes of this machine, or on a Ray cluster."),
@@ -49,6 +55,8 @@ ClusterAddress = Annotated[
 ]
 """Option: the Ray cluster of a study."""
 _REFERENCE: Final = "reference"
+# Suffixes of files that are robots of the user's own.
+_MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
 # The largest seed that both PyTorch and NumPy accept.
 _LARGEST_SEED: Final = 2**32 - 1
 
@@ -57,7 +65,8 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
     """Return a reference to an env, optionally with another body.
 
     Args:
-        env_id: An id of the catalogue, its name alone, or any id registered with Gymnasium.
+        env_id: An id of the catalogue, its name alone, any id registered with Gymnasium, or a robot
+            of the user's own as FILE or FILE@TASK.
         body: Name of a body of the env's family, or edits as JSON; empty for the env's own.
 
     Raises:
@@ -66,6 +75,11 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
         RenderError: If `MUJOCO_GL` prevents every env from being made.
     """
     require_known_gl()
+    file, at, own_task = env_id.partition("@")
+    if file.endswith(_MODEL_FILES):
+        allow_own_modules(own_task)
+        more = {"task": own_task} if at else {}
+        return EnvRef(OWN_ROBOT, {"path": file, **more, **({"body": body} if body else {})})
     task = find_task(env_id)
     if task and not body:
         return EnvRef(task)
@@ -77,9 +91,21 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
             raise
         allow_own_modules(env_id)
         full = env_id
-    if body and full not in CATALOGUE:
+    if body and full not in {*CATALOGUE, *ODRL_ENVS, OWN_ROBOT}:
         raise MorphologyError(f"{full} takes no body; these do: {', '.join(CATALOGUE)}.")
     return EnvRef(full, {"body": body} if body else {})
+
+
+def short_name(env_id: str) -> str:
+    """Return the name of an env as a part of a folder's name.
+
+    Args:
+        env_id: As of `env_ref`.
+    """
+    file, _, own_task = env_id.partition("@")
+    if file.endswith(_MODEL_FILES):
+        return "-".join(filter(None, (Path(file).stem, own_task.rpartition(":")[2])))
+    return env_id.replace("odrl/", "odrl-").rpartition("/")[2].removesuffix("-v1")
 
 
 def allow_own_modules(*names: str | None) -> None:
@@ -107,7 +133,7 @@ def default_learner(env: EnvRef) -> str:
         return "ppo-drive"
     if env.id in (REMOTE_FINGER, REMOTE_FINGER_TRACK):
         return "ppo-rig"
-    entry = CATALOGUE.get(env.id) or FINGER_ENVS.get(env.id)
+    entry = CATALOGUE.get(env.id) or ODRL_ENVS.get(env.id) or FINGER_ENVS.get(env.id)
     return entry.learner if entry else "ppo-run"
 
 
@@ -188,6 +214,8 @@ def options_of(given: str, flag: str) -> dict[str, Any]:
         raise StudyError(f"{flag} must be JSON ({error}), got {given!r}.") from None
     if not isinstance(options, dict):
         raise StudyError(f'{flag} are a JSON object such as {{"robot": "mine"}}, got {given}.')
+    task = cast("dict[str, Any]", options).get("task")
+    allow_own_modules(task if isinstance(task, str) else None)
     return cast("dict[str, Any]", options)
 
 

@@ -11,25 +11,43 @@ from rich.table import Table
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console, print_table, say
-from shapechanger.cli.env_arguments import Body, EnvId, asked, env_ref, opened
+from shapechanger.cli.env_arguments import (
+    Body,
+    EnvId,
+    EnvOptions,
+    asked,
+    env_ref,
+    opened,
+    options_of,
+)
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
+    ODRL_ENVS,
+    OWN_ROBOT,
     RANGES_ENVS,
     VEHICLE_ENVS,
     WAYPOINT_ENVS,
 )
 from shapechanger.layout import Layout
-from shapechanger.transfer.env_ref import layouts_of
+from shapechanger.transfer.env_ref import EnvRef, layouts_of
 
 
 @dataclass(frozen=True)
 class ListEnvs:
     """List all envs."""
 
+    odrl: bool = False
+    """List the bodies of ODRL one by one, instead of in one row."""
+
     def run(self) -> None:
         """Print a table of the catalogue."""
         table = Table("id", "body", box=None, pad_edge=False)
+        if self.odrl:
+            for entry in ODRL_ENVS.values():
+                table.add_row(entry.id, entry.family)
+            print_table(table)
+            return
         for entry in CATALOGUE.values():
             table.add_row(entry.id, entry.summary)
         vehicles = (VEHICLE_ENVS, RANGES_ENVS, WAYPOINT_ENVS)
@@ -37,6 +55,13 @@ class ListEnvs:
             table.add_row(env_id, f"{vehicle}: {summary}")
         for env_id, task in FINGER_ENVS.items():
             table.add_row(env_id, task.summary)
+        table.add_row(OWN_ROBOT, "an MJCF or URDF file of yours: give FILE or FILE@TASK as ENV")
+        robots = len({entry.family for entry in ODRL_ENVS.values()})
+        targets = len(ODRL_ENVS) - robots
+        table.add_row(
+            "shapechanger/odrl-ROBOT-SHIFT-LEVEL-v1",
+            f"{targets} targets of ODRL and their {robots} sources: `envs list --odrl`",
+        )
         print_table(table)
 
 
@@ -47,10 +72,11 @@ class ShowEnv:
     env: EnvId
     """Id of the env, such as BigAnt or shapechanger/BigAnt-v1."""
     body: Body = ""
+    options: EnvOptions = ""
 
     def run(self) -> None:
         """Print both layouts and the properties of the body."""
-        with opened(env_ref(self.env, self.body)) as env:
+        with opened(_env(self.env, self.body, self.options)) as env:
             observation, action = layouts_of(env)
             print_table(_layout_table("action", action))
             print_table(_layout_table("observation", observation))
@@ -72,12 +98,16 @@ class Compare:
     """Another body of the source's family: its name, or edits as JSON."""
     target_body: str = ""
     """Another body of the target's family: its name, or edits as JSON."""
+    source_options: str = ""
+    """More arguments of the source as JSON, such as '{"frame_skip": 4}'."""
+    target_options: str = ""
+    """The same of the target."""
 
     def run(self) -> None:
         """Print the certificate of the shift."""
         with (
-            opened(env_ref(self.source, self.source_body)) as source,
-            opened(env_ref(self.target, self.target_body)) as target,
+            opened(_env(self.source, self.source_body, self.source_options)) as source,
+            opened(_env(self.target, self.target_body, self.target_options)) as target,
         ):
             asked(target, "certify_shift")
             certificate = asked(source, "certify_shift")(source, target)
@@ -91,12 +121,13 @@ class CheckEnv:
     env: EnvId
     """Id of the env."""
     body: Body = ""
+    options: EnvOptions = ""
 
     def run(self) -> None:
         """Run the exam on the env."""
         from shapechanger.testing import examine
 
-        ref = env_ref(self.env, self.body)
+        ref = _env(self.env, self.body, self.options)
         for question in examine(ref.make):
             plain_console().print(Text.assemble(("kept", "green"), f"  {question}"))
 
@@ -110,6 +141,7 @@ class Render:
     out: Path
     """The picture to write, a PNG file."""
     body: Body = ""
+    options: EnvOptions = ""
     width: int = 640
     """Width of the picture in pixels."""
     height: int = 480
@@ -119,7 +151,7 @@ class Render:
         """Write the image."""
         from shapechanger.cli.pictures import write_picture
 
-        with opened(env_ref(self.env, self.body)) as env:
+        with opened(_env(self.env, self.body, self.options)) as env:
             picture = asked(env, "picture")(self.width, self.height)
             write_picture(picture, self.out)
         say(f"wrote {self.out}")
@@ -136,6 +168,11 @@ class Envs:
         | Annotated[CheckEnv, tyro.conf.subcommand("check")]
         | Annotated[Render, tyro.conf.subcommand("render")]
     )
+
+
+def _env(env_id: str, body: str, options: str) -> EnvRef:
+    """Return an env with a body and more arguments."""
+    return env_ref(env_id, body).having(options_of(options, "--options"))
 
 
 def _layout_table(side: str, layout: Layout) -> Table:

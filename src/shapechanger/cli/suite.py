@@ -36,6 +36,7 @@ from shapechanger.cli.env_arguments import (
     env_ref,
     executor_of,
     require_seed,
+    short_name,
 )
 from shapechanger.cli.transfer import run_steps, write_study_report
 from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
@@ -210,7 +211,7 @@ def _name(env: _Env) -> str:
     """The env's name as a part of a folder's name."""
     if isinstance(env, _Body):
         return env.name or "-".join([_name(env.env), *env.lenses])
-    return env.rpartition("/")[2].removesuffix("-v1")
+    return short_name(env)
 
 
 @dataclass(frozen=True)

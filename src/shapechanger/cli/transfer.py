@@ -26,6 +26,7 @@ from shapechanger.cli.env_arguments import (
     require_seed,
     settings_of,
 )
+from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.presets import resolve_learner
@@ -271,6 +272,8 @@ def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
 
 def _name(env: EnvRef) -> str:
     """Return a short folder name."""
+    if env.id == OWN_ROBOT:
+        return Path(env.kwargs["path"]).stem
     return env.id.split("/")[-1].removesuffix("-v1")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -25,6 +25,8 @@ REMOTE_VEHICLE: Final = "shapechanger/RemoteVehicle-v1"
 REMOTE_WAYPOINT: Final = "shapechanger/RemoteWaypoint-v1"
 """Id of the env of a vehicle on the network with the camera and the action of all vehicles."""
 
+OWN_ROBOT: Final = "shapechanger/OwnRobot-v1"
+"""Id of the env of a robot and a task of the user's own, from a file."""
 
 VEHICLE_ENVS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {
@@ -159,6 +161,37 @@ CATALOGUE: Final[dict[str, CatalogueEntry]] = {
     entry.id: entry for entry in (_entry(*row) for row in _BODIES)
 }
 
+# Robots of ODRL with their families and their two shifts of joints and of shapes each.
+_ODRL: Final = (
+    ("ant", "Ant", ("anklejnt", "hipjnt"), ("alllegs", "halflegs")),
+    ("halfcheetah", "HalfCheetah", ("footjnt", "thighjnt"), ("thigh", "torso")),
+    ("hopper", "Hopper", ("footjnt", "legjnt"), ("foot", "torso")),
+    ("walker2d", "Walker2d", ("footjnt", "thighjnt"), ("leg", "torso")),
+)
+
+
+def _odrl_entries() -> Iterator[CatalogueEntry]:
+    """Yield the source and the 20 targets of each robot of ODRL."""
+    for robot, family, joints, shapes in _ODRL:
+        entry_point, learner, threshold = _FAMILIES[family]
+        tasks = [
+            "",
+            *(f"-{kind}-{f}" for kind in ("friction", "gravity") for f in (0.1, 0.5, 2.0, 5.0)),
+        ]
+        shifts = [f"kinematic-{name}" for name in joints] + [f"morph-{name}" for name in shapes]
+        tasks += [f"-{shift}-{level}" for shift in shifts for level in ("easy", "medium", "hard")]
+        for task in tasks:
+            name = f"odrl-{robot}{task}"
+            where = f"shapechanger.envs.{entry_point}"
+            summary = f"body of ODRL: {robot}{task}"
+            yield CatalogueEntry(name, family, summary, where, learner, name, threshold)
+
+
+ODRL_ENVS: Final[Mapping[str, CatalogueEntry]] = MappingProxyType(
+    {entry.id: entry for entry in _odrl_entries()}
+)
+"""Envs with the bodies of ODRL by id: 4 sources and 80 targets; see `shapechanger.bodies.odrl`."""
+
 # Envs whose bodies form no family, except the vehicle on the network.
 _TASK_IDS: Final = (
     *VEHICLE_ENVS,
@@ -167,6 +200,7 @@ _TASK_IDS: Final = (
     *FINGER_ENVS,
     REMOTE_FINGER,
     REMOTE_FINGER_TRACK,
+    OWN_ROBOT,
 )
 _EPISODE_STEPS: Final = 1000
 _RANGES_STEPS: Final = 400  # A learner meets more courses.
@@ -176,7 +210,7 @@ _TUNED: Final = ("Ant", "InvertedPendulum")
 
 def register_all() -> None:
     """Register every env of the catalogue with Gymnasium, once."""
-    for entry in CATALOGUE.values():
+    for entry in (*CATALOGUE.values(), *ODRL_ENVS.values()):
         _register(
             entry.id,
             entry.entry_point,
@@ -188,6 +222,12 @@ def register_all() -> None:
             disable_env_checker=entry.family in _TUNED,
             kwargs={"body": entry.body} if entry.body else {},
         )
+    _register(
+        OWN_ROBOT,
+        "shapechanger.envs.own:OwnRobotEnv",
+        _EPISODE_STEPS,
+        vector_entry_point="shapechanger.envs.vector.entry_points:OwnRobot",
+    )
     for envs, kind, limit in (
         (VEHICLE_ENVS, "VehicleEnv", _EPISODE_STEPS),
         (RANGES_ENVS, "RangesEnv", _RANGES_STEPS),
@@ -216,14 +256,17 @@ def _register(env_id: str, entry_point: str, episode_steps: int | None, **more: 
 
 
 def find(env_id: str) -> CatalogueEntry:
-    """Return the entry of an id, or of a name such as `BigAnt`.
+    """Return the entry of an id, or of a name such as `BigAnt` or `odrl/ant-friction-0.5`.
 
     Raises:
         UnknownName: If there is none.
     """
     name = _name(env_id)
-    entry = CATALOGUE.get(f"{NAMESPACE}/{name}-v1")
+    full = f"{NAMESPACE}/{name}-v1"
+    entry = CATALOGUE.get(full) or ODRL_ENVS.get(full)
     if entry is None:
+        if name.startswith("odrl"):
+            raise UnknownName("environment", name, [each.name for each in ODRL_ENVS.values()])
         known = [entry.name for entry in CATALOGUE.values()]
         raise UnknownName("environment", name, [*known, *map(_name, _TASK_IDS)])
     return entry
@@ -236,4 +279,6 @@ def find_task(env_id: str) -> str | None:
 
 
 def _name(env_id: str) -> str:
-    return env_id.removeprefix(f"{NAMESPACE}:").removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
+    name = env_id.removeprefix(f"{NAMESPACE}:").removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
+    # Ids of Gymnasium have one slash only.
+    return f"odrl-{name.removeprefix('odrl/')}" if name.startswith("odrl/") else name

@@ -114,7 +114,11 @@ def drive_features(model: mujoco.MjModel) -> list[Feature]:
 
 
 def action_layout(model: mujoco.MjModel) -> Layout:
-    """Return a feature `actuator/motor` per control, with its gear as gain."""
+    """Return a feature per control.
+
+    `actuator/motor` with its gear as gain; `actuator/target` of a servo, the position or velocity
+    that it drives its joint to.
+    """
     features: list[Feature] = []
     for a in range(model.nu):
         name = model.actuator(a).name
@@ -123,6 +127,11 @@ def action_layout(model: mujoco.MjModel) -> Layout:
         gear = float(model.actuator_gear[a, 0] * model.actuator_gainprm[a, 0])
         drives_joint = model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT
         kind = _J(model.jnt_type[model.actuator_trnid[a, 0]]) if drives_joint else None
+        target = _servo_unit(model, a, kind)
+        if target:
+            element = Element("actuator", name)
+            features.append(Feature(f"{name}/target", target, float(low), float(high), element))
+            continue
         known = kind in _FORCE_UNIT and gear > 0.0
         features.append(
             Feature(
@@ -136,6 +145,23 @@ def action_layout(model: mujoco.MjModel) -> Layout:
             )
         )
     return Layout(tuple(features))
+
+
+def _servo_unit(model: mujoco.MjModel, actuator: int, kind: mujoco.mjtJoint | None) -> str:
+    """Return the unit of the target of a servo on a hinge or slide; empty for other actuators."""
+    # MuJoCo's shortcuts <position> and <velocity>, with a gear of 1.
+    plain = (
+        kind in _POSITION_UNIT
+        and model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
+        and model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_FIXED
+        and model.actuator_gear[actuator, 0] == 1.0
+    )
+    if not plain or kind is None:
+        return ""
+    gain, bias = model.actuator_gainprm[actuator, 0], model.actuator_biasprm[actuator]
+    if gain and bias[1] == -gain:
+        return _POSITION_UNIT[kind]
+    return f"{_POSITION_UNIT[kind]}/s" if gain and bias[1] == 0.0 and bias[2] == -gain else ""
 
 
 def _body_of(model: mujoco.MjModel, joint: int) -> tuple[str, Element]:

@@ -6,7 +6,7 @@ import copy
 import inspect
 from collections.abc import Mapping
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
@@ -88,7 +88,7 @@ class Reshapable(MujocoEnv):
             middle of its range, m; None for a body that does not stand.
     """
 
-    family: ClassVar[Family]
+    family: Family
 
     body: Body
     observation_layout: Layout
@@ -459,13 +459,17 @@ def _check_arguments(env: type[Any], family: str, arguments: Mapping[str, Any]) 
         known.update({each.name: each.default for each in parameters if each.name not in _FIXED})
     for name, value in arguments.items():
         if name not in known:
-            raise UnknownName(f"argument of {family}", name, ("body", *known))
+            own = [
+                each for each in inspect.signature(env.__init__).parameters if each not in _FIXED
+            ]
+            names = dict.fromkeys([*own, *known])
+            raise UnknownName(f"argument of {family}", name, names)
         if name != "main_body" and (expected := _mismatch(known[name], value)):
             raise EnvArgumentError(f"{family}: {name} must be {expected}, got {value!r}.")
 
 
 # Arguments of Gymnasium's base class that its envs set themselves.
-_FIXED: Final = ("self", "kwargs", "model_path", "observation_space")
+_FIXED: Final = ("self", "arguments", "kwargs", "model_path", "observation_space")
 
 
 def _mismatch(default: Any, value: Any) -> str:

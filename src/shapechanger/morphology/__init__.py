@@ -23,12 +23,16 @@ from shapechanger.morphology.body import (
     compile_body,
     from_json,
     interpolate,
+    reason_of,
+    register_edit,
     reshape,
     to_json,
 )
 from shapechanger.morphology.edits.edit import Edit
 from shapechanger.morphology.edits.joints import JointRange, Lock
 from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
+from shapechanger.morphology.edits.places import PlaceBody, PlaceGeom, TotalMass
+from shapechanger.morphology.edits.rigging import AddFloor, AddFreeJoint, AddMotor
 from shapechanger.morphology.edits.values import (
     Damping,
     Density,
@@ -45,7 +49,10 @@ from shapechanger.morphology.spec.elements import name_elements
 
 __all__ = [
     "EDITS",
+    "AddFloor",
+    "AddFreeJoint",
     "AddLimb",
+    "AddMotor",
     "AddSegment",
     "Body",
     "Cut",
@@ -58,17 +65,22 @@ __all__ = [
     "JointRange",
     "Lock",
     "Mass",
+    "PlaceBody",
+    "PlaceGeom",
     "Radius",
     "Remove",
     "Split",
     "StartHeight",
     "Stiffness",
     "Stretch",
+    "TotalMass",
     "as_body",
     "compile_body",
     "from_json",
     "interpolate",
     "name_elements",
+    "reason_of",
+    "register_edit",
     "reshape",
     "to_json",
 ]

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Hashable, Iterable
-from typing import Any, Final, cast
+from collections.abc import Hashable, Iterable, Mapping
+from typing import Any, Final, TypeVar, cast
 
 import msgspec
 import mujoco
@@ -19,6 +19,8 @@ from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError,
 from shapechanger.morphology.edits.edit import Edit, Vector
 from shapechanger.morphology.edits.joints import JointRange, Lock
 from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
+from shapechanger.morphology.edits.places import PlaceBody, PlaceGeom, TotalMass
+from shapechanger.morphology.edits.rigging import AddFloor, AddFreeJoint, AddMotor
 from shapechanger.morphology.edits.values import (
     Damping,
     Density,
@@ -40,9 +42,32 @@ EDITS: Final[tuple[type[Edit], ...]] = (
     *(Stretch, Radius, Cut, Remove, Split, AddSegment, AddLimb),
     *(Mass, Density, Gear, Damping, Stiffness, Friction),
     *(JointRange, Lock, Gravity, StartHeight),
+    *(PlaceBody, PlaceGeom, TotalMass),
+    *(AddMotor, AddFreeJoint, AddFloor),
 )
+"""The edits of Shapechanger; `register_edit` adds others."""
 
-_TAGS: Final = {str(edit.__struct_config__.tag): edit for edit in EDITS}
+_TAGS: Final[dict[str, type[Edit]]] = {str(edit.__struct_config__.tag): edit for edit in EDITS}
+
+_E = TypeVar("_E", bound=type[Edit])
+
+
+def register_edit(kind: _E) -> _E:
+    """Let JSON name an edit of your own, as worker processes and files need; a class decorator.
+
+    Args:
+        kind: A frozen subclass of `Edit`; its name in JSON follows from its class.
+
+    Raises:
+        MorphologyError: If another edit has this name in JSON.
+    """
+    tag = str(kind.__struct_config__.tag)
+    known = _TAGS.get(tag)
+    # A module that is imported again defines its classes again.
+    if (known is not None and known.__qualname__ != kind.__qualname__) or known in EDITS:
+        raise MorphologyError(f"There is an edit {tag!r} already: give {kind.__name__} a new name.")
+    _TAGS[tag] = kind
+    return kind
 
 
 def to_json(body: Iterable[Edit]) -> str:
@@ -78,6 +103,8 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
         return (value,)
     given: Any = value  # Not checked at run time.
     edits = list(cast("Iterable[Any]", given)) if isinstance(given, Iterable) else [given]
+    # JSON that is parsed already, as of options that hold a body.
+    edits = [_edit(edit) if isinstance(edit, Mapping) else edit for edit in edits]
     for edit in edits:
         if not isinstance(edit, Edit):
             raise MorphologyError(
@@ -88,9 +115,9 @@ def as_body(value: Edit | Iterable[Edit] | str) -> Body:
 
 def _edit(item: Any) -> Edit:
     """Return an edit from its parsed JSON."""
-    if not isinstance(item, dict) or "edit" not in item:
+    if not isinstance(item, Mapping) or "edit" not in item:
         raise MorphologyError(f'An edit is an object with the key "edit", got {item!r}.')
-    fields = cast("dict[str, Any]", item)
+    fields = dict(cast("Mapping[str, Any]", item))
     kind = _TAGS.get(str(fields["edit"]))
     if kind is None:
         raise UnknownName("edit", str(fields["edit"]), _TAGS)
@@ -206,6 +233,11 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
     except (ValueError, mujoco.FatalError) as error:
         if isinstance(error, ShapechangerError):
             raise
-        lines = [" ".join(line.split()) for line in str(error).splitlines()]
-        reason = "; ".join(filter(None, lines)).removeprefix("Error: ").removesuffix(".")
-        raise BrokenModel(f"MuJoCo does not compile the body {to_json(body)}: {reason}.") from error
+        text = f"MuJoCo does not compile the body {to_json(body)}: {reason_of(error)}."
+        raise BrokenModel(text) from error
+
+
+def reason_of(error: BaseException) -> str:
+    """Return the message of an error of MuJoCo, which may have several lines, for a sentence."""
+    lines = [" ".join(line.split()) for line in str(error).splitlines()]
+    return "; ".join(filter(None, lines)).removeprefix("Error: ").removesuffix(".")

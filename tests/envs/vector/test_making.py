@@ -140,6 +140,18 @@ def test_each_env_may_have_a_body_of_its_own() -> None:
         envs.close()
 
 
+def test_bodies_of_odrl_are_made_by_either_name() -> None:
+    """As on the command line, and by Gymnasium, whose ids have one slash."""
+    name = "odrl-hopper-gravity-0.5"
+    for envs in (
+        shapechanger.make_vec(name.replace("odrl-", "odrl/"), 1),
+        shapechanger.make_vec(name, 1),
+        gym.make_vec(f"shapechanger/{name}-v1", num_envs=1),
+    ):
+        assert envs.get_attr("model")[0].opt.gravity[2] == -4.905
+        envs.close()
+
+
 def test_external_ids_are_accepted() -> None:
     """Ids of other packages work without a vector entry point."""
     envs = shapechanger.make_vec("Hopper-v5", 2, threads=2)

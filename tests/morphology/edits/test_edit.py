@@ -97,6 +97,8 @@ def test_tags_are_the_names_of_the_kinds() -> None:
         *("stretch", "radius", "cut", "remove", "split", "add_segment", "add_limb"),
         *("mass", "density", "gear", "damping", "stiffness", "friction"),
         *("joint_range", "lock", "gravity", "start_height"),
+        *("place_body", "place_geom", "total_mass"),
+        *("add_motor", "add_free_joint", "add_floor"),
     ]
 
 

@@ -144,8 +144,9 @@ def _make(env_id: str, arguments: dict[str, Any]) -> gym.Env[Any, Any]:
 
 
 def _known_id(env_id: str) -> str:
-    """Return the full id of a name such as `BigAnt`."""
-    if env_id in gym.registry or ":" in env_id or "/" in env_id:
+    """Return the full id of a name such as `BigAnt` or `odrl/ant-friction-0.5`."""
+    in_full = "/" in env_id and not env_id.startswith("odrl/")
+    if env_id in gym.registry or ":" in env_id or in_full:
         return env_id
     return find_task(env_id) or find(env_id).id
 

@@ -181,7 +181,8 @@ def _height(env: Certifiable | Wrapped) -> float | None:
 
 
 def _label(env: Any) -> str:
-    """Return the registered id of an environment, or the name of its class."""
+    """Return the label of an environment, its registered id, or the name of its class."""
     spec = getattr(env, "spec", None)
     inner = getattr(env, "unwrapped", env)
-    return str(getattr(spec, "id", None) or type(inner).__name__)
+    own = getattr(inner, "label", None)
+    return str(own or getattr(spec, "id", None) or type(inner).__name__)

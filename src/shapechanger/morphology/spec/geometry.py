@@ -156,7 +156,7 @@ def stretch_geom(
     if not has_ends(geom):
         _lengthen(spec, geom, factor, axis)
     _move_outwards(geom, held, factor, axis)
-    _keep_density(spec, geom, before)
+    keep_density(spec, geom, before)
 
 
 def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: float) -> None:
@@ -171,7 +171,7 @@ def resize_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, held: Array, factor: 
     before = volume(spec, geom)
     geom.size = geom.size * factor
     _move_outwards(geom, held, factor)
-    _keep_density(spec, geom, before)
+    keep_density(spec, geom, before)
 
 
 def thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> None:
@@ -189,7 +189,7 @@ def thicken_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float) -> No
     else:
         size[np.arange(3) != np.argmax(size)] *= factor
     geom.size = size
-    _keep_density(spec, geom, before)
+    keep_density(spec, geom, before)
 
 
 def _lengthen(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float, axis: str | None) -> None:
@@ -214,8 +214,14 @@ def _lengthen(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float, axis: st
     geom.size = size
 
 
-def _keep_density(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, volume_before: float) -> None:
-    """Scale a mass that is written out with the geom's volume, to keep the density."""
+def keep_density(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, volume_before: float) -> None:
+    """Scale a mass that is written out with the geom's volume, to keep the density.
+
+    Args:
+        spec: Specification that contains it.
+        geom: The geom, changed.
+        volume_before: Its volume before the change, m³.
+    """
     if not math.isnan(geom.mass):
         geom.mass *= volume(spec, geom) / volume_before
 

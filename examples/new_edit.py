@@ -1,0 +1,75 @@
+# /// script
+# dependencies = ["shapechanger[sim]", "tyro"]
+# ///
+"""Write an edit of a body that Shapechanger does not have: hinges that are turned."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import tyro
+
+import shapechanger  # noqa: F401  # Registers the ids.
+from shapechanger.errors import MorphologyError
+from shapechanger.morphology import Edit, from_json, interpolate, register_edit, to_json
+from shapechanger.morphology.spec.elements import select
+
+
+@register_edit
+class TurnHinge(Edit, frozen=True):
+    """Turn the axis of hinges about the vertical of their body.
+
+    Attributes:
+        joint: Name or glob of the hinges.
+        angle: Turn, rad; positive is counter-clockwise seen from above.
+    """
+
+    joint: str
+    angle: float
+
+    def check(self) -> None:
+        """Refuse an angle that is no number, when the edit is made."""
+        if not math.isfinite(self.angle):
+            raise MorphologyError(f"An angle must be finite, got {self.angle}.")
+
+    def apply(self, spec: mujoco.MjSpec) -> None:
+        """Turn every hinge that fits; `amount` is the share of the change that is made."""
+        turn = self.amount * self.angle
+        matrix = np.array(
+            [
+                [math.cos(turn), -math.sin(turn), 0.0],
+                [math.sin(turn), math.cos(turn), 0.0],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+        for joint in select("joint", self.joint, spec.joints):
+            joint.axis = matrix @ joint.axis
+
+
+def main(steps: int = 200) -> None:
+    """Step an ant with turned ankles, and prove what is different about it."""
+    body = (TurnHinge("ankle_*", math.radians(40.0)),)
+    print(to_json(body))
+    assert from_json(to_json(body)) == body  # So studies and worker processes can have it.
+    with (
+        gym.make("shapechanger/Ant-v1") as plain,
+        gym.make("shapechanger/Ant-v1", body=body) as env,
+    ):
+        inner: Any = env.unwrapped
+        print(inner.certify_shift(plain, env))
+        # The body halfway, at a reset.
+        env.reset(seed=0, options={"body": interpolate((), body, 0.5)})
+        print("halfway:", inner.model.joint("ankle_1").axis.round(3))
+        env.action_space.seed(0)
+        for _ in range(steps):
+            _, _, terminated, truncated, _ = env.step(env.action_space.sample())
+            if terminated or truncated:
+                env.reset()
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -1,0 +1,144 @@
+"""Robots of the user's own: MJCF and URDF files, and robots of `robot_descriptions`."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import mujoco
+
+from shapechanger.bodies.families import Family
+from shapechanger.errors import BrokenModel, MorphologyError, UnknownName
+from shapechanger.morphology import Body, name_elements, reason_of, reshape, to_json
+
+# Names of the package are those of its modules.
+_DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")
+_PACKAGE: Final = "robot_descriptions"
+
+
+@dataclass(frozen=True)
+class OwnFamily(Family):
+    """The bodies that edits make from a robot of the user's own.
+
+    Attributes:
+        path: The file; the family is the same only for the same file and rig.
+    """
+
+    path: Path = Path()
+
+    @property
+    def key(self) -> str:
+        """The file and the rig: two robots with the same key have bodies between them."""
+        return f"{self.path}{to_json(self.rig) if self.rig else ''}"
+
+    def load(self, path: str | Path) -> mujoco.MjSpec:
+        """Load a model with the rig, and name all its elements.
+
+        Args:
+            path: The file.
+
+        Raises:
+            BrokenModel: If MuJoCo cannot read it.
+            MorphologyError: If the rig does not fit it.
+        """
+        try:
+            spec = mujoco.MjSpec.from_file(str(path))
+        except (ValueError, mujoco.FatalError) as error:
+            raise BrokenModel(f"MuJoCo cannot read {path}: {reason_of(error)}.") from error
+        # The base of a URDF would vanish in the world, and its names with it.
+        spec.compiler.fusestatic = False
+        name_elements(spec)
+        return reshape(spec, self.rig)
+
+
+def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:
+    """Return the family of a robot of the user's own.
+
+    Args:
+        path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
+            `go2_mj_description`, which downloads it.
+        rig: Edits that come before those of any body.
+
+    Raises:
+        UnknownName: If there is no such file, or the package has no robot of this name.
+        MorphologyError: If the path is a folder, or the package is missing or fails.
+    """
+    file = model_file(path)
+    name = file.stem
+    return OwnFamily(name, {name: ()}, path=file, rig=rig)
+
+
+def model_file(path: str | Path) -> Path:
+    """Return the file of a robot, as an absolute path.
+
+    Args:
+        path: As of `own_family`.
+
+    Raises:
+        UnknownName: If there is no such file, or the package has no robot of this name.
+        MorphologyError: If the path is a folder, or the package is missing or fails.
+    """
+    file = Path(path).expanduser()
+    if file.is_file():
+        return file.resolve()
+    if _DESCRIPTION.fullmatch(str(path)):
+        return _described(str(path))
+    if file.is_dir():
+        raise MorphologyError(f"{path} is a folder: name a file of MJCF or URDF in it.")
+    known = sorted(each.name for each in _models_beside(file))
+    raise UnknownName(f"model in {file.parent.resolve()}", file.name, known)
+
+
+def _models_beside(file: Path) -> list[Path]:
+    """Return the models in a file's folder."""
+    folder = file.parent
+    return [each for each in folder.glob("*") if each.suffix in (".xml", ".urdf", ".mjcf")]
+
+
+def _described(name: str) -> Path:
+    """Return the file of a robot of `robot_descriptions`."""
+    if importlib.util.find_spec(_PACKAGE) is None:
+        raise MorphologyError(
+            f"{name} looks like a robot of the package {_PACKAGE}, which is not installed: run "
+            f"`pip install {_PACKAGE}`."
+        )
+    if importlib.util.find_spec(f"{_PACKAGE}.{name}") is None:
+        known: Any = importlib.import_module(f"{_PACKAGE}._descriptions").DESCRIPTIONS
+        raise UnknownName(f"robot of {_PACKAGE}", name, list(known))
+    try:
+        module = importlib.import_module(f"{_PACKAGE}.{name}")
+    except Exception as error:  # Git, network and file errors of several packages.
+        raise MorphologyError(f"{_PACKAGE} cannot fetch {name}: {reason_of(error)}.") from error
+    for attribute in ("MJCF_PATH", "URDF_PATH"):
+        if hasattr(module, attribute):
+            return Path(getattr(module, attribute)).resolve()
+    raise MorphologyError(f"{name} of {_PACKAGE} has neither MJCF nor URDF.")
+
+
+def require_robot(model: mujoco.MjModel, path: Path) -> None:
+    """Require a model that a policy can act on.
+
+    Args:
+        model: The compiled model.
+        path: Its file.
+
+    Raises:
+        MorphologyError: If it has no actuators, or one whose range is unknown.
+    """
+    if not model.nu:
+        motors = "rig=AddMotor('*')" if path.suffix == ".urdf" else "rig=AddMotor('*', GEAR)"
+        raise MorphologyError(
+            f"{path.name} has no actuators: add them to the file, or motors with {motors}."
+        )
+    unlimited = [
+        model.actuator(i).name for i in range(model.nu) if not model.actuator_ctrllimited[i]
+    ]
+    if unlimited:
+        raise MorphologyError(
+            f"These actuators of {path.name} have no ctrlrange, so nobody knows what to send them: "
+            f"{', '.join(unlimited)}."
+        )

@@ -1,0 +1,367 @@
+"""A robot and a task of the user's own, from an MJCF or URDF file."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Iterator, Mapping, Sequence
+from os import fspath
+from pathlib import Path
+from typing import Any, Final, cast
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.errors import BrokenModel, EnvArgumentError, MissingExtra, UnknownName
+
+try:
+    import mujoco
+    from gymnasium.envs.mujoco import MujocoEnv
+except (ImportError, gym.error.DependencyNotInstalled) as error:
+    raise MissingExtra("mujoco", "sim") from error
+
+from shapechanger.bodies.families import BodyLike
+from shapechanger.bodies.own import own_family, require_robot
+from shapechanger.envs.catalogue import OWN_ROBOT
+from shapechanger.envs.layouts import contact_features, position_features, velocity_features
+from shapechanger.envs.reshapable import Reshapable
+from shapechanger.layout import Feature
+from shapechanger.morphology import as_body, reason_of, to_json
+from shapechanger.morphology.pose import (
+    StartRules,
+    standing_height,
+    start_pose,
+    travelling_body,
+    trunk_lift,
+)
+from shapechanger.tasks.measure import RETURN, Measure
+from shapechanger.tasks.own import RobotState, as_task, has_ended, observed, reference, reward_terms
+
+_Floats = NDArray[np.float64]
+
+# By default as many physics steps as come nearest to this; that of Gymnasium's runners is 8 to
+# 50 ms.
+_CONTROL_STEP_S: Final = 0.02
+# The pose that collections of models call so is where a robot starts.
+_HOME: Final = "home"
+_J: Final = mujoco.mjtJoint
+
+
+class _TaskEnv(MujocoEnv, EzPickle):
+    """Gymnasium's half: step the physics, ask the task, draw a start."""
+
+    def step(self, action: Any) -> Any:
+        """Take one step."""
+        own = cast("OwnRobotEnv", self)
+        before = own.trunk_place()
+        cast("Any", self).do_simulation(action, self.frame_skip)
+        robot = own.seen(np.asarray(action), before)
+        # A state that is huge or not finite is no fault of the task, and is not its business.
+        terms = {} if own.diverged else reward_terms(own.task, own.task_name, robot)
+        terminated = own.diverged or has_ended(own.task, own.task_name, robot)
+        info = {
+            "x_position": float(robot.place[0]),
+            "y_position": float(robot.place[1]),
+            "x_velocity": float(robot.velocity[0]),
+            "y_velocity": float(robot.velocity[1]),
+            **{f"reward_{name}": value for name, value in terms.items()},
+        }
+        if self.render_mode == "human":
+            self.render()
+        return self._get_obs(), sum(terms.values(), 0.0), terminated, False, info
+
+    def reset_model(self) -> _Floats:
+        """Draw a start state around the start pose."""
+        own = cast("OwnRobotEnv", self)
+        scale = own.reset_noise_scale
+        place = self.init_qpos + self.np_random.uniform(-scale, scale, self.model.nq)
+        speed = self.init_qvel + scale * self.np_random.standard_normal(self.model.nv)
+        cast("Any", self).set_state(place, speed)
+        return self._get_obs()
+
+    def _get_obs(self) -> _Floats:
+        return cast("OwnRobotEnv", self).observed_numbers()
+
+    def _get_reset_info(self) -> dict[str, Any]:
+        place = cast("OwnRobotEnv", self).trunk_place()
+        return {"x_position": float(place[0]), "y_position": float(place[1])}
+
+
+class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
+    Reshapable, _TaskEnv
+):
+    """A robot of an MJCF or URDF file, with a task of the user's own.
+
+    - **Observation**: positions and velocities of all joints, without the place of the trunk on the
+      floor; or the numbers that the task names as `observe`. `observation_layout` names each.
+    - **Action**: one number per actuator, over its `ctrlrange`; `action_layout` has names, units
+      and gains.
+    - **Reward**: the sum of the terms that the task returns, which `info` lists as `reward_...`.
+    - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
+      at least a tenth of its range inside its limits; the feet stand above the floor. The standing
+      height is that of this pose.
+    - **End**: where the task ends it, and where the simulation diverges, with a reward of 0.
+
+    Args:
+        path: An MJCF or URDF file, or a name of the package `robot_descriptions`.
+        task: `walk`, or a task of your own: `module:Name`, a class, a function or an object; see
+            `shapechanger.tasks.own`.
+        task_options: Arguments of the task's class.
+        body: Edits of `shapechanger.morphology`, or their JSON; the file's own robot by default.
+        rig: Edits that come before those of any body, such as `AddMotor("*")` and `AddFloor()`, or
+            their JSON.
+        frame_skip: Physics steps per action; None for a step of 20 ms.
+        reset_noise_scale: Half-width of the uniform noise of the start pose, rad and m, and
+            standard deviation of that of its velocities, rad/s and m/s.
+        **arguments: Arguments of Gymnasium's `MujocoEnv`, and those of `Reshapable`.
+
+    Attributes:
+        task: The task.
+        task_name: Its name.
+        measures: What a policy is measured by, the default first.
+        reset_noise_scale: As given.
+    """
+
+    measures: tuple[Measure, ...]
+
+    def __init__(
+        self,
+        path: str | Path = "",
+        task: Any = "walk",
+        task_options: Mapping[str, Any] | None = None,
+        body: BodyLike = (),
+        rig: BodyLike = (),
+        frame_skip: int | None = None,
+        reset_noise_scale: float = 0.05,
+        **arguments: Any,
+    ) -> None:
+        if not str(path):
+            raise EnvArgumentError(f"{OWN_ROBOT} needs the file of a robot, as path=FILE.")
+        self.task, self.task_name = as_task(task, task_options)
+        self._observed = observed(self.task)
+        self.measures = getattr(self.task, "measures", (RETURN,))
+        if not 0.0 <= reset_noise_scale < np.inf:
+            raise EnvArgumentError(
+                f"reset_noise_scale must be a number of at least 0, got {reset_noise_scale!r}."
+            )
+        self.reset_noise_scale = float(reset_noise_scale)
+        self.family = self._file = own_family(path, as_body(rig))
+        self._begin(body, arguments)
+        spec = self.family.load(self._file.path)
+        self._home = _home_of(spec, self._file.path)
+        if frame_skip is None:
+            frame_skip = max(1, round(_CONTROL_STEP_S / spec.option.timestep))
+        if frame_skip < 1:
+            raise EnvArgumentError(f"frame_skip must be at least 1, got {frame_skip}.")
+        # Gymnasium compares the rate of its frames, which it expects in the class, with the model.
+        modes = ["human", "rgb_array", "depth_array", "rgbd_tuple"]
+        self.metadata: dict[str, Any] = {"render_modes": modes}
+        # `_finish` replaces the space by that of the layout.
+        space = gym.spaces.Box(-np.inf, np.inf, (0,), np.float64)
+        cast("Any", MujocoEnv).__init__(self, str(self._file.path), frame_skip, space, **arguments)
+        self.metadata["render_fps"] = round(1.0 / self.dt)
+        self._finish(arguments)
+        self._ezpickle_kwargs |= {
+            "path": fspath(path),
+            "task": reference(task),
+            "task_options": task_options,
+            "rig": to_json(self._file.rig),
+            "frame_skip": frame_skip,
+            "reset_noise_scale": reset_noise_scale,
+        }
+        self.set_state(self.init_qpos, self.init_qvel)
+        check = getattr(self.task, "check", None)
+        if check is not None:
+            check(self.seen(np.zeros(self.model.nu), self.trunk_place()))
+
+    def _initialize_simulation(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        model, data = super()._initialize_simulation()
+        require_robot(model, self._file.path)
+        return model, data
+
+    def _start_and_height(self, model: mujoco.MjModel) -> tuple[_Floats, float | None]:
+        pose = start_pose(model)
+        if self._home:
+            for joint, place, size in _places_of_joints(model):
+                if joint in self._home:
+                    pose[place : place + size] = self._home[joint]
+            # Lifted to the floor if the robot has grown since.
+            pose = StartRules(model).feasible(pose, mujoco.MjData(model))
+        # In the middle of their ranges many legs are folded.
+        return pose, standing_height(model, pose)
+
+    def _follow_body(self) -> None:
+        model = self.model
+        travelling = travelling_body(model)
+        self._can_travel = travelling is not None
+        self._trunk = travelling or min(1, model.nbody - 1)
+        super()._follow_body()
+        data = mujoco.MjData(model)
+        data.qpos[:] = self.init_qpos
+        mujoco.mj_kinematics(model, data)
+        self._up_axis = data.xmat[self._trunk].reshape(3, 3)[2].copy()
+        low, high = self.action_layout.low, self.action_layout.high
+        self._middle, self._half_range = 0.5 * (low + high), 0.5 * (high - low)
+
+    def _observation_features(self, model: mujoco.MjModel) -> list[Feature]:
+        features = position_features(model) + velocity_features(model)
+        hidden = _place_on_floor(model)
+        names = [feature.name for feature in features]
+        if self._observed is None:
+            places = [i for i in range(len(features)) if i not in hidden]
+        else:
+            features += contact_features(model, -np.inf, np.inf)
+            names = [feature.name for feature in features]
+            places = _matching(names, self._observed)
+        self._places = np.array(places, np.intp)
+        self._contacts_observed = any(place >= model.nq + model.nv for place in places)
+        self._place_of = {name: place for place, name in enumerate(names)}
+        return [features[place] for place in places]
+
+    def observed_numbers(self) -> _Floats:
+        """Return the present observation."""
+        return self._all_numbers(self._contacts_observed)[self._places]
+
+    def _all_numbers(self, contacts: bool) -> _Floats:
+        """Return all numbers that can be observed, in the order of the names."""
+        blocks = [self.data.qpos, self.data.qvel]
+        if contacts:
+            blocks.append(self.data.cfrc_ext[1:].ravel())
+        return np.concatenate(blocks)
+
+    def _number(self, name: str) -> float:
+        """Return a number by its name."""
+        if name not in self._place_of:
+            raise UnknownName(f"number of {self.family.name}", name, self._place_of)
+        return float(self._all_numbers(contacts=True)[self._place_of[name]])
+
+    def trunk_place(self) -> _Floats:
+        """Return the place of the trunk in the world, shape (3,), m, as of the last step."""
+        return self.data.xpos[self._trunk].copy()
+
+    def seen(self, action: NDArray[Any], before: _Floats) -> RobotState:
+        """Return what a task sees.
+
+        Args:
+            action: The last action, shape (nu,).
+            before: Where the trunk was before it, shape (3,), m.
+        """
+        place = self.trunk_place()
+        return RobotState(
+            self.model,
+            self.data,
+            self.dt,
+            place,
+            (place - before) / self.dt,
+            float(self._up_axis @ self.data.xmat[self._trunk].reshape(3, 3)[2]),
+            action,
+            (action - self._middle) / self._half_range,
+            self.standing_height,
+            self._can_travel,
+            self._number,
+        )
+
+    @property
+    def label(self) -> str:
+        """Name of the file without its suffix, for certificates."""
+        return self.family.name
+
+    @property
+    def family_name(self) -> str:
+        """The file and the rig, which two robots with bodies between them share."""
+        return self._file.key
+
+
+_SIZES: Final = {_J.mjJNT_FREE: 7, _J.mjJNT_BALL: 4, _J.mjJNT_SLIDE: 1, _J.mjJNT_HINGE: 1}
+
+
+def _places_of_joints(model: mujoco.MjModel) -> Iterator[tuple[str, int, int]]:
+    """Yield name, first index in qpos and count of numbers of each joint."""
+    for j in range(model.njnt):
+        yield model.joint(j).name, int(model.jnt_qposadr[j]), _SIZES[_J(model.jnt_type[j])]
+
+
+def _home_of(spec: mujoco.MjSpec, path: Path) -> dict[str, _Floats]:
+    """Return the pose of the keyframe `home` by joint, because edits add and remove joints.
+
+    Args:
+        spec: The unedited robot.
+        path: Its file.
+
+    Raises:
+        BrokenModel: If it does not compile.
+    """
+    try:
+        model = spec.copy().compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise BrokenModel(f"MuJoCo does not compile {path.name}: {reason_of(error)}.") from error
+    home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, _HOME)
+    if home < 0:
+        return {}
+    pose = model.key_qpos[home]
+    return {name: pose[at : at + size].copy() for name, at, size in _places_of_joints(model)}
+
+
+def _place_on_floor(model: mujoco.MjModel) -> set[int]:
+    """Return the indices in qpos of the coordinates that move the trunk over the floor."""
+    trunk, lift = travelling_body(model), trunk_lift(model)
+    hidden: set[int] = set()
+    for joint in np.flatnonzero(model.jnt_bodyid == (-1 if trunk is None else trunk)).tolist():
+        place, kind = int(model.jnt_qposadr[joint]), model.jnt_type[joint]
+        if kind == _J.mjJNT_FREE:
+            hidden |= {place, place + 1}
+        elif kind == _J.mjJNT_SLIDE and not model.jnt_limited[joint]:
+            hidden |= {place} - ({lift.place} if lift else set())
+    return hidden
+
+
+def _matching(names: Sequence[str], patterns: Sequence[str]) -> list[int]:
+    """Return the places of the names that match one of the patterns, in their order."""
+    for pattern in patterns:
+        if not any(pattern == name or fnmatch.fnmatchcase(name, pattern) for name in names):
+            raise UnknownName("observed number", pattern, names)
+    return [
+        place
+        for place, name in enumerate(names)
+        if any(pattern == name or fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+    ]
+
+
+def from_mjcf(
+    path: str | Path,
+    task: Any = "walk",
+    *,
+    body: BodyLike = (),
+    rig: BodyLike = (),
+    task_options: Mapping[str, Any] | None = None,
+    max_episode_steps: int = 1000,
+    **arguments: Any,
+) -> gym.Env[Any, Any]:
+    """Return an env of a robot and a task of your own, as `gymnasium.make` returns it.
+
+    Args:
+        path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
+            `go2_mj_description`, which downloads it.
+        task: `walk`, or a task of your own: `module:Name`, a class, a function or an object; see
+            `shapechanger.tasks.own`. Worker processes need one that they can import.
+        body: Edits of `shapechanger.morphology`, or their JSON.
+        rig: Edits that come before those of any body, such as `AddMotor("*")` and `AddFloor()`.
+        task_options: Arguments of the task's class.
+        max_episode_steps: Steps after which an episode is truncated.
+        **arguments: More arguments of `OwnRobotEnv`, such as `frame_skip` or `render_mode`.
+
+    Raises:
+        UnknownName: If there is no such file, task, edit or argument.
+        BrokenModel: If MuJoCo cannot read or compile the file.
+        MorphologyError: If it is no robot that can be controlled.
+        TaskError: If the task cannot be made or does not fit the robot.
+    """
+    file = Path(path).expanduser()
+    # A spec then makes the same env wherever the program has gone.
+    where = str(file.resolve()) if file.is_file() else fspath(path)
+    given: dict[str, Any] = {"path": where, "task": reference(task)}
+    given |= {"body": to_json(as_body(body))} if body else {}
+    given |= {"rig": to_json(as_body(rig))} if rig else {}
+    given |= {"task_options": dict(task_options)} if task_options else {}
+    return gym.make(OWN_ROBOT, max_episode_steps=max_episode_steps, **given, **arguments)

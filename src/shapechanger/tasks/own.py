@@ -1,0 +1,299 @@
+"""Tasks for robots of the user's own: what a task sees, what it returns, and where it is found.
+
+A task is any object with a method `reward`, or a function:
+
+>>> class Jump:
+...     observe = ("torso/z", "*/angle", "*/velocity")
+...
+...     def reward(self, robot):
+...         return {"height": robot.height, "control": -0.1 * float((robot.action**2).sum())}
+...
+...     def terminated(self, robot):
+...         return robot.up < 0.0
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Final, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import TaskError, UnknownName
+from shapechanger.tasks.measure import FORWARD_SPEED, RETURN, Measure
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class RobotState:
+    """What a task sees of a robot after a step.
+
+    Attributes:
+        model: MuJoCo's model.
+        data: MuJoCo's data.
+        dt: Duration of a step, s.
+        place: Origin of the trunk in the world, shape (3,), m. The trunk is the body that can
+            travel or, of a robot fixed to the world, its first body.
+        velocity: Mean velocity of that point over the step, shape (3,), m/s.
+        up: Vertical part of the axis of the trunk that points up at the start: 1 upright, 0 on its
+            side, -1 upside down.
+        action: The action, shape (nu,).
+        scaled_action: The action from -1 to 1 over the range of each actuator, shape (nu,).
+        standing_height: Height of the trunk when it stands, m; None for a robot that does not.
+        can_travel: Whether the trunk can go anywhere.
+        numbers: All numbers that can be observed, by name.
+    """
+
+    model: Any
+    data: Any
+    dt: float
+    place: _Floats
+    velocity: _Floats
+    up: float
+    action: NDArray[Any]
+    scaled_action: NDArray[Any]
+    standing_height: float | None
+    can_travel: bool
+    numbers: Callable[[str], float]
+
+    @property
+    def height(self) -> float:
+        """Height of the trunk, m."""
+        return float(self.place[2])
+
+    def __getitem__(self, name: str) -> float:
+        """Return a number by its name in the layout, such as `knee/angle`, observed or not.
+
+        Raises:
+            UnknownName: If the robot has no such number.
+        """
+        return self.numbers(name)
+
+
+class OwnTask(Protocol):
+    """A task; it may also have the attributes below.
+
+    - `observe`: names or globs of the numbers to observe, such as `("*/angle", "*/contact/*")`; by
+      default all positions and velocities but the place on the floor.
+    - `terminated(robot)`: whether the episode ends; by default never.
+    - `measures`: what a policy is measured by (`shapechanger.tasks.measure`), the default first.
+    - `check(robot)`: called once with the robot at its start; raises `TaskError` if the robot does
+      not fit.
+    """
+
+    def reward(self, robot: RobotState, /) -> Mapping[str, float]:
+        """Return the terms of the reward by name; the reward is their sum."""
+        ...
+
+
+class Walk:
+    """Walk or run forwards along x, as Gymnasium's runners.
+
+    Args:
+        forward: Reward per m/s.
+        alive: Reward of each step in which the robot is healthy.
+        control: Cost of the sum of squares of the actions, each scaled to -1 to 1.
+        least_height: Share of its standing height below which the robot has fallen.
+        least_up: Vertical part of its up axis below which it has fallen: 0 lets it tilt by 90
+            degrees.
+        terminate: Whether an episode ends when the robot has fallen.
+    """
+
+    measures: tuple[Measure, ...] = (FORWARD_SPEED, RETURN)
+
+    def __init__(
+        self,
+        forward: float = 1.0,
+        alive: float = 1.0,
+        control: float = 0.1,
+        least_height: float = 0.4,
+        least_up: float = 0.0,
+        terminate: bool = True,
+    ) -> None:
+        self._forward = forward
+        self._alive = alive
+        self._control = control
+        self._least_height = least_height
+        self._least_up = least_up
+        self._terminate = terminate
+
+    def check(self, robot: RobotState) -> None:
+        """Require a robot that can travel, on a floor."""
+        if not robot.can_travel:
+            raise TaskError(
+                "The task 'walk' needs a robot that can travel, and this one is fixed to the "
+                "world: give it a free joint with rig=AddFreeJoint(BODY), or another task."
+            )
+        if robot.standing_height is None:
+            raise TaskError(
+                "The task 'walk' needs a floor, and this robot would fall through the world: give "
+                "it one with rig=AddFloor(), or let its geoms touch the floor that it has."
+            )
+
+    def healthy(self, robot: RobotState) -> bool:
+        """Return whether the robot has not fallen."""
+        lowest = self._least_height * (robot.standing_height or 0.0)
+        return robot.height >= lowest and robot.up >= self._least_up
+
+    def reward(self, robot: RobotState) -> Mapping[str, float]:
+        """Return the terms `forward`, `alive` and `control`."""
+        return {
+            "forward": self._forward * float(robot.velocity[0]),
+            "alive": self._alive * self.healthy(robot),
+            "control": -self._control * float(np.square(robot.scaled_action).sum()),
+        }
+
+    def terminated(self, robot: RobotState) -> bool:
+        """Return whether the robot has fallen."""
+        return self._terminate and not self.healthy(robot)
+
+
+BUILT_IN: Final[Mapping[str, type[OwnTask]]] = {"walk": Walk}
+"""Tasks by name."""
+
+
+class _OfFunction:
+    """A task made of a function that returns the terms of the reward."""
+
+    def __init__(self, reward: Callable[[RobotState], Mapping[str, float]]) -> None:
+        self.reward = reward
+
+
+def as_task(task: Any, options: Mapping[str, Any] | None = None) -> tuple[OwnTask, str]:
+    """Return a task and its name for messages.
+
+    Args:
+        task: Name of a built-in task; `module:Name` of a class or function; a class, a function or
+            an object.
+        options: Arguments of a class or of a built-in task.
+
+    Raises:
+        UnknownName: If there is no such task or name in the module.
+        TaskError: If the module cannot be imported, the class does not take the options, options
+            are given to an object or a function, or there is no reward.
+    """
+    found = _found(task) if isinstance(task, str) else task
+    name = task if isinstance(task, str) else getattr(task, "__qualname__", type(task).__qualname__)
+    if isinstance(found, type):
+        # Checked first: a name from a file must not make just any object, such as a process.
+        if not callable(getattr(found, "reward", None)):
+            raise _without_reward(name)
+        try:
+            found = found(**(options or {}))
+        except TypeError as error:
+            raise TaskError(f"The task {name!r} cannot be made: {error}.") from error
+    elif options:
+        raise TaskError(f"The task {name!r} is no class, so it takes no options.")
+    if callable(getattr(found, "reward", None)):
+        return cast("OwnTask", found), name
+    if callable(found):
+        return _OfFunction(cast("Any", found)), name
+    raise _without_reward(name)
+
+
+def _without_reward(name: str) -> TaskError:
+    return TaskError(
+        f"The task {name!r} has no method `reward(robot)` that returns a dict of reward terms."
+    )
+
+
+def reference(task: Any) -> Any:
+    """Return `module:Name` of a class or function, so that JSON can hold it; else the task itself.
+
+    Args:
+        task: As of `as_task`.
+    """
+    module, name = getattr(task, "__module__", ""), getattr(task, "__qualname__", "")
+    importable = module != "__main__" and name.isidentifier() and not isinstance(task, str)
+    return f"{module}:{name}" if importable else task
+
+
+def _found(name: str) -> Any:
+    """Return the built-in task, or the name in a module."""
+    module_name, colon, attribute = name.partition(":")
+    if not colon:
+        if name not in BUILT_IN:
+            raise UnknownName("task", name, (*BUILT_IN, "module:Name"))
+        return BUILT_IN[name]
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise TaskError(f"The task {name!r} is not found: {error}.") from error
+    if not hasattr(module, attribute):
+        known = [each for each in vars(module) if not each.startswith("_")]
+        raise UnknownName(f"name in {module_name}", attribute, known)
+    return getattr(module, attribute)
+
+
+def reward_terms(task: OwnTask, name: str, robot: RobotState) -> dict[str, float]:
+    """Return the terms of the reward of a step.
+
+    Args:
+        task: The task.
+        name: Its name.
+        robot: What it sees.
+
+    Raises:
+        TaskError: If they are not a dict of finite numbers.
+    """
+    given: Any = task.reward(robot)
+    if not isinstance(given, Mapping):
+        raise TaskError(
+            f"The task {name!r} returns {type(given).__name__} as reward: return a dict of terms, "
+            'such as {"forward": 1.0}.'
+        )
+    terms: dict[str, float] = {}
+    for term, value in cast("Mapping[str, Any]", given).items():
+        number: Any = value
+        if isinstance(value, np.ndarray):
+            array = cast("NDArray[Any]", value)
+            number = array.item() if array.ndim == 0 else None
+        if not isinstance(number, Real | np.bool_) or not np.isfinite(cast("Any", number)):
+            raise TaskError(
+                f"The reward term {term!r} of the task {name!r} is {value!r}: it must be one "
+                "finite number."
+            )
+        terms[term] = float(cast("Any", number))
+    return terms
+
+
+def has_ended(task: OwnTask, name: str, robot: RobotState) -> bool:
+    """Return whether a task ends the episode.
+
+    Args:
+        task: The task.
+        name: Its name.
+        robot: What it sees.
+
+    Raises:
+        TaskError: If its answer is neither true nor false.
+    """
+    terminated = getattr(task, "terminated", None)
+    if terminated is None:
+        return False
+    answer: Any = terminated(robot)
+    if not isinstance(answer, bool | np.bool_):
+        raise TaskError(
+            f"`terminated` of the task {name!r} returns {answer!r}: it must be True or False."
+        )
+    return bool(cast("Any", answer))
+
+
+def observed(task: OwnTask) -> Sequence[str] | None:
+    """Return the names and globs that a task observes; None for the default.
+
+    Raises:
+        TaskError: If they are no sequence of names.
+    """
+    given: Any = getattr(task, "observe", None)
+    if given is None:
+        return None
+    names: list[Any] = [] if isinstance(given, str) else list(given)
+    if not names or not all(isinstance(each, str) for each in names):
+        raise TaskError(f"`observe` is a list of names or globs of numbers, got {given!r}.")
+    return names

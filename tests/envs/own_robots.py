@@ -1,0 +1,59 @@
+"""Robots and tasks of a user, for tests."""
+
+from __future__ import annotations
+
+from shapechanger.tasks.measure import Measure
+from shapechanger.tasks.own import RobotState
+
+# A dog in a plane: two legs with a hinge each, of which one is a servo.
+DOG = """
+<mujoco model="dog">
+  <option timestep="0.005"/>
+  <worldbody>
+    <geom name="floor" type="plane" size="20 20 1"/>
+    <body name="trunk" pos="0 0 .5">
+      <freejoint/>
+      <geom name="trunk" type="box" size=".3 .15 .05" mass="3"/>
+      <body name="front" pos=".25 0 0">
+        <joint name="front" axis="0 1 0" range="-60 60" damping="1"/>
+        <geom name="front" type="capsule" fromto="0 0 0 .1 0 -.4" size=".04"/>
+      </body>
+      <body name="back" pos="-.25 0 0">
+        <joint name="back" axis="0 1 0" range="-60 60" damping="1"/>
+        <geom name="back" type="capsule" fromto="0 0 0 -.1 0 -.4" size=".04"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="front" joint="front" gear="30" ctrlrange="-2 1"/>
+    <position name="back" joint="back" kp="40" ctrlrange="-1 1"/>
+  </actuator>
+  <keyframe><key name="home" qpos="0 0 .47 1 0 0 0 .2 -.2" ctrl="0 -.2"/></keyframe>
+</mujoco>
+"""
+
+
+class Rear:
+    """Lift the front."""
+
+    observe = ("trunk/z", "trunk/q*", "*/angle", "*/velocity", "front/contact/fz")
+    measures = (Measure("height", "m", "reward_height"),)
+
+    def __init__(self, weight: float = 1.0) -> None:
+        self.weight = weight
+
+    def reward(self, robot: RobotState) -> dict[str, float]:
+        """Return the height and the cost of the servo."""
+        return {"height": self.weight * robot.height, "servo": -abs(robot["back/angle"])}
+
+    def terminated(self, robot: RobotState) -> bool:
+        """Return whether the dog lies on its back."""
+        return robot.up < 0.0
+
+
+class Nonsense:
+    """Return what is no number."""
+
+    def reward(self, robot: RobotState) -> dict[str, float]:
+        """Return the reward of nonsense."""
+        return {"nonsense": float("nan")}

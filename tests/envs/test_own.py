@@ -1,0 +1,375 @@
+"""Robots and tasks of the user's own."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import shapechanger
+from shapechanger.errors import (
+    BrokenModel,
+    EmptyShift,
+    EnvArgumentError,
+    MorphologyError,
+    SpaceMismatch,
+    TaskError,
+    UnknownName,
+)
+from shapechanger.morphology import (
+    AddFloor,
+    AddFreeJoint,
+    AddLimb,
+    AddMotor,
+    AddSegment,
+    Edit,
+    Lock,
+    Mass,
+    Stretch,
+    to_json,
+)
+from shapechanger.tasks.measure import FORWARD_SPEED, RETURN
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef, env_traits
+from tests.envs.own_robots import DOG, Nonsense, Rear
+from tests.morphology.edits.test_rigging import URDF
+
+REAR = "tests.envs.own_robots:Rear"
+
+
+@pytest.fixture
+def dog(tmp_path: Path) -> Path:
+    """Return the file of the dog."""
+    path = tmp_path / "dog.xml"
+    path.write_text(DOG)
+    return path
+
+
+def _inner(env: gym.Env[Any, Any]) -> Any:
+    return env.unwrapped
+
+
+def test_a_robot_walks(dog: Path) -> None:
+    """Names, units and ranges follow from the model; the reward is the sum of its terms."""
+    env = shapechanger.from_mjcf(dog)
+    inner = _inner(env)
+    names = inner.observation_layout.names
+    assert names[:6] == ("trunk/z", "trunk/qw", "trunk/qx", "trunk/qy", "trunk/qz", "front/angle")
+    assert len(names) == 7 + 8
+    motor, servo = inner.action_layout
+    assert (motor.name, motor.low, motor.high) == ("front/motor", -2.0, 1.0)
+    assert (motor.gain, motor.gain_unit) == (30.0, "N·m")
+    assert (servo.name, servo.unit, servo.gain, servo.gain_unit) == ("back/target", "rad", 1.0, "")
+    assert inner.dt == pytest.approx(0.02)
+    assert inner.measures == (FORWARD_SPEED, RETURN)
+    env.reset(seed=0)
+    before = float(inner.data.qpos[0])
+    _, reward, _, _, info = env.step(np.array([1.0, 0.5], np.float32))
+    assert info["x_velocity"] == pytest.approx((inner.data.xpos[1, 0] - before) / 0.02, abs=0.05)
+    assert info["reward_alive"] == 1.0
+    # Half of the action's ranges: 1 of -2 to 1 is the end, 0.5 of -1 to 1 half of it.
+    assert info["reward_control"] == pytest.approx(-0.1 * (1.0 + 0.25))
+    assert reward == sum(info[f"reward_{term}"] for term in ("forward", "alive", "control"))
+    with pytest.raises(ValueError, match="finite"):
+        env.step(np.array([np.nan, 0.0]))
+
+
+def test_a_robot_starts_at_home(dog: Path) -> None:
+    """The keyframe is the start, and other bodies start at it as high as their feet need."""
+    env = shapechanger.from_mjcf(dog, reset_noise_scale=0.0)
+    env.reset(seed=0)
+    np.testing.assert_allclose(_inner(env).data.qpos[7:], [0.2, -0.2])
+    height = _inner(env).data.qpos[2]
+    env.reset(options={"body": Stretch("front", 2.0)})
+    assert _inner(env).data.qpos[2] > height + 0.2
+    # Standing on its longer leg.
+    assert _inner(env).standing_height == pytest.approx(_inner(env).data.qpos[2])
+
+
+@pytest.mark.parametrize(
+    ("body", "angles"),
+    [
+        (AddSegment("front", "toe", (0.1, 0.0, 0.0), lower=-1.0, upper=0.0), [0.2, -0.1, -0.2]),
+        (Lock("front"), [-0.2]),
+        (AddLimb("front", "_2", 1.0), [0.2, -0.2, 0.0]),
+    ],
+)
+def test_a_home_is_kept_joint_by_joint(dog: Path, body: Edit, angles: list[float]) -> None:
+    """Where edits add or remove joints; MuJoCo fills a keyframe at its end."""
+    env = shapechanger.from_mjcf(dog, body=body, reset_noise_scale=0.0)
+    env.reset(seed=0)
+    np.testing.assert_allclose(_inner(env).data.qpos[7:], angles)
+
+
+def test_without_a_home_joints_start_inside_their_limits(dog: Path) -> None:
+    """At the model's own pose."""
+    dog.write_text(DOG[: DOG.index("  <keyframe>")] + "</mujoco>")
+    env = shapechanger.from_mjcf(dog, reset_noise_scale=0.0)
+    env.reset(seed=0)
+    np.testing.assert_array_equal(_inner(env).data.qpos[7:], [0.0, 0.0])
+
+
+def test_a_task_of_ones_own(dog: Path) -> None:
+    """It names what it observes, ends episodes, and has options and measures."""
+    env = shapechanger.from_mjcf(dog, Rear, task_options={"weight": 2.0})
+    inner = _inner(env)
+    assert inner.observation_layout.names[-1] == "front/contact/fz"
+    assert "trunk/vx" not in inner.observation_layout.names
+    assert inner.measures == Rear.measures
+    observation, info = env.reset(seed=0)
+    assert list(info) == ["x_position", "y_position"]
+    observation, reward, terminated, _, info = env.step(np.zeros(2))
+    assert info["reward_height"] == pytest.approx(2.0 * inner.data.xpos[1, 2])
+    assert reward == info["reward_height"] + info["reward_servo"]
+    assert not terminated
+    np.testing.assert_array_equal(observation[-1], inner.data.cfrc_ext[2, 5])
+    inner.set_state(np.array([0.0, 0.0, 2.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(8))
+    assert env.step(np.zeros(2))[2]
+
+
+def test_every_number_can_be_read(dog: Path) -> None:
+    """By its name, observed or not; others are named."""
+    inner = _inner(shapechanger.from_mjcf(dog, Rear))
+    robot = inner.seen(np.zeros(2), np.zeros(3))
+    assert robot["trunk/x"] == inner.data.qpos[0]
+    with pytest.raises(UnknownName, match="Did you mean 'front/angle'"):
+        robot["front/angel"]
+
+
+def test_an_up_axis_is_that_of_the_start(tmp_path: Path) -> None:
+    """A robot whose frame lies on its side is upright as it starts."""
+    path = tmp_path / "dog.xml"
+    path.write_text(DOG.replace('qpos="0 0 .47 1 0 0 0', 'qpos="0 0 .47 .7071 .7071 0 0'))
+    inner = _inner(shapechanger.from_mjcf(path, Rear))
+    assert inner.seen(np.zeros(2), np.zeros(3)).up == pytest.approx(1.0)
+
+
+def test_a_diverging_simulation_is_reported(dog: Path) -> None:
+    """It ends the episode without a reward, and is not blamed on the task."""
+    env = shapechanger.from_mjcf(dog, Nonsense())
+    env.reset(seed=0)
+    _inner(env).data.qvel[:] = 1e12
+    _, reward, terminated, _, info = env.step(np.zeros(2))
+    assert (reward, terminated, info["diverged"]) == (0.0, True, True)
+
+
+def test_a_robot_is_made_again_from_its_spec(dog: Path) -> None:
+    """A class is named in it, so that JSON and worker processes can hold it."""
+    env = shapechanger.from_mjcf(dog, Rear, body=Stretch("back", 1.2), max_episode_steps=7)
+    assert env.spec is not None
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    copies = [again, pickle.loads(pickle.dumps(_inner(env)))]
+    expected = env.reset(seed=3)[0]
+    for copy in copies:
+        np.testing.assert_array_equal(copy.reset(seed=3)[0], expected)
+    assert again.spec is not None
+    assert again.spec.max_episode_steps == 7
+    assert again.spec.kwargs["task"] == REAR
+
+
+def test_a_study_makes_it_by_id(dog: Path) -> None:
+    """With arguments that JSON can hold, also a body and a rig as lists of objects."""
+    edits = [{"edit": "stretch", "body": "front", "factor": 1.5}]
+    ref = EnvRef("shapechanger/OwnRobot-v1", {"path": str(dog), "task": REAR, "body": edits})
+    with ref.make() as env:
+        assert _inner(env).body == (Stretch("front", 1.5),)
+        traits = env_traits(env)
+    assert traits.family == str(dog)
+    assert traits.measures == (*Rear.measures, RETURN)
+
+
+def test_bodies_change_at_a_reset(dog: Path) -> None:
+    """If no space changes."""
+    env = shapechanger.from_mjcf(dog)
+    env.reset(seed=0, options={"body": Mass("trunk", scale=2.0)})
+    assert _inner(env).model.body("trunk").mass == 6.0
+    env.reset(options={"body": "dog"})
+    assert _inner(env).model.body("trunk").mass == 3.0
+    with pytest.raises(SpaceMismatch, match="observation space from 15 to 13"):
+        env.reset(options={"body": Lock("front")})
+    assert _inner(env).model.nq == 9
+
+
+def test_bodies_lie_between_two(dog: Path) -> None:
+    """`towards` draws one at each reset."""
+    long = to_json([Stretch("front", 2.0)])
+    env = shapechanger.from_mjcf(dog, towards=long)
+    env.reset(seed=0)
+    assert 0.2 < _inner(env).model.geom("front").size[1] < 0.42
+
+
+def test_certificates_name_the_files(dog: Path, tmp_path: Path) -> None:
+    """And what differs between two bodies, or between two files."""
+    one = shapechanger.from_mjcf(dog)
+    other = shapechanger.from_mjcf(dog, body=Stretch("front", 1.5))
+    text = str(_inner(one).certify_shift(one, other))
+    assert "front: length 0.4123 m -> 0.6185 m (x1.5)" in text
+    with pytest.raises(EmptyShift, match="dog and dog behave alike"):
+        _inner(one).certify_shift(one, shapechanger.from_mjcf(dog))
+    cat = tmp_path / "cat.xml"
+    cat.write_text(DOG.replace('mass="3"', 'mass="1"'))
+    assert "dog" in str(_inner(one).certify_shift(one, shapechanger.from_mjcf(cat)))
+
+
+def test_a_map_leads_to_another_file(dog: Path, tmp_path: Path) -> None:
+    """By name, as between any two bodies."""
+    tail = (
+        '<body name="tail" pos="-.3 0 0"><joint name="tail" axis="0 1 0" range="-1 1"/>'
+        '<geom size=".05" mass=".1"/></body>'
+    )
+    text = DOG.replace('      <body name="front"', f'      {tail}<body name="front"')
+    text = text.replace("  </actuator>", '<motor joint="tail" ctrlrange="-1 1"/>  </actuator>')
+    other = tmp_path / "tailed.xml"
+    other.write_text(text[: text.index("  <keyframe>")] + "</mujoco>")
+    source, target = (_inner(shapechanger.from_mjcf(path)) for path in (dog, other))
+    mapped = BodyMap.between(
+        source.observation_layout,
+        target.observation_layout,
+        source.action_layout,
+        target.action_layout,
+    )
+    start = target.reset(seed=0)[0]
+    seen = mapped.adapt_observation(start)
+    place = target.observation_layout.names.index("front/angle")
+    assert seen[source.observation_layout.names.index("front/angle")] == start[place]
+    np.testing.assert_array_equal(mapped.adapt_action(np.array([0.3, 0.4])), [0.3, 0.4, 0.0])
+
+
+def test_many_at_once_equal_one_by_one(dog: Path) -> None:
+    """To the last bit, over the ends of episodes."""
+    options: dict[str, Any] = {"path": str(dog), "task": REAR, "max_episode_steps": 5}
+    many = shapechanger.make_vec("shapechanger/OwnRobot-v1", 3, threads=2, **options)
+    sync = gym.make_vec("shapechanger/OwnRobot-v1", 3, vectorization_mode="sync", **options)
+    same = gym.make_vec("shapechanger/OwnRobot-v1", 3, **options)
+    try:
+        starts = [envs.reset(seed=4)[0] for envs in (many, sync, same)]
+        rng = np.random.default_rng(0)
+        for _ in range(12):
+            action = rng.uniform(-1.0, 1.0, (3, 2)).astype(np.float32)
+            steps = [envs.step(action) for envs in (many, sync, same)]
+            for other in steps[1:]:
+                for x, y in zip(steps[0][:4], other[:4], strict=True):
+                    np.testing.assert_array_equal(x, y)
+                for name, values in steps[0][4].items():
+                    np.testing.assert_array_equal(values, other[4][name])
+        np.testing.assert_array_equal(starts[0], starts[1])
+    finally:
+        for envs in (many, sync, same):
+            envs.close()
+
+
+def test_a_urdf_stands_on_a_floor(tmp_path: Path) -> None:
+    """With motors, freedom and a floor as its rig."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF)
+    rig = (AddMotor("*", 2.0), AddFreeJoint("base"), AddFloor())
+    env = shapechanger.from_mjcf(path, rig=rig, frame_skip=4)
+    env.reset(seed=0, options={"body": Mass("base", scale=1.5)})
+    assert _inner(env).dt == pytest.approx(0.008)
+    assert _inner(env).observation_layout.names[0] == "base/z"
+    _, _, terminated, _, _ = env.step(np.zeros(2))
+    assert not terminated
+
+
+def test_robots_in_a_plane_hide_their_place(tmp_path: Path) -> None:
+    """A slide along the floor is hidden, one that raises the trunk is seen."""
+    path = tmp_path / "hopper.xml"
+    text = DOG.replace(
+        "<freejoint/>",
+        '<joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>',
+    )
+    path.write_text(text[: text.index("  <keyframe>")] + "</mujoco>")
+    names = _inner(shapechanger.from_mjcf(path)).observation_layout.names
+    assert names[:2] == ("z/position", "front/angle")
+    assert "x/velocity" in names
+
+
+def test_fixed_robots_have_tasks_too(tmp_path: Path) -> None:
+    """An arm has nothing to hide, and its first body is its trunk."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF)
+
+    def reach(robot: Any) -> dict[str, float]:
+        return {"elbow": -abs(robot["elbow/angle"])}
+
+    env = shapechanger.from_mjcf(path, reach, rig=AddMotor("*", 2.0))
+    assert _inner(env).observation_layout.names[:2] == ("shoulder/angle", "elbow/angle")
+    env.reset(seed=0)
+    assert env.step(np.zeros(2))[4]["x_velocity"] == 0.0
+    with pytest.raises(TaskError, match="fixed to the world"):
+        shapechanger.from_mjcf(path, rig=AddMotor("*", 2.0))
+
+
+def test_a_robot_that_would_fall_through_is_refused(dog: Path) -> None:
+    """No floor, or one that its geoms do not touch."""
+    dog.write_text(DOG.replace('name="floor"', 'name="floor" contype="2" conaffinity="2"'))
+    with pytest.raises(TaskError, match="would fall through the world"):
+        shapechanger.from_mjcf(dog)
+
+
+def test_velocity_servos_have_a_unit(dog: Path) -> None:
+    """A velocity servo's control is a velocity; other actuators with a bias are plain motors."""
+    dog.write_text(
+        DOG.replace(
+            '<position name="back" joint="back" kp="40"',
+            '<velocity name="back" joint="back" kv="3"',
+        )
+    )
+    assert _inner(shapechanger.from_mjcf(dog)).action_layout.features[1].unit == "rad/s"
+    damper = '<general name="back" joint="back" biastype="affine" gainprm="2" biasprm="0 -1 0"'
+    dog.write_text(DOG.replace('<position name="back" joint="back" kp="40"', damper))
+    feature = _inner(shapechanger.from_mjcf(dog)).action_layout.features[1]
+    assert (feature.name, feature.gain) == ("back/motor", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "sentence"),
+    [
+        ({"path": ""}, EnvArgumentError, "needs the file of a robot, as path=FILE"),
+        ({"task": "wlak"}, UnknownName, "Did you mean 'walk'"),
+        ({"tsk": "walk"}, UnknownName, "No argument of dog matches 'tsk'. Did you mean 'task'"),
+        ({"body": "cat"}, UnknownName, "No body of the family dog matches 'cat'"),
+        ({"body": Stretch("tail", 2.0)}, UnknownName, "No body matches 'tail'"),
+        ({"frame_skip": 0}, EnvArgumentError, "frame_skip must be at least 1"),
+        ({"reset_noise_scale": -1.0}, EnvArgumentError, "reset_noise_scale must be a number"),
+        ({"width": "wide"}, EnvArgumentError, "width must be a number"),
+        ({"rig": AddMotor("*", 1.0)}, MorphologyError, "has a motor, or there is none"),
+    ],
+)
+def test_wrong_arguments_are_refused(
+    dog: Path, arguments: dict[str, Any], error: type[Exception], sentence: str
+) -> None:
+    """In one sentence that names what exists."""
+    with pytest.raises(error, match=sentence):
+        EnvRef("shapechanger/OwnRobot-v1", {"path": str(dog), **arguments}).make()
+
+
+def test_tasks_that_return_nonsense_are_refused(dog: Path) -> None:
+    """At the step that returns it."""
+    env = shapechanger.from_mjcf(dog, Nonsense())
+    env.reset(seed=0)
+    with pytest.raises(TaskError, match="The reward term 'nonsense' of the task 'Nonsense' is nan"):
+        env.step(np.zeros(2))
+
+
+def test_observed_numbers_must_exist(dog: Path) -> None:
+    """A glob that matches nothing is a typing mistake."""
+
+    class Blind(Rear):
+        observe = ("*/angel",)
+
+    with pytest.raises(UnknownName, match="No observed number matches"):
+        shapechanger.from_mjcf(dog, Blind)
+
+
+def test_models_that_do_not_compile_are_refused(dog: Path) -> None:
+    """With MuJoCo's reason in one sentence."""
+    dog.write_text(
+        DOG.replace('name="front" pos', 'name="paw" pos').replace(' mass="3"', ' mass="0"')
+    )
+    with pytest.raises(BrokenModel, match=r"compile dog\.xml: mass and inertia of moving bodies"):
+        shapechanger.from_mjcf(dog)

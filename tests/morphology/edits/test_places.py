@@ -1,0 +1,148 @@
+"""Edits that place one body or geom, and that set the total mass."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import MorphologyError, UnknownName
+from shapechanger.morphology import Edit, Mass, PlaceBody, PlaceGeom, TotalMass, reshape
+from tests.morphology.models import (
+    ant,
+    built,
+    capsule_inertia,
+    capsule_mass,
+    leg,
+    limb,
+    posed,
+    tip,
+)
+
+
+def test_a_body_moves_with_what_it_carries() -> None:
+    """Joints, geoms, sites and children keep their places relative to the body."""
+    before, after = built(leg()), built(leg(), PlaceBody("thigh", (0.0, 0.5, 0.1)))
+    np.testing.assert_array_equal(after.body("thigh").pos, [0.0, 0.5, 0.1])
+    for field in ("geom_pos", "jnt_pos", "site_pos", "body_mass", "body_inertia", "body_ipos"):
+        np.testing.assert_array_equal(getattr(after, field), getattr(before, field))
+    np.testing.assert_allclose(tip(after, "toe") - tip(before, "toe"), [0.0, 0.3, 0.1])
+
+
+def test_a_geom_is_placed_by_its_ends() -> None:
+    """The body's mass and inertia follow, and nothing else moves."""
+    edit = PlaceGeom("thigh", (0.0, 0.0, 0.1), (0.0, 0.3, -0.3), radius=0.05)
+    before, after = built(leg()), built(leg(), edit)
+    assert after.geom("thigh").size[:2] == pytest.approx([0.05, 0.25])
+    np.testing.assert_allclose(after.geom("thigh").pos, [0.0, 0.15, -0.1])
+    across, along = capsule_inertia(0.05, 0.5, 500.0)
+    assert after.body("thigh").mass == pytest.approx(capsule_mass(0.05, 0.5, 500.0))
+    np.testing.assert_allclose(sorted(after.body("thigh").inertia), sorted([across, across, along]))
+    for site in ("scar", "knee_cap", "toe"):
+        np.testing.assert_array_equal(tip(after, site), tip(before, site))
+
+
+@pytest.mark.parametrize("ends", [(0.1, 0.9), (0.9, 0.1)])
+def test_halfway_lies_between(ends: tuple[float, float]) -> None:
+    """The ends of a geom given by its pose have no order: each goes to the nearer new one."""
+    model = limb('<geom name="rod" type="capsule" size=".1 .2" pos="0 0 .3"/>')
+    start, end = ((0.0, 0.0, height) for height in ends)
+    whole = built(model, PlaceGeom("rod", start, end))
+    assert whole.geom("rod").size[1] == pytest.approx(0.4)
+    half = built(model, PlaceGeom("rod", start, end, amount=0.5))
+    assert half.geom("rod").size[1] == pytest.approx(0.3)
+    assert half.geom("rod").pos[2] == pytest.approx(0.4)
+
+
+def test_ends_that_are_written_have_an_order() -> None:
+    """Halfway, the geom has turned about its middle."""
+    model = limb('<geom name="rod" type="capsule" size=".1" fromto="0 0 .2 0 0 .6"/>')
+    half = built(model, PlaceGeom("rod", (0.4, 0.0, 0.4), (-0.4, 0.0, 0.4), amount=0.5))
+    assert half.geom("rod").size[1] == pytest.approx(0.5 * math.hypot(0.4, 0.2))
+
+
+def test_a_geom_is_moved_by_its_middle() -> None:
+    """Whatever its shape, and halfway at half the amount; its axes keep their directions."""
+    before = built(leg())
+    for geom in ("sole", "shin", "trunk"):
+        after = built(leg(), PlaceGeom(geom, middle=(0.0, 0.1, 0.2)))
+        np.testing.assert_allclose(after.geom(geom).pos, [0.0, 0.1, 0.2], atol=1e-15)
+        np.testing.assert_array_equal(after.geom(geom).quat, before.geom(geom).quat)
+        half = built(leg(), PlaceGeom(geom, middle=(0.0, 0.1, 0.2), amount=0.5))
+        np.testing.assert_allclose(
+            half.geom(geom).pos,
+            0.5 * (before.geom(geom).pos + np.array([0.0, 0.1, 0.2])),
+            atol=1e-15,
+        )
+
+
+def test_a_floor_can_be_moved() -> None:
+    """A geom of the world has no mass that would have to follow."""
+    model = built(leg(), PlaceGeom("floor", middle=(0.0, 0.0, -1.0)))
+    assert posed(model).geom("floor").xpos[2] == -1.0
+
+
+def test_a_written_mass_keeps_its_density() -> None:
+    """A mass written out is scaled with the volume."""
+    model = limb('<geom name="rod" type="cylinder" size=".1" fromto="0 0 0 0 0 .4" mass="2"/>')
+    after = built(model, PlaceGeom("rod", (0.0, 0.0, 0.0), (0.0, 0.0, 0.8), radius=0.2))
+    assert after.body("link").mass == pytest.approx(16.0)
+
+
+@pytest.mark.parametrize(
+    ("edit", "sentence"),
+    [
+        (PlaceGeom("sole", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), "'sole' is no capsule or cylinder"),
+        (PlaceGeom("trunk", radius=0.1), "'trunk' is no sphere, capsule or cylinder"),
+    ],
+)
+def test_shapes_without_ends_or_radius_are_refused(edit: Edit, sentence: str) -> None:
+    """The error names the geom."""
+    with pytest.raises(MorphologyError, match=sentence):
+        reshape(leg(), [edit])
+
+
+def test_unknown_elements_are_refused() -> None:
+    """With the nearest spelling."""
+    with pytest.raises(UnknownName, match="Did you mean 'shin'"):
+        reshape(leg(), [PlaceGeom("shinn", radius=0.1)])
+    with pytest.raises(UnknownName, match="Did you mean 'thigh'"):
+        reshape(leg(), [PlaceBody("tigh", (0.0, 0.0, 0.0))])
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: PlaceGeom("a"), "takes two ends, a middle or a radius"),
+        (lambda: PlaceGeom("a", start=(0.0, 0.0, 0.0)), "has a start and an end"),
+        (lambda: PlaceGeom("a", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), "two different ends"),
+        (
+            lambda: PlaceGeom("a", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
+            "two different ends or by its middle",
+        ),
+        (lambda: PlaceGeom("a", middle=(0.0, 0.0, math.nan)), "The middle of a geom must be"),
+        (lambda: PlaceGeom("a", radius=0.0), "A radius must be above zero"),
+        (lambda: PlaceGeom("a", radius=math.inf), "A radius must be above zero"),
+        (lambda: PlaceBody("a", (0.0, 0.0, math.inf)), "The place of a body must be"),
+        (lambda: TotalMass(0.0), "A robot cannot have a mass of 0.0 kg"),
+        (lambda: TotalMass(math.nan), "A robot cannot have a mass of nan kg"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(make: Callable[[], Any], sentence: str) -> None:
+    """When the edit is made."""
+    with pytest.raises(MorphologyError, match=sentence):
+        make()
+
+
+def test_the_total_mass_is_set() -> None:
+    """After other edits, with the inertia in proportion; halfway at half the amount."""
+    before = built(ant(), Mass("torso", scale=3.0))
+    after = built(ant(), Mass("torso", scale=3.0), TotalMass(14.0))
+    assert after.body_mass.sum() == pytest.approx(14.0, rel=1e-12)
+    factor = 14.0 / before.body_mass.sum()
+    np.testing.assert_allclose(after.body_inertia, factor * before.body_inertia, rtol=1e-9)
+    half = built(ant(), Mass("torso", scale=3.0), TotalMass(14.0, amount=0.5))
+    assert half.body_mass.sum() == pytest.approx(0.5 * (14.0 + before.body_mass.sum()))
