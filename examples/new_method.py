@@ -1,3 +1,6 @@
+# /// script
+# dependencies = ["shapechanger[sim,learn,report,cli]"]
+# ///
 """A transfer method of one's own, compared with scratch and fine-tuning on two poles.
 
 It freezes everything but the last layer. With the installed command, from this folder:
@@ -5,9 +8,9 @@ It freezes everything but the last layer. With the installed command, from this 
     shapechanger transfer InvertedPendulum BigInvertedPendulum --arms scratch new_method:last-layer
 """
 
-import os
 from pathlib import Path
 
+import tyro
 from stable_baselines3.common.callbacks import BaseCallback
 
 from shapechanger import TransferTask, make_plan, run_study
@@ -15,9 +18,6 @@ from shapechanger.reports.verdict import verdict
 from shapechanger.transfer import EnvRef
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.methods import Method, MethodRun, register
-
-STEPS = int(os.environ.get("STEPS", "24576"))
-OUT = Path(os.environ.get("OUT", "results/last-layer"))
 
 
 class OnlyLastLayer(BaseCallback):
@@ -50,7 +50,8 @@ class LastLayer(Method):
         )
 
 
-if __name__ == "__main__":  # The runs are separate processes, which import this file.
+def main(steps: int = 24_576, seeds: int = 3, out: Path = Path("results/last-layer")) -> None:
+    """Run the study, with this many steps in source and target."""
     task = TransferTask(
         EnvRef("shapechanger/InvertedPendulum-v1"), EnvRef("shapechanger/BigInvertedPendulum-v1")
     )
@@ -58,10 +59,14 @@ if __name__ == "__main__":  # The runs are separate processes, which import this
         task,
         "ppo-balance",
         learner_settings("ppo-balance"),
-        steps=STEPS,
-        source_steps=STEPS,
-        seeds=3,
+        steps=steps,
+        source_steps=steps,
+        seeds=seeds,
         arms=("scratch", "fine-tune", "new_method:last-layer"),
     )
-    study = run_study(plan, OUT)
+    study = run_study(plan, out)
     print(verdict(study))
+
+
+if __name__ == "__main__":  # The runs are separate processes, which import this file.
+    tyro.cli(main)

@@ -1,21 +1,22 @@
+# /// script
+# dependencies = ["shapechanger[sim,robot,remote]", "tyro"]
+# ///
 """A new vehicle is a profile: a tracked one with two motors, tried on its twin.
 
 The twin runs the real programs of the robot on simulated pins, so a swapped motor shows here first.
 """
 
-import os
 import tempfile
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
+import tyro
 
 import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.robot.guard.plan import output_values
 from shapechanger.robot.profile import load_profile
 from shapechanger.twin.robot import run_robot
-
-STEPS = int(os.environ.get("STEPS", "40"))
 
 PROFILE = """
 [robot]
@@ -48,27 +49,36 @@ deadline_ms = 300       # A command that is older stops it.
 arming = "anyone"       # A program may arm it; the default is a person.
 """
 
-with tempfile.TemporaryDirectory() as folder:
-    path = Path(folder, "snowcat.toml")
-    path.write_text(PROFILE)
-    profile = load_profile(path)  # Every mistake is an error with its line.
-    for steering, throttle in ((0.0, 1.0), (1.0, 0.0), (-0.5, 0.5)):
-        left, right = output_values(profile.guard_plan(), [steering, throttle])
-        print(f"steering {steering:4}, throttle {throttle}: tracks {left:5.2f} and {right:5.2f}")
 
-    with run_robot(profile, clock="twin", arguments=("--world", "room")) as robot:
-        env = gym.make(
-            "shapechanger/RemoteVehicle-v1",
-            robot=robot.known.address,
-            key=robot.known.key,
-            fingerprint=robot.known.fingerprint,
-            pace="lockstep",
-        )
-        with robot.operator() as operator:
-            env.reset(seed=0)
-            start = operator.where()
-            for _ in range(STEPS):
-                env.step(np.array([0.0, 1.0], np.float32))
-            end = operator.where()
-        print(f"driven {end.travelled_m - start.travelled_m:.2f} m in {STEPS / 20:.1f} s")
-        env.close()
+def main(steps: int = 40) -> None:
+    """Drive forward for this many steps."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "snowcat.toml")
+        path.write_text(PROFILE)
+        profile = load_profile(path)  # Every mistake is an error with its line.
+        for steering, throttle in ((0.0, 1.0), (1.0, 0.0), (-0.5, 0.5)):
+            left, right = output_values(profile.guard_plan(), [steering, throttle])
+            print(
+                f"steering {steering:4}, throttle {throttle}: tracks {left:5.2f} and {right:5.2f}"
+            )
+
+        with run_robot(profile, clock="twin", arguments=("--world", "room")) as robot:
+            env = gym.make(
+                "shapechanger/RemoteVehicle-v1",
+                robot=robot.known.address,
+                key=robot.known.key,
+                fingerprint=robot.known.fingerprint,
+                pace="lockstep",
+            )
+            with robot.operator() as operator:
+                env.reset(seed=0)
+                start = operator.where()
+                for _ in range(steps):
+                    env.step(np.array([0.0, 1.0], np.float32))
+                end = operator.where()
+            print(f"driven {end.travelled_m - start.travelled_m:.2f} m in {steps / 20:.1f} s")
+            env.close()
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -1,3 +1,6 @@
+# /// script
+# dependencies = ["shapechanger[sim,robot,remote]", "tyro"]
+# ///
 """The same script in simulation and on a robot: go where the floor reaches furthest.
 
     python examples/simulation_and_robot.py                        # the simulated car
@@ -7,15 +10,11 @@
 person may arm waits for `shapechanger robot drive my-car` in another terminal: E, then P.
 """
 
-import argparse
-import os
-
 import gymnasium as gym
 import numpy as np
+import tyro
 
 import shapechanger  # noqa: F401  # Registers the ids.
-
-STEPS = int(os.environ.get("STEPS", "400"))
 
 
 def drive(picture: np.ndarray) -> np.ndarray:
@@ -39,23 +38,26 @@ def drive(picture: np.ndarray) -> np.ndarray:
     return np.array([np.clip(2.5 * heading, -1.0, 1.0), 0.3 + 0.4 * ahead], np.float32)
 
 
-parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-parser.add_argument("--robot", default="", help="name of a known robot, or its address")
-robot = parser.parse_args().robot
-env = (
-    gym.make("shapechanger/RemoteVehicle-v1", robot=robot)
-    if robot
-    else gym.make("shapechanger/Car-v1")
-)
-picture, info = env.reset(seed=0)
-total, collisions = 0.0, 0
-for _ in range(STEPS):
-    picture, reward, terminated, truncated, info = env.step(drive(picture))
-    total += float(reward)
-    collisions += terminated
-    if truncated:
-        print(info.get("truncated_because", "The time is up."))
-    if terminated or truncated:
-        picture, info = env.reset()
-env.close()
-print(f"a return of {total:.1f} in {STEPS} steps, {collisions} collisions")
+def main(steps: int = 400, robot: str = "") -> None:
+    """Drive for this many steps; a robot is named as it is known, or by its address."""
+    env = (
+        gym.make("shapechanger/RemoteVehicle-v1", robot=robot)
+        if robot
+        else gym.make("shapechanger/Car-v1")
+    )
+    picture, info = env.reset(seed=0)
+    total, collisions = 0.0, 0
+    for _ in range(steps):
+        picture, reward, terminated, truncated, info = env.step(drive(picture))
+        total += float(reward)
+        collisions += terminated
+        if truncated:
+            print(info.get("truncated_because", "The time is up."))
+        if terminated or truncated:
+            picture, info = env.reset()
+    env.close()
+    print(f"a return of {total:.1f} in {steps} steps, {collisions} collisions")
+
+
+if __name__ == "__main__":
+    tyro.cli(main)
