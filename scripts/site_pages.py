@@ -22,6 +22,8 @@ from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
     NAMESPACE,
+    ODRL_ENVS,
+    OWN_ROBOT,
     RANGES_ENVS,
     VEHICLE_ENVS,
     WAYPOINT_ENVS,
@@ -61,20 +63,41 @@ _MOST_ROWS: Final = 40  # Longer tables are folded.
 
 
 def environment_pages() -> list[SitePage]:
-    """Return a page for each env that `import shapechanger` registers, and their index."""
-    ids = [env_id for env_id in gym.registry if env_id.startswith(f"{NAMESPACE}/")]
+    """Return a page for each env that `import shapechanger` registers, and their index.
+
+    The bodies of ODRL share a page.
+    """
+    registered = [env_id for env_id in gym.registry if env_id.startswith(f"{NAMESPACE}/")]
+    ids = [env_id for env_id in registered if env_id not in ODRL_ENVS]
     pages = [environment_page(env_id) for env_id in ids]
     rows = [
         (_thumbnail(page), f"[`{env_id}`]({page.title}.md)", _summary(env_id))
         for env_id, page in zip(ids, pages, strict=True)
     ]
+    rows.append(("", "[ODRL](ODRL.md)", f"{len(ODRL_ENVS)} ids: published bodies of four runners"))
     index = [
         "# Environments",
         "`import shapechanger` registers these ids with Gymnasium. Their pages are made from the "
         "registry, the docstrings, the layouts, the certificates and the models of this version.",
         _table(("picture", "id", "body"), rows),
     ]
-    return [SitePage("environments/index.md", "Environments", "\n\n".join(index)), *pages]
+    first = SitePage("environments/index.md", "Environments", "\n\n".join(index))
+    return [first, *pages, _odrl_page()]
+
+
+def _odrl_page() -> SitePage:
+    """Return the page of the bodies of ODRL, with what each changes."""
+    rows: list[tuple[str, ...]] = []
+    for env_id, entry in ODRL_ENVS.items():
+        edits = _loaded(entry.entry_point).family.published[entry.body]
+        rows.append((f"`{env_id}`", ", ".join(f"`{edit}`" for edit in edits) or "none: a source"))
+    parts = [
+        "# ODRL",
+        "The sources and the targets of ODRL's locomotion tasks, as ids. Their models equal the "
+        "published ones; [rewards and observations](../own-bodies.md) are those of our runners.",
+        _table(("id", "edits of its family"), rows),
+    ]
+    return SitePage("environments/ODRL.md", "ODRL", "\n\n".join(parts))
 
 
 def _thumbnail(page: SitePage) -> str:
@@ -95,8 +118,9 @@ def environment_page(env_id: str) -> SitePage:
     parts = [f"# {short}", f"`{env_id}`: {_summary(env_id)}."]
     pictures: dict[str, bytes] = {}
     notes: list[str] = []
-    on_hardware = short.startswith("Remote")
-    env = None if on_hardware else EnvRef(env_id).make()
+    # Their layouts are those of a robot, or of a file.
+    has_layouts = not short.startswith("Remote") and env_id != OWN_ROBOT
+    env = EnvRef(env_id).make() if has_layouts else None
     if env is not None and hasattr(env.unwrapped, "picture"):
         try:
             pictures[f"environments/{short}.jpg"] = _picture(env)
@@ -107,7 +131,7 @@ def environment_page(env_id: str) -> SitePage:
     parts += [_docstring(kind), _class_link(entry_point)]
     if env is None:
         parts.append(
-            "The layouts are those of the robot: its profile states them, and "
+            f"The layouts follow from the robot's {'file' if env_id == OWN_ROBOT else 'profile'}: "
             "`env.unwrapped.observation_layout` has them after `gym.make`."
         )
     else:

@@ -29,6 +29,7 @@ from scripts.site_pages import (
     reference_path,
 )
 from scripts.wiring_diagrams import devices_of, draw_wiring, part_list, pin_table
+from shapechanger.envs.catalogue import ODRL_ENVS
 from shapechanger.errors import RenderError
 from shapechanger.robot.guard.plan import driven_pins
 from shapechanger.robot.profile import Profile, load_profile, read_profile, shipped_profiles
@@ -263,8 +264,11 @@ def test_the_site(tmp_path: Path, chromium: Browser) -> None:
             )
             assert described, f"{package}.{name}"
         assert "<blockquote>" not in page, f"{package}: an example that no fence holds"
+    odrl = (site / "environments" / "ODRL.html").read_text()
     for env_id in gym.registry:
-        if env_id.startswith("shapechanger/"):
+        if env_id in ODRL_ENVS:
+            assert env_id in odrl
+        elif env_id.startswith("shapechanger/"):
             assert (site / "environments" / f"{env_id[13:-3]}.html").exists(), env_id
     # From a comment of docs/build.md, which a code host hides.
     assert 'href="wiring/car.html"' in (site / "build.html").read_text()
