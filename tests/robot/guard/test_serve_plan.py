@@ -160,7 +160,7 @@ def test_guard_and_supervisor_import_only_their_drivers() -> None:
     bare = subprocess.check_output([sys.executable, "-I", "-c", before], text=True).split()
     loaded = subprocess.check_output(command, text=True).split()
     # gpiozero prefers the backport of importlib.metadata where another package has brought it.
-    backport = {"importlib_metadata", "zipp"}
+    backport = {"importlib_metadata", "lazy_importer", "zipp"}
     theirs = {"gpiozero", "colorzero", "lgpio", "_lgpio", "smbus2", "start"} | backport
     for module in set(loaded) - set(bare):
         top = module.partition(".")[0]
