@@ -5,10 +5,12 @@ The studies take hours and resume from `results/`; `SEEDS` sets the number of ru
 
 from __future__ import annotations
 
+import json
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import msgspec
 import numpy as np
@@ -30,6 +32,8 @@ _SECONDS: Final = (15, 30)
 FEW: Final = 3.0
 # Out of twelve.
 GOOD: Final = 8
+_ARMS: Final = ("scratch", "fine-tune", "rehearsal")
+RUNS: Final = Path(__file__).parent / "results" / "vehicles-waypoint-runs.json"
 
 
 def pairs() -> list[Row]:
@@ -66,6 +70,7 @@ def waypoint_rows(folder: Path) -> list[Row]:
         folder: Folder of the suite.
     """
     pairs = [path.parent for path in sorted(folder.glob("*-to-*/study.json"))]
+    keep_runs(pairs)
     rows = [_seconds_row(pair) for pair in pairs]
     for arm in ("fine-tune", "rehearsal"):
         better = dict.fromkeys(_SECONDS, 0)
@@ -100,11 +105,36 @@ def waypoint_rows(folder: Path) -> list[Row]:
     return rows
 
 
+def keep_runs(pairs: Sequence[Path]) -> None:
+    """Write what every run drove at each evaluation beside the rows; other pairs are kept.
+
+    Args:
+        pairs: Folders of the studies.
+    """
+    kept: dict[str, Any] = json.loads(RUNS.read_text()) if RUNS.exists() else {}
+    for pair in pairs:
+        kept[pair.name] = {
+            arm: {
+                str(steps): {
+                    "returns": [round(one.mean_return, 2) for one in each],
+                    "metres": [round(one.terms["reward_velocity"], 2) for one in each],
+                    "collisions": [
+                        round(one.terms["reward_collision"] / COLLISION_REWARD, 2) for one in each
+                    ],
+                }
+                for steps, each in sorted(_evaluations(pair / "runs", arm).items())
+            }
+            for arm in _ARMS
+            if (pair / "runs" / f"{arm}-0").exists()
+        }
+    RUNS.write_text(json.dumps(kept, indent=1) + "\n")
+
+
 def _seconds_row(pair: Path) -> Row:
     """Return how much of the target's driving each arm needs to collide rarely."""
     needed: list[str] = []
     rates: list[str] = []
-    for arm in ("scratch", "fine-tune", "rehearsal"):
+    for arm in _ARMS:
         runs = _evaluations(pair / "runs", arm)
         found = {steps: _per_100_m(runs[steps]) for steps in sorted(runs)}
         if found:
