@@ -385,3 +385,15 @@ def test_a_pendulum_is_seen_whole_on_a_light_background(env_id: str) -> None:
     assert frame[0].min() > 200
     body = frame[frame.min(axis=2) < 200]
     assert body.max(axis=1).mean() > 120.0
+
+
+@pytest.mark.parametrize("shadows", [False, True])
+def test_floors_are_grey_and_shadows_are_not_black(shadows: bool) -> None:
+    """Gymnasium's ant walks on green tiles in frames with shadows, and its shadow is black."""
+    env = gym.make("shapechanger/Ant-v1", render_mode="rgb_array", shadows=shadows, **_SIZE)
+    env.reset(seed=0)
+    frame: Any = env.render()
+    env.close()
+    floor = frame[:, : _SIZE["width"] // 8].astype(int)  # Left of the body.
+    assert np.abs(floor[..., 1] - (floor[..., 0] + floor[..., 2]) / 2).max() < 8
+    assert frame.max(axis=2).min() > 40

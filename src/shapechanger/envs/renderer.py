@@ -140,6 +140,9 @@ _LARGEST: Final = 8192
 # Tiles of floors, red, green and blue.
 _DARK_TILE: Final = [0.42, 0.45, 0.48]
 _LIGHT_TILE: Final = [0.54, 0.57, 0.6]
+# Light from all sides, and from lamps, in models with lamps; in a shadow only the first is left.
+_AMBIENT: Final = 0.3
+_DIFFUSE: Final = 0.7
 # Higher than any body of the catalogue reaches, m.
 _LIGHT_HEIGHT_M: Final = 4.0
 # Half the width of shadow maps, in extents of the model.
@@ -236,16 +239,23 @@ def prepare_scene(spec: mujoco.MjSpec) -> None:
     """Make a model's floor, lights and sky fit to look at; nothing of this moves a body.
 
     Gymnasium's floors are black and white and mirror half of the light: they draw the eye from the
-    body, and flicker towards the horizon. Its lights hang lower than large bodies stand, and their
-    shadow maps, which stay behind a body that walks, leave dark stripes far from it. The pendulums'
-    models have neither a light nor a sky: their frames would be dark shapes on black.
+    body, and flicker towards the horizon; in frames with shadows they turn green, and the shadows
+    are black. Its lights hang lower than large bodies stand, and their shadow maps, which stay
+    behind a body that walks, leave dark stripes far from it. The pendulums' models have neither a
+    light nor a sky: their frames would be dark shapes on black.
     """
     for texture in spec.textures:
         if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:
             texture.rgb1, texture.rgb2 = _DARK_TILE, _LIGHT_TILE
     for material in spec.materials:
         material.reflectance = 0.0
+    for geom in spec.geoms:
+        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+            geom.rgba = [1.0] * 4
+    if spec.lights:
+        spec.visual.headlight.ambient = [_AMBIENT] * 3
     for light in spec.lights:
+        light.diffuse = [_DIFFUSE] * 3
         if light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
             light.pos = [light.pos[0], light.pos[1], max(light.pos[2], _LIGHT_HEIGHT_M)]
             light.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM
