@@ -375,9 +375,11 @@ def test_gymnasium_records_videos(tmp_path: Path) -> None:
     assert video.stat().st_size > 1000
 
 
-@pytest.mark.parametrize("env_id", ["InvertedPendulum", "BigInvertedPendulum"])
+@pytest.mark.parametrize(
+    "env_id", ["InvertedPendulum", "BigInvertedPendulum", "InvertedDoublePendulum"]
+)
 def test_a_pendulum_is_seen_whole_on_a_light_background(env_id: str) -> None:
-    """Its model has neither lights nor a sky; a longer pole is seen from farther away."""
+    """Its model has no sky; a longer pole is seen from farther away."""
     env = gym.make(f"shapechanger/{env_id}-v1", render_mode="rgb_array")
     env.reset(seed=0)
     frame: Any = env.render()

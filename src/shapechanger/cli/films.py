@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
@@ -73,8 +74,15 @@ def film_study(
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []
     fps = 0.0
-    for scene in _scenes(study, folder, source_policy):
-        frames, fps, measured = _play(scene, shadows)
+    scenes = _scenes(study, folder, source_policy)
+    # Bodies of one family have one scale.
+    distances: dict[str, float] = {}
+    for scene in scenes:
+        if scene.env.id in CATALOGUE:
+            family = CATALOGUE[scene.env.id].family
+            distances[family] = max(view_distance(scene.env), distances.get(family, 0.0))
+    for scene in scenes:
+        frames, fps, measured = _play(scene, distances, shadows)
         if not frames:
             return []
         places = np.linspace(0, len(frames) - 1, _PICTURES).round().astype(int)
@@ -93,6 +101,15 @@ def film_study(
         beside: NDArray[np.uint8] = np.concatenate(padded, axis=2)
         write_film([*beside], film, fps)
     return strips
+
+
+def view_distance(env_ref: EnvRef) -> float:
+    """Return the distance from which frames of an env of the catalogue show its body, m."""
+    env: Any = env_ref.make()
+    try:
+        return float(env.unwrapped.mujoco_renderer.default_cam_config["distance"])
+    finally:
+        env.close()
 
 
 def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
@@ -131,7 +148,9 @@ def _median(study: Study, kind: str) -> int:
     return int(np.argsort(values, kind="stable")[(values.size - 1) // 2])
 
 
-def _play(scene: _Scene, shadows: bool) -> tuple[list[NDArray[np.uint8]], float, str]:
+def _play(
+    scene: _Scene, distances: Mapping[str, float], shadows: bool
+) -> tuple[list[NDArray[np.uint8]], float, str]:
     """Return frames, their rate, and the default measure over them."""
     size: dict[str, Any] = {}
     if not scene.drives:
@@ -140,6 +159,9 @@ def _play(scene: _Scene, shadows: bool) -> tuple[list[NDArray[np.uint8]], float,
         if scene.env.id in CATALOGUE:
             size["shadows"] = shadows
     env: Any = scene.env.make(**size)
+    if scene.env.id in CATALOGUE:
+        camera = env.unwrapped.mujoco_renderer.default_cam_config
+        camera["distance"] = distances[CATALOGUE[scene.env.id].family]
 
     def frame() -> NDArray[Any]:
         if scene.drives:

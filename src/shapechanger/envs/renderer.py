@@ -241,8 +241,8 @@ def prepare_scene(spec: mujoco.MjSpec) -> None:
     Gymnasium's floors are black and white and mirror half of the light: they draw the eye from the
     body, and flicker towards the horizon; in frames with shadows they turn green, and the shadows
     are black. Its lights hang lower than large bodies stand, and their shadow maps, which stay
-    behind a body that walks, leave dark stripes far from it. The pendulums' models have neither a
-    light nor a sky: their frames would be dark shapes on black.
+    behind a body that walks, leave dark stripes far from it. The pendulums' models have no sky,
+    and most have no light: their frames would be dark shapes on black.
     """
     for texture in spec.textures:
         if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:
@@ -251,7 +251,8 @@ def prepare_scene(spec: mujoco.MjSpec) -> None:
         material.reflectance = 0.0
     for geom in spec.geoms:
         if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
-            geom.rgba = [1.0] * 4
+            # The double pendulum's has no tiles and lies far below it.
+            geom.rgba = [1.0, 1.0, 1.0, 1.0 if geom.material else 0.0]
     if spec.lights:
         spec.visual.headlight.ambient = [_AMBIENT] * 3
     for light in spec.lights:
@@ -260,9 +261,8 @@ def prepare_scene(spec: mujoco.MjSpec) -> None:
             light.pos = [light.pos[0], light.pos[1], max(light.pos[2], _LIGHT_HEIGHT_M)]
             light.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM
     spec.visual.map.shadowclip = _SHADOW_CLIP
-    if spec.lights:
-        return
-    spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [_HEADLIGHT] * 3
+    if not spec.lights:
+        spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [_HEADLIGHT] * 3
     if any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
         return
     grey = [_BACKGROUND / 255.0] * 3
