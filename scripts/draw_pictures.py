@@ -55,6 +55,12 @@ VEHICLES: Final = ("Car", "Tank", "Truck", "Boat")
 _SIZE: Final = 300, 240
 _DRIVEN_S: Final = 3.0
 _FPS: Final = 20
+# Directions of view from a vehicle's heading: 0 is from behind.
+_BESIDE: Final = math.radians(30.0)
+_PORTRAIT: Final = math.radians(125.0)
+_INDOORS: Final = ("corridor", FLOODED)
+# Gamma of the view from outside where lamps are the only light.
+_DARK: Final = 0.7
 
 
 def main() -> None:
@@ -190,7 +196,8 @@ def _seen(name: str) -> tuple[Picture, Picture]:
     expert.begin()
     for _ in range(round(_DRIVEN_S * env.metadata["render_fps"])):
         picture, *_ = env.step(expert.act()[1])
-    outside = env.unwrapped.picture(*_SIZE)
+    world = env.unwrapped.world
+    outside = _outside(world, _SIZE, world.reach)
     env.close()
     seen = Image.fromarray(picture).resize(_SIZE, Image.Resampling.NEAREST)
     return outside, np.asarray(seen)
@@ -264,21 +271,32 @@ def _driving(
     """Frames from outside and through the camera of a vehicle that a shipped clone drives."""
     env = cast("Any", EnvRef(f"shapechanger/{name}-v1", {"courses": "held-out"}).make())
     policy = CameraPolicy.load(CLONES[driver])
-    picture, _ = env.reset(seed=3)
+    picture, _ = env.reset(seed=_COURSE)
     world = env.unwrapped.world
     frames: list[tuple[Picture, Picture]] = []
     for _ in range(round(seconds * _FPS)):
-        outside = world.outside(*size, 1.3 * world.reach, azimuth_rad=_BESIDE)
+        outside = _outside(world, size, 1.3 * world.reach, _BESIDE)
         seen = Image.fromarray(picture).resize(size, Image.Resampling.BICUBIC)
         frames.append((outside, np.asarray(seen)))
-        picture, _, terminated, truncated, _ = env.step(policy.predict_many(picture[None])[0])
+        picture, _, terminated, truncated, _ = env.step(policy.predict(picture))
         if terminated or truncated:
             break
     env.close()
     return frames
 
 
-_BESIDE: Final = math.radians(30.0)
+def _outside(
+    world: MujocoWorld, size: tuple[int, int], reach: float, azimuth_rad: float = _PORTRAIT
+) -> Picture:
+    """View of a vehicle from outside, with smooth edges, and exposed longer in a dark corridor."""
+    wide, high = size
+    drawn = world.outside(2 * wide, 2 * high, reach, azimuth_rad=azimuth_rad)
+    averaged = drawn.reshape(high, 2, wide, 2, 3).mean(axis=(1, 3))
+    exposure = _DARK if world.course.world in _INDOORS else 1.0
+    return (255.0 * (averaged / 255.0) ** exposure).astype(np.uint8)
+
+
+_COURSE: Final = 5
 
 
 def _film_vehicles(stem: Path) -> None:
@@ -316,10 +334,11 @@ def _film_transfer(stem: Path) -> None:
         "Ant", "BigAnt", source_policy=Path("reference"), seeds=2, steps=_STEPS, out=STUDY
     )
     study.run()
+    clip = stem.with_suffix(".webm")
     strips = film_study(
         read_json(STUDY / STUDY_FILE, Study, f"delete {STUDY}"),
         STUDY,
-        stem.with_suffix(".webm"),
+        clip,
         source_policy=reference_policy("shapechanger/Ant-v1"),
         shadows=True,
     )
@@ -329,7 +348,9 @@ def _film_transfer(stem: Path) -> None:
         arm, _, measured = strip.caption.partition(": ")
         axes.set_title(f"{_CAPTIONS[arm]}: {measured}", fontsize=9, loc="left", pad=2)
         axes.axis("off")
-    figure.savefig(stem.with_suffix(".jpg"), dpi=130, pil_kwargs={"quality": 80})
+    figure.savefig(stem.with_name("ants-strip.jpg"), dpi=130, pil_kwargs={"quality": 80})
+    frames = np.asarray(iio.imread(clip))
+    iio.imwrite(stem.with_suffix(".jpg"), frames[len(frames) // 3], quality=80)
 
 
 STILLS: Final[Mapping[str, Callable[[], Picture]]] = {

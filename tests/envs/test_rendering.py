@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 import pytest
 from gymnasium.wrappers import RecordVideo
@@ -399,3 +400,17 @@ def test_floors_are_grey_and_shadows_are_not_black(shadows: bool) -> None:
     floor = frame[:, : _SIZE["width"] // 8].astype(int)  # Left of the body.
     assert np.abs(floor[..., 1] - (floor[..., 0] + floor[..., 2]) / 2).max() < 8
     assert frame.max(axis=2).min() > 40
+
+
+def test_floors_do_not_end(ant: Any) -> None:
+    """An ant that has walked for a kilometre is still on tiles; the floor of contacts stays."""
+    data = ant.unwrapped.data
+    near = ant.render().astype(int)
+    repeats = 80.0 / 60.0  # Width of the floor, m, over the number of times that its tiles repeat.
+    data.qpos[0] += 750 * repeats
+    mujoco.mj_forward(ant.unwrapped.model, data)
+    floor = ant.unwrapped.model.geom("floor").id
+    before = data.geom_xpos[floor].copy()
+    far = ant.render().astype(int)
+    np.testing.assert_array_equal(data.geom_xpos[floor], before)
+    assert np.abs(near - far).mean() < 3.0

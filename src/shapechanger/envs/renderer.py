@@ -53,6 +53,7 @@ class Renderer(MujocoRenderer):
     ) -> None:
         super().__init__(*arguments, **more)  # pyright: ignore[reportUnknownMemberType]
         self._follow = follow
+        self._floors = _floors(self.model)
         pixels = (self.width or 0) * (self.height or 0)
         self._plain = pixels <= _MOST_CAMERA_PIXELS if shadows is None else not shadows
         # An env that is garbage-collected unclosed must not delete the contexts of another.
@@ -80,7 +81,29 @@ class Renderer(MujocoRenderer):
             viewer.cam.lookat[:] = self.data.xpos[self._follow]
         for marker in markers:
             viewer.add_marker(**marker)
-        return cast("Any", super().render(render_mode))
+        with self._floors_below():
+            return cast("Any", super().render(render_mode))
+
+    @contextmanager
+    def _floors_below(self) -> Generator[None]:
+        """Draw floors below the body that the camera follows, which may walk off them.
+
+        Contacts take floors as infinite, and pictures do not. They move by whole tiles, so that
+        they seem to stay.
+        """
+        if self._follow is None:
+            yield
+            return
+        places = self.data.geom_xpos
+        middle = self.data.xpos[self._follow, :2]
+        before = {floor: places[floor].copy() for floor in self._floors}
+        for floor, period in self._floors.items():
+            places[floor, :2] += np.round((middle - places[floor, :2]) / period) * period
+        try:
+            yield
+        finally:
+            for floor, place in before.items():
+                places[floor] = place
 
     def _get_viewer(self, render_mode: str | None) -> OffScreenViewer | WindowViewer:
         viewers: Any = super()
@@ -96,6 +119,17 @@ class Renderer(MujocoRenderer):
         """Free the contexts; the next frame is drawn in a new one."""
         self.viewer = None
         _free(self._viewers)
+
+
+def _floors(model: mujoco.MjModel) -> dict[int, NDArray[np.float64]]:
+    """Return the level floors with tiles, and the width and depth after which these repeat, m."""
+    found: dict[int, NDArray[np.float64]] = {}
+    for floor in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).tolist():
+        material, size = model.geom_matid[floor], model.geom_size[floor, :2]
+        level = model.geom_bodyid[floor] == 0 and model.geom_quat[floor, 0] == 1.0
+        if level and material >= 0 and size.all() and not model.mat_texuniform[material]:
+            found[floor] = 2.0 * size / model.mat_texrepeat[material]
+    return found
 
 
 @functools.cache
@@ -247,12 +281,12 @@ def prepare_scene(spec: mujoco.MjSpec) -> None:
     for texture in spec.textures:
         if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:
             texture.rgb1, texture.rgb2 = _DARK_TILE, _LIGHT_TILE
-    for material in spec.materials:
-        material.reflectance = 0.0
     for geom in spec.geoms:
         if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
             # The double pendulum's has no tiles and lies far below it.
             geom.rgba = [1.0, 1.0, 1.0, 1.0 if geom.material else 0.0]
+    for material in spec.materials:
+        material.reflectance = 0.0
     if spec.lights:
         spec.visual.headlight.ambient = [_AMBIENT] * 3
     for light in spec.lights:
