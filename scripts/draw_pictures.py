@@ -214,11 +214,12 @@ def _clip(stem: Path, panels: list[list[Picture]]) -> None:
     iio.imwrite(stem.with_suffix(".jpg"), frames[len(frames) // 3], quality=80)
 
 
-def _film_bodies(
+def film_bodies(
     groups: Sequence[tuple[str, ...]],
     seconds: float,
     *,
     rows: int = _SIZE[1],
+    farther: float = 1.0,
     **arguments: Any,
 ) -> Film:
     """Return what films the reference policies of bodies, each group at one scale.
@@ -227,6 +228,7 @@ def _film_bodies(
         groups: Names of bodies.
         seconds: Length of the film.
         rows: Rows of pixels to keep; below them is nothing to see.
+        farther: Factor of the distance at which a body fills the frame.
         **arguments: Arguments of the envs.
     """
 
@@ -234,7 +236,7 @@ def _film_bodies(
         panels: list[list[Picture]] = []
         for names in groups:
             refs = [EnvRef(f"shapechanger/{name}-v1", arguments) for name in names]
-            distance = max(view_distance(ref) for ref in refs)
+            distance = farther * max(view_distance(ref) for ref in refs)
             films = [_moving(ref, distance, seconds) for ref in refs]
             panels += [[frame[:rows] for frame in film] for film in films]
         _clip(stem, panels)
@@ -363,9 +365,9 @@ STILLS: Final[Mapping[str, Callable[[], Picture]]] = {
 """Pictures by name."""
 
 CLIPS: Final[Mapping[str, Film]] = {
-    "walking": _film_bodies((ANTS,), 8.0),
-    "balancing": _film_bodies((PENDULUMS, (DOUBLE,)), 5.0, rows=160, **_LEANING),
-    "running": _film_bodies([(name,) for name in RUNNERS], 6.0),
+    "walking": film_bodies((ANTS,), 8.0),
+    "balancing": film_bodies((PENDULUMS, (DOUBLE,)), 5.0, rows=160, **_LEANING),
+    "running": film_bodies([(name,) for name in RUNNERS], 6.0, farther=1.25),
     "driving": _film_vehicles,
     "corridor": _film_corridor,
     "finger-reach-follow": _film_finger,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import weakref
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, cast
 
@@ -107,8 +107,11 @@ class Renderer(MujocoRenderer):
 
     def _get_viewer(self, render_mode: str | None) -> OffScreenViewer | WindowViewer:
         viewers: Any = super()
-        if not self._plain or render_mode == "human" or render_mode in self._viewers:
+        if render_mode in self._viewers:
             return viewers._get_viewer(render_mode)
+        if not self._plain or render_mode == "human":
+            with _fine_floors(self.model, self._floors):
+                return viewers._get_viewer(render_mode)
         with _small_buffers(self.model):
             viewer = viewers._get_viewer(render_mode)
         for flag in _COSTLY:
@@ -150,6 +153,22 @@ def _small_buffers(model: mujoco.MjModel) -> Generator[None]:
         quality.offsamples, quality.shadowsize = before
 
 
+@contextmanager
+def _fine_floors(model: mujoco.MjModel, floors: Iterable[int]) -> Generator[None]:
+    """Create contexts inside this block whose floors consist of small squares.
+
+    In large ones, coordinates in the shadow map are inexact enough that floors shadow themselves in
+    places. Contacts do not read the size of a square.
+    """
+    chosen = [*floors]
+    before = model.geom_size[chosen, 2].copy()
+    model.geom_size[chosen, 2] = _SQUARE_M
+    try:
+        yield
+    finally:
+        model.geom_size[chosen, 2] = before
+
+
 def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:
     """Free the OpenGL resources and then the context of each viewer."""
     while viewers:
@@ -177,6 +196,8 @@ _LIGHT_TILE: Final = [0.54, 0.57, 0.6]
 # Light from all sides, and from lamps, in models with lamps; in a shadow only the first is left.
 _AMBIENT: Final = 0.3
 _DIFFUSE: Final = 0.7
+# Width of the squares that floors consist of in frames with shadows, m.
+_SQUARE_M: Final = 0.5
 # Higher than any body of the catalogue reaches, m.
 _LIGHT_HEIGHT_M: Final = 4.0
 # Half the width of shadow maps, in extents of the model.
