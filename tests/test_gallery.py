@@ -14,6 +14,7 @@ from imageio_ffmpeg import count_frames_and_secs
 
 from scripts.draw_pictures import CLIPS, PICTURES, STILLS, film_bodies, main
 from scripts.site_hooks import on_page_markdown
+from shapechanger.cli.pictures import require_film
 
 GALLERY = PICTURES.parent / "gallery.md"
 
@@ -40,6 +41,7 @@ def test_the_command_draws_one_picture(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.usefixtures("gl")
 def test_bodies_are_filmed(tmp_path: Path) -> None:
     """A clip has a frame for each twentieth of a second, and a picture that stands for it."""
+    require_film(tmp_path / "one.webm")  # The check of commands that take a film's name.
     film_bodies((("InvertedPendulum",),), 0.5, rows=160)(tmp_path / "one")
     assert count_frames_and_secs(str(tmp_path / "one.webm")) == (10, 0.5)
     picture = np.asarray(iio.imread(tmp_path / "one.jpg"))
