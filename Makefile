@@ -37,7 +37,7 @@ VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # Two installations at once would interfere.
-.PHONY: help setup demo test test-system test-all test-matrix release test-lerobot check bench docs clean
+.PHONY: help setup demo test test-system test-all test-matrix release test-lerobot check bench docs gallery clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
@@ -81,6 +81,9 @@ bench: $(INSTALLED_DEV)  ## measure every number that the documentation states
 docs: $(INSTALLED_DEV)  ## check the documentation, and build its site into site/
 	$(PYTEST) -m "not system" tests/test_docs.py tests/test_documented_commands.py tests/test_site.py
 	$(SITE)
+
+gallery: $(INSTALLED_DEV)  ## draw all pictures and clips of the documentation; trains for minutes
+	$(RUN) scripts/draw_pictures.py
 
 clean:  ## remove build products and environments; keep results/
 	rm -rf $(VENV) $(LEROBOT_VENV) build dist site htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \

@@ -7,14 +7,12 @@ the README are written next to the rows.
 
 from __future__ import annotations
 
-import io
 import os
 import shutil
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
-import imageio.v3 as iio
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -22,7 +20,6 @@ from numpy.typing import NDArray
 from playwright.sync_api import sync_playwright
 
 from benchmarks.row import Row
-from shapechanger.cli.films import film_study
 from shapechanger.cli.suite import RunSuite, load_suite, suite_tasks
 from shapechanger.errors import StudyError
 from shapechanger.reports.charts import sweep_chart
@@ -42,9 +39,6 @@ from shapechanger.transfer.study import STUDY_FILE, Study
 
 RESULTS: Final = Path(__file__).parent / "results"
 PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
-# Study shown as film strips in the README, and its arms.
-SHOWN: Final = "Ant-to-BigAnt"
-SHOWN_ARMS: Final = ("source", "zero-shot", "fine-tune", "scratch")
 # Index of the limb that is shortened in the Amputated Ant.
 _DAMAGED: Final = 3
 
@@ -54,8 +48,6 @@ def ants() -> list[Row]:
     studies = _suite("ants")
     if len(studies) > 1:
         _matrix_picture(studies, PICTURES / "ants-matrix.png")
-    if SHOWN in studies:
-        _strip_picture(studies[SHOWN], Path("results", "ants", SHOWN), PICTURES / "ants-strip.jpg")
     return _rows(studies) + _method_rows(studies)
 
 
@@ -362,15 +354,3 @@ def _matrix_picture(studies: dict[str, Study], path: Path) -> None:
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0)
     figure.savefig(path, dpi=130)
-
-
-def _strip_picture(study: Study, folder: Path, path: Path) -> None:
-    """Stack the film strips of a study, with their captions."""
-    strips = [s for s in film_study(study, folder) if s.caption.startswith(SHOWN_ARMS)]
-    figure = Figure(figsize=(9.0, 1.25 * len(strips)), layout="constrained")
-    for axes, strip in zip(np.ravel(figure.subplots(len(strips), 1)), strips, strict=True):
-        picture: NDArray[np.uint8] = np.asarray(iio.imread(io.BytesIO(strip.jpeg)))
-        axes.imshow(picture, aspect="equal")
-        axes.set_title(strip.caption, fontsize=9, loc="left", pad=2)
-        axes.axis("off")
-    figure.savefig(path, dpi=130, pil_kwargs={"quality": 80})

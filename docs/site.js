@@ -11,3 +11,16 @@ document$.subscribe(() => {
     }
   });
 });
+
+// The controls of a clip hide its lower half, so they are there only while they are of use.
+document$.subscribe(() => {
+  for (const video of document.querySelectorAll("video")) {
+    video.tabIndex = 0;
+    video.controls = false;
+    for (const [event, shown] of [["pointerenter", true], ["focus", true], ["pointerleave", false], ["blur", false]]) {
+      video.addEventListener(event, () => {
+        video.controls = shown;
+      });
+    }
+  }
+});

@@ -1,6 +1,9 @@
-"""Draw the pictures of README and docs: `python scripts/draw_pictures.py`.
+"""Draw the pictures and clips of README, gallery and docs: `make gallery`.
 
-`--only vehicles` draws one of them, and `--only finger-film` films reach and follow.
+`python scripts/draw_pictures.py --only vehicles` draws one of them, and `--out FOLDER` writes
+elsewhere than to docs/pictures. The clip from one ant to another trains for some minutes first, in
+results/gallery; where that study has ended, it is only filmed.
+
 `--sheets results/sheets` draws contact sheets instead, one of each world: a row for each vehicle
 and course, with the camera's picture, the same through each lens, and two views from outside. The
 last course of each vehicle is held out and has a random look.
@@ -9,37 +12,62 @@ last course of each vehicle is held out and has a random look.
 from __future__ import annotations
 
 import argparse
+import io
 import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, cast
 
 import imageio.v3 as iio
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
+from shapechanger.cli.films import film_study, view_distance
+from shapechanger.cli.pictures import write_film
+from shapechanger.cli.transfer import Transfer
+from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.finger.oracle import FingerOracle
 from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.files import read_json
 from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.transfer.references import reference_policy
+from shapechanger.transfer.study import STUDY_FILE, Study
 from shapechanger.worlds.course import FLOODED, HELD_OUT, HOME
 from shapechanger.worlds.lens import LENSES
 from shapechanger.worlds.look import LOOKS, Look
 from shapechanger.worlds.simulation import MujocoWorld
 
-PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
-ANTS: Final = ("Ant", "AmputatedAnt", "BigAnt", "ExtendedAnt")
-VEHICLES: Final = ("Car", "Tank", "Truck", "Boat")
+Picture = NDArray[np.uint8]
+Film = Callable[[Path], None]
 
+PICTURES: Final = Path(__file__).parents[1] / "docs" / "pictures"
+STUDY: Final = Path("results", "gallery")
+ANTS: Final = ("Ant", "AmputatedAnt", "BigAnt", "ExtendedAnt")
+PENDULUMS: Final = ("SmallInvertedPendulum", "InvertedPendulum", "BigInvertedPendulum")
+DOUBLE: Final = "InvertedDoublePendulum"
+RUNNERS: Final = ("HalfCheetah", "Hopper", "Walker2d", "Swimmer", "Humanoid")
+VEHICLES: Final = ("Car", "Tank", "Truck", "Boat")
 
 _SIZE: Final = 300, 240
 _DRIVEN_S: Final = 3.0
+_FPS: Final = 20
+# Directions of view from a vehicle's heading: 0 is from behind.
+_BESIDE: Final = math.radians(30.0)
+_PORTRAIT: Final = math.radians(125.0)
+_INDOORS: Final = ("corridor", FLOODED)
+# Gamma of the view from outside where lamps are the only light.
+_DARK: Final = 0.7
 
 
 def main() -> None:
-    """Draw four ants, four vehicles with what their cameras see, and a finger on its way."""
+    """Draw every body and vehicle, and film their policies."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--only", choices=("ants", "vehicles", "finger", "finger-film"))
+    parser.add_argument("--only", choices=sorted({*STILLS, *CLIPS}))
+    parser.add_argument("--out", type=Path, default=PICTURES, help="folder for the pictures")
     parser.add_argument("--sheets", type=Path, help="folder for contact sheets of the worlds")
     asked = parser.parse_args()
     if asked.sheets is not None:
@@ -47,19 +75,21 @@ def main() -> None:
         for world in LOOKS:
             iio.imwrite(asked.sheets / f"{world}.png", _sheet(world))
         return
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    for name, draw in (("ants", _ants), ("vehicles", _vehicles), ("finger", _finger)):
+    asked.out.mkdir(parents=True, exist_ok=True)
+    for name, draw in STILLS.items():
         if asked.only in (None, name):
-            iio.imwrite(PICTURES / f"{name}.jpg", draw(), quality=85)
-    if asked.only in (None, "finger-film"):
-        _film_finger(PICTURES / "finger-reach-follow.gif")
+            iio.imwrite(asked.out / f"{name}.jpg", draw(), quality=85)
+    for name, film in CLIPS.items():
+        if asked.only in (None, name):
+            film(asked.out / name)
 
 
-def _ants() -> NDArray[np.uint8]:
-    return _row(ANTS)
+def _together() -> Picture:
+    """The runners, which are bodies of different families and so each at its own scale."""
+    return np.concatenate([_row((name,)) for name in RUNNERS], axis=1)
 
 
-def _vehicles() -> NDArray[np.uint8]:
+def _vehicles() -> Picture:
     """Four vehicles from outside, and below each what its camera sees."""
     pairs = [_seen(name) for name in VEHICLES]
     rows = [np.concatenate(row, axis=1) for row in zip(*pairs, strict=True)]
@@ -69,10 +99,10 @@ def _vehicles() -> NDArray[np.uint8]:
 _SEEDS: Final = (0, 1, 2, HELD_OUT[0])
 
 
-def _sheet(world: str) -> NDArray[np.uint8]:
+def _sheet(world: str) -> Picture:
     """Vehicles of a world on four courses; see the docstring of this script."""
     vehicles = ["boat"] if world == FLOODED else [name for name in HOME if HOME[name] == world]
-    rows: list[NDArray[np.uint8]] = []
+    rows: list[Picture] = []
     for name in vehicles:
         for seed in _SEEDS:
             drawn = Look.random(world, np.random.default_rng(seed))
@@ -92,14 +122,14 @@ def _sheet(world: str) -> NDArray[np.uint8]:
 _BEHIND: Final = math.radians(15.0)
 
 
-def _finger() -> NDArray[np.uint8]:
+def _finger() -> Picture:
     """A finger on a circle, four times."""
     made = EnvRef("shapechanger/FingerTrack-v1", {"path": {"kind": "circle", "radius": 0.018}})
     wide, high = _SIZE
     env = cast("Any", made.make(render_mode="rgb_array", width=wide, height=high))
     act = FingerOracle(env.unwrapped.observation_layout)
     observation, _ = env.reset(seed=1)
-    frames: list[NDArray[np.uint8]] = []
+    frames: list[Picture] = []
     for step in range(100):
         if step % 25 == 0:
             frames.append(env.render())
@@ -114,7 +144,7 @@ _FILM_SKIP: Final = 4
 _FILM_COLOURS: Final = 256
 
 
-def _film_finger(path: Path) -> None:
+def _film_finger(stem: Path) -> None:
     """Film the shipped policies: two targets reached, and a figure eight followed."""
     reach = EnvRef("shapechanger/Finger-v1", {})
     follow = EnvRef("shapechanger/FingerTrack-v1", {"path": "figure-eight"})
@@ -124,7 +154,7 @@ def _film_finger(path: Path) -> None:
     palette = frames[-1].quantize(_FILM_COLOURS, Image.Quantize.MAXCOVERAGE)
     drawn = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     drawn[0].save(
-        path,
+        stem.with_suffix(".gif"),
         save_all=True,
         append_images=drawn[1:],
         duration=20 * _FILM_SKIP,
@@ -133,11 +163,11 @@ def _film_finger(path: Path) -> None:
     )
 
 
-def _filmed(env_ref: EnvRef, name: str, seeds: tuple[int, ...]) -> list[NDArray[np.uint8]]:
+def _filmed(env_ref: EnvRef, name: str, seeds: tuple[int, ...]) -> list[Picture]:
     """Frames of a shipped policy, for the same time from each start."""
     policy = load_policy(POLICIES[name])
     env = cast("Any", env_ref.make(render_mode="rgb_array", **_FILM_SIZE))
-    frames: list[NDArray[np.uint8]] = []
+    frames: list[Picture] = []
     for seed in seeds:
         observation, _ = env.reset(seed=seed)
         for step in range(_FILM_STEPS // len(seeds)):
@@ -148,17 +178,17 @@ def _filmed(env_ref: EnvRef, name: str, seeds: tuple[int, ...]) -> list[NDArray[
     return frames
 
 
-def _row(names: tuple[str, ...]) -> NDArray[np.uint8]:
-    """Bodies side by side."""
+def _row(names: tuple[str, ...], share: float = 1.0) -> Picture:
+    """Bodies side by side, at a scale at which a share of the largest one's reach is in view."""
     envs = [cast("Any", EnvRef(f"shapechanger/{name}-v1").make().unwrapped) for name in names]
-    reach = 0.8 * max(env.reach for env in envs)
+    reach = share * max(env.reach for env in envs)
     row = np.concatenate([env.picture(*_SIZE, reach) for env in envs], axis=1)
     for env in envs:
         env.close()
     return row
 
 
-def _seen(name: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def _seen(name: str) -> tuple[Picture, Picture]:
     """A vehicle after some seconds of its expert's driving, from outside and through its camera."""
     env = cast("Any", EnvRef(f"shapechanger/{name}-v1").make())
     picture, _ = env.reset(seed=3)
@@ -166,11 +196,185 @@ def _seen(name: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     expert.begin()
     for _ in range(round(_DRIVEN_S * env.metadata["render_fps"])):
         picture, *_ = env.step(expert.act()[1])
-    outside = env.unwrapped.picture(*_SIZE)
+    world = env.unwrapped.world
+    outside = _outside(world, _SIZE, world.reach)
     env.close()
     seen = Image.fromarray(picture).resize(_SIZE, Image.Resampling.NEAREST)
     return outside, np.asarray(seen)
 
+
+# Starts that differ more than those of the policies' training, so that there is something to see.
+_LEANING: Final = {"reset_noise_scale": 0.08}
+
+
+def _clip(stem: Path, panels: list[list[Picture]]) -> None:
+    """Write films side by side, and a frame of them as the picture that stands for the clip."""
+    frames = [np.concatenate(row, axis=1) for row in zip(*panels, strict=True)]
+    write_film(cast("list[NDArray[Any]]", frames), stem.with_suffix(".webm"), _FPS)
+    iio.imwrite(stem.with_suffix(".jpg"), frames[len(frames) // 3], quality=80)
+
+
+def film_bodies(
+    groups: Sequence[tuple[str, ...]],
+    seconds: float,
+    *,
+    rows: int = _SIZE[1],
+    farther: float = 1.0,
+    **arguments: Any,
+) -> Film:
+    """Return what films the reference policies of bodies, each group at one scale.
+
+    Args:
+        groups: Names of bodies.
+        seconds: Length of the film.
+        rows: Rows of pixels to keep; below them is nothing to see.
+        farther: Factor of the distance at which a body fills the frame.
+        **arguments: Arguments of the envs.
+    """
+
+    def film(stem: Path) -> None:
+        panels: list[list[Picture]] = []
+        for names in groups:
+            refs = [EnvRef(f"shapechanger/{name}-v1", arguments) for name in names]
+            distance = farther * max(view_distance(ref) for ref in refs)
+            films = [_moving(ref, distance, seconds) for ref in refs]
+            panels += [[frame[:rows] for frame in film] for film in films]
+        _clip(stem, panels)
+
+    return film
+
+
+def _moving(ref: EnvRef, distance: float, seconds: float) -> list[Picture]:
+    """Frames of a body's reference policy; one that falls stays as it is."""
+    policy = load_policy(reference_policy(ref.id))
+    wide, high = _SIZE
+    drawing = {"render_mode": "rgb_array", "width": wide, "height": high, "shadows": True}
+    env = cast("Any", ref.make(**drawing))
+    env.unwrapped.mujoco_renderer.default_cam_config["distance"] = distance
+    fps = env.metadata["render_fps"]
+    observation, _ = env.reset(seed=0)
+    frames: list[Picture] = []
+    taken, over = 0, False
+    while len(frames) < round(seconds * _FPS):
+        while not over and taken * _FPS < len(frames) * fps:
+            action = policy.act(np.asarray(observation)[None])[0]
+            observation, _, terminated, truncated, _ = env.step(action)
+            taken, over = taken + 1, terminated or truncated
+        frames.append(frames[-1] if over else env.render())
+    if over:
+        print(f"{ref.id} ended after {taken / fps:.1f} s")
+    env.close()
+    return frames
+
+
+def _driving(
+    name: str, driver: str, seconds: float, size: tuple[int, int] = _SIZE
+) -> list[tuple[Picture, Picture]]:
+    """Frames from outside and through the camera of a vehicle that a shipped clone drives."""
+    env = cast("Any", EnvRef(f"shapechanger/{name}-v1", {"courses": "held-out"}).make())
+    policy = CameraPolicy.load(CLONES[driver])
+    picture, _ = env.reset(seed=_COURSE)
+    world = env.unwrapped.world
+    frames: list[tuple[Picture, Picture]] = []
+    for _ in range(round(seconds * _FPS)):
+        outside = _outside(world, size, 1.3 * world.reach, _BESIDE)
+        seen = Image.fromarray(picture).resize(size, Image.Resampling.BICUBIC)
+        frames.append((outside, np.asarray(seen)))
+        picture, _, terminated, truncated, _ = env.step(policy.predict(picture))
+        if terminated or truncated:
+            break
+    env.close()
+    return frames
+
+
+def _outside(
+    world: MujocoWorld, size: tuple[int, int], reach: float, azimuth_rad: float = _PORTRAIT
+) -> Picture:
+    """View of a vehicle from outside, with smooth edges, and exposed longer in a dark corridor."""
+    wide, high = size
+    drawn = world.outside(2 * wide, 2 * high, reach, azimuth_rad=azimuth_rad)
+    averaged = drawn.reshape(high, 2, wide, 2, 3).mean(axis=(1, 3))
+    exposure = _DARK if world.course.world in _INDOORS else 1.0
+    return (255.0 * (averaged / 255.0) ** exposure).astype(np.uint8)
+
+
+_COURSE: Final = 5
+
+
+def _film_vehicles(stem: Path) -> None:
+    """Film the four clones, from outside and below that through the camera."""
+    panels = [
+        [np.concatenate(pair) for pair in _driving(name, name.lower(), 8.0)] for name in VEHICLES
+    ]
+    _clip(stem, panels)
+
+
+def _film_corridor(stem: Path) -> None:
+    """Film the car's clone in its corridor."""
+    both = _driving("Car", "car", 12.0, (480, 360))
+    _clip(stem, [list(panel) for panel in zip(*both, strict=True)])
+
+
+def _film_tank(stem: Path) -> None:
+    """Film a tank that the car's clone drives, and one that its own does."""
+    panels = [[outside for outside, _ in _driving("Tank", by, 10.0)] for by in ("car", "tank")]
+    _clip(stem, panels)
+
+
+_STEPS: Final = 196_608
+_CAPTIONS: Final = {
+    "source, in the source": "Ant, its reference policy",
+    "zero-shot": "BigAnt, the same policy",
+    "fine-tune": f"BigAnt, the same policy after {_STEPS:,} steps of fine-tuning",
+    "scratch": f"BigAnt, a policy from scratch after {_STEPS:,} steps",
+}
+
+
+def _film_transfer(stem: Path) -> None:
+    """Transfer from Ant to BigAnt, and film before and after, as a clip and as a strip."""
+    study = Transfer(
+        "Ant", "BigAnt", source_policy=Path("reference"), seeds=2, steps=_STEPS, out=STUDY
+    )
+    study.run()
+    clip = stem.with_suffix(".webm")
+    strips = film_study(
+        read_json(STUDY / STUDY_FILE, Study, f"delete {STUDY}"),
+        STUDY,
+        clip,
+        source_policy=reference_policy("shapechanger/Ant-v1"),
+        shadows=True,
+    )
+    figure = Figure(figsize=(9.0, 1.35 * len(strips)), layout="constrained")
+    for axes, strip in zip(figure.subplots(len(strips), 1), strips, strict=True):
+        axes.imshow(np.asarray(iio.imread(io.BytesIO(strip.jpeg))), aspect="equal")
+        arm, _, measured = strip.caption.partition(": ")
+        axes.set_title(f"{_CAPTIONS[arm]}: {measured}", fontsize=9, loc="left", pad=2)
+        axes.axis("off")
+    figure.savefig(stem.with_name("ants-strip.jpg"), dpi=130, pil_kwargs={"quality": 80})
+    frames = np.asarray(iio.imread(clip))
+    iio.imwrite(stem.with_suffix(".jpg"), frames[len(frames) // 3], quality=80)
+
+
+STILLS: Final[Mapping[str, Callable[[], Picture]]] = {
+    "ants": lambda: _row(ANTS, 0.8),
+    "pendulums": lambda: _row((*PENDULUMS, DOUBLE)),
+    "runners": _together,
+    "vehicles": _vehicles,
+    "finger": _finger,
+}
+"""Pictures by name."""
+
+CLIPS: Final[Mapping[str, Film]] = {
+    "walking": film_bodies((ANTS,), 8.0),
+    "balancing": film_bodies((PENDULUMS, (DOUBLE,)), 5.0, rows=160, **_LEANING),
+    "running": film_bodies([(name,) for name in RUNNERS], 6.0, farther=1.25),
+    "driving": _film_vehicles,
+    "corridor": _film_corridor,
+    "finger-reach-follow": _film_finger,
+    "car-to-tank": _film_tank,
+    "ant-to-bigant": _film_transfer,
+}
+"""Clips by name; each gets the path that it writes to, without a suffix."""
 
 if __name__ == "__main__":
     main()

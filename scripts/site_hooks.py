@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import html
 import logging
 import posixpath
 import re
@@ -35,6 +36,8 @@ _FENCE: Final = re.compile(r"^ *(```|~~~).*?^ *\1 *$", re.DOTALL | re.MULTILINE)
 # Words for the site alone: they link to pages that no code host has.
 _ONLY_HERE: Final = re.compile(r"<!-- site: (.*?) -->", re.DOTALL)
 _MERMAID: Final = re.compile(r"^```mermaid\n(.*?)^```", re.DOTALL | re.MULTILINE)
+# A picture that leads to a clip: code hosts show no clips inside a page.
+_CLIP: Final = re.compile(r"\[!\[([^\]]*)\]\(([^)\s]+)\)\]\(([^)\s]+\.webm)\)")
 _SEARCH: Final = '<div class="md-search" data-md-component="search" role="dialog"'
 _SCHEME: Final = re.compile(r"[a-z]+:")
 
@@ -99,7 +102,16 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Rewrite the links of a page to files outside `docs`, and those of such files."""
     origin = origin_of(page.file.src_uri)
     markdown = _ONLY_HERE.sub(lambda match: _to_made_pages(match[1], origin), markdown)
-    return rewritten(_MERMAID.sub(_graph_as_table, markdown), origin)
+    return _CLIP.sub(_player, rewritten(_MERMAID.sub(_graph_as_table, markdown), origin))
+
+
+def _player(match: re.Match[str]) -> str:
+    """Return a player for a picture that leads to a clip."""
+    words, picture, clip = (html.escape(part) for part in match.groups())
+    return (
+        f'<video controls loop muted playsinline preload="none" poster="{picture}" '
+        f'aria-label="{words}" src="{clip}"></video>'
+    )
 
 
 def _to_made_pages(words: str, origin: str) -> str:

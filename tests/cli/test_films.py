@@ -16,6 +16,7 @@ from shapechanger.cli.films import film_study
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import learner_settings, resolve_learner
 from shapechanger.transfer.plan import TransferTask
+from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.studies import tiny_plan
 
@@ -37,6 +38,29 @@ def test_every_policy_is_filmed(tmp_path: Path) -> None:
         assert picture.std() > 1.0
         assert "return" in strip.caption
     assert film.stat().st_size > 1000
+
+
+def test_a_given_source_policy_is_filmed(tmp_path: Path) -> None:
+    """A study that was given its source policy stores no copy of it, so its file is passed."""
+    policy = reference_policy("shapechanger/SmallInvertedPendulum-v1")
+    short = {"n_envs": 2, "n_steps": 16, "batch_size": 16, "eval_every": 32, "eval_episodes": 1}
+    _, settings = resolve_learner("ppo-balance", short)
+    plan = tiny_plan(cast("Any", settings), steps=32, source_policy=policy)
+    study = run_study(plan, tmp_path, source_policy=policy, executor=Serial())
+    names = [one.caption.partition(":")[0] for one in film_study(study, tmp_path)]
+    assert names == ["fine-tune", "scratch"]
+    strips = film_study(study, tmp_path, source_policy=policy)
+    names = [one.caption.partition(":")[0] for one in strips]
+    assert names == ["source, in the source", "zero-shot", "fine-tune", "scratch"]
+
+
+def test_films_have_smooth_edges(tmp_path: Path) -> None:
+    """Edges have pixels between the pole's colour and the background's."""
+    plan = tiny_plan(steps=32, source_steps=32)
+    study = run_study(plan, tmp_path, executor=Serial())
+    strip = film_study(study, tmp_path)[0]
+    frame = np.asarray(iio.imread(io.BytesIO(strip.jpeg)))[:90, :240, 0].astype(int)
+    assert ((frame > 60) & (frame < 180)).sum() > 20
 
 
 def test_vehicles_are_filmed_from_outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 import pytest
 from gymnasium.wrappers import RecordVideo
@@ -375,9 +376,11 @@ def test_gymnasium_records_videos(tmp_path: Path) -> None:
     assert video.stat().st_size > 1000
 
 
-@pytest.mark.parametrize("env_id", ["InvertedPendulum", "BigInvertedPendulum"])
+@pytest.mark.parametrize(
+    "env_id", ["InvertedPendulum", "BigInvertedPendulum", "InvertedDoublePendulum"]
+)
 def test_a_pendulum_is_seen_whole_on_a_light_background(env_id: str) -> None:
-    """Its model has neither lights nor a sky; a longer pole is seen from farther away."""
+    """Its model has no sky; a longer pole is seen from farther away."""
     env = gym.make(f"shapechanger/{env_id}-v1", render_mode="rgb_array")
     env.reset(seed=0)
     frame: Any = env.render()
@@ -385,3 +388,29 @@ def test_a_pendulum_is_seen_whole_on_a_light_background(env_id: str) -> None:
     assert frame[0].min() > 200
     body = frame[frame.min(axis=2) < 200]
     assert body.max(axis=1).mean() > 120.0
+
+
+@pytest.mark.parametrize("shadows", [False, True])
+def test_floors_are_grey_and_shadows_are_not_black(shadows: bool) -> None:
+    """Gymnasium's ant walks on green tiles in frames with shadows, and its shadow is black."""
+    env = gym.make("shapechanger/Ant-v1", render_mode="rgb_array", shadows=shadows, **_SIZE)
+    env.reset(seed=0)
+    frame: Any = env.render()
+    env.close()
+    floor = frame[:, : _SIZE["width"] // 8].astype(int)  # Left of the body.
+    assert np.abs(floor[..., 1] - (floor[..., 0] + floor[..., 2]) / 2).max() < 8
+    assert frame.max(axis=2).min() > 40
+
+
+def test_floors_do_not_end(ant: Any) -> None:
+    """An ant that has walked for a kilometre is still on tiles; the floor of contacts stays."""
+    data = ant.unwrapped.data
+    near = ant.render().astype(int)
+    repeats = 80.0 / 60.0  # Width of the floor, m, over the number of times that its tiles repeat.
+    data.qpos[0] += 750 * repeats
+    mujoco.mj_forward(ant.unwrapped.model, data)
+    floor = ant.unwrapped.model.geom("floor").id
+    before = data.geom_xpos[floor].copy()
+    far = ant.render().astype(int)
+    np.testing.assert_array_equal(data.geom_xpos[floor], before)
+    assert np.abs(near - far).mean() < 3.0

@@ -43,6 +43,7 @@ def test_the_guard_loads_only_light_modules(tmp_path: Path) -> None:
         "pkg_resources",
         "importlib_resources",
         "importlib_metadata",
+        "lazy_importer",
         "msgspec",
         "typing_extensions",
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.cli.pictures import write_film
+from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.reports.suite import FilmStrip
 from shapechanger.reports.verdict import finals
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from shapechanger.transfer.study import Study
 
 _WIDTH, _HEIGHT = 240, 180
+# Frames are drawn this many times larger, and averaged: multisampling takes longer without a GPU.
+_FINER: Final = 2
 _FILM_S: Final = 10.0
 _PICTURES: Final = 6
 _GAP: Final = 4
@@ -41,13 +45,24 @@ class _Scene(NamedTuple):
     drives: bool = False  # Its env renders what it sees, so it is filmed from outside.
 
 
-def film_study(study: Study, folder: Path, film: Path | None = None) -> list[FilmStrip]:
+def film_study(
+    study: Study,
+    folder: Path,
+    film: Path | None = None,
+    *,
+    source_policy: Path | None = None,
+    shadows: bool = False,
+) -> list[FilmStrip]:
     """Play each arm's median seed for ten seconds, from the same start.
 
     Args:
         study: The study.
         folder: Its folder, with the policies.
         film: A film to write with all of them side by side; None for none.
+        source_policy: File of the source policy that the study was given; without it, neither the
+            source nor zero-shot is filmed in such a study.
+        shadows: Whether bodies of the catalogue have shadows; without a GPU these take ten times as
+            long as all the rest of a frame.
 
     Returns:
         A strip for each; none if the envs draw nothing.
@@ -59,8 +74,15 @@ def film_study(study: Study, folder: Path, film: Path | None = None) -> list[Fil
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []
     fps = 0.0
-    for scene in _scenes(study, folder):
-        frames, fps, measured = _play(scene)
+    scenes = _scenes(study, folder, source_policy)
+    # Bodies of one family have one scale.
+    distances: dict[str, float] = {}
+    for scene in scenes:
+        if scene.env.id in CATALOGUE:
+            family = CATALOGUE[scene.env.id].family
+            distances[family] = max(view_distance(scene.env), distances.get(family, 0.0))
+    for scene in scenes:
+        frames, fps, measured = _play(scene, distances, shadows)
         if not frames:
             return []
         places = np.linspace(0, len(frames) - 1, _PICTURES).round().astype(int)
@@ -81,20 +103,32 @@ def film_study(study: Study, folder: Path, film: Path | None = None) -> list[Fil
     return strips
 
 
-def _scenes(study: Study, folder: Path) -> list[_Scene]:
+def view_distance(env_ref: EnvRef) -> float:
+    """Return the distance from which frames of an env of the catalogue show its body, m."""
+    env: Any = env_ref.make()
+    try:
+        return float(env.unwrapped.mujoco_renderer.default_cam_config["distance"])
+    finally:
+        env.close()
+
+
+def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
     plan = study.plan
     learner = learner_of(plan.learner, plan.settings)
     drives = isinstance(plan.settings, CloningSettings)
     scenes: list[_Scene] = []
 
     def policy(run: Run) -> Act:
-        loaded = learner.load(run.policy_file(folder))
+        file = given if given is not None and run.kind == SOURCE else run.policy_file(folder)
+        loaded = learner.load(file)
         return loaded.predict_many if drives else loaded.act
 
-    has_source = bool(study.of(SOURCE))
+    trained = bool(study.of(SOURCE))
+    has_source = trained or given is not None
     if has_source:
-        best = Run(SOURCE, _median(study, SOURCE))
-        scenes.append(_Scene("source, in the source", plan.task.source, policy(best), None, drives))
+        middle = Run(SOURCE, _median(study, SOURCE) if trained else 0)
+        acting = policy(middle)
+        scenes.append(_Scene("source, in the source", plan.task.source, acting, None, drives))
     for arm in sorted(plan.arms, key=lambda arm: arm == "scratch"):  # The baseline comes last.
         run = Run(arm, _median(study, arm))
         target = plan.target_of(run)
@@ -114,15 +148,26 @@ def _median(study: Study, kind: str) -> int:
     return int(np.argsort(values, kind="stable")[(values.size - 1) // 2])
 
 
-def _play(scene: _Scene) -> tuple[list[NDArray[np.uint8]], float, str]:
+def _play(
+    scene: _Scene, distances: Mapping[str, float], shadows: bool
+) -> tuple[list[NDArray[np.uint8]], float, str]:
     """Return frames, their rate, and the default measure over them."""
-    size = {} if scene.drives else {"render_mode": "rgb_array", "width": _WIDTH, "height": _HEIGHT}
+    size: dict[str, Any] = {}
+    if not scene.drives:
+        finer = {"width": _FINER * _WIDTH, "height": _FINER * _HEIGHT}
+        size = {"render_mode": "rgb_array", **finer}
+        if scene.env.id in CATALOGUE:
+            size["shadows"] = shadows
     env: Any = scene.env.make(**size)
+    if scene.env.id in CATALOGUE:
+        camera = env.unwrapped.mujoco_renderer.default_cam_config
+        camera["distance"] = distances[CATALOGUE[scene.env.id].family]
 
     def frame() -> NDArray[Any]:
         if scene.drives:
             return env.unwrapped.world.outside(_WIDTH, _HEIGHT, _REACH_M, azimuth_rad=_BESIDE_RAD)
-        return env.render()
+        parts = np.asarray(env.render()).reshape(_HEIGHT, _FINER, _WIDTH, _FINER, 3)
+        return parts.mean(axis=(1, 3)).astype(np.uint8)
 
     try:
         if scene.drives and not hasattr(env.unwrapped, "world"):

@@ -15,7 +15,13 @@ try:
 except ImportError as error:
     raise MissingExtra("imageio", "sim") from error
 
-_FILMS: Final = (".avi", ".gif", ".mkv", ".mov", ".mp4")
+_WEBM: Final = ".webm"
+_FILMS: Final = (".avi", ".gif", ".mkv", ".mov", ".mp4", _WEBM)
+# Constant quality rather than a bit rate, and a speed at which encoding takes as long as rendering.
+_VP9: Final = {
+    "codec": "libvpx-vp9",
+    "output_params": ["-crf", "36", "-b:v", "0", "-cpu-used", "3", "-row-mt", "1"],
+}
 
 
 def require_film(path: Path) -> None:
@@ -54,7 +60,8 @@ def write_film(frames: list[NDArray[Any]], path: Path, fps: float) -> None:
     Raises:
         OutputError: If it cannot be written.
     """
-    _write(path, frames, fps=fps, macro_block_size=1)
+    encoding = _VP9 if path.suffix.lower() == _WEBM else {}
+    _write(path, frames, fps=fps, macro_block_size=1, **encoding)
 
 
 def _write(path: Path, content: Any, **options: Any) -> None:

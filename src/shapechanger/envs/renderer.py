@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import weakref
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, cast
 
@@ -53,6 +53,7 @@ class Renderer(MujocoRenderer):
     ) -> None:
         super().__init__(*arguments, **more)  # pyright: ignore[reportUnknownMemberType]
         self._follow = follow
+        self._floors = _floors(self.model)
         pixels = (self.width or 0) * (self.height or 0)
         self._plain = pixels <= _MOST_CAMERA_PIXELS if shadows is None else not shadows
         # An env that is garbage-collected unclosed must not delete the contexts of another.
@@ -80,12 +81,37 @@ class Renderer(MujocoRenderer):
             viewer.cam.lookat[:] = self.data.xpos[self._follow]
         for marker in markers:
             viewer.add_marker(**marker)
-        return cast("Any", super().render(render_mode))
+        with self._floors_below():
+            return cast("Any", super().render(render_mode))
+
+    @contextmanager
+    def _floors_below(self) -> Generator[None]:
+        """Draw floors below the body that the camera follows, which may walk off them.
+
+        Contacts take floors as infinite, and pictures do not. They move by whole tiles, so that
+        they seem to stay.
+        """
+        if self._follow is None:
+            yield
+            return
+        places = self.data.geom_xpos
+        middle = self.data.xpos[self._follow, :2]
+        before = {floor: places[floor].copy() for floor in self._floors}
+        for floor, period in self._floors.items():
+            places[floor, :2] += np.round((middle - places[floor, :2]) / period) * period
+        try:
+            yield
+        finally:
+            for floor, place in before.items():
+                places[floor] = place
 
     def _get_viewer(self, render_mode: str | None) -> OffScreenViewer | WindowViewer:
         viewers: Any = super()
-        if not self._plain or render_mode == "human" or render_mode in self._viewers:
+        if render_mode in self._viewers:
             return viewers._get_viewer(render_mode)
+        if not self._plain or render_mode == "human":
+            with _fine_floors(self.model, self._floors):
+                return viewers._get_viewer(render_mode)
         with _small_buffers(self.model):
             viewer = viewers._get_viewer(render_mode)
         for flag in _COSTLY:
@@ -96,6 +122,17 @@ class Renderer(MujocoRenderer):
         """Free the contexts; the next frame is drawn in a new one."""
         self.viewer = None
         _free(self._viewers)
+
+
+def _floors(model: mujoco.MjModel) -> dict[int, NDArray[np.float64]]:
+    """Return the level floors with tiles, and the width and depth after which these repeat, m."""
+    found: dict[int, NDArray[np.float64]] = {}
+    for floor in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).tolist():
+        material, size = model.geom_matid[floor], model.geom_size[floor, :2]
+        level = model.geom_bodyid[floor] == 0 and model.geom_quat[floor, 0] == 1.0
+        if level and material >= 0 and size.all() and not model.mat_texuniform[material]:
+            found[floor] = 2.0 * size / model.mat_texrepeat[material]
+    return found
 
 
 @functools.cache
@@ -114,6 +151,22 @@ def _small_buffers(model: mujoco.MjModel) -> Generator[None]:
         yield
     finally:
         quality.offsamples, quality.shadowsize = before
+
+
+@contextmanager
+def _fine_floors(model: mujoco.MjModel, floors: Iterable[int]) -> Generator[None]:
+    """Create contexts inside this block whose floors consist of small squares.
+
+    In large ones, coordinates in the shadow map are inexact enough that floors shadow themselves in
+    places. Contacts do not read the size of a square.
+    """
+    chosen = [*floors]
+    before = model.geom_size[chosen, 2].copy()
+    model.geom_size[chosen, 2] = _SQUARE_M
+    try:
+        yield
+    finally:
+        model.geom_size[chosen, 2] = before
 
 
 def _free(viewers: dict[str, OffScreenViewer | WindowViewer]) -> None:
@@ -140,6 +193,11 @@ _LARGEST: Final = 8192
 # Tiles of floors, red, green and blue.
 _DARK_TILE: Final = [0.42, 0.45, 0.48]
 _LIGHT_TILE: Final = [0.54, 0.57, 0.6]
+# Light from all sides, and from lamps, in models with lamps; in a shadow only the first is left.
+_AMBIENT: Final = 0.3
+_DIFFUSE: Final = 0.7
+# Width of the squares that floors consist of in frames with shadows, m.
+_SQUARE_M: Final = 0.5
 # Higher than any body of the catalogue reaches, m.
 _LIGHT_HEIGHT_M: Final = 4.0
 # Half the width of shadow maps, in extents of the model.
@@ -236,23 +294,30 @@ def prepare_scene(spec: mujoco.MjSpec) -> None:
     """Make a model's floor, lights and sky fit to look at; nothing of this moves a body.
 
     Gymnasium's floors are black and white and mirror half of the light: they draw the eye from the
-    body, and flicker towards the horizon. Its lights hang lower than large bodies stand, and their
-    shadow maps, which stay behind a body that walks, leave dark stripes far from it. The pendulums'
-    models have neither a light nor a sky: their frames would be dark shapes on black.
+    body, and flicker towards the horizon; in frames with shadows they turn green, and the shadows
+    are black. Its lights hang lower than large bodies stand, and their shadow maps, which stay
+    behind a body that walks, leave dark stripes far from it. The pendulums' models have no sky,
+    and most have no light: their frames would be dark shapes on black.
     """
     for texture in spec.textures:
         if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:
             texture.rgb1, texture.rgb2 = _DARK_TILE, _LIGHT_TILE
+    for geom in spec.geoms:
+        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+            # The double pendulum's has no tiles and lies far below it.
+            geom.rgba = [1.0, 1.0, 1.0, 1.0 if geom.material else 0.0]
     for material in spec.materials:
         material.reflectance = 0.0
+    if spec.lights:
+        spec.visual.headlight.ambient = [_AMBIENT] * 3
     for light in spec.lights:
+        light.diffuse = [_DIFFUSE] * 3
         if light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
             light.pos = [light.pos[0], light.pos[1], max(light.pos[2], _LIGHT_HEIGHT_M)]
             light.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM
     spec.visual.map.shadowclip = _SHADOW_CLIP
-    if spec.lights:
-        return
-    spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [_HEADLIGHT] * 3
+    if not spec.lights:
+        spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [_HEADLIGHT] * 3
     if any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
         return
     grey = [_BACKGROUND / 255.0] * 3
