@@ -92,6 +92,7 @@ def trained(name: str, seed: int) -> Path:
     out = FOLDER / f"{name}-{seed}.safetensors"
     if out.exists():
         return out
+    FOLDER.mkdir(parents=True, exist_ok=True)
     task = TASKS[name]
     settings = learner_settings(task.learner)
     assert isinstance(settings, PpoSettings)
