@@ -71,8 +71,6 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
         copy: bool = True,
     ) -> None:
-        # Gymnasium 1.2 and older close what they collect, even what was never complete.
-        self.closed = True
         if not makers:
             raise VectorEnvError("A vector env needs at least one env, got 0.")
         if threads < 1:
@@ -111,7 +109,6 @@ class ThreadVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self._batch = BatchStep(self._subs, self._observations, self.threads)
         # Ends the threads of a vector env that is never closed, at the latest at exit.
         weakref.finalize(self, self._threads.stop)
-        self.closed = False
 
     def reset(
         self,
