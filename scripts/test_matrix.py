@@ -131,6 +131,7 @@ def run_lane(lane: str, wheel: Path) -> int:
     if is_wheel:
         place = folder / "checkout"
         left_out = ("src", "build", "dist", "site", ".venv*", ".git", "results", "__pycache__")
+        left_out += (".lgd-nfy*",)  # A pipe of lgpio cannot be copied.
         shutil.copytree(ROOT, place, ignore=shutil.ignore_patterns(*left_out))
     environment = {name: v for name, v in os.environ.items() if name != "PYTHONPATH"}
     command = [str(venv / "bin/python"), "-m", "pytest", *FAST]
