@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import traceback
 from collections.abc import Generator
 from contextlib import contextmanager
 
@@ -22,6 +23,9 @@ def device_errors(device: str) -> Generator[None]:
     try:
         yield
     except _kinds() as error:
+        # A device that could not be opened frees its pins when nothing refers to it any more, and in
+        # Python 3.13 the frame that opened it would live until a garbage collection.
+        traceback.clear_frames(error.__traceback__)
         raise RobotError(f"{device} does not answer: {str(error).rstrip('.')}.") from error
 
 
