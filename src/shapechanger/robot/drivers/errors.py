@@ -23,7 +23,7 @@ def device_errors(device: str) -> Generator[None]:
     try:
         yield
     except _kinds() as error:
-        # A device that could not be opened frees its pins when nothing refers to it any more, and in
+        # A device that could not be opened frees its pins when nothing refers to it any more. In
         # Python 3.13 the frame that opened it would live until a garbage collection.
         traceback.clear_frames(error.__traceback__)
         raise RobotError(f"{device} does not answer: {str(error).rstrip('.')}.") from error
