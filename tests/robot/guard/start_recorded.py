@@ -9,7 +9,11 @@ import sys
 from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parents[3]
-_START = _ROOT / "src/shapechanger/robot/guard/start.py"
+# Of the installed package, which is not imported yet.
+_PACKAGE = importlib.util.find_spec("shapechanger")
+assert _PACKAGE is not None
+assert _PACKAGE.origin is not None
+_START = Path(_PACKAGE.origin).parent / "robot/guard/start.py"
 
 
 def main(program: str, arguments: list[str]) -> None:
