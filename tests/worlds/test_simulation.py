@@ -59,6 +59,35 @@ def test_poses_that_are_computed_once_change_no_drive(
     assert states[0] == states[1]
 
 
+@_EACH
+def test_wheels_that_meet_only_the_ground_change_no_drive(
+    vehicle: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until it hits a wall with its hull, a coarse world of equal steps is bit for bit alike."""
+    monkeypatch.setattr(simulation, "_COARSE_DT", SIM_DT)
+    poses: list[Pose] = []
+    for coarse in (False, True):
+        world = MujocoWorld(vehicle, seed=3, size=None, coarse=coarse)
+        world.put(_before_a_wall(world, 1.0))
+        for _ in range(600):
+            if world.collisions:
+                break
+            poses.append(world.pose)
+            world.advance(0.01, _AHEAD[vehicle])
+        assert world.collisions == 1
+    assert poses[: len(poses) // 2] == poses[len(poses) // 2 :]
+
+
+def test_only_the_tank_needs_the_short_step() -> None:
+    """Coarse worlds have a longer step, but for a vehicle that skids when it turns."""
+    steps = {
+        vehicle: MujocoWorld(vehicle, size=None, coarse=True).model.opt.timestep
+        for vehicle in VEHICLES
+    }
+    assert steps.pop("tank") == SIM_DT
+    assert set(steps.values()) == {2.0 * SIM_DT}
+
+
 def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
     """Return a pose that faces the middle of the longest wall at this distance."""
     ends = [np.array((wall.start, wall.end)) for wall in world.course.walls]

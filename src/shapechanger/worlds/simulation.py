@@ -37,6 +37,7 @@ _INNER_OHM: Final = 0.12  # Of the battery and its leads.
 _IDLE_A: Final = 0.6  # Current of the computer.
 _CONE: Final = (-math.radians(7.0), 0.0, math.radians(7.0))  # An HC-SR04 hears 15 degrees.
 _SOLID_GROUP: Final = 3  # Group of the collision geoms; see `shapechanger.worlds.scene`.
+_COARSE_DT: Final = 2.0 * SIM_DT
 _ROUNDING_S: Final = 1e-9
 # Laying out a course takes 70 ms and planning a path 60, so both are kept; a model takes 5 MB.
 _KEPT_COURSES: Final = 64
@@ -60,6 +61,8 @@ class MujocoWorld:
         size: Width and height of the camera's pictures in pixels; None for no camera.
         look: Light and colours; None for the usual look of the world.
         lenses: Names of camera faults; see `shapechanger.worlds.lens`.
+        coarse: Whether to take twice as long steps, but for a vehicle that turns on the spot, and
+            to let wheels meet only the ground. The hull, which is wider, meets the walls.
 
     Attributes:
         vehicle: Model of the vehicle.
@@ -85,8 +88,12 @@ class MujocoWorld:
         size: tuple[int, int] | None = (160, 120),
         look: Look | None = None,
         lenses: Sequence[str] = (),
+        coarse: bool = False,
     ) -> None:
         self.vehicle = vehicle_model(vehicle)
+        self._coarse = coarse
+        # With the longer step a tank, which skids when it turns, would turn a fifth less.
+        self._step_s = _COARSE_DT if coarse and self.vehicle.turning_radius_m > 0.0 else SIM_DT
         self._world = HOME[vehicle] if world is None else world
         self.look: Look = Look.of(self._world) if look is None else look
         self._camera = None if size is None else OnboardCamera(size)
@@ -144,7 +151,9 @@ class MujocoWorld:
         """
         look = self.look if look is None else look
         require_element(self.vehicle.name, floats=self.vehicle.floats, world=self._world)
-        course, model = _compiled(self.vehicle.name, self._world, seed, look)
+        course, model = _compiled(
+            self.vehicle.name, self._world, seed, look, self._coarse, self._step_s
+        )
         if camera is not None:
             model = copy.copy(model)
             move_camera(model, _CAMERA, camera)
@@ -215,9 +224,9 @@ class MujocoWorld:
         these matter.
         """
         self._rest_s += dt_s
-        steps = int((self._rest_s + _ROUNDING_S) / SIM_DT)
+        steps = int((self._rest_s + _ROUNDING_S) / self._step_s)
         if steps:
-            self._rest_s -= steps * SIM_DT
+            self._rest_s -= steps * self._step_s
             self._step(outputs, steps)
         x, y = self._motion[:2]
         before_x, before_y = self._updated_at
@@ -375,7 +384,7 @@ class MujocoWorld:
 
     def _step(self, outputs: Mapping[str, float | None], steps: int) -> None:
         """Take simulation steps with the same outputs and the same voltage of the battery."""
-        bound, dt_s = self._bound, steps * SIM_DT
+        bound, dt_s = self._bound, steps * self._step_s
         bound.drive(outputs, self.resting_v - _INNER_OHM * self._current_a)
         mujoco.mj_step(self.model, self.data, nstep=steps)
         before, now = self._motion, bound.motion()
@@ -389,13 +398,36 @@ class MujocoWorld:
 
 
 @lru_cache(maxsize=_KEPT_COURSES)
-def _compiled(vehicle: str, world: str, seed: int, look: Look) -> tuple[Course, mujoco.MjModel]:
+def _compiled(
+    vehicle: str, world: str, seed: int, look: Look, coarse: bool, step_s: float
+) -> tuple[Course, mujoco.MjModel]:
     """Return a course, and the compiled model of a vehicle on it; neither may be changed."""
     course = lay_out(world, seed)
     spec = mujoco.MjSpec()
     add_course(spec, course, look)
     add_vehicle(spec, vehicle, look.tone())
+    spec.option.timestep = step_s
+    if coarse:
+        _let_wheels_meet_only_the_ground(spec)
     return course, spec.compile()
+
+
+def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
+    """Replace the search of what the wheels meet, a third of a step, by pairs with the ground."""
+    ground = spec.geom("world/ground")
+    for geom in spec.geoms:
+        if geom.contype & ground.conaffinity and geom.name.startswith("vehicle/"):
+            geom.contype = geom.conaffinity = 0
+            # As MuJoCo combines the frictions of two geoms.
+            wins = geom.priority > ground.priority
+            slide, spin, roll = (
+                geom.friction if wins else np.maximum(geom.friction, ground.friction)
+            )
+            spec.add_pair(
+                geomname1=ground.name,
+                geomname2=geom.name,
+                friction=[slide, slide, spin, roll, roll],
+            )
 
 
 @lru_cache(maxsize=_KEPT_COURSES)
