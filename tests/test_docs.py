@@ -36,6 +36,7 @@ def test_examples_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert bool(planned) == (page.stem == "studies")
 
 
+@pytest.mark.sources
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_links_to_files_exist(page: Path) -> None:
     """Relative links lead to files of the project."""

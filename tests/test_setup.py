@@ -60,6 +60,7 @@ def test_stubs_describe_the_pinned_mujoco() -> None:
     assert f"Generated from mujoco {_pins()['mujoco']} " in header
 
 
+@pytest.mark.sources
 def test_coverage_gate_finds_its_files() -> None:
     """Every pattern of the coverage configuration matches a file."""
     patterns: list[str] = _PYPROJECT["tool"]["coverage"]["run"]["include"]

@@ -166,6 +166,7 @@ def test_examples_of_docstrings_are_fenced() -> None:
     assert fenced(text) == "Sum.\n\n```pycon\n>>> 1 + 1\n2\n>>> 2 + 2\n4\n```\n\nMore."
 
 
+@pytest.mark.sources
 def test_every_exported_name_is_in_the_reference() -> None:
     """The page of a package describes each name that it exports, or links to its description."""
     pages = {page.path: page.content for page in api_pages()}
