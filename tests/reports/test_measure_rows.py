@@ -71,7 +71,7 @@ def test_every_arm_has_every_measure(study: Study) -> None:
     assert [row.arm for row in rows] == ["zero-shot"] * 9 + ["fine-tune"] * 9
     names = [row.measure for row in rows[:9]]
     assert names[:3] == ["Jumpstart", "Total reward gain", "Asymptotic gain"]
-    assert names[3:5] == ["auc_ratio", "Forward transfer"]
+    assert names[3:5] == ["Area ratio", "Forward transfer"]
     assert names[5:] == [f"Time to threshold {t:g}: steps saved" for t in DEFAULT_THRESHOLDS]
 
 
@@ -79,7 +79,7 @@ def test_rows_match_the_summary(study: Study) -> None:
     """Rows have the texts of the estimates, one column for each way of counting."""
     summary = study.summaries["fine-tune"]
     rows = by_name(study, "fine-tune")
-    ratio = rows["auc_ratio"]
+    ratio = rows["Area ratio"]
     assert ratio.target == estimate_text(summary.in_target_steps.auc_ratio)
     assert ratio.total == estimate_text(summary.in_total_steps.auc_ratio)
     assert not ratio.target.startswith("+")
@@ -90,9 +90,9 @@ def test_rows_match_the_summary(study: Study) -> None:
 def test_undefined_measures_have_a_reason() -> None:
     """Undefined measures have a note with the reason."""
     rows = by_name(make_study(arms=("scratch", "zero-shot")), "zero-shot")
-    assert rows["auc_ratio"].target == rows["auc_ratio"].total == "undefined"
-    assert rows["auc_ratio"].method == "none"
-    assert rows["auc_ratio"].note.startswith("Undefined: it needs a learning curve")
+    assert rows["Area ratio"].target == rows["Area ratio"].total == "undefined"
+    assert rows["Area ratio"].method == "none"
+    assert rows["Area ratio"].note.startswith("Undefined: it needs a learning curve")
     flat = rising(-50.0, -50.0, 1e3)
     not_learnt = make_study(scratch=flat, fine_tune=flat, zero_shot=flat[:, :1])
     rows = by_name(not_learnt, "fine-tune")
@@ -102,7 +102,7 @@ def test_undefined_measures_have_a_reason() -> None:
 
 def test_notes_name_their_way_of_counting() -> None:
     """If only one way of counting lacks an interval, the note names it."""
-    row = by_name(make_study(source_steps=10_240), "fine-tune")["auc_ratio"]
+    row = by_name(make_study(source_steps=10_240), "fine-tune")["Area ratio"]
     assert row.total == "0 (no interval)"
     assert row.method.endswith("/ none")
     assert row.note.startswith("In total steps: No interval")

@@ -14,7 +14,7 @@ from shapechanger.bodies.vehicles.looks import OUTSIDE_VIEW
 from shapechanger.envs.vehicle import VehicleEnv
 from shapechanger.errors import RenderError
 from shapechanger.worlds.course import HOME
-from shapechanger.worlds.simulation import MujocoWorld
+from shapechanger.worlds.simulation import PORTRAITS_RAD, MujocoWorld
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
@@ -116,3 +116,15 @@ def test_a_size_out_of_range_is_refused(size: tuple[int, int]) -> None:
     with pytest.raises(RenderError, match=r"cannot be|4096"):
         world.outside(*size)
     world.close()
+
+
+def test_no_wall_hides_the_vehicle() -> None:
+    """In a corridor narrower than the distance of view, another side is chosen."""
+    world = MujocoWorld("car", size=None, seed=10)
+    shown: list[float] = []
+    for azimuth in (PORTRAITS_RAD[0], PORTRAITS_RAD):
+        seen = world.outside(160, 120, 0.4, azimuth_rad=azimuth)
+        with _invisible(world):
+            shown.append(_changed(seen, world.outside(160, 120, 0.4, azimuth_rad=azimuth)).mean())
+    world.close()
+    assert shown[0] < 0.5 * shown[1]

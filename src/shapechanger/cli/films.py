@@ -30,9 +30,10 @@ _FINER: Final = 2
 _FILM_S: Final = 10.0
 _PICTURES: Final = 6
 _GAP: Final = 4
-# View of a vehicle: radius around it, m, and direction from its heading, rad.
-_REACH_M: Final = 0.6
-_BESIDE_RAD: Final = 0.5
+# View of a vehicle: radius around it, m, and directions from its heading, rad: from behind, and
+# from ahead where a wall hides it.
+_REACH_M: Final = 0.45
+_FOLLOWING_RAD: Final = (0.4, -0.4, 0.0, 2.7, -2.7)
 
 
 class _Scene(NamedTuple):
@@ -165,7 +166,9 @@ def _play(
 
     def frame() -> NDArray[Any]:
         if scene.drives:
-            return env.unwrapped.world.outside(_WIDTH, _HEIGHT, _REACH_M, azimuth_rad=_BESIDE_RAD)
+            return env.unwrapped.world.outside(
+                _WIDTH, _HEIGHT, _REACH_M, azimuth_rad=_FOLLOWING_RAD
+            )
         parts = np.asarray(env.render()).reshape(_HEIGHT, _FINER, _WIDTH, _FINER, 3)
         return parts.mean(axis=(1, 3)).astype(np.uint8)
 

@@ -32,7 +32,7 @@ from shapechanger.transfer.study import Study
 JUMPSTART: Final = "Jumpstart"
 TOTAL_REWARD_GAIN: Final = "Total reward gain"
 ASYMPTOTIC_GAIN: Final = "Asymptotic gain"
-AUC_RATIO: Final = "auc_ratio"
+AUC_RATIO: Final = "Area ratio"
 FORWARD_TRANSFER: Final = "Forward transfer"
 TIME_TO_THRESHOLD: Final = "Time to threshold"
 

@@ -31,6 +31,11 @@ BUMPER_SPREAD: Final = math.radians(60.0)
 APART_S: Final = 0.5
 """Contacts that follow one another within this time, s, belong to the same collision."""
 
+PORTRAITS_RAD: Final = tuple(
+    math.radians(degrees) for degrees in (125.0, -125.0, 150.0, -150.0, 55.0, -55.0, 25.0, -25.0)
+)
+"""Directions of view of a portrait, rad from the heading: from ahead first, then from behind."""
+
 _CAMERA: Final = "vehicle/camera"
 _CHASSIS: Final = "vehicle/chassis"
 _INNER_OHM: Final = 0.12  # Of the battery and its leads.
@@ -41,9 +46,8 @@ _COARSE_DT: Final = 2.0 * SIM_DT
 _ROUNDING_S: Final = 1e-9
 # Laying out a course takes 70 ms and planning a path 60, so both are kept; a model takes 5 MB.
 _KEPT_COURSES: Final = 64
-# View from outside: from the right and ahead, a little above, at a height on the vehicle, m. At
-# MuJoCo's field of view of 45 degrees a sphere of radius 1 fills the height at a distance of 2.6.
-_PORTRAIT_RAD: Final = math.radians(125.0)
+# Views from outside are a little above, at a height on the vehicle, m. At MuJoCo's field of view of
+# 45 degrees a sphere of radius 1 fills the height at a distance of 2.6.
 _ABOVE_RAD: Final = math.radians(-20.0)
 _LOOKED_AT_M: Final = 0.06
 _DISTANCE_PER_REACH: Final = 3.0
@@ -332,7 +336,7 @@ class MujocoWorld:
         height: int = 360,
         reach: float | None = None,
         *,
-        azimuth_rad: float = _PORTRAIT_RAD,
+        azimuth_rad: float | Sequence[float] = PORTRAITS_RAD,
         elevation_rad: float = _ABOVE_RAD,
     ) -> NDArray[np.uint8]:
         """Picture of the vehicle in its world from outside, (height, width, 3).
@@ -342,6 +346,7 @@ class MujocoWorld:
             height: Height in pixels.
             reach: Radius in view around the middle of the vehicle, m; None for its own reach.
             azimuth_rad: Direction of view from its heading, counter-clockwise; 0 is from behind.
+                Of several, the first in which no wall hides the vehicle, if there is one.
             elevation_rad: Angle of view above the horizon; negative looks down.
 
         Raises:
@@ -355,14 +360,53 @@ class MujocoWorld:
             camera.look_at(self.model)
         x, y, heading = self._motion[:3]
         middle = self.vehicle.nose_m - 0.5 * self.vehicle.length_m
+        ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
+        centre = np.array((x, y, _LOOKED_AT_M)) + middle * ahead
+        distance = _DISTANCE_PER_REACH * (reach or self.reach)
+        views = (azimuth_rad,) if isinstance(azimuth_rad, int | float) else azimuth_rad
+        view = next(
+            (
+                azimuth
+                for azimuth in views
+                if self._sees(centre, ahead, distance, heading + azimuth, elevation_rad)
+            ),
+            views[0],
+        )
         return self._outside.picture(
             self.model,
             self.data,
-            (x + middle * math.cos(heading), y + middle * math.sin(heading), _LOOKED_AT_M),
-            _DISTANCE_PER_REACH * (reach or self.reach),
-            heading + azimuth_rad,
+            (centre[0], centre[1], centre[2]),
+            distance,
+            heading + view,
             elevation_rad,
         )
+
+    def _sees(
+        self,
+        centre: NDArray[np.float64],
+        ahead: NDArray[np.float64],
+        distance: float,
+        azimuth_rad: float,
+        elevation_rad: float,
+    ) -> bool:
+        """Return whether neither nose nor tail is behind a wall or an obstacle."""
+        flat = math.cos(elevation_rad)
+        eye = centre - distance * np.array(
+            (
+                flat * math.cos(azimuth_rad),
+                flat * math.sin(azimuth_rad),
+                math.sin(elevation_rad),
+            )
+        )
+        hit = np.zeros(1, np.int32)
+        for end in (-0.5 * self.vehicle.length_m, 0.5 * self.vehicle.length_m):
+            ray = centre + end * ahead - eye
+            met = mujoco.mj_ray(
+                self.model, self.data, eye, ray, self._solid, True, self._chassis, hit
+            )
+            if 0.0 <= met < 1.0 and self.model.geom_bodyid[hit[0]] == 0:  # In lengths of the ray.
+                return False
+        return True
 
     def close(self) -> None:
         """Free the cameras' OpenGL contexts."""

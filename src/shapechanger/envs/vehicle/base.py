@@ -241,6 +241,26 @@ class DrivingEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """Return the camera's picture, shape (height, width, 3); None without a render mode."""
         return self._world.picture() if self.render_mode else None
 
+    @property
+    def reach(self) -> float:
+        """Distance from the middle of the vehicle to its farthest point, m."""
+        return self._world.reach
+
+    def picture(
+        self, width: int = 480, height: int = 360, reach: float | None = None
+    ) -> NDArray[np.uint8]:
+        """Return a picture of the vehicle in its world from outside, shape (height, width, 3).
+
+        Args:
+            width: Width in pixels.
+            height: Height in pixels.
+            reach: Radius in view around the middle of the vehicle, m; None for its own reach.
+
+        Raises:
+            RenderError: If the size is out of range, or nothing can be drawn here.
+        """
+        return self._world.outside(width, height, reach)
+
     def close(self) -> None:
         """Release the renderer, if there is one."""
         self._world.close()
