@@ -392,6 +392,7 @@ MODULES: Final = (
     "shapechanger.demos.dataset",
     "shapechanger.demos.recording",
     "shapechanger.envs.ant",
+    "shapechanger.envs.own",
     "shapechanger.envs.pendulum",
     "shapechanger.envs.reshapable",
     "shapechanger.envs.runners",
