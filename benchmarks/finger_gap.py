@@ -13,7 +13,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, cast
 
 import msgspec
 import numpy as np
@@ -32,6 +32,7 @@ from shapechanger.transfer.executor import Processes
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 from shapechanger.transfer.learners.presets import learner_settings
+from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
 from shapechanger.transfer.runs import RunResult, load_result
 from shapechanger.transfer.study import make_plan, run_study
@@ -39,7 +40,7 @@ from shapechanger.transfer.study import make_plan, run_study
 # Twenty minutes on a bench; arms are also evaluated after ten.
 STEPS: Final = 61_440
 RIGS: Final = 5
-RIG_STEPS: Final = 6144
+FOLLOW_STEPS: Final = 6144  # Two minutes.
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 # Zero-shot success below this counts as a gap.
 _MILD: Final = 0.5
@@ -48,12 +49,14 @@ _RECOVERED: Final = 0.8
 _RECOVERED_IN_GAP: Final = 0.9
 _TUNED: Final = 0.7
 _FOLLOWED: Final = 2.0
+_MINUTES: Final = 30.0
 # Distance within which a target counts as reached, m, as in `Finger-v1`.
 _NEAR_M: Final = 0.005
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
 
 
 _WHERE: Final = "fingers of the gap real-like"
+_RIGS: Final = "twins of a rig, real-like"
 _GAP_ARMS: Final = (*ARMS, "randomised", "identified")
 _SCRATCH: Final = "scratch"
 _IDENTIFIED: Final = "identified"
@@ -80,11 +83,7 @@ def gap() -> list[Row]:
     runs = _ended(plan, out)
     rows = [
         *rows_of(runs, _WHERE, {"identified": _RECOVERED_IN_GAP, "fine-tune": _TUNED}),
-        *(
-            _share_row(f"{_WHERE}, {arm} after {STEPS // 2:,} steps", runs[arm], STEPS // 2)
-            for arm in ("scratch", "fine-tune")
-            if arm in runs
-        ),
+        *_half_way(runs, _WHERE),
     ]
     chatter = {arm: np.mean([_chatter(run) for run in ended]) for arm, ended in runs.items()}
     rows.append(
@@ -110,12 +109,31 @@ def gap() -> list[Row]:
         )
     )
     if _RIG_ONLY in wanted:
-        knows_rig = load_policy(trained(_RIG_ONLY, 0))
-        fingers = [target.having({"finger_seed": seed}) for seed in range(plan.seeds)]
-        ends = [[i["is_success"] for i in played(knows_rig, each, TARGETS)] for each in fingers]
-        name = f"{_WHERE}, policy that knows the rig's motors and delay only"
-        rows.append(_row(name, dict(enumerate(np.mean(ends, axis=1)))))
+        rows.append(_rig_only_row(target, plan.seeds, _WHERE))
     return rows
+
+
+def _half_way(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
+    """Return the success of the arms that learn on the target after half of their steps."""
+    return [
+        _share_row(f"{where}, {arm} after {STEPS // 2:,} steps", runs[arm], STEPS // 2)
+        for arm in (_SCRATCH, "fine-tune")
+        if arm in runs
+    ]
+
+
+def _rig_only_row(target: EnvRef, fingers: int, where: str) -> Row:
+    """Return the success of a policy that knows the rig's motors and delay, but no finger."""
+    policy = load_policy(trained(_RIG_ONLY, 0))
+    ends = [
+        [
+            info["is_success"]
+            for info in played(policy, target.having({"finger_seed": seed}), TARGETS)
+        ]
+        for seed in range(fingers)
+    ]
+    name = f"{where}, policy that knows the rig's motors and delay only"
+    return _row(name, dict(enumerate(np.mean(ends, axis=1))))
 
 
 def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
@@ -188,13 +206,36 @@ def _chatter(run: RunResult) -> float:
 
 
 def rig() -> list[Row]:
-    """Measure the same through link, daemon, guard and servo bus, with two minutes per rig."""
+    """Measure the same arms through link, daemon, guard and servo bus, on twins of a rig.
+
+    `ONLY` and `ENDED=1` are those of `gap`.
+    """
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
-    arms: tuple[str, ...] = ("scratch", "zero-shot", "identified")
     out = Path("results", "finger-rig")
-    plan = _plan(target, "ppo-rig", arms, RIGS, RIG_STEPS)
-    _run(plan, out)
-    return rows_of(_ended(plan, out), "twins of a rig, real-like", {"identified": _RECOVERED})
+    wanted = asked("arm or row", (*_GAP_ARMS, _RIG_ONLY))
+    arms = tuple(arm for arm in _GAP_ARMS if arm in (*wanted, _SCRATCH))
+    plan = _plan(target, "ppo-rig", arms, RIGS, STEPS, evaluations=2)
+    if "ENDED" not in os.environ:
+        _run(plan, out)
+    runs = _ended(plan, out)
+    rows = [
+        *rows_of(runs, _RIGS, {"identified": _RECOVERED, "fine-tune": _TUNED}),
+        *_half_way(runs, _RIGS),
+    ]
+    if _RIG_ONLY in wanted:
+        rows.append(_rig_only_row(target, plan.seeds, _RIGS))
+    if all(len(runs.get(arm, [])) == plan.seeds for arm in arms):
+        minutes = sum(run.wall_s for ended in runs.values() for run in ended) / 60.0
+        rows.append(
+            Row(
+                f"{_RIGS}: minutes on two cores for one finger, with {', '.join(arms)}",
+                f"{minutes / plan.seeds / 2.0:.0f}",
+                f"mean of {plan.seeds} fingers, two runs at a time",
+                "< 30",
+                minutes / plan.seeds / 2.0 < _MINUTES,
+            )
+        )
+    return rows
 
 
 def follow() -> list[Row]:
@@ -209,7 +250,7 @@ def follow() -> list[Row]:
     target = EnvRef("shapechanger/RemoteFingerTrack-v1", {"twin": "real-like", **circle})
     out = Path("results", "finger-follow")
     arms = ("scratch", "zero-shot", "identified")
-    plan = _plan(target, "ppo-rig", arms, RIGS, RIG_STEPS, source=source, policy="track")
+    plan = _plan(target, "ppo-rig", arms, RIGS, FOLLOW_STEPS, source=source, policy="track")
     _run(plan, out, policy="track")
     errors: list[tuple[float, float]] = []
     shipped: list[float] = []
@@ -254,12 +295,16 @@ def _plan(
     *,
     source: EnvRef = _FINGER,
     policy: Shipped = "reach",
+    evaluations: int | None = None,
 ) -> Plan:
-    """Plan a study of a shipped policy."""
+    """Plan a study of a shipped policy, with so many evaluations if not as often as usual."""
+    settings = cast("PpoSettings", learner_settings(learner))
+    if evaluations is not None:
+        settings = msgspec.structs.replace(settings, eval_every=steps // evaluations)
     return make_plan(
         TransferTask(source, target),
         learner,
-        learner_settings(learner),
+        settings,
         seeds=int(os.environ.get("SEEDS", seeds)),
         steps=steps,
         source_policy=POLICIES[policy],
