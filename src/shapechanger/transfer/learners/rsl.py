@@ -260,11 +260,11 @@ class _LimbModel(MLPModel):
         self.mlp: Any = copy.deepcopy(net)
         # One deviation for all limbs, however many there are.
         self.distribution: Any = GaussianDistribution(1, std_type="log") if acts else None
-        self._policy = [policy]  # A list, so that its weights are not this module's.
+        self._as_rows = policy.rows
 
     def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> Tensor:
         """Return the rows, shape (n, 1 + limbs, width)."""
-        self._rows = self._policy[0].rows(super().get_latent(obs, masks, hidden_state))
+        self._rows = self._as_rows(super().get_latent(obs, masks, hidden_state))
         return self._rows
 
     def forward(self, *arguments: Any, **more: Any) -> Tensor:

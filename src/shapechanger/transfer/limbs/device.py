@@ -37,7 +37,8 @@ class DeviceRows:
         # Each batch has spaces of its own, and so tensors of its own.
         self._apart = isinstance(envs.single_action_space, gym.spaces.Tuple)
         self._batches = [
-            _Batch(batch.numbers, [each[int(i)] for i in batch.numbers]) for batch in envs.batches
+            _Batch(batch.numbers, [each[int(i)] for i in batch.numbers.tolist()])
+            for batch in envs.batches
         ]
 
     def of(self, observations: Any) -> Tensor:
