@@ -38,6 +38,18 @@ def test_it_is_trained_in_drawn_bodies(policy: Path) -> None:
     assert card.learner == "limbs"
 
 
+def test_it_is_trained_on_a_device(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In many bodies `rsl-ppo` has the network of limbs; the policy acts in a body it never had."""
+    out = tmp_path / "ants.safetensors"
+    of_two = ["train", "Ant", "--bodies", "2", "--learner", "rsl-ppo", "--steps", "48"]
+    main([*of_two, "--out", str(out), "--set", *_TINY, 'device="cpu"'])
+    card = load_policy(out).card
+    assert card.env.kwargs == {"bodies": {"split": "train", "count": 2, "seed": 0}}
+    assert (card.learner, card.settings.n_envs) == ("rsl-limbs", 3)
+    main(["policies", "evaluate", str(out), "--env", "ExtendedAnt", "--episodes", "1"])
+    assert "forward speed" in capsys.readouterr().out
+
+
 def test_it_is_evaluated_in_any_body(policy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Without a body in the family's own, otherwise in the named one, without a body map."""
     main(["policies", "evaluate", str(policy), "--episodes", "1"])
@@ -68,6 +80,14 @@ def test_it_is_exported_for_one_body(policy: Path, tmp_path: Path) -> None:
         ("train Swimmer --bodies 3", "The family Swimmer declares no axes"),
         ("train Car --bodies 3", "belongs to no family to draw from"),
         ("train HalfCheetah --bodies 70", "70 bodies need as many envs, and there are 64"),
+        (
+            "train HalfCheetah --bodies 70 --learner rsl-ppo",
+            "70 bodies need as many envs, and there are 64",
+        ),
+        (
+            "train Ant --bodies 3 --learner rsl-ppo --tensorboard logs",
+            "rsl-limbs has no TensorBoard logs",
+        ),
         ("policies evaluate POLICY --env HalfCheetah", "another family than that of"),
         ("policies export POLICY --env Walker2d --out a.onnx", "another family than that of"),
         (

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 import torch
@@ -12,6 +14,7 @@ import torch
 import shapechanger
 from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import load_policy, save_policy
 from shapechanger.transfer.learners.rsl import RslLearner, RslVecEnv
@@ -60,6 +63,20 @@ def test_a_short_training_balances_longer(tmp_path: Path) -> None:
     seen = np.random.default_rng(0).normal(size=(5, 4))
     np.testing.assert_array_equal(again.act(seen), policy.act(seen))
     assert learner.origin(path).steps == 2048
+
+
+@pytest.mark.usefixtures("one_thread")
+def test_a_policy_of_any_number_of_worlds_is_loaded(tmp_path: Path) -> None:
+    """A device steps more worlds than there may be envs of other learners."""
+    few = msgspec.structs.replace(SETTINGS, n_steps=2, batch_size=16, eval_every=16)
+    trained = RslLearner("rsl-ppo", few).train(PENDULUM, 16, 0, on_evaluation=ignore)
+    many = msgspec.structs.replace(SETTINGS, n_envs=8192, eval_every=2**20)
+    card = msgspec.structs.replace(trained.card, settings=many)
+    save_policy(dataclasses.replace(trained, card=card), tmp_path / "many.safetensors")
+    loaded = load_policy(tmp_path / "many.safetensors")
+    assert loaded.card.settings.n_envs == 8192
+    seen = np.zeros((1, 4))
+    np.testing.assert_array_equal(loaded.act(seen), trained.act(seen))
 
 
 def test_what_the_adapter_promises() -> None:

@@ -26,10 +26,10 @@ from shapechanger.cli.env_arguments import (
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.transfer.files import make_folder
-from shapechanger.transfer.learners.presets import resolve_learner, tuning_text
+from shapechanger.transfer.learners.presets import IN_MANY_BODIES, resolve_learner, tuning_text
 from shapechanger.transfer.learners.settings import (
     LimbSettings,
-    RslPpoSettings,
+    RslSettings,
     Sb3Settings,
     require_budget,
 )
@@ -111,18 +111,21 @@ class Train:
         from shapechanger.transfer.runs import learner_of
 
         own = "limbs" if self.bodies else default_learner(env)
-        learner, settings = resolve_learner(self.learner or own, settings_of(self.set))
+        wanted = self.learner or own
+        if self.bodies:
+            wanted = IN_MANY_BODIES.get(wanted, wanted)
+        learner, settings = resolve_learner(wanted, settings_of(self.set))
         if self.bodies and not isinstance(settings, LimbSettings):
             raise StudyError(
-                f"{learner} learns in one body: give --learner limbs, which fits many, with "
-                "--bodies."
+                f"{learner} learns in one body: give --learner limbs, or rsl-ppo for worlds on a "
+                "GPU, which fit many, with --bodies."
             )
         steps = settings.steps if self.steps is None else self.steps
         require_budget(steps, settings)
         with opened(each_body(env)[0]) as made:
             learner_of(learner, settings).require(env, env_traits(made))
         if self.tensorboard is not None:
-            if not isinstance(settings, Sb3Settings) or isinstance(settings, RslPpoSettings):
+            if not isinstance(settings, Sb3Settings) or isinstance(settings, RslSettings):
                 raise StudyError(f"{learner} has no TensorBoard logs: leave out --tensorboard.")
             try:
                 import_module("torch.utils.tensorboard")
@@ -134,7 +137,7 @@ class Train:
         def training(on_steps: Callable[[int], None]) -> None:
             say(f"{learner}: {tuning_text(learner, env.id)}")
             if isinstance(settings, Sb3Settings):
-                if isinstance(settings, RslPpoSettings):
+                if isinstance(settings, RslSettings):
                     from shapechanger.transfer.learners.rsl import RslLearner
 
                     trains: Sb3Learner = RslLearner(learner, settings)

@@ -25,7 +25,7 @@ from shapechanger.transfer.learners.evaluation import (
     zero_actions,
 )
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
-from shapechanger.transfer.learners.settings import RslPpoSettings, Sb3Settings, Settings
+from shapechanger.transfer.learners.settings import RslSettings, Sb3Settings, Settings
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 
@@ -58,7 +58,7 @@ def learner_of(name: str, settings: Settings) -> Learner:
         name: Name of the learner.
         settings: Its settings.
     """
-    if isinstance(settings, RslPpoSettings):
+    if isinstance(settings, RslSettings):
         from shapechanger.transfer.learners.rsl import RslLearner
 
         return RslLearner(name, settings)
@@ -73,7 +73,7 @@ def device_of(settings: Settings) -> str:
     Args:
         settings: The learner's settings.
     """
-    if not isinstance(settings, RslPpoSettings):
+    if not isinstance(settings, RslSettings):
         return "CPU"
     import torch
 

@@ -25,7 +25,7 @@ from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
-from shapechanger.transfer.learners.settings import Sb3Settings
+from shapechanger.transfer.learners.settings import RslSettings, Sb3Settings
 from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 
@@ -241,7 +241,8 @@ def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
     # A custom class need not take `net_arch`.
     if settings.algorithm in {"PPO", "SAC", "TQC"} and weights > known:
         raise ValueError(f"its card needs at least {weights} weights, and it has {known} numbers")
-    if settings.n_envs > _MOST_ENVS:
+    # Worlds on a device are not built again.
+    if settings.n_envs > _MOST_ENVS and not isinstance(settings, RslSettings):
         raise ValueError(f"its card has {settings.n_envs} envs, more than {_MOST_ENVS}")
 
 
@@ -258,6 +259,8 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], function: str)
         if low.shape != (layout.size,):
             raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
         spaces.append(gym.spaces.Box(low, high, dtype=low.dtype.type))
+    if isinstance(settings, RslSettings):
+        settings = settings.for_one_env()  # As in its training.
     envs = DummyVecEnv([lambda: SpacesOnly(*spaces)] * settings.n_envs)
     # Building a model seeds Python, NumPy and PyTorch; a training around it must not repeat itself.
     states = random.getstate(), np.random.get_state(), torch.get_rng_state()  # noqa: NPY002

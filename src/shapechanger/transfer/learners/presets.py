@@ -18,6 +18,7 @@ from shapechanger.transfer.learners.settings import (
     LimbSettings,
     OffPolicySettings,
     PpoSettings,
+    RslLimbSettings,
     RslPpoSettings,
     Settings,
 )
@@ -98,7 +99,8 @@ LEARNERS: Final[dict[str, Settings]] = {
         eval_every=65_536,
     ),
     "limbs": _LIMBS,
-    # What it is compared with; an extended ant has 12 limbs.
+    "rsl-limbs": RslLimbSettings(**msgspec.structs.asdict(_LIMBS)),
+    # What limbs are compared with; an extended ant has 12 limbs.
     "padded": msgspec.structs.replace(_LIMBS, network="padded", net_arch=(256, 256), room=12),
     # A humanoid takes actions up to 0.4, so it explores with less noise, in smaller batches: it
     # ends at 653, and with `ppo-run` at 468. With both it falls after two seconds, before it walks.
@@ -181,6 +183,10 @@ LEARNERS: Final[dict[str, Settings]] = {
 }
 
 
+IN_MANY_BODIES: Final = {"rsl-ppo": "rsl-limbs"}
+"""Learners of one body, each with the one that learns alike in many."""
+
+
 TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "ppo-balance": ("InvertedPendulum", "BigInvertedPendulum", "SmallInvertedPendulum"),
     "ppo-run": ("Ant", "AmputatedAnt", "BigAnt", "ExtendedAnt", "HalfCheetah"),
@@ -196,6 +202,7 @@ TUNED_ON: Final[dict[str, tuple[str, ...]]] = {
     "waypoint": ("CarWaypoint", "TankWaypoint", "TruckWaypoint"),
     "sac-balance": ("InvertedPendulum",),
     "rsl-ppo": (),
+    "rsl-limbs": (),
     "sac": (),
     "tqc": (),
 }

@@ -11,7 +11,8 @@ are the same as those of other learners.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import copy
+from collections.abc import Callable, Sequence
 from typing import Any, Final, cast
 
 import numpy as np
@@ -22,7 +23,7 @@ from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners import DemonstrationFile, ignore
 from shapechanger.transfer.learners import sb3 as _sb3
-from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model
+from shapechanger.transfer.learners.algorithms import SpacesOnly
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,
@@ -31,18 +32,23 @@ from shapechanger.transfer.learners.evaluation import (
 )
 from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy, actor
 from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.learners.settings import RslPpoSettings, require_budget
+from shapechanger.transfer.learners.settings import LimbSettings, RslSettings, require_budget
+from shapechanger.transfer.limbs.device import DeviceRows
+from shapechanger.transfer.limbs.envs import bodies_in_turn, together
+from shapechanger.transfer.limbs.policy import LimbPolicy
+from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns
 
 try:
     import torch
     from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
-    from torch import Tensor
+    from torch import Tensor, nn
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 try:
     from rsl_rl.algorithms import PPO
     from rsl_rl.env import VecEnv
     from rsl_rl.models import MLPModel
+    from rsl_rl.modules.distribution import GaussianDistribution
     from rsl_rl.storage import RolloutStorage
     from tensordict import TensorDict
 except ImportError as error:
@@ -67,28 +73,39 @@ class RslVecEnv(VecEnv):
     Args:
         envs: The worlds, with the autoreset mode `SameStep`; they are reset.
         seed: Seed of the first world; None for seeds of the system.
+        rows: The rows of each world's body, for a policy of limbs, which then observes rows and
+            gives a number from -1 to 1 for each limb; None for the body's own numbers.
 
     Raises:
-        StudyError: If the worlds have another autoreset mode or several spaces.
+        StudyError: If the worlds have another autoreset mode, or several spaces and no rows.
     """
 
-    def __init__(self, envs: Any, seed: int | None = None) -> None:
+    def __init__(
+        self, envs: Any, seed: int | None = None, rows: Sequence[LimbRows] | None = None
+    ) -> None:
         if envs.metadata["autoreset_mode"].value != "SameStep":
             raise StudyError("rsl-rl takes worlds with autoreset_mode='SameStep'.")
-        if len(envs.batches) > 1 and isinstance(envs.reset(seed=seed)[0], tuple):
+        seen = envs.reset(seed=seed)[0]
+        if rows is None and isinstance(seen, tuple):
             raise StudyError(
-                "rsl-rl takes worlds of one pair of spaces: make one vector env for each."
+                "rsl-rl takes worlds of one pair of spaces: make one vector env for each, or give "
+                "the rows of each body's limbs."
             )
         self.envs = envs
         self.num_envs = envs.num_envs
-        self.num_actions = envs.action_layout.size
         self.max_episode_length = envs.max_episode_steps or 0
         self.device = envs.device
         self.cfg = {}
-        space = envs.single_action_space
-        self._low = torch.as_tensor(space.low, device=self.device)
-        self._high = torch.as_tensor(space.high, device=self.device)
-        self._observations: Tensor = envs.reset(seed=seed)[0]
+        self._rows = None if rows is None else DeviceRows(envs, rows)
+        if self._rows is not None:
+            self.num_actions = self._rows.room
+            self._low, self._high = torch.tensor([-1.0, 1.0], device=self.device)
+        else:
+            self.num_actions = envs.action_layout.size
+            space = envs.single_action_space
+            self._low = torch.as_tensor(space.low, device=self.device)
+            self._high = torch.as_tensor(space.high, device=self.device)
+        self._observations: Tensor = seen if self._rows is None else self._rows.of(seen)
 
     @property
     def episode_length_buf(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -112,8 +129,11 @@ class RslVecEnv(VecEnv):
         Returns:
             Observations, rewards, ends, and `time_outs` among the extras.
         """
-        moved = actions.clamp(self._low, self._high)
-        self._observations, rewards, terminated, truncated, _ = self.envs.step(moved)
+        moved: Any = actions.clamp(self._low, self._high)
+        if self._rows is not None:
+            moved = self._rows.actions(moved)
+        seen, rewards, terminated, truncated, _ = self.envs.step(moved)
+        self._observations = seen if self._rows is None else self._rows.of(seen)
         ends = terminated | truncated
         return self.get_observations(), rewards, ends, {"time_outs": truncated & ~terminated}
 
@@ -126,7 +146,7 @@ class RslLearner(Sb3Learner):
         settings: Its settings.
     """
 
-    def __init__(self, name: str, settings: RslPpoSettings) -> None:
+    def __init__(self, name: str, settings: RslSettings) -> None:
         super().__init__(name, settings)
         self._ppo = settings
 
@@ -149,7 +169,9 @@ class RslLearner(Sb3Learner):
 
         Raises:
             StudyError: If `steps` is smaller than one evaluation, a callback or a rehearsal is
-                given, or the training diverges.
+                given, there are more bodies than worlds, or the training diverges.
+            TransplantError: If the source policy is of another family than the bodies.
+            UnknownName: If there is no such device.
             VectorEnvError: If the task has no functions for a device.
         """
         del demonstrations, only_last
@@ -157,29 +179,32 @@ class RslLearner(Sb3Learner):
             raise StudyError(f"{self._name} takes no callback and rehearses no demonstrations.")
         settings = self._ppo
         require_budget(steps, settings)
-        eval_envs = evaluation_envs(env, settings)
+        rows: list[LimbRows] | None = None
+        if isinstance(settings, LimbSettings):
+            bodies, rows = bodies_in_turn(env, settings.n_envs, settings.room)
+            made = together(bodies)
+            if start is not None:
+                require_same_columns(start.card.observation, rows[0].layouts()[0], env.id)
+        else:
+            made = env
         worlds = shapechanger.make_vec(
-            env.id,
+            made.id,
             settings.n_envs,
             backend="warp",
             device=settings.device or None,
             autoreset_mode="SameStep",
-            **env.kwargs,
+            **made.kwargs,
         )
+        eval_envs = evaluation_envs(env, settings)
         try:
             one: Any = eval_envs[0]
             spaces = SpacesOnly(one.observation_space, one.action_space)
-            envs: Any = DummyVecEnv([lambda: spaces])
-            if settings.normalise:
-                envs = VecNormalize(envs, gamma=settings.gamma)
+            envs: Any = _sb3._with_statistics(DummyVecEnv([lambda: spaces]), settings)
             single = settings.for_one_env()
-            explores: tuple[float, ...] | None = None
-            if start is None or body_map is None:
-                model: Any = build_model(single, envs, seed)
-            else:
-                model = _sb3._transplanted_model(envs, single, seed, None, start, body_map)
-                explores = _sb3._explore(model, settings)
-            training = _Training(RslVecEnv(worlds, seed), model, envs, settings)
+            # Stable-Baselines3 leaves out types.
+            model: Any
+            model, explores = _sb3._first_model(envs, single, seed, None, start, body_map)
+            training = _Training(RslVecEnv(worlds, seed, rows), model, envs, settings)
 
             def evaluated(done: int) -> None:
                 _sb3._require_finite(model, self._name)
@@ -218,6 +243,45 @@ class RslLearner(Sb3Learner):
                 one.close()
 
 
+class _LimbModel(MLPModel):
+    """A network of a policy of limbs as rsl-rl's actor or critic.
+
+    Args:
+        policy: The policy.
+        net: One of its networks, of which this has a copy.
+        acts: Whether it is the actor.
+    """
+
+    def __init__(self, policy: LimbPolicy, net: nn.Module, *, acts: bool) -> None:
+        # Not that of MLPModel, which builds a network.
+        nn.Module.__init__(self)
+        self.obs_groups, self.obs_normalization = [_GROUP], False
+        self.obs_normalizer = nn.Identity()
+        self.mlp: Any = copy.deepcopy(net)
+        # One deviation for all limbs, however many there are.
+        self.distribution: Any = GaussianDistribution(1, std_type="log") if acts else None
+        self._as_rows = policy.rows
+
+    def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> Tensor:
+        """Return the rows, shape (n, 1 + limbs, width)."""
+        self._rows = self._as_rows(super().get_latent(obs, masks, hidden_state))
+        return self._rows
+
+    def forward(self, *arguments: Any, **more: Any) -> Tensor:
+        """Return actions, shape (n, limbs), or values, shape (n, 1)."""
+        found = super().forward(*arguments, **more)
+        return found.unsqueeze(-1) if self.distribution is None else found
+
+    @property
+    def output_entropy(self) -> Tensor:
+        """Entropy of the actions of limbs that have a motor, shape (n,)."""
+        return LimbPolicy.over_motors(self.distribution._distribution.entropy(), self._rows)
+
+    def get_output_log_prob(self, outputs: Tensor) -> Tensor:
+        """Return logarithms of the probabilities of actions, (n, limbs); shape (n,)."""
+        return LimbPolicy.over_motors(self.distribution._distribution.log_prob(outputs), self._rows)
+
+
 class _Training:
     """rsl-rl's PPO with the weights and statistics of a model of Stable-Baselines3.
 
@@ -228,33 +292,14 @@ class _Training:
         settings: The settings.
     """
 
-    def __init__(
-        self, envs: RslVecEnv, model: Any, statistics: Any, settings: RslPpoSettings
-    ) -> None:
+    def __init__(self, envs: RslVecEnv, model: Any, statistics: Any, settings: RslSettings) -> None:
         self._envs = envs
         self._model = model
         self._statistics = statistics if isinstance(statistics, VecNormalize) else None
         self._settings = settings
         device = envs.device
         seen = envs.get_observations()
-        groups = {"actor": [_GROUP], "critic": [_GROUP]}
-        shape: dict[str, Any] = {
-            "hidden_dims": settings.net_arch,
-            "activation": "tanh",  # Stable-Baselines3's.
-            "obs_normalization": settings.normalise,
-        }
-        self._actor: Any = cast("Any", MLPModel)(
-            seen,
-            groups,
-            "actor",
-            envs.num_actions,
-            **shape,
-            distribution_cfg={
-                "class_name": "rsl_rl.modules.distribution:GaussianDistribution",
-                "std_type": "log",
-            },
-        )
-        self._critic: Any = cast("Any", MLPModel)(seen, groups, "critic", 1, **shape)
+        self._actor, self._critic = self._networks(seen)
         self._read()
         storage = cast("Any", RolloutStorage)(
             "rl", envs.num_envs, settings.n_steps, seen, [envs.num_actions], device
@@ -282,6 +327,33 @@ class _Training:
         self._ppo.train_mode()
         self._seen = seen
         self._returns = torch.zeros(envs.num_envs, device=device)
+
+    def _networks(self, seen: TensorDict) -> tuple[Any, Any]:
+        """Return an actor and a critic of the shapes of the model's."""
+        policy = self._model.policy
+        if isinstance(policy, LimbPolicy):
+            return (
+                _LimbModel(policy, policy.actor_net, acts=True),
+                _LimbModel(policy, policy.critic_net, acts=False),
+            )
+        groups = {"actor": [_GROUP], "critic": [_GROUP]}
+        shape: dict[str, Any] = {
+            "hidden_dims": self._settings.net_arch,
+            "activation": "tanh",  # Stable-Baselines3's.
+            "obs_normalization": self._settings.normalise,
+        }
+        actor = cast("Any", MLPModel)(
+            seen,
+            groups,
+            "actor",
+            self._envs.num_actions,
+            **shape,
+            distribution_cfg={
+                "class_name": "rsl_rl.modules.distribution:GaussianDistribution",
+                "std_type": "log",
+            },
+        )
+        return actor, cast("Any", MLPModel)(seen, groups, "critic", 1, **shape)
 
     def update(self, done: int, on_steps: Callable[[int], None]) -> None:
         """Collect the steps of an update, and learn from them.
@@ -315,8 +387,10 @@ class _Training:
         return (rewards / scale).clamp(-_CLIPPED_REWARD, _CLIPPED_REWARD)
 
     def _pairs(self) -> list[tuple[Any, Any]]:
-        """Return the layers of rsl-rl's networks, each with that of Stable-Baselines3's policy."""
+        """Return modules of rsl-rl's networks, each with that of Stable-Baselines3's policy."""
         policy = self._model.policy
+        if isinstance(policy, LimbPolicy):
+            return [(self._actor.mlp, policy.actor_net), (self._critic.mlp, policy.critic_net)]
         extractor = policy.mlp_extractor
         pairs: list[tuple[Any, Any]] = []
         for network, hidden, head in (
@@ -334,7 +408,7 @@ class _Training:
             for ours, theirs in self._pairs():
                 ours.load_state_dict(theirs.state_dict())
             self._actor.distribution.log_std_param.copy_(self._model.policy.log_std)
-            if self._statistics is not None:
+            if self._statistics is not None and self._statistics.norm_obs:
                 found: Any = self._statistics.obs_rms
                 for network in (self._actor, self._critic):
                     normaliser = network.obs_normalizer
@@ -351,7 +425,7 @@ class _Training:
             for ours, theirs in self._pairs():
                 theirs.load_state_dict(cast("dict[str, Any]", ours.state_dict()))
             self._model.policy.log_std.copy_(self._actor.distribution.log_std_param)
-        if self._statistics is not None:
+        if self._statistics is not None and self._statistics.norm_obs:
             normaliser, found = self._actor.obs_normalizer, cast("Any", self._statistics.obs_rms)
             found.mean = normaliser._mean[0].double().cpu().numpy()
             deviation = normaliser._std[0].double() + normaliser.eps

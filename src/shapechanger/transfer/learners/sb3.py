@@ -141,27 +141,12 @@ class Sb3Learner:
             together: VecEnv = DummyVecEnv([lambda: eval_envs[0]])
         else:
             together = _training_envs(env, settings, self._threads)
-        envs: VecEnv = VecMonitor(together)
-        if settings.normalise:
-            # Rows of limbs are scaled already.
-            seen = not isinstance(settings, LimbSettings)
-            gamma = settings.model_arguments.get("gamma", 0.99)
-            envs = VecNormalize(envs, norm_obs=seen, gamma=gamma)
-        explores: tuple[float, ...] | None = None
+        envs = _with_statistics(VecMonitor(together), settings)
         try:
-            if start is None or body_map is None:
-                model = build_model(settings, envs, seed, self._tensorboard)
-            elif isinstance(settings, LimbSettings):
-                model = build_model(settings, envs, seed, self._tensorboard)
+            if start is not None and isinstance(settings, LimbSettings):
                 rows, _ = layouts_of(eval_envs[0])
                 require_same_columns(start.card.observation, rows, env.id)
-                _take_weights(model, envs, start)
-                explores = _explore(model, settings)
-            else:
-                model = _transplanted_model(
-                    envs, settings, seed, self._tensorboard, start, body_map
-                )
-                explores = _explore(model, settings)
+            model, explores = _first_model(envs, settings, seed, self._tensorboard, start, body_map)
             evaluations = _PeriodicEvaluation(
                 self._name, settings, eval_envs, single, on_evaluation, on_steps
             )
@@ -242,6 +227,39 @@ def _training_envs(env: EnvRef, settings: Sb3Settings, threads: int | None) -> V
     if isinstance(settings, LimbSettings):
         return LimbVecEnv(env, settings.n_envs, threads=threads, room=settings.room)
     return training_vec_env(env, settings.n_envs, threads)
+
+
+def _with_statistics(envs: VecEnv, settings: Sb3Settings) -> VecEnv:
+    """Return envs that keep the statistics of a learner that normalises."""
+    if not settings.normalise:
+        return envs
+    # Rows of limbs are scaled already.
+    seen = not isinstance(settings, LimbSettings)
+    gamma = settings.model_arguments.get("gamma", 0.99)
+    return VecNormalize(envs, norm_obs=seen, gamma=gamma)
+
+
+def _first_model(
+    envs: VecEnv,
+    settings: Sb3Settings,
+    seed: int,
+    tensorboard: str | None,
+    start: TrainedPolicy | None,
+    body_map: BodyMap | None,
+) -> tuple[BaseAlgorithm, tuple[float, ...] | None]:
+    """Return the model that a training begins with.
+
+    Returns:
+        The model, and what `_explore` returns if it begins with the weights of a policy.
+    """
+    if start is None or body_map is None:
+        return build_model(settings, envs, seed, tensorboard), None
+    if isinstance(settings, LimbSettings):
+        model = build_model(settings, envs, seed, tensorboard)
+        _take_weights(model, envs, start)
+    else:
+        model = _transplanted_model(envs, settings, seed, tensorboard, start, body_map)
+    return model, _explore(model, settings)
 
 
 def _take_weights(model: BaseAlgorithm, envs: VecEnv, source: TrainedPolicy) -> None:

@@ -179,6 +179,27 @@ class RslPpoSettings(PpoSettings, frozen=True, kw_only=True, tag="rsl-ppo"):
         return arguments
 
 
+class RslLimbSettings(LimbSettings, frozen=True, kw_only=True, tag="rsl-limbs"):
+    """Settings of rsl-rl's PPO with a policy of limbs, on worlds of one device.
+
+    Attributes:
+        device: As in `RslPpoSettings`.
+    """
+
+    device: str = ""
+
+    @property
+    def model_arguments(self) -> dict[str, Any]:
+        """Arguments of Stable-Baselines3's class, which holds the policy between updates."""
+        arguments = super().model_arguments
+        del arguments["device"]
+        return arguments
+
+
+RslSettings = RslPpoSettings | RslLimbSettings
+"""The settings of any learner on worlds of one device."""
+
+
 class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
     """Settings of SAC of Stable-Baselines3, or TQC of sb3-contrib, under their names.
 
@@ -317,7 +338,7 @@ class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
         return tuple(budget for budget in self.budgets if budget <= steps)
 
 
-Sb3Settings = PpoSettings | LimbSettings | RslPpoSettings | OffPolicySettings | ImportedSettings
+Sb3Settings = PpoSettings | LimbSettings | RslSettings | OffPolicySettings | ImportedSettings
 """The settings of any learner of Stable-Baselines3."""
 
 Settings = Sb3Settings | CloningSettings

@@ -138,30 +138,18 @@ class LimbVecEnv(VecEnv):
     def __init__(
         self, env: EnvRef, num_envs: int, *, threads: int | None = 1, room: int = 0
     ) -> None:
-        bodies = each_body(env)
-        if len(bodies) > num_envs:
-            raise StudyError(
-                f"{len(bodies)} bodies need as many envs, and there are {num_envs}: give "
-                f"--set n_envs={len(bodies)}."
-            )
-        own = rows_of_each(bodies, room)
-        room = own[0].room
+        bodies, own = bodies_in_turn(env, num_envs, room)
         # Envs that are stepped together have the same layouts.
         groups: dict[tuple[tuple[str, ...], ...], list[int]] = {}
-        for i in range(num_envs):
-            groups.setdefault(own[i % len(bodies)].names, []).append(i)
+        for i, rows in enumerate(own):
+            groups.setdefault(rows.names, []).append(i)
         self._groups = [
-            _Group(
-                numbers,
-                [bodies[i % len(bodies)] for i in numbers],
-                [own[i % len(bodies)] for i in numbers],
-                threads,
-            )
+            _Group(numbers, [bodies[i] for i in numbers], [own[i] for i in numbers], threads)
             for numbers in groups.values()
         ]
         cast("Any", super()).__init__(num_envs, *limb_spaces(own[0]))
         self._size = own[0].constant.size
-        self._actions = np.zeros((num_envs, room), np.float32)
+        self._actions = np.zeros((num_envs, own[0].room), np.float32)
 
     def reset(self) -> NDArray[np.float32]:
         """Start an episode in each env with the seeds that were set."""
@@ -255,12 +243,8 @@ class _Group:
     ) -> None:
         self.numbers = numbers
         self.each = each
-        first = bodies[0]
-        kwargs = {name: value for name, value in first.kwargs.items() if name != "body"}
-        if "body" in first.kwargs:
-            kwargs["bodies"] = [body.kwargs["body"] for body in bodies]
         # Stable-Baselines3 leaves out types.
-        self.envs: Any = training_vec_env(EnvRef(first.id, kwargs), len(numbers), threads)
+        self.envs: Any = training_vec_env(together(bodies), len(numbers), threads)
         self._scale = np.stack([rows.scale for rows in each])
         self._offset = np.stack([rows.offset for rows in each])
         self._constant = np.stack([rows.constant for rows in each])
@@ -273,6 +257,43 @@ class _Group:
     def actions(self, limbs: NDArray[Any]) -> NDArray[Any]:
         """Return the actions of all envs; `limbs` has the shape (envs, room)."""
         return np.stack([rows.actions(own) for rows, own in zip(self.each, limbs, strict=True)])
+
+
+def bodies_in_turn(
+    env: EnvRef, num_envs: int, room: int = 0
+) -> tuple[list[EnvRef], list[LimbRows]]:
+    """Return the body of each of many envs, which have those of one env in turn, and its rows.
+
+    Args:
+        env: The env; its argument `bodies` says which bodies, see `each_body`.
+        num_envs: Number of envs, at least one of each body.
+        room: Limbs to have rows for; 0 for as many as the bodies have.
+
+    Raises:
+        StudyError: If there are more bodies than envs, or a body has more limbs than room.
+    """
+    bodies = each_body(env)
+    if len(bodies) > num_envs:
+        raise StudyError(
+            f"{len(bodies)} bodies need as many envs, and there are {num_envs}: give "
+            f"--set n_envs={len(bodies)}."
+        )
+    own = rows_of_each(bodies, room)
+    turns = [i % len(bodies) for i in range(num_envs)]
+    return [bodies[i] for i in turns], [own[i] for i in turns]
+
+
+def together(bodies: Sequence[EnvRef]) -> EnvRef:
+    """Return envs of different bodies as the one that `shapechanger.make_vec` makes of them.
+
+    Args:
+        bodies: The envs, equal but for their bodies.
+    """
+    first = bodies[0]
+    kwargs = {name: value for name, value in first.kwargs.items() if name != "body"}
+    if "body" in first.kwargs:
+        kwargs["bodies"] = [body.kwargs["body"] for body in bodies]
+    return EnvRef(first.id, kwargs)
 
 
 def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:

@@ -176,8 +176,9 @@ class LimbPolicy(ActorCriticPolicy):
         return Normal(mean, self.log_std.exp().expand_as(mean), validate_args=False)
 
     @staticmethod
-    def _log_prob(normal: Normal, actions: Tensor, rows: Tensor) -> Tensor:
-        return (normal.log_prob(actions) * rows[:, 1:, 1]).sum(dim=1)
+    def over_motors(numbers: Tensor, rows: Tensor) -> Tensor:
+        """Add up a number of each limb, shape (n, limbs), over those that have a motor."""
+        return (numbers * rows[:, 1:, 1]).sum(dim=1)
 
     def forward(self, obs: Tensor, deterministic: bool = False) -> tuple[Tensor, Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return actions, values and logarithms of the actions' probabilities."""
@@ -185,15 +186,15 @@ class LimbPolicy(ActorCriticPolicy):
         normal = self._normal(rows)
         actions = normal.mean if deterministic else normal.sample()
         values = self.critic_net(rows).unsqueeze(-1)
-        return actions, values, self._log_prob(normal, actions, rows)
+        return actions, values, self.over_motors(normal.log_prob(actions), rows)
 
     def evaluate_actions(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return values, logarithms of the probabilities of actions, and the entropy."""
         rows = self.rows(obs)
         normal = self._normal(rows)
-        entropy = (normal.entropy() * rows[:, 1:, 1]).sum(dim=1)
+        entropy = self.over_motors(normal.entropy(), rows)
         values = self.critic_net(rows).unsqueeze(-1)
-        return values, self._log_prob(normal, actions, rows), entropy
+        return values, self.over_motors(normal.log_prob(actions), rows), entropy
 
     def predict_values(self, obs: Tensor) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the values of observations, shape (n, 1)."""

@@ -28,7 +28,7 @@ class Generalist(Method):
     def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
         """Require a policy that fits many bodies, and a family to draw them from."""
         if not isinstance(settings, LimbSettings):
-            raise self._lacks("a policy that fits many bodies: give --learner limbs")
+            raise self._lacks("a policy that fits many bodies: give --learner limbs or rsl-limbs")
         if not source.family or source.family != target.family:
             raise self._lacks("two bodies of one family")
 

@@ -1,0 +1,232 @@
+"""A policy of limbs on worlds of a device: the same rows, the same actions, the same files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+import pytest
+import torch
+
+import shapechanger
+from shapechanger.errors import StudyError, TransplantError, UnknownName, VectorEnvError
+from shapechanger.morphology import JointRange
+from shapechanger.morphology.body import to_json
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.rsl import RslLearner, RslVecEnv, _LimbModel
+from shapechanger.transfer.learners.settings import RslLimbSettings
+from shapechanger.transfer.limbs.envs import fitted, rows_of_each
+from shapechanger.transfer.limbs.export import export_limbs
+from shapechanger.transfer.limbs.policy import LimbPolicy
+from shapechanger.transfer.methods import generalist
+from shapechanger.transfer.onnx_policy import OnnxPolicy
+from shapechanger.transfer.plan import TransferTask
+from shapechanger.transfer.study import make_plan, run_study
+
+pytestmark = pytest.mark.usefixtures("one_thread")
+
+ANT: Final = EnvRef("shapechanger/Ant-v1", {"max_episode_steps": 20})
+EXTENDED: Final = EnvRef("shapechanger/ExtendedAnt-v1", {"max_episode_steps": 20})
+# Bodies of 12 and of 8 limbs, whose observations have 137 and 105 numbers.
+BOTH: Final = ANT.having({"bodies": ["ExtendedAnt", "Ant"]})
+PENDULUMS: Final = EnvRef(
+    "shapechanger/InvertedPendulum-v1",
+    {"bodies": ["InvertedPendulum", "BigInvertedPendulum"]},
+)
+TINY: Final = RslLimbSettings(
+    n_envs=3,
+    n_steps=16,
+    batch_size=24,
+    n_epochs=2,
+    learning_rate=1e-3,
+    normalise=True,
+    steps=48,
+    source_steps=48,
+    eval_every=48,
+    eval_episodes=2,
+    device="cpu",
+)
+# A policy of limbs needs no map.
+_NO_MAP: Any = object()
+
+
+def _learner(**changed: Any) -> RslLearner:
+    return RslLearner("rsl-limbs", msgspec.structs.replace(TINY, **changed))
+
+
+def _worlds(bodies: list[str]) -> RslVecEnv:
+    """Return worlds of ants as rows, with one body each."""
+    envs = shapechanger.make_vec(
+        "Ant",
+        len(bodies),
+        backend="warp",
+        device="cpu",
+        autoreset_mode="SameStep",
+        bodies=bodies,
+        max_episode_steps=20,
+    )
+    return RslVecEnv(envs, 0, rows_of_each([ANT.having({"body": body}) for body in bodies]))
+
+
+@pytest.fixture(scope="module")
+def policy() -> TrainedPolicy:
+    """A policy of two ants that has hardly learned."""
+    return _learner().train(BOTH, 48, 0, on_evaluation=lambda evaluation: None)
+
+
+def _net(policy: TrainedPolicy) -> LimbPolicy:
+    net = policy.model.policy
+    assert isinstance(net, LimbPolicy)
+    return net
+
+
+def test_actions_are_those_of_the_policy_in_every_body(policy: TrainedPolicy) -> None:
+    """In bodies of 12 and of 8 limbs rsl-rl's actor acts as the policy does on the CPU."""
+    worlds = _worlds(["ExtendedAnt", "Ant", "ExtendedAnt"])
+    net = _net(policy)
+    actor = _LimbModel(net, net.actor_net, acts=True)
+    critic = _LimbModel(net, net.critic_net, acts=False)
+    seen = worlds.get_observations()
+    with torch.no_grad():
+        actions = actor(seen)
+        values = critic(seen)
+    moved = worlds._rows.actions(actions.clamp(-1.0, 1.0))
+    own = [part.numpy() for part in worlds.envs.reset(seed=0)[0]]
+    for body, batch, place, world in (("ExtendedAnt", 0, 0, 0), ("Ant", 1, 0, 1)):
+        env = fitted(ANT.having({"body": body}).make(), policy.card.observation)
+        rows = env.rows.of(own[batch][place])
+        expected = env.rows.actions(policy.act(rows[None])[0])
+        np.testing.assert_allclose(moved[batch][place], expected, atol=1e-5)
+        size = rows.size
+        np.testing.assert_allclose(seen["policy"][world, :size], rows, atol=1e-5)
+        assert not seen["policy"][world, size:].any()
+        value = net.predict_values(torch.as_tensor(rows[None]))
+        np.testing.assert_allclose(values[world].item(), value.item(), atol=1e-5)
+    assert values.shape == (3, 1)
+
+
+def test_probabilities_are_those_of_the_policy(policy: TrainedPolicy) -> None:
+    """Limbs that a body does not have, or that have no motor, count in no probability."""
+    worlds = _worlds(["ExtendedAnt", "Ant", "ExtendedAntPassive"])
+    net = _net(policy)
+    actor = _LimbModel(net, net.actor_net, acts=True)
+    with torch.no_grad():
+        actor.distribution.log_std_param.copy_(net.log_std)
+        seen = worlds.get_observations()
+        actions = actor(seen, stochastic_output=True)
+        found = actor.get_output_log_prob(actions)
+        _, expected, entropy = net.evaluate_actions(seen["policy"], actions)
+    torch.testing.assert_close(found, expected)
+    torch.testing.assert_close(actor.output_entropy, entropy)
+    assert entropy[1].item() == pytest.approx(entropy[2].item())
+    assert entropy[0].item() == pytest.approx(1.5 * entropy[1].item())
+
+
+def test_worlds_of_equal_spaces_and_several_batches() -> None:
+    """Where a vector env has one tensor for all batches, so have rows and actions."""
+    bodies = ["Swimmer", to_json([JointRange("free_body_rot", -2.0, 2.0)])]
+    swimmer = EnvRef("shapechanger/Swimmer-v1")
+    envs = shapechanger.make_vec(
+        "Swimmer", 2, backend="warp", device="cpu", autoreset_mode="SameStep", bodies=bodies
+    )
+    assert len(envs.batches) == 2
+    rows = rows_of_each([swimmer.having({"body": body}) for body in bodies])
+    worlds = RslVecEnv(envs, 0, rows)
+    own = envs.reset(seed=0)[0].numpy()
+    for i, one in enumerate(rows):
+        np.testing.assert_allclose(
+            worlds.get_observations()["policy"][i], one.of(own[i]), atol=1e-5
+        )
+    limbs = torch.tensor([[0.5, -0.5], [1.0, -2.0]])
+    moved = worlds._rows.actions(limbs)
+    np.testing.assert_allclose(moved[1], rows[1].actions(limbs[1].numpy()))
+    assert worlds.step(limbs)[0]["policy"].shape == (2, rows[0].constant.size)
+
+
+def test_training_changes_every_layer(policy: TrainedPolicy) -> None:
+    """Two updates in two bodies of differing spaces move all weights, and the curve says when."""
+    found: list[Evaluation] = []
+    counted: list[int] = []
+    trained = _learner().train(BOTH, 96, 0, on_evaluation=found.append, on_steps=counted.append)
+    assert [evaluation.steps for evaluation in found] == [0, 48, 96]
+    assert counted == list(range(3, 97, 3))
+    before = _net(policy).state_dict()
+    for name, weights in _net(trained).state_dict().items():
+        assert not torch.equal(weights, before[name]), name
+    statistics = trained.normalisation
+    assert statistics is not None
+    # Rows are scaled already; rewards are divided by the deviation of their returns.
+    assert (statistics.observation.var == 1.0).all()
+    assert statistics.reward.count == pytest.approx(96, abs=1)
+
+
+def test_the_file_acts_in_an_unseen_body(policy: TrainedPolicy, tmp_path: Path) -> None:
+    """It is loaded, evaluated, fine-tuned on either backend, and exported as any other."""
+    path = tmp_path / "ants.safetensors"
+    save_policy(policy, path)
+    loaded = load_policy(path)
+    assert loaded.card == policy.card
+    assert loaded.card.settings == TINY
+    unseen = ANT.having({"body": "AmputatedAnt"})
+    zero_shot = _learner().evaluate(unseen, loaded, _NO_MAP)
+    assert zero_shot == _learner().evaluate(unseen, policy, _NO_MAP)
+    found: list[Evaluation] = []
+    tuned = _learner().train(
+        unseen, 48, 1, start=loaded, body_map=_NO_MAP, on_evaluation=found.append
+    )
+    assert found[0].mean_return == zero_shot.mean_return
+    assert tuned.card.start_log_std == pytest.approx([0.0], abs=0.1)
+    with EXTENDED.make() as env:
+        export_limbs(loaded, env, EXTENDED, tmp_path / "ant.onnx")
+        acting = fitted(env, loaded.card.observation)
+        observation, _ = env.reset(seed=0)
+        expected = acting.rows.actions(loaded.act(acting.rows.of(observation[None])))
+    exported = OnnxPolicy(tmp_path / "ant.onnx")
+    np.testing.assert_allclose(exported.act(observation[None]), expected, atol=1e-5)
+
+
+def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It learns in drawn bodies on the device first, and is evaluated before the first step."""
+    monkeypatch.setattr(generalist, "BODIES", 2)
+    trained: list[EnvRef] = []
+    train = RslLearner.train
+
+    def recorded(self: RslLearner, env: EnvRef, *arguments: Any, **more: Any) -> TrainedPolicy:
+        trained.append(env)
+        return train(self, env, *arguments, **more)
+
+    monkeypatch.setattr(RslLearner, "train", recorded)
+    settings = msgspec.structs.replace(TINY, eval_episodes=1)
+    plan = make_plan(
+        TransferTask(ANT, EXTENDED), "rsl-limbs", settings, seeds=2, arms=("scratch", "generalist")
+    )
+    study = run_study(plan, tmp_path / "study", executor=Serial())
+    many = ANT.having({"bodies": {"split": "train", "count": 2, "seed": 0}})
+    assert [trained.count(env) for env in (many, EXTENDED)] == [2, 4]
+    curves = [study.of(arm)[0].curve for arm in ("generalist", "scratch")]
+    assert [evaluation.steps for evaluation in curves[0]] == [0, 48]
+    assert curves[0][0].mean_return != curves[1][0].mean_return
+    assert [result.device for result in study.of("generalist")] == ["CPU", "CPU"]
+
+
+def test_what_it_refuses(policy: TrainedPolicy) -> None:
+    """More bodies than worlds, other families, tasks and devices that are not there."""
+    with pytest.raises(StudyError, match=r"2 bodies need as many envs, .* --set n_envs=2"):
+        _learner(n_envs=1).train(BOTH, 48, 0, on_evaluation=print)
+    mixed = ANT.having({"bodies": ["Ant", "HalfCheetah"]})
+    with pytest.raises(UnknownName, match="No body of the family Ant matches 'HalfCheetah'"):
+        _learner().train(mixed, 48, 0, on_evaluation=print)
+    cheetah = EnvRef("shapechanger/HalfCheetah-v1")
+    with pytest.raises(TransplantError, match=r"of another family than that of .*HalfCheetah-v1"):
+        _learner().train(cheetah, 48, 0, start=policy, body_map=_NO_MAP, on_evaluation=print)
+    with pytest.raises(VectorEnvError, match=r"Humanoid-v1 has no batched functions, .* Ant, "):
+        _learner().train(EnvRef("shapechanger/Humanoid-v1"), 48, 0, on_evaluation=print)
+    with pytest.raises(UnknownName, match=r"No device matches 'cuda:99'\. .*There are: cpu"):
+        _learner(device="cuda:99").train(BOTH, 48, 0, on_evaluation=print)
+    with pytest.raises(StudyError, match="or give the rows of each body's limbs"):
+        RslVecEnv(_worlds(["Ant", "ExtendedAnt"]).envs)
