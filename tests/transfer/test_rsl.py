@@ -19,7 +19,9 @@ from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import load_policy, save_policy
 from shapechanger.transfer.learners.rsl import RslLearner, RslVecEnv
 from shapechanger.transfer.learners.settings import RslPpoSettings
+from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.runs import learner_of
+from shapechanger.transfer.study import make_plan
 
 PENDULUM = EnvRef("shapechanger/InvertedPendulum-v1")
 SETTINGS = RslPpoSettings(
@@ -63,6 +65,13 @@ def test_a_short_training_balances_longer(tmp_path: Path) -> None:
     seen = np.random.default_rng(0).normal(size=(5, 4))
     np.testing.assert_array_equal(again.act(seen), policy.act(seen))
     assert learner.origin(path).steps == 2048
+
+
+def test_a_study_records_what_steps_its_worlds() -> None:
+    """Versions of the packages on the device count, as those of the CPU do."""
+    task = TransferTask(PENDULUM, PENDULUM)
+    plan = make_plan(task, "rsl-ppo", SETTINGS, seeds=2, steps=2048, source_steps=2048)
+    assert {"mujoco-warp", "warp-lang", "rsl-rl-lib"} < plan.versions.keys()
 
 
 @pytest.mark.usefixtures("one_thread")

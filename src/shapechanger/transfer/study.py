@@ -33,7 +33,7 @@ from shapechanger.transfer.env_ref import (
 )
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.files import make_folder, read_json, write_json
-from shapechanger.transfer.learners.settings import Settings, require_budget
+from shapechanger.transfer.learners.settings import RslSettings, Settings, require_budget
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, NO_SKILL, SOURCE, Plan, Run, TransferTask
@@ -47,6 +47,7 @@ STUDY_FILE: Final = "study.json"
 _ADAPTED: Final = ("randomised", "identified")
 # Packages that the numbers depend on.
 _PACKAGES: Final = ("numpy", "scipy", "gymnasium", "mujoco", "torch", "stable-baselines3")
+_DEVICE_PACKAGES: Final = ("rsl-rl-lib", "mujoco-warp", "warp-lang")  # Where arms learn on one.
 
 
 class Study(msgspec.Struct, frozen=True, kw_only=True):
@@ -225,6 +226,7 @@ def make_plan(
         traits.source.action_layout,
         traits.target.action_layout,
     )
+    packages = (*_PACKAGES, *(_DEVICE_PACKAGES if isinstance(settings, RslSettings) else ()))
     return Plan(
         task=task,
         body_map=(
@@ -248,7 +250,7 @@ def make_plan(
         versions={
             "shapechanger": shapechanger.__version__,
             "python": platform.python_version(),
-            **{name: version_of(name) for name in _PACKAGES},
+            **{name: version_of(name) for name in packages},
         },
     )
 
