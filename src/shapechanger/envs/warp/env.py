@@ -16,7 +16,7 @@ from shapechanger.bodies.families import BodyLike
 from shapechanger.envs.vector.checks import masked_options, one_seed_each
 from shapechanger.envs.warp.batch import BatchKind, WarpBatch, require_fitting
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
-from shapechanger.envs.warp.reader import BodyReader
+from shapechanger.envs.warp.reader import Reader
 from shapechanger.errors import BadAction, UnknownName, VectorEnvError
 from shapechanger.layout import Layout
 from shapechanger.morphology import Body
@@ -66,7 +66,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
     def __init__(
         self,
-        reader: BodyReader,
+        reader: Reader,
         bodies: Sequence[BodyLike | None],
         *,
         device: str,
@@ -409,11 +409,16 @@ def _place_among(kinds: list[BatchKind], body: DeviceBody) -> int:
     return len(kinds)
 
 
+def _like(mask: Tensor, value: Tensor) -> Tensor:
+    """Return a mask, shape (n,), with as many dimensions as a value, shape (n, ...)."""
+    return mask.view(-1, *[1] * (value.dim() - 1))
+
+
 def _masked(infos: dict[str, Tensor], mask: Tensor) -> dict[str, Any]:
     """Return infos, zero outside of a mask, with the mask under `_key` of each key."""
     found: dict[str, Any] = {}
     for name, value in infos.items():
-        found[name] = torch.where(mask, value, torch.zeros_like(value))
+        found[name] = torch.where(_like(mask, value), value, torch.zeros_like(value))
         found[f"_{name}"] = mask
     return found
 
@@ -429,6 +434,6 @@ def _merged(found: dict[str, Any], infos: dict[str, Tensor], mask: Tensor) -> di
     merged = dict(found)
     for name, value in infos.items():
         here = found.get(name, torch.zeros_like(value))
-        merged[name] = torch.where(mask, value, here)
+        merged[name] = torch.where(_like(mask, value), value, here)
         merged[f"_{name}"] = found.get(f"_{name}", torch.zeros_like(mask)) | mask
     return merged

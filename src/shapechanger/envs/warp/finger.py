@@ -1,0 +1,383 @@
+"""The finger on a device: its command path, its senses and its task as functions of tensors.
+
+All but the physics is computed in double precision, so that tensions are rounded down to the same
+step, and a slow slew adds up to the same tension, as on a CPU.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import partial
+from typing import Any, Final, cast
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, FingerParameters
+from shapechanger.bodies.finger.anatomy import DIP_BAND, JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.bodies.finger.path import slews
+from shapechanger.envs.finger.env import SMOOTHNESS, FingerLike, as_finger
+from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant, smoothed
+from shapechanger.envs.finger.postures import START_SPREAD, coupled, inner_range
+from shapechanger.envs.finger.reach import HELD_STEPS, TOLERANCE_M
+from shapechanger.envs.warp.batch import BatchKind
+from shapechanger.envs.warp.bodies import DeviceBody, device_body
+from shapechanger.envs.warp.noise import normals, uniforms
+from shapechanger.envs.warp.starts import length
+from shapechanger.envs.warp.tasks import Constants, DeviceOutcome, DeviceTask
+from shapechanger.envs.warp.worlds import Worlds
+from shapechanger.errors import VectorEnvError
+from shapechanger.tasks.finger import directions, tip_at
+
+_J: Final = len(JOINTS)
+_T: Final = len(TENDONS)
+# Streams of random numbers; those from the last one on are of the measurements of each step.
+_ANGLES: Final = 0
+_TARGETS: Final = 1
+_SENSES: Final = 2
+# A delay this close to a whole number of simulation steps takes one more at some of them.
+_WHOLE: Final = 1e-6
+_LONGEST_NAME: Final = 60
+
+
+class DeviceFinger(DeviceTask):
+    """Fingers that reach for a point, with any parameters.
+
+    Args:
+        env: A CPU env of the task.
+        plant: The simulation of a finger of the batch.
+    """
+
+    precision = torch.float64
+
+    def __init__(self, env: Any, plant: FingerPlant) -> None:
+        super().__init__(env)
+        parameters = plant.parameters
+        self._gives = parameters.gives
+        self._noisy = parameters.joint_noise > 0.0, parameters.tension_noise > 0.0
+        self._held = plant.held
+        addresses, samples = plant.model.actuator_historyadr, plant.model.actuator_history[:, 0]
+        # Where the former controls of each actuator are: after its settings, cursor and times.
+        self._former = (addresses + 2 + samples)[:, None] + np.arange(samples[0])
+
+    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+        """See `DeviceTask`."""
+        count, device = worlds.count, worlds.device
+        zeros = partial(torch.zeros, dtype=self.precision, device=device)
+        whole = partial(torch.zeros, count, dtype=torch.int64, device=device)
+        drive = self._env.drive
+        arrays = {name: torch.as_tensor(getattr(drive, name)) for name in ("offset", "gain", "rest")}
+        moved = {name: cast("Any", array.to(device)) for name, array in arrays.items()}
+        self._drive: Any = dataclasses.replace(drive, **moved)
+        self._commands, self._change = zeros(count, _T), zeros(count, _T)
+        self._shares = zeros(count, _T)  # Tensions on the path, of their ranges.
+        self._angles, self._velocities = zeros(count, _J), zeros(count, _J)
+        self._senses = zeros(count, 2 * _J + 3 * _T)
+        self._seen_tip, self._tip, self._target = zeros(count, 3), zeros(count, 3), zeros(count, 3)
+        self._near = whole()
+        self._seeds, self._episodes, self._steps = whole(), whole(), whole()
+
+    def start(
+        self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
+    ) -> None:
+        """See `DeviceTask`."""
+        like = {"dtype": self.precision, "device": seeds.device}
+        low, high = (torch.as_tensor(end, **like) for end in inner_range())
+        moved = 2.0 * uniforms(seeds, episodes, _ANGLES, _J) - 1.0
+        angles = (torch.as_tensor(JOINT_REST, **like) + START_SPREAD * moved).clip(low, high)
+        drawn = uniforms(seeds, episodes, _TARGETS, _J)
+        free = low[:3] + (high - low)[:3] * drawn[:, :3]
+        off = DIP_BAND * (2.0 * drawn[:, 3] - 1.0)
+        posture = torch.stack(coupled(*free.unbind(dim=1), off), dim=1).clip(low, high)
+        self._seeds[mask], self._episodes[mask] = seeds[mask], episodes[mask]
+        self.place_at(worlds, constants, mask, angles, _fingertip(posture))
+
+    def place_at(
+        self, worlds: Worlds, constants: Constants, mask: Tensor, angles: Tensor, targets: Tensor
+    ) -> None:
+        """Start some worlds, whose state is clear, at rest with every tendon just taut.
+
+        Args:
+            worlds: The worlds.
+            constants: Numbers of each world's finger.
+            mask: Which worlds, shape (n,).
+            angles: Joint angles, rad, shape (n, 4).
+            targets: Targets of the fingertip, m, shape (n, 3).
+        """
+        lengths = -_turned(constants["arms"], angles)
+        qpos = torch.cat([angles, constants["taut"] - lengths], dim=1) if self._gives else angles
+        command = self._drive.command(constants["least"], lengths, torch.zeros_like(lengths))
+        command = command.clip(-1.0, 1.0)
+        self._shares[mask] = 0.0
+        controls = command if self._held is None else self._controls(constants)
+        held = controls.to(worlds.ctrl.dtype)
+        worlds.qpos[mask] = qpos.to(worlds.qpos.dtype)[mask]
+        worlds.ctrl[mask] = worlds.act[mask] = held[mask]
+        if constants["history"].numel():
+            history = constants["history"].to(held.dtype)
+            history[:, self._former] = held[:, :, None].expand(-1, *self._former.shape)
+            worlds.history[mask] = history[mask]
+        self._commands[mask], self._target[mask] = command[mask], targets[mask]
+        self._change[mask] = 0.0
+        self._near[mask] = self._steps[mask] = 0
+        worlds.forward()
+        self._measure(worlds, constants, mask)
+
+    def act(self, worlds: Worlds, constants: Constants, actions: Tensor) -> None:
+        """See `DeviceTask`."""
+        before = self._commands
+        self._commands = actions.to(self.precision).clip(-1.0, 1.0)
+        self._change = self._commands - before
+        if self._held is None:
+            worlds.ctrl[:] = self._commands
+            worlds.step()
+        else:
+            for _ in range(self._held.computations):
+                lengths, speeds = self._lengths(worlds, constants)
+                tensions = self._drive.tension(self._commands, lengths, speeds)
+                aim = _share(constants, tensions)
+                for _ in range(self._held.ticks):
+                    lowest, highest = (
+                        self._shares - constants["fall"],
+                        self._shares + constants["rise"],
+                    )
+                    self._shares = aim.clip(lowest, highest)
+                    worlds.ctrl[:] = self._controls(constants)
+                    worlds.step()
+        self._steps += 1
+        self._measure(worlds, constants, None)
+        near = length(self._tip - self._target) <= TOLERANCE_M
+        self._near = torch.where(near, self._near + 1, 0)
+
+    def _controls(self, constants: Constants) -> Tensor:
+        """Return the controls of the present tensions on the path, as `HeldTensions` does."""
+        least, step = constants["least"], constants["step"]
+        tensions = least + self._shares * (constants["most"] - least)
+        rounded = _share(constants, torch.floor(tensions / step) * step)
+        return 2.0 * torch.where(step > 0.0, rounded, self._shares) - 1.0
+
+    def _lengths(self, worlds: Worlds, constants: Constants) -> tuple[Tensor, Tensor]:
+        """Return lengths at the motors, m, and their rates, m/s, shape (n, 7) each."""
+        state = worlds.qpos.to(self.precision), worlds.qvel.to(self.precision)
+        if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
+            return -state[0][:, _J:], -state[1][:, _J:]
+        return -_turned(constants["arms"], state[0]), -_turned(constants["arms"], state[1])
+
+    def _measure(self, worlds: Worlds, constants: Constants, mask: Tensor | None) -> None:
+        """Measure after a step, or where a mask is given after a start in some worlds."""
+        angles = true = worlds.qpos[:, :_J].to(self.precision)
+        tensions = worlds.actuator_force.abs().to(self.precision)
+        if any(self._noisy):
+            stream = _SENSES + self._steps
+            noise = normals(self._seeds, self._episodes, stream, _J + _T)
+            angles = angles + constants["joint_noise"] * noise[:, :_J]
+            tensions = (tensions + constants["tension_noise"] * noise[:, _J:]).clip(0.0)
+        velocities = worlds.qvel[:, :_J].to(self.precision)
+        if mask is not None:
+            velocities = torch.zeros_like(velocities)
+        elif self._noisy[0]:
+            velocities = smoothed(self._velocities, self._angles, angles, CONTROL_DT)
+        lengths, _ = self._lengths(worlds, constants)
+        senses = torch.cat([angles, velocities, tensions, lengths, self._commands], dim=1)
+        new = {
+            "_angles": angles,
+            "_velocities": velocities,
+            "_senses": senses,
+            "_seen_tip": _fingertip(angles),
+            "_tip": _fingertip(true),
+        }
+        for name, values in new.items():
+            kept = values if mask is None else torch.where(mask[:, None], values, getattr(self, name))
+            setattr(self, name, kept)
+
+    def observations(self, worlds: Worlds) -> Tensor:
+        """See `DeviceTask`."""
+        tip, target = self._seen_tip, self._target
+        return torch.cat([self._senses, tip, target, target - tip], dim=1).to(worlds.qpos.dtype)
+
+    def outcome(
+        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
+    ) -> DeviceOutcome:
+        """See `DeviceTask`."""
+        pulled = worlds.actuator_force / constants["most"]
+        terms: dict[str, Tensor] = self._env._reward.terms(
+            length(self._tip - self._target),
+            pulled.square().mean(dim=1),
+            self._change.square().mean(dim=1),
+            CONTROL_DT,
+        )
+        terms[SMOOTHNESS.key] = 1.0 - 0.5 * self._change.abs().mean(dim=1)
+        plain = {name: term.to(worlds.qpos.dtype) for name, term in terms.items()}
+        rewards = sum(term for name, term in terms.items() if name != SMOOTHNESS.key)
+        never = torch.zeros_like(self._near, dtype=torch.bool)
+        infos = {**self.start_infos(worlds, constants), **plain}
+        return DeviceOutcome(cast("Tensor", rewards).to(worlds.qpos.dtype), never, infos)
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        return {
+            "is_success": self._near >= HELD_STEPS,
+            "distance": length(self._tip - self._target).to(worlds.qpos.dtype),
+            "target": self._target.to(worlds.qpos.dtype),
+        }
+
+
+def _turned(arms: Tensor, angles: Tensor) -> Tensor:
+    """Return what joint angles wind up of the tendons, m, shape (n, 7)."""
+    return torch.einsum("ntj,nj->nt", arms, angles[:, :_J])
+
+
+def _share(constants: Constants, tensions: Tensor) -> Tensor:
+    """Return tensions as shares of their ranges, 0 to 1, shape (n, 7)."""
+    least = constants["least"]
+    return ((tensions - least) / (constants["most"] - least)).clip(0.0, 1.0)
+
+
+def _fingertip(angles: Tensor) -> Tensor:
+    """Return the fingertips of angles, rad, shape (n, 4), as m, shape (n, 3)."""
+    turned = directions(angles)
+    cos, sin = [angle.cos() for angle in turned], [angle.sin() for angle in turned]
+    return torch.stack(tip_at(cos, sin, PHALANX_LENGTH_M), dim=1)
+
+
+class FingerReader:
+    """Compiles fingers, and reads what a device needs to know about them.
+
+    Args:
+        env: A CPU env of the task.
+
+    Attributes:
+        spec: The spec of the CPU env, with its time limit.
+
+    Raises:
+        VectorEnvError: If the env has goals, or draws another finger at each reset.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        self._env: Any = env.unwrapped
+        self.spec = env.spec
+        if isinstance(env.observation_space, gym.spaces.Dict):
+            raise VectorEnvError(
+                "backend='warp' takes no goal: its observations are vectors, without goals."
+            )
+        if self._env.individual:
+            raise VectorEnvError(
+                f"backend='warp' takes a gap with a {self._env.individual} only: a reset draws no "
+                "finger by itself; hand drawn ones with bodies=[...] and options={'bodies': [...]}."
+            )
+
+    def body(self, value: FingerLike | None) -> FingerParameters:
+        """Return the parameters of a finger; those of the arguments for None.
+
+        Raises:
+            FingerError: If they contradict themselves, or the tendons cannot balance a joint.
+            UnknownName: If there is no such set or parameter.
+        """
+        return self._env.parameters if value is None else as_finger(value)
+
+    def read(self, body: FingerParameters) -> tuple[DeviceBody, BatchKind]:
+        """Compile a finger.
+
+        Args:
+            body: Its parameters.
+
+        Returns:
+            The finger, and the kind of a batch that begins with it.
+
+        Raises:
+            VectorEnvError: If its delay is a whole number of simulation steps.
+            FingerError: If its path does not fit the steps.
+        """
+        env = self._env
+        plant = FingerPlant(body, env.drive, CONTROL_DT)
+        model, held = plant.model, plant.held
+        found = device_body(_described(body), model, _numbers(plant))
+        timestep = float(model.opt.timestep)
+        rows = {**found.rows, "actuator_delay": np.full(model.nu, _device_delay(body, timestep))}
+        rhythm = (round(CONTROL_DT / timestep), 1, 1)
+        if held is not None:
+            rhythm = (held.steps, held.ticks, held.computations)
+        shared = {
+            "path": str(held is not None),
+            "steps of an action": str(rhythm),
+            "zeros of joint_noise": str(body.joint_noise > 0.0),
+            "zeros of tension_noise": str(body.tension_noise > 0.0),
+        }
+        encoded = {name: text.encode() for name, text in shared.items()}
+        found = found._replace(rows=rows, shared={**found.shared, **encoded})
+        layouts = env.observation_layout, env.action_layout
+        kind = BatchKind(
+            found, model, DeviceFinger(env, plant), rhythm[0], *layouts, env.action_space
+        )
+        return found, kind
+
+    def close(self) -> None:
+        """Close the CPU env."""
+        self._env.close()
+
+
+def _numbers(plant: FingerPlant) -> dict[str, NDArray[Any]]:
+    """Return the numbers of a finger that its task reads."""
+    parameters, data = plant.parameters, cast("Any", plant.data)
+    path = parameters.path
+    rise, fall = (math.inf, math.inf) if path is None else slews(path)
+    taut = 0.0
+    if parameters.tendon_stiffness is not None:
+        taut = parameters.backlash + parameters.least_tension / parameters.tendon_stiffness
+    plant.place(JOINT_REST, np.random.default_rng(0))
+    numbers = {
+        "least": parameters.least_tension,
+        "taut": taut,
+        "joint_noise": parameters.joint_noise,
+        "tension_noise": parameters.tension_noise,
+        "rise": rise,
+        "fall": fall,
+        "step": 0.0 if path is None else path.tension_step,
+    }
+    return {
+        **{name: np.array([number]) for name, number in numbers.items()},
+        "arms": parameters.arms,
+        "most": np.array(parameters.most_tension),
+        "init_qpos": np.array(data.qpos),
+        "history": np.array(data.history),
+    }
+
+
+def _device_delay(parameters: FingerParameters, timestep: float) -> float:
+    """Return a delay, s, with the same controls at each simulation step as that of a finger.
+
+    Args:
+        parameters: The finger.
+        timestep: Duration of a simulation step, s.
+
+    Raises:
+        VectorEnvError: If it is a whole number of steps.
+    """
+    delay = parameters.command_delay
+    steps = delay / timestep
+    if delay > 0.0 and abs(steps - round(steps)) < _WHOLE * steps:
+        raise VectorEnvError(
+            f"backend='warp' takes no command_delay of {delay:g} s, which is a whole number of "
+            f"simulation steps, {timestep:g} s: rounding makes it a step longer at times on a CPU, "
+            f"so take {delay - 0.1 * timestep:g} s, which never is."
+        )
+    # A delay ends at a step, so that it may as well end half a step before, where single precision
+    # decides alike.
+    return (math.ceil(steps) - 0.5) * timestep if delay > 0.0 else 0.0
+
+
+def _described(parameters: FingerParameters) -> str:
+    """Return what sets a finger apart, for messages."""
+    own = [
+        f"{name}={getattr(parameters, name)}"
+        for name in parameters.__struct_fields__
+        if getattr(parameters, name) != getattr(NOMINAL, name)
+    ]
+    text = ", ".join(own)
+    shortened = f"{text[:_LONGEST_NAME]}..." if len(text) > _LONGEST_NAME else text
+    return f"the finger with {shortened}" if own else "the nominal finger"
