@@ -25,9 +25,9 @@ def fingertip(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray[np.float
         angles: rad, (..., 4).
         phalanges: Lengths of the proximal, middle and distal phalanx, m.
     """
-    turned = directions(np.asarray(angles, np.float64))
-    cos, sin = ([of(angle) for angle in turned] for of in (np.cos, np.sin))
-    return np.stack(tip_at(cos, sin, phalanges), axis=-1)
+    bent = directions(np.asarray(angles, np.float64))
+    place = tip_at([np.cos(a) for a in bent], [np.sin(a) for a in bent], phalanges)
+    return np.stack(place, axis=-1)
 
 
 def directions(angles: Any) -> tuple[Any, Any, Any, Any]:
@@ -68,8 +68,9 @@ def fingertip_jacobian(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray
         phalanges: Lengths of the proximal, middle and distal phalanx, m.
     """
     q = np.asarray(angles, np.float64)
-    flexion, abduction, middle, both = turned = directions(q)
-    along, down = _in_plane([np.cos(a) for a in turned], [np.sin(a) for a in turned], phalanges)
+    bent = directions(q)
+    flexion, abduction, middle, both = bent
+    along, down = _in_plane([np.cos(a) for a in bent], [np.sin(a) for a in bent], phalanges)
     zero = np.zeros_like(flexion)
     # (d along, d down) by each angle, and the part that abduction turns sideways.
     end_along, end_down = -phalanges[2] * np.sin(both), phalanges[2] * np.cos(both)

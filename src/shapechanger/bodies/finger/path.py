@@ -49,10 +49,7 @@ class HeldTensions:
     ) -> None:
         self.computations = round(control_dt * path.control_hz)
         self.steps = round(1.0 / (path.tick_hz * timestep))
-        if (
-            abs(self.computations - control_dt * path.control_hz) > _WHOLE
-            or not self.computations
-        ):
+        if abs(self.computations - control_dt * path.control_hz) > _WHOLE or not self.computations:
             raise FingerError(
                 f"control_hz of a path must be a multiple of {1.0 / control_dt:g}, the commands "
                 f"per second, got {path.control_hz:g}."

@@ -35,8 +35,9 @@ _own: Final = threading.local()
 def draw_posture(rng: np.random.Generator) -> NDArray[np.float64]:
     """Sample angles, rad, (4,), away from every limit, that the nominal finger can hold."""
     low, high = inner_range()
-    drawn = rng.uniform(low[:3], high[:3])
-    return np.array(coupled(*drawn, rng.uniform(-DIP_BAND, DIP_BAND))).clip(low, high)
+    flexion, abduction, middle = rng.uniform(low[:3], high[:3])
+    off = rng.uniform(-DIP_BAND, DIP_BAND)
+    return np.array(coupled(flexion, abduction, middle, off)).clip(low, high)
 
 
 def coupled(flexion: Any, abduction: Any, middle: Any, off: Any) -> tuple[Any, Any, Any, Any]:

@@ -61,9 +61,10 @@ class DeviceFinger(DeviceTask):
         self._gives = parameters.gives
         self._noisy = parameters.joint_noise > 0.0, parameters.tension_noise > 0.0
         self._held = plant.held
-        addresses, samples = plant.model.actuator_historyadr, plant.model.actuator_history[:, 0]
-        # Where the former controls of each actuator are: after its settings, cursor and times.
-        self._former = (addresses + 2 + samples)[:, None] + np.arange(samples[0])
+        # Where the former controls of each actuator are: after two settings and their times.
+        samples = int(plant.model.actuator_history[0, 0])
+        first = np.asarray(plant.model.actuator_historyadr) + 2 + samples
+        self._former = [[int(place) + i for i in range(samples)] for place in first]
 
     def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
         """See `DeviceTask`."""
@@ -71,7 +72,9 @@ class DeviceFinger(DeviceTask):
         zeros = partial(torch.zeros, dtype=self.precision, device=device)
         whole = partial(torch.zeros, count, dtype=torch.int64, device=device)
         drive = self._env.drive
-        arrays = {name: torch.as_tensor(getattr(drive, name)) for name in ("offset", "gain", "rest")}
+        arrays = {
+            name: torch.as_tensor(getattr(drive, name)) for name in ("offset", "gain", "rest")
+        }
         moved = {name: cast("Any", array.to(device)) for name, array in arrays.items()}
         self._drive: Any = dataclasses.replace(drive, **moved)
         self._commands, self._change = zeros(count, _T), zeros(count, _T)
@@ -86,16 +89,18 @@ class DeviceFinger(DeviceTask):
         self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
     ) -> None:
         """See `DeviceTask`."""
-        like = {"dtype": self.precision, "device": seeds.device}
-        low, high = (torch.as_tensor(end, **like) for end in inner_range())
+        low, high, rest = (
+            torch.as_tensor(angles, dtype=self.precision, device=seeds.device)
+            for angles in (*inner_range(), JOINT_REST)
+        )
         moved = 2.0 * uniforms(seeds, episodes, _ANGLES, _J) - 1.0
-        angles = (torch.as_tensor(JOINT_REST, **like) + START_SPREAD * moved).clip(low, high)
+        angles = (rest + START_SPREAD * moved).clip(low, high)
         drawn = uniforms(seeds, episodes, _TARGETS, _J)
         free = low[:3] + (high - low)[:3] * drawn[:, :3]
         off = DIP_BAND * (2.0 * drawn[:, 3] - 1.0)
-        posture = torch.stack(coupled(*free.unbind(dim=1), off), dim=1).clip(low, high)
+        posture = torch.stack(coupled(free[:, 0], free[:, 1], free[:, 2], off), dim=1)
         self._seeds[mask], self._episodes[mask] = seeds[mask], episodes[mask]
-        self.place_at(worlds, constants, mask, angles, _fingertip(posture))
+        self.place_at(worlds, constants, mask, angles, _fingertip(posture.clip(low, high)))
 
     def place_at(
         self, worlds: Worlds, constants: Constants, mask: Tensor, angles: Tensor, targets: Tensor
@@ -120,7 +125,7 @@ class DeviceFinger(DeviceTask):
         worlds.ctrl[mask] = worlds.act[mask] = held[mask]
         if constants["history"].numel():
             history = constants["history"].to(held.dtype)
-            history[:, self._former] = held[:, :, None].expand(-1, *self._former.shape)
+            history[:, self._former] = held[:, :, None]
             worlds.history[mask] = history[mask]
         self._commands[mask], self._target[mask] = command[mask], targets[mask]
         self._change[mask] = 0.0
@@ -184,16 +189,15 @@ class DeviceFinger(DeviceTask):
             velocities = smoothed(self._velocities, self._angles, angles, CONTROL_DT)
         lengths, _ = self._lengths(worlds, constants)
         senses = torch.cat([angles, velocities, tensions, lengths, self._commands], dim=1)
-        new = {
-            "_angles": angles,
-            "_velocities": velocities,
-            "_senses": senses,
-            "_seen_tip": _fingertip(angles),
-            "_tip": _fingertip(true),
-        }
-        for name, values in new.items():
-            kept = values if mask is None else torch.where(mask[:, None], values, getattr(self, name))
-            setattr(self, name, kept)
+
+        def kept(former: Tensor, new: Tensor) -> Tensor:
+            return new if mask is None else torch.where(mask[:, None], new, former)
+
+        self._angles = kept(self._angles, angles)
+        self._velocities = kept(self._velocities, velocities)
+        self._senses = kept(self._senses, senses)
+        self._seen_tip = kept(self._seen_tip, _fingertip(angles))
+        self._tip = kept(self._tip, _fingertip(true))
 
     def observations(self, worlds: Worlds) -> Tensor:
         """See `DeviceTask`."""

@@ -9,6 +9,7 @@ import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 
 from shapechanger.bodies.families import BodyLike
+from shapechanger.envs.finger.env import FingerLike
 from shapechanger.envs.warp.devices import find_device
 from shapechanger.envs.warp.env import WarpVectorEnv
 from shapechanger.envs.warp.reader import make_reader
@@ -27,7 +28,7 @@ def make_warp(
     num_envs: int,
     *,
     device: str | None,
-    bodies: Sequence[BodyLike] | None,
+    bodies: Sequence[BodyLike | FingerLike] | None,
     autoreset_mode: AutoresetMode,
     arguments: dict[str, Any],
 ) -> WarpVectorEnv:
@@ -51,5 +52,5 @@ def make_warp(
             raise VectorEnvError(f"backend='warp' takes no {name}: {reason}.")
     place = find_device(device)
     reader = make_reader(env_id, make, arguments)
-    given: Sequence[BodyLike | None] = [None] * num_envs if bodies is None else bodies
+    given: Sequence[BodyLike | FingerLike | None] = [None] * num_envs if bodies is None else bodies
     return WarpVectorEnv(reader, given, device=place, autoreset_mode=autoreset_mode)

@@ -170,9 +170,7 @@ class Worlds:
 
     def _widen(self, name: str, array: Any) -> None:
         """Give a field of the model one row per world."""
-        shape = (
-            (self.count * array.size,) if name == ARMS else (self.count, *array.shape[1:])
-        )
+        shape = (self.count * array.size,) if name == ARMS else (self.count, *array.shape[1:])
         with on(self.device):
             wide = wp.empty(shape, dtype=array.dtype)
         wide._is_batched = True  # As mujoco-warp marks them.
