@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,6 +20,7 @@ from shapechanger.bodies.finger import (
     drive_of,
 )
 from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
+from shapechanger.envs.finger import FingerReachEnv, FingerTrackEnv
 from shapechanger.envs.finger.gap import GAPS, Gap
 from shapechanger.envs.finger.oracle import FingerOracle
 from shapechanger.envs.finger.plant import CONTROL_DT, JointVelocities
@@ -27,9 +29,15 @@ from shapechanger.envs.warp import WarpVectorEnv
 from shapechanger.envs.warp.noise import uniforms
 from shapechanger.errors import FingerError, UnknownName, VectorEnvError
 from shapechanger.tasks.finger import fingertip
+from shapechanger.tasks.paths import from_callable
 from tests.envs.warp.side_by_side import OBSERVATION_TOLERANCE, REWARD_TOLERANCE, apart
 
 ROUNDS = 3
+
+
+def sway(t: float) -> tuple[float, float, float]:
+    """Return a point of an open path, m."""
+    return 0.05, 0.01 * math.sin(3.0 * t), -0.045
 
 
 def drawn(count: int, gap: str = "wide") -> list[FingerParameters]:
@@ -63,17 +71,21 @@ KINDS: dict[str, tuple[list[Any], dict[str, Any]]] = {
     "path": ([{"path": PATH}, OTHER.replace(path=QUANTISED)], {}),
     "path of lengths": ([{"path": QUANTISED}, {"path": PATH}], {"actions": "length"}),
     "rigs": (drawn(4), {}),
+    "circles": ([None, OTHER], {"task": "FingerTrack"}),
+    "open paths": (drawn(2), {"task": "FingerTrack", "path": from_callable(sway, 1.0)}),
 }
 
 
 def many(kind: str) -> tuple[WarpVectorEnv, list[Any]]:
     """Return fingers on the CPU device, and the CPU env of each."""
     bodies, arguments = KINDS[kind]
+    arguments = dict(arguments)
+    task = arguments.pop("task", "Finger")
     worlds = shapechanger.make_vec(
-        "Finger", len(bodies), backend="warp", device="cpu", bodies=bodies, **arguments
+        task, len(bodies), backend="warp", device="cpu", bodies=bodies, **arguments
     )
     alone = [
-        gym.make("shapechanger/Finger-v1", parameters=body, **arguments).unwrapped
+        gym.make(f"shapechanger/{task}-v1", parameters=body, **arguments).unwrapped
         for body in bodies
     ]
     return worlds, alone
@@ -86,11 +98,20 @@ def start_alike(worlds: WarpVectorEnv, alone: list[Any], seed: int) -> list[Any]
         Observation and info of each CPU env.
     """
     _, infos = worlds.reset(seed=seed)
-    angles = worlds.batches[0].worlds.qpos[:, :4].double().numpy()
-    return [
-        env.reset(seed=seed, options={"posture": angle, "target": target})
-        for env, angle, target in zip(alone, angles, infos["target"].double().numpy(), strict=True)
-    ]
+    batch: Any = worlds.batches[0]
+    begun: list[Any] = []
+    for i, env in enumerate(alone):
+        options = {"posture": batch.worlds.qpos[i, :4].double().numpy()}
+        if isinstance(env, FingerReachEnv):
+            target = infos["target"][i].double().numpy()
+            begun.append(env.reset(seed=seed, options={**options, "target": target}))
+            continue
+        env.reset(seed=seed, options=options)
+        env._t = batch.kind.task._times[i]
+        env._look()
+        distance = float(np.linalg.norm(env.plant.fingertip - env._points[0]))
+        begun.append((env._observation(env._senses), env._info(distance)))
+    return begun
 
 
 def copy_states(worlds: WarpVectorEnv, alone: list[Any]) -> None:
@@ -107,8 +128,12 @@ def copy_states(worlds: WarpVectorEnv, alone: list[Any]) -> None:
         warm = physics._view(physics._data.qacc_warmstart)
         warm[i] = torch.as_tensor(data.qacc_warmstart)
         task._commands[i] = torch.as_tensor(env._senses.commands)
-        task._target[i] = torch.as_tensor(env._target)
-        task._near[i] = env._steps_near
+        if isinstance(env, FingerReachEnv):
+            task._target[i] = torch.as_tensor(env._target)
+            task._near[i] = env._steps_near
+        else:
+            task._times[i], task._steps[i] = env._t, env._steps
+            task._squares[i] = env._squares
         if env.plant.held is not None:
             task._shares[i] = torch.as_tensor(env.plant.held._now)
 
@@ -151,14 +176,16 @@ def test_a_step_from_the_same_state_has_the_same_results(
         for _ in range(5):
             for env, action in zip(alone, rng.uniform(-1.2, 1.2, shape), strict=True):
                 env.step(action.astype(np.float32))
-        # One finger is where it has to be, for the tenth time if it stays.
-        alone[0]._target, alone[0]._steps_near = alone[0].plant.fingertip, 9
+        if isinstance(alone[0], FingerTrackEnv):
+            alone[0]._steps, alone[0]._counted, alone[0]._squares = 40, 15, 15 * 0.002**2
+        else:  # Where it has to be, for the tenth time if it stays.
+            alone[0]._target, alone[0]._steps_near = alone[0].plant.fingertip, 9
         copy_states(worlds, alone)
         actions = rng.uniform(-1.2, 1.2, shape).astype(np.float32)
         require_equal(worlds.step(actions), alone, actions)
 
 
-@pytest.mark.parametrize("kind", ["plain", "rigs"])
+@pytest.mark.parametrize("kind", ["plain", "rigs", "circles", "open paths"])
 def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
     """Nothing of the state is missing: steps that follow each other agree, too."""
     worlds, alone = many(kind)
@@ -170,7 +197,10 @@ def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
         assert {name for name in infos if not name.startswith("_")} == set(info)
         for name, value in info.items():
             assert apart(infos[name][i], value) < REWARD_TOLERANCE, name
-    for _ in range(8):
+    if kind == "circles":  # Starts are spread over closed paths.
+        times = worlds.batches[0].kind.task._times  # pyright: ignore[reportAttributeAccessIssue]
+        assert 0.0 <= times.min() < times.max() < alone[0].path.duration_s
+    for _ in range(30 if kind == "circles" else 8):
         actions = rng.uniform(-1.0, 1.0, (len(alone), 7)).astype(np.float32)
         require_equal(worlds.step(actions), alone, actions)
 
@@ -190,9 +220,10 @@ def test_success_is_ten_steps_near_the_target() -> None:
     assert not any(seen[:9])
 
 
-def test_layouts_are_those_of_the_cpu() -> None:
+@pytest.mark.parametrize("kind", ["plain", "circles"])
+def test_layouts_are_those_of_the_cpu(kind: str) -> None:
     """Each number has the CPU env's name, and the spaces fit the tensors."""
-    worlds, alone = many("plain")
+    worlds, alone = many(kind)
     assert worlds.observation_layout == alone[0].observation_layout
     assert worlds.action_layout == alone[0].action_layout
     observations, _ = worlds.reset(seed=0)
@@ -380,6 +411,7 @@ def test_motors_keep_as_many_commands_for_any_short_delay() -> None:
     ("arguments", "sentence"),
     [
         ({"goal": True}, "takes no goal: its observations are vectors"),
+        ({"path": "random"}, "takes no path='random': a reset draws no path; name one"),
         ({"gap": "wide"}, "takes a gap with a finger_seed only: a reset draws no finger by itself"),
         (
             {"parameters": {"command_delay": 0.012}},
@@ -389,8 +421,9 @@ def test_motors_keep_as_many_commands_for_any_short_delay() -> None:
 )
 def test_what_is_refused(arguments: dict[str, Any], sentence: str) -> None:
     """The error says why, and what to do instead."""
+    task = "FingerTrack" if "path" in arguments else "Finger"
     with pytest.raises(VectorEnvError, match=sentence):
-        shapechanger.make_vec("Finger", 2, backend="warp", device="cpu", **arguments)
+        shapechanger.make_vec(task, 2, backend="warp", device="cpu", **arguments)
 
 
 def test_fingers_are_checked() -> None:

@@ -1,4 +1,4 @@
-"""The finger on a device: its command path, its senses and its task as functions of tensors.
+"""The finger on a device: its command path, its senses and its tasks as functions of tensors.
 
 All but the physics is computed in double precision, so that tensions are rounded down to the same
 step, and a slow slew adds up to the same tension, as on a CPU.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from abc import abstractmethod
 from functools import partial
 from typing import Any, Final, cast
 
@@ -24,7 +25,8 @@ from shapechanger.bodies.finger.path import slews
 from shapechanger.envs.finger.env import SMOOTHNESS, FingerLike, as_finger
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant, smoothed
 from shapechanger.envs.finger.postures import START_SPREAD, coupled, inner_range
-from shapechanger.envs.finger.reach import HELD_STEPS, TOLERANCE_M
+from shapechanger.envs.finger.reach import HELD_STEPS, TOLERANCE_M, FingerReachEnv
+from shapechanger.envs.finger.track import FOLLOWS_M, SEEN_S, SETTLING_STEPS, FingerTrackEnv
 from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
 from shapechanger.envs.warp.noise import normals, uniforms
@@ -37,7 +39,7 @@ from shapechanger.tasks.finger import directions, tip_at
 _J: Final = len(JOINTS)
 _T: Final = len(TENDONS)
 # Streams of random numbers; those from the last one on are of the measurements of each step.
-_ANGLES: Final = 0
+_STARTS: Final = 0
 _TARGETS: Final = 1
 _SENSES: Final = 2
 # A delay this close to a whole number of simulation steps takes one more at some of them.
@@ -46,7 +48,7 @@ _LONGEST_NAME: Final = 60
 
 
 class DeviceFinger(DeviceTask):
-    """Fingers that reach for a point, with any parameters.
+    """Fingers with any parameters, whose fingertip has a target.
 
     Args:
         env: A CPU env of the task.
@@ -82,38 +84,14 @@ class DeviceFinger(DeviceTask):
         self._angles, self._velocities = zeros(count, _J), zeros(count, _J)
         self._senses = zeros(count, 2 * _J + 3 * _T)
         self._seen_tip, self._tip, self._target = zeros(count, 3), zeros(count, 3), zeros(count, 3)
-        self._near = whole()
         self._seeds, self._episodes, self._steps = whole(), whole(), whole()
 
     def start(
         self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
     ) -> None:
         """See `DeviceTask`."""
-        low, high, rest = (
-            torch.as_tensor(angles, dtype=self.precision, device=seeds.device)
-            for angles in (*inner_range(), JOINT_REST)
-        )
-        moved = 2.0 * uniforms(seeds, episodes, _ANGLES, _J) - 1.0
-        angles = (rest + START_SPREAD * moved).clip(low, high)
-        drawn = uniforms(seeds, episodes, _TARGETS, _J)
-        free = low[:3] + (high - low)[:3] * drawn[:, :3]
-        off = DIP_BAND * (2.0 * drawn[:, 3] - 1.0)
-        posture = torch.stack(coupled(free[:, 0], free[:, 1], free[:, 2], off), dim=1)
-        self._seeds[mask], self._episodes[mask] = seeds[mask], episodes[mask]
-        self.place_at(worlds, constants, mask, angles, _fingertip(posture.clip(low, high)))
-
-    def place_at(
-        self, worlds: Worlds, constants: Constants, mask: Tensor, angles: Tensor, targets: Tensor
-    ) -> None:
-        """Start some worlds, whose state is clear, at rest with every tendon just taut.
-
-        Args:
-            worlds: The worlds.
-            constants: Numbers of each world's finger.
-            mask: Which worlds, shape (n,).
-            angles: Joint angles, rad, shape (n, 4).
-            targets: Targets of the fingertip, m, shape (n, 3).
-        """
+        self._seeds[mask], self._episodes[mask], self._steps[mask] = seeds[mask], episodes[mask], 0
+        angles = self._begin(mask)
         lengths = -_turned(constants["arms"], angles)
         qpos = torch.cat([angles, constants["taut"] - lengths], dim=1) if self._gives else angles
         command = self._drive.command(constants["least"], lengths, torch.zeros_like(lengths))
@@ -127,11 +105,22 @@ class DeviceFinger(DeviceTask):
             history = constants["history"].to(held.dtype)
             history[:, self._former] = held[:, :, None]
             worlds.history[mask] = history[mask]
-        self._commands[mask], self._target[mask] = command[mask], targets[mask]
-        self._change[mask] = 0.0
-        self._near[mask] = self._steps[mask] = 0
+        self._commands[mask], self._change[mask] = command[mask], 0.0
         worlds.forward()
         self._measure(worlds, constants, mask)
+
+    @abstractmethod
+    def _begin(self, mask: Tensor) -> Tensor:
+        """Set new targets of some worlds, and return start angles of all, rad, shape (n, 4)."""
+
+    @abstractmethod
+    def _follow(self) -> None:
+        """Note a step: `_steps` and the fingertips are new."""
+
+    @property
+    @abstractmethod
+    def _succeeds(self) -> Tensor:
+        """Whether each finger does its task, shape (n,)."""
 
     def act(self, worlds: Worlds, constants: Constants, actions: Tensor) -> None:
         """See `DeviceTask`."""
@@ -156,8 +145,7 @@ class DeviceFinger(DeviceTask):
                     worlds.step()
         self._steps += 1
         self._measure(worlds, constants, None)
-        near = length(self._tip - self._target) <= TOLERANCE_M
-        self._near = torch.where(near, self._near + 1, 0)
+        self._follow()
 
     def _controls(self, constants: Constants) -> Tensor:
         """Return the controls of the present tensions on the path, as `HeldTensions` does."""
@@ -199,10 +187,16 @@ class DeviceFinger(DeviceTask):
         self._seen_tip = kept(self._seen_tip, _fingertip(angles))
         self._tip = kept(self._tip, _fingertip(true))
 
+    @property
+    def _points(self) -> Tensor:
+        """Points in the observation, of which the first is the target, m, shape (n, k, 3)."""
+        return self._target[:, None]
+
     def observations(self, worlds: Worlds) -> Tensor:
         """See `DeviceTask`."""
-        tip, target = self._seen_tip, self._target
-        return torch.cat([self._senses, tip, target, target - tip], dim=1).to(worlds.qpos.dtype)
+        tip, points = self._seen_tip, self._points
+        offsets = (points - tip[:, None]).flatten(1)
+        return torch.cat([self._senses, tip, points[:, 0], offsets], dim=1).to(worlds.qpos.dtype)
 
     def outcome(
         self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
@@ -218,17 +212,113 @@ class DeviceFinger(DeviceTask):
         terms[SMOOTHNESS.key] = 1.0 - 0.5 * self._change.abs().mean(dim=1)
         plain = {name: term.to(worlds.qpos.dtype) for name, term in terms.items()}
         rewards = sum(term for name, term in terms.items() if name != SMOOTHNESS.key)
-        never = torch.zeros_like(self._near, dtype=torch.bool)
+        never = torch.zeros_like(self._steps, dtype=torch.bool)
         infos = {**self.start_infos(worlds, constants), **plain}
         return DeviceOutcome(cast("Tensor", rewards).to(worlds.qpos.dtype), never, infos)
 
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
         """See `DeviceTask`."""
         return {
-            "is_success": self._near >= HELD_STEPS,
+            "is_success": self._succeeds,
             "distance": length(self._tip - self._target).to(worlds.qpos.dtype),
             "target": self._target.to(worlds.qpos.dtype),
         }
+
+
+class DeviceReach(DeviceFinger):
+    """Fingers that reach for a point."""
+
+    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+        """See `DeviceTask`."""
+        super().attach(model, worlds)
+        self._near = torch.zeros_like(self._steps)
+
+    def _begin(self, mask: Tensor) -> Tensor:
+        low, high, rest = (
+            torch.as_tensor(angles, dtype=self.precision, device=mask.device)
+            for angles in (*inner_range(), JOINT_REST)
+        )
+        drawn = uniforms(self._seeds, self._episodes, _TARGETS, _J)
+        free = low[:3] + (high - low)[:3] * drawn[:, :3]
+        off = DIP_BAND * (2.0 * drawn[:, 3] - 1.0)
+        posture = torch.stack(coupled(free[:, 0], free[:, 1], free[:, 2], off), dim=1)
+        self._target[mask] = _fingertip(posture.clip(low, high))[mask]
+        self._near[mask] = 0
+        moved = 2.0 * uniforms(self._seeds, self._episodes, _STARTS, _J) - 1.0
+        return (rest + START_SPREAD * moved).clip(low, high)
+
+    def _follow(self) -> None:
+        near = length(self._tip - self._target) <= TOLERANCE_M
+        self._near = torch.where(near, self._near + 1, 0)
+
+    @property
+    def _succeeds(self) -> Tensor:
+        return self._near >= HELD_STEPS
+
+
+class DeviceTrack(DeviceFinger):
+    """Fingers that follow a path.
+
+    Paths are functions of NumPy: their points, and the first angles at them, are computed on the
+    CPU from times that are known there.
+    """
+
+    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+        """See `DeviceTask`."""
+        super().attach(model, worlds)
+        self._path, self._angles_there = self._env.path, self._env.start_angles
+        self._times = np.zeros(worlds.count)
+        self._ahead = self._target[:, None].expand(-1, len(SEEN_S) - 1, -1).clone()
+        self._squares = torch.zeros_like(self._target[:, 0])
+
+    def _begin(self, mask: Tensor) -> Tensor:
+        chosen = mask.cpu().numpy()
+        if self._path.closed:
+            drawn = uniforms(self._seeds, self._episodes, _STARTS, 1)[:, 0].cpu().numpy()
+            self._times[chosen] = self._path.duration_s * drawn[chosen]
+        else:
+            self._times[chosen] = 0.0
+        angles = np.tile(JOINT_REST, (len(chosen), 1))
+        for i in np.flatnonzero(chosen):
+            angles[i] = self._angles_there(self._times[i])
+        self._squares[mask] = 0.0
+        self._look()
+        return torch.as_tensor(angles, dtype=self.precision, device=mask.device)
+
+    def _follow(self) -> None:
+        self._times += CONTROL_DT
+        self._look()
+        squares = (self._tip - self._target).square().sum(dim=1)
+        self._squares += torch.where(self._steps > SETTLING_STEPS, squares, 0.0)
+
+    def _look(self) -> None:
+        """Compute the present and coming points of the path."""
+        places = self._path.at(self._times[:, None] + SEEN_S)
+        points = torch.as_tensor(places, dtype=self.precision, device=self._target.device)
+        self._target, self._ahead = points[:, 0], points[:, 1:]
+
+    @property
+    def _points(self) -> Tensor:
+        return self._ahead
+
+    @property
+    def _rms(self) -> Tensor:
+        """Root mean square of the distances so far, m, infinite before the first, shape (n,)."""
+        counted = (self._steps - SETTLING_STEPS).clip(0)
+        return torch.where(counted > 0, (self._squares / counted).sqrt(), torch.inf)
+
+    @property
+    def _succeeds(self) -> Tensor:
+        return self._rms < FOLLOWS_M
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        rms = self._rms.to(worlds.qpos.dtype)
+        return {**super().start_infos(worlds, constants), "rms": rms}
+
+
+FINGERS: Final = {FingerReachEnv: DeviceReach, FingerTrackEnv: DeviceTrack}
+"""Batched functions of fingers by the class of their CPU env."""
 
 
 def _turned(arms: Tensor, angles: Tensor) -> Tensor:
@@ -264,10 +354,15 @@ class FingerReader:
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         self._env: Any = env.unwrapped
+        self._task = FINGERS[type(self._env)]
         self.spec = env.spec
         if isinstance(env.observation_space, gym.spaces.Dict):
             raise VectorEnvError(
                 "backend='warp' takes no goal: its observations are vectors, without goals."
+            )
+        if isinstance(self._env, FingerTrackEnv) and self._env.path_is_random:
+            raise VectorEnvError(
+                "backend='warp' takes no path='random': a reset draws no path; name one."
             )
         if self._env.individual:
             raise VectorEnvError(
@@ -316,7 +411,7 @@ class FingerReader:
         found = found._replace(rows=rows, shared={**found.shared, **encoded})
         layouts = env.observation_layout, env.action_layout
         kind = BatchKind(
-            found, model, DeviceFinger(env, plant), rhythm[0], *layouts, env.action_space
+            found, model, self._task(env, plant), rhythm[0], *layouts, env.action_space
         )
         return found, kind
 

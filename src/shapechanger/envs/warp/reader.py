@@ -8,11 +8,10 @@ from typing import Any, Protocol, cast
 import gymnasium as gym
 
 from shapechanger.bodies.families import BodyLike
-from shapechanger.envs.finger import FingerReachEnv
 from shapechanger.envs.vector.checks import describe_body
 from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
-from shapechanger.envs.warp.finger import FingerReader
+from shapechanger.envs.warp.finger import FINGERS, FingerReader
 from shapechanger.envs.warp.tasks import DeviceTask, find_device_task
 from shapechanger.errors import SpaceMismatch
 from shapechanger.morphology import Body
@@ -54,7 +53,7 @@ def make_reader(
         VectorEnvError: If the task has no batched functions.
     """
     first = make(arguments)
-    if type(first.unwrapped) is FingerReachEnv:
+    if type(first.unwrapped) in FINGERS:
         return FingerReader(first)
     return BodyReader(first, find_device_task(first, env_id), make, arguments)
 

@@ -390,7 +390,7 @@ def find_device_task(env: gym.Env[Any, Any], env_id: str) -> type[DeviceTask]:
         ]
         raise VectorEnvError(
             f"{env_id} has no batched functions, which backend='warp' needs: there are those of "
-            f"{', '.join(known)} and Finger."
+            f"{', '.join(known)}, Finger and FingerTrack."
         )
     return task
 
