@@ -301,10 +301,15 @@ def test_noise_depends_on_seed_episode_and_step_alone() -> None:
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_time_limits_restart_fingers_alone(mode: str) -> None:
+@pytest.mark.parametrize(
+    "parameters",
+    [{"path": PATH}, {"command_delay": 0.0061, "joint_noise": 0.01}],
+    ids=["path", "late and noisy"],
+)
+def test_time_limits_restart_fingers_alone(mode: str, parameters: Any) -> None:
     """An episode of 100 steps ends, and its finger starts at rest with another target."""
     worlds = shapechanger.make_vec(
-        "Finger", 2, backend="warp", device="cpu", autoreset_mode=mode, parameters={"path": PATH}
+        "Finger", 2, backend="warp", device="cpu", autoreset_mode=mode, parameters=parameters
     )
     assert worlds.max_episode_steps == 100
     _, infos = worlds.reset(seed=0)
@@ -326,12 +331,10 @@ def test_time_limits_restart_fingers_alone(mode: str) -> None:
     assert torch.equal(infos["target"][0], targets[0])
     assert not torch.equal(infos["target"][1], targets[1])
     assert not seen[1, 4:8].any()
-    np.testing.assert_allclose(seen[1, 8:15], 0.5, atol=1e-5)
+    np.testing.assert_allclose(seen[1, 8:15], 0.5, atol=0.05)
     assert seen[0, 8:15].max() > 0.6
     # The restarted one goes on as a new one does.
-    other = shapechanger.make_vec(
-        "Finger", 1, backend="warp", device="cpu", parameters={"path": PATH}
-    )
+    other = shapechanger.make_vec("Finger", 1, backend="warp", device="cpu", parameters=parameters)
     other.reset(seed=1)
     began, _ = other.reset()
     assert torch.equal(began[0], seen[1])
