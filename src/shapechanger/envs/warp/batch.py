@@ -172,7 +172,10 @@ class WarpBatch:
         return self._started(mask)
 
     def set_state(self, qpos: Tensor, qvel: Tensor) -> None:
-        """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear all else."""
+        """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear all else.
+
+        Fingers have more than that: start them with `start`.
+        """
         everywhere = torch.ones(self.worlds.count, dtype=torch.bool, device=qpos.device)
         self.worlds.clear(everywhere)
         self.worlds.qpos[:], self.worlds.qvel[:] = qpos, qvel

@@ -11,7 +11,8 @@ from shapechanger.bodies.families import BodyLike
 from shapechanger.envs.vector.checks import describe_body
 from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
-from shapechanger.envs.warp.finger import FINGERS, FingerReader
+from shapechanger.envs.warp.finger import FINGERS
+from shapechanger.envs.warp.finger_reader import FingerReader
 from shapechanger.envs.warp.tasks import DeviceTask, find_device_task
 from shapechanger.errors import SpaceMismatch
 from shapechanger.morphology import Body
