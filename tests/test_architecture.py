@@ -62,7 +62,7 @@ _RULES = {
         never=_HARDWARE | {"torch"},
     ),
     # Worlds on a device are imported only when asked for: their results are tensors.
-    "envs.warp": _Rule(_names("errors layout morphology bodies envs"), never=_HARDWARE),
+    "envs.warp": _Rule(_names("errors layout morphology bodies tasks envs"), never=_HARDWARE),
     # Transfer does not distinguish simulators from robots. Cloning is one of its learners.
     "transfer": _Rule(
         _names("errors layout tasks demos shapechanger tensor_file"),

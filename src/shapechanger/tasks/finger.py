@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,17 +25,38 @@ def fingertip(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray[np.float
         angles: rad, (..., 4).
         phalanges: Lengths of the proximal, middle and distal phalanx, m.
     """
-    q = np.asarray(angles, np.float64)
-    flexion, abduction = q[..., 0], q[..., 1]
-    along, down = _in_plane(q, phalanges)
-    ahead = along * np.cos(abduction)
-    return np.stack(
-        [
-            ahead * np.cos(flexion) - down * np.sin(flexion),
-            along * np.sin(abduction),
-            -ahead * np.sin(flexion) - down * np.cos(flexion),
-        ],
-        axis=-1,
+    bent = directions(np.asarray(angles, np.float64))
+    place = tip_at([np.cos(a) for a in bent], [np.sin(a) for a in bent], phalanges)
+    return np.stack(place, axis=-1)
+
+
+def directions(angles: Any) -> tuple[Any, Any, Any, Any]:
+    """Return the angles that place the fingertip, rad, each of shape (...).
+
+    Args:
+        angles: Array or tensor, rad, (..., 4).
+
+    Returns:
+        Flexion and abduction of the knuckle, and the directions of the middle and the distal
+        phalanx from the proximal one.
+    """
+    return angles[..., 0], angles[..., 1], angles[..., 2], angles[..., 2] + angles[..., 3]
+
+
+def tip_at(cos: Sequence[Any], sin: Sequence[Any], phalanges: Sequence[float]) -> tuple[Any, ...]:
+    """Return the place of the fingertip, m, as arrays or tensors x, y and z of shape (...).
+
+    Args:
+        cos: Cosines of what `directions` returns.
+        sin: Their sines.
+        phalanges: Lengths of the proximal, middle and distal phalanx, m.
+    """
+    along, down = _in_plane(cos, sin, phalanges)
+    ahead = along * cos[1]
+    return (
+        ahead * cos[0] - down * sin[0],
+        along * sin[1],
+        -ahead * sin[0] - down * cos[0],
     )
 
 
@@ -47,9 +68,9 @@ def fingertip_jacobian(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray
         phalanges: Lengths of the proximal, middle and distal phalanx, m.
     """
     q = np.asarray(angles, np.float64)
-    flexion, abduction, middle, end = (q[..., j] for j in range(4))
-    along, down = _in_plane(q, phalanges)
-    both = middle + end
+    bent = directions(q)
+    flexion, abduction, middle, both = bent
+    along, down = _in_plane([np.cos(a) for a in bent], [np.sin(a) for a in bent], phalanges)
     zero = np.zeros_like(flexion)
     # (d along, d down) by each angle, and the part that abduction turns sideways.
     end_along, end_down = -phalanges[2] * np.sin(both), phalanges[2] * np.cos(both)
@@ -72,13 +93,12 @@ def fingertip_jacobian(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray
 
 
 def _in_plane(
-    q: NDArray[np.float64], phalanges: Sequence[float]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    cos: Sequence[Any], sin: Sequence[Any], phalanges: Sequence[float]
+) -> tuple[Any, Any]:
     """Return the tip's distance along the proximal phalanx and towards the palm, m."""
     proximal, middle, distal = phalanges
-    both = q[..., 2] + q[..., 3]
-    along = proximal + middle * np.cos(q[..., 2]) + distal * np.cos(both)
-    return along, middle * np.sin(q[..., 2]) + distal * np.sin(both)
+    along = proximal + middle * cos[2] + distal * cos[3]
+    return along, middle * sin[2] + distal * sin[3]
 
 
 # Distances at which the two halves of nearness have fallen by half: one guides the finger from
@@ -117,8 +137,8 @@ class FingertipReward:
                 raise UnknownName("weight of the reward", name, names)
         return cls(**{name: float(value) for name, value in weights.items()})
 
-    def terms(self, distance: float, effort: float, change: float, dt_s: float) -> dict[str, float]:
-        """Return the terms of one step; the reward is their sum.
+    def terms(self, distance: Any, effort: Any, change: Any, dt_s: float) -> dict[str, Any]:
+        """Return the terms of one step, as numbers, arrays or tensors; the reward is their sum.
 
         Args:
             distance: Distance of the fingertip from its target, m, at least 0.

@@ -15,8 +15,15 @@ from shapechanger.bodies.finger.anatomy import (
     MOST_TENSION_N,
 )
 from shapechanger.bodies.finger.tensions import tensions_for_torque
-from shapechanger.envs.finger.postures import can_hold, draw_posture, draw_start, moving_torque
+from shapechanger.envs.finger.postures import (
+    coupled,
+    draw_posture,
+    draw_start,
+    inner_range,
+    moving_torque,
+)
 from tests.bodies.finger.commands import made
+from tests.envs.finger.holding import can_hold
 
 _STILL = np.zeros(4)
 _LOW, _HIGH = JOINT_RANGE.T
@@ -32,6 +39,16 @@ def test_postures_are_away_from_limits_and_can_be_held() -> None:
         assert (postures <= _HIGH - inner).all()
         assert all(can_hold(posture) for posture in postures)
         assert (np.ptp(postures, axis=0) > 0.1).all()
+
+
+def test_every_posture_of_the_range_can_be_held() -> None:
+    """Also at its corners, so that no drawn one needs a check."""
+    low, high = inner_range()
+    shares = np.stack(np.meshgrid(*[[0.0, 0.5, 1.0]] * 4), axis=-1).reshape(-1, 4)
+    for share in shares:
+        free = low[:3] + share[:3] * (high - low)[:3]
+        off = DIP_BAND * (2.0 * share[3] - 1.0)
+        assert can_hold(np.array(coupled(free[0], free[1], free[2], off)).clip(low, high))
 
 
 def test_balanced_tensions_hold_a_posture() -> None:

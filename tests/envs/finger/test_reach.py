@@ -19,9 +19,10 @@ from shapechanger.bodies.finger.anatomy import (
 from shapechanger.envs.finger import FingerReachEnv
 from shapechanger.envs.finger.gap import GAPS
 from shapechanger.envs.finger.oracle import FingerOracle
-from shapechanger.envs.finger.postures import angles_for, can_hold
+from shapechanger.envs.finger.postures import angles_for
 from shapechanger.errors import BadAction, FingerError, UnknownName
 from shapechanger.tasks.finger import fingertip
+from tests.envs.finger.holding import can_hold
 
 _NOTHING = np.zeros(7, np.float32)
 _REST = JOINT_REST.tolist()

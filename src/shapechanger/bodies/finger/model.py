@@ -43,6 +43,10 @@ _GEARED_KG: Final = 0.5
 """Simulation step with heavier motors than this, s: with gears they oscillate at some 20 Hz. The
 error of each step is a row of `python -m benchmarks.run finger-physics`."""
 
+# Former commands that a motor with a delay has at least, s, so that fingers with other delays have
+# arrays of the same shapes.
+_KEPT_S: Final = 0.020
+
 FINGERTIP: Final = "fingertip"
 """Name of the site at the end of the distal phalanx."""
 HOOD: Final = "extensor_hood"
@@ -237,7 +241,8 @@ def _add_tendon(
     motor.biasprm[:3] = drive.offset[i] * muscle - (0.0, drive.stiffness, drive.damping)
     if parameters.command_delay > 0.0:
         motor.delay = parameters.command_delay
-        motor.nsample = 1 + math.ceil(parameters.command_delay / spec.option.timestep)
+        kept = max(parameters.command_delay, _KEPT_S)
+        motor.nsample = 1 + math.ceil(kept / spec.option.timestep)
 
 
 class FingerFigure:

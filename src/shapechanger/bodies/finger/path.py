@@ -29,6 +29,11 @@ class HeldTensions:
         control_dt: Duration of a command, s.
         timestep: Duration of a simulation step, s.
 
+    Attributes:
+        computations: How often tensions are computed per command.
+        ticks: How often they are sent per computation.
+        steps: Simulation steps per tick.
+
     Raises:
         FingerError: If a command does not last a whole number of computations, or a tick a whole
             number of simulation steps.
@@ -42,22 +47,19 @@ class HeldTensions:
         control_dt: float,
         timestep: float,
     ) -> None:
-        self._computations = round(control_dt * path.control_hz)
-        self._steps = round(1.0 / (path.tick_hz * timestep))
-        if (
-            abs(self._computations - control_dt * path.control_hz) > _WHOLE
-            or not self._computations
-        ):
+        self.computations = round(control_dt * path.control_hz)
+        self.steps = round(1.0 / (path.tick_hz * timestep))
+        if abs(self.computations - control_dt * path.control_hz) > _WHOLE or not self.computations:
             raise FingerError(
                 f"control_hz of a path must be a multiple of {1.0 / control_dt:g}, the commands "
                 f"per second, got {path.control_hz:g}."
             )
-        if abs(self._steps * path.tick_hz * timestep - 1.0) > _WHOLE:
+        if abs(self.steps * path.tick_hz * timestep - 1.0) > _WHOLE:
             raise FingerError(
                 f"tick_hz of a path must divide {1.0 / timestep:g}, the simulation steps per "
                 f"second, got {path.tick_hz:g}."
             )
-        self._ticks = round(path.tick_hz / path.control_hz)
+        self.ticks = round(path.tick_hz / path.control_hz)
         self._path, self._drive = path, drive
         self._arms, self._gives = parameters.arms, parameters.gives
         self._least = parameters.least_tension
@@ -79,16 +81,16 @@ class HeldTensions:
             data: Its state.
             command: -1 to 1, (7,).
         """
-        for _ in range(self._computations):
+        for _ in range(self.computations):
             if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
                 length, speed = -data.qpos[_N:], -data.qvel[_N:]
             else:
                 length, speed = -self._arms @ data.qpos[:_N], -self._arms @ data.qvel[:_N]
             aim = self._share(self._drive.tension(command, length, speed))
-            for _ in range(self._ticks):
+            for _ in range(self.ticks):
                 self._now = slewed(self._path, self._now, aim)
                 data.ctrl[:] = self._controls()
-                mujoco.mj_step(model, data, self._steps)
+                mujoco.mj_step(model, data, self.steps)
 
     def _share(self, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.clip((tensions - self._least) / self._range, 0.0, 1.0)
@@ -129,8 +131,14 @@ def slewed(
         now: Present tensions, as shares of their ranges, 0 to 1, (n,).
         aim: Tensions asked for, likewise.
     """
+    rise, fall = slews(path)
+    return np.clip(aim, now - fall, now + rise)
+
+
+def slews(path: CommandPath) -> tuple[float, float]:
+    """Return the largest rise and fall of a tension per tick, as shares of its range."""
     rise, fall = (
         math.inf if slew is None else slew / path.tick_hz
         for slew in (path.slew_per_s, path.slew_down_per_s)
     )
-    return np.clip(aim, now - fall, now + rise)
+    return rise, fall

@@ -41,7 +41,7 @@ class TendonDrive:
 
     tension = (`offset` + `gain` u) (1 + `muscle_stiffness` (l - `rest`) + `muscle_damping` dl/dt)
     + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1, and the tendon's length l beyond
-    that of the straight finger, m.
+    that of the straight finger, m. A drive of tensors instead of arrays maps tensors.
 
     Attributes:
         offset: Tension at rest, N, (7,).
@@ -92,7 +92,7 @@ class TendonDrive:
         """
         pulled = self.stiffness * length + self.damping * speed
         # A muscle too short to pull has no such command; the largest is the nearest.
-        strength = np.maximum(self._strength(length, speed), _WEAKEST)
+        strength = self._strength(length, speed).clip(_WEAKEST)
         return ((tension - pulled) / strength - self.offset) / self.gain
 
     def _strength(

@@ -127,10 +127,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         self._figure: FingerFigure | None = None
         self._renderer: Renderer | None = None
         if self._gap is None:
-            given = _parameters(parameters)
-            if given not in PARAMETER_SETS.values():
-                require_balance(given)
-            self._use(given)
+            self._use(as_finger(parameters))
         else:
             self._use(self._gap.draw(np.random.default_rng(finger_seed or 0)))
         self._senses: FingerSenses | None = None
@@ -319,7 +316,24 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         )
 
 
-def _parameters(value: FingerParameters | Mapping[str, Any] | str | None) -> FingerParameters:
+FingerLike = FingerParameters | Mapping[str, Any] | str
+"""A finger as users give it: parameters, their JSON, some by name, or the name of a set."""
+
+
+def as_finger(value: FingerLike | None) -> FingerParameters:
+    """Return a finger whose tendons can hold it; the nominal one for None.
+
+    Raises:
+        UnknownName: If there is no such set or parameter.
+        FingerError: If the parameters contradict themselves, or the tendons cannot balance a joint.
+    """
+    given = _parameters(value)
+    if given not in PARAMETER_SETS.values():
+        require_balance(given)
+    return given
+
+
+def _parameters(value: FingerLike | None) -> FingerParameters:
     if value is None:
         return NOMINAL
     if isinstance(value, FingerParameters):

@@ -28,7 +28,6 @@ class JointVelocities:
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
-        self._share = 1.0 - math.exp(-period_s / _LAG_S)
         self._angles: NDArray[np.float64] | None = None
         self._velocities = np.zeros(0)
 
@@ -41,10 +40,22 @@ class JointVelocities:
         if self._angles is None:
             self._velocities = np.zeros_like(angles)
         else:
-            speed = (angles - self._angles) / self._period_s
-            self._velocities = self._velocities + self._share * (speed - self._velocities)
+            self._velocities = smoothed(self._velocities, self._angles, angles, self._period_s)
         self._angles = angles.copy()
         return self._velocities
+
+
+def smoothed(velocities: Any, former: Any, angles: Any, period_s: float) -> Any:
+    """Return smoothed velocities after new angles, rad/s, as arrays or tensors of any shape.
+
+    Args:
+        velocities: Those of the former angles, rad/s.
+        former: The former angles, rad.
+        angles: The new angles, rad.
+        period_s: Time between them, s.
+    """
+    speed = (angles - former) / period_s
+    return velocities + (1.0 - math.exp(-period_s / _LAG_S)) * (speed - velocities)
 
 
 CONTROL_DT: Final = 0.020
@@ -65,6 +76,7 @@ class FingerPlant:
     Attributes:
         model: The compiled model.
         data: Its state.
+        held: What its commands become on their path; None without one.
     """
 
     def __init__(self, parameters: FingerParameters, drive: TendonDrive, control_dt: float) -> None:
@@ -76,9 +88,9 @@ class FingerPlant:
         self._drive = drive
         timestep = self.model.opt.timestep
         self._frame_skip = round(control_dt / timestep)
-        self._held: HeldTensions | None = None
+        self.held: HeldTensions | None = None
         if parameters.path is not None:
-            self._held = HeldTensions(parameters.path, parameters, drive, control_dt, timestep)
+            self.held = HeldTensions(parameters.path, parameters, drive, control_dt, timestep)
         self._arms = parameters.arms
         self._tip = self.data.site_xpos[self.model.site(FINGERTIP).id]
         self._command = np.zeros(_N_TENDONS)
@@ -123,8 +135,8 @@ class FingerPlant:
         command = self._drive.command(np.full(_N_TENDONS, least), length, np.zeros(_N_TENDONS))
         self._command = np.clip(command, -1.0, 1.0)
         controls = self._command
-        if self._held is not None:
-            controls = self._held.start(np.full(_N_TENDONS, least))
+        if self.held is not None:
+            controls = self.held.start(np.full(_N_TENDONS, least))
         hold_controls(model, data, controls)
         mujoco.mj_forward(model, data)
         self._angles = self._measured(rng)
@@ -140,11 +152,11 @@ class FingerPlant:
             rng: Source of measurement noise.
         """
         self._command = np.clip(np.asarray(command, np.float64), -1.0, 1.0)
-        if self._held is None:
+        if self.held is None:
             self.data.ctrl[:] = self._command
             mujoco.mj_step(self.model, self.data, self._frame_skip)
         else:
-            self._held.advance(self.model, self.data, self._command)
+            self.held.advance(self.model, self.data, self._command)
         mujoco.mj_kinematics(self.model, self.data)  # Move the fingertip to the new angles.
         self._angles = self._measured(rng)
         if self.parameters.joint_noise > 0.0:

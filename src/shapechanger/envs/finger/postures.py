@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import threading
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -16,12 +16,8 @@ from shapechanger.bodies.finger.anatomy import (
     DIP_BY_PIP,
     JOINT_RANGE,
     JOINT_REST,
-    LEAST_TENSION_N,
-    MOMENT_ARMS,
-    MOST_TENSION_N,
     PHALANX_LENGTH_M,
 )
-from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.tasks.finger import fingertip, fingertip_jacobian
 
 # Distance of a joint from either end, as a fraction of its range.
@@ -30,35 +26,39 @@ _MARGIN: Final = 0.1
 _SPREAD_LEFT: Final = 0.3
 # Friction changes its sign smoothly around this speed, rad/s.
 _STICKS_BELOW: Final = 0.1
-# Largest distance of starts from the rest posture, rad.
-_START_SPREAD: Final = 0.1
+START_SPREAD: Final = 0.1
+"""Largest distance of starts from the rest posture, rad."""
 # Data per thread, because envs run in threads, and creating it takes longer than using it.
 _own: Final = threading.local()
 
 
 def draw_posture(rng: np.random.Generator) -> NDArray[np.float64]:
     """Sample angles, rad, (4,), away from every limit, that the nominal finger can hold."""
-    low, high = _inner_range()
-    while True:
-        flexion, abduction, middle = rng.uniform(low[:3], high[:3])
-        share = 1.0 - (1.0 - _SPREAD_LEFT) * max(flexion, 0.0) / float(JOINT_RANGE[0, 1])
-        abduction *= share
-        end = DIP_BY_PIP * middle + rng.uniform(-DIP_BAND, DIP_BAND)
-        angles = np.array([flexion, abduction, middle, end]).clip(low, high)
-        if can_hold(angles):
-            return angles
+    low, high = inner_range()
+    flexion, abduction, middle = rng.uniform(low[:3], high[:3])
+    off = rng.uniform(-DIP_BAND, DIP_BAND)
+    return np.array(coupled(flexion, abduction, middle, off)).clip(low, high)
+
+
+def coupled(flexion: Any, abduction: Any, middle: Any, off: Any) -> tuple[Any, Any, Any, Any]:
+    """Return angles of a finger with its tissue from independent ones, rad, arrays or tensors.
+
+    The nominal finger can hold all those within `inner_range`.
+
+    Args:
+        flexion: Of the knuckle, rad.
+        abduction: Of the knuckle when it is straight, rad; it has less when flexed.
+        middle: Angle of the middle joint, rad.
+        off: What the end joint has beyond the angle that follows from the middle one, rad.
+    """
+    share = 1.0 - (1.0 - _SPREAD_LEFT) * flexion.clip(0.0) / float(JOINT_RANGE[0, 1])
+    return flexion, abduction * share, middle, DIP_BY_PIP * middle + off
 
 
 def draw_start(rng: np.random.Generator) -> NDArray[np.float64]:
     """Sample angles, rad, (4,), near those of a finger at rest."""
-    low, high = _inner_range()
-    return np.clip(JOINT_REST + rng.uniform(-_START_SPREAD, _START_SPREAD, 4), low, high)
-
-
-def can_hold(angles: NDArray[np.float64]) -> bool:
-    """Return whether feasible tensions hold the nominal finger at these angles, rad, (4,)."""
-    torque = moving_torque(angles, np.zeros(4), np.zeros(4))
-    return tensions_for_torque(MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N)[1]
+    low, high = inner_range()
+    return np.clip(JOINT_REST + rng.uniform(-START_SPREAD, START_SPREAD, 4), low, high)
 
 
 def moving_torque(
@@ -104,7 +104,8 @@ def joint_torque(
     return inertial + data.qfrc_bias - data.qfrc_passive + friction
 
 
-def _inner_range() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def inner_range() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lowest and highest angles of starts and targets, rad, (4,) each."""
     low, high = JOINT_RANGE.T
     inner = _MARGIN * (high - low)
     return low + inner, high - inner

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
 from shapechanger.envs.finger.env import SMOOTHNESS, FingerEnv, as_numbers
-from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_posture
 from shapechanger.errors import FingerError
 from shapechanger.layout import Element, Feature, Layout
@@ -19,9 +18,10 @@ from shapechanger.tasks.finger import FingerSenses, fingertip, place_features
 from shapechanger.tasks.measure import RETURN, SUCCESS
 
 _TARGET: Final = Element("task", "target")
-# Distance within which the fingertip must stay, m, and for how long without a break, s.
-_TOLERANCE_M: Final = 0.005
-_HELD_S: Final = 0.2
+TOLERANCE_M: Final = 0.005
+"""Distance from the target within which the fingertip must stay, m."""
+HELD_STEPS: Final = 10
+"""Steps for which it must stay there without a break: 0.2 s."""
 
 
 class FingerReachEnv(FingerEnv):
@@ -125,7 +125,7 @@ class FingerReachEnv(FingerEnv):
         """
         senses = self._act(action)
         distance, terms = self._terms(self._target)
-        self._steps_near = self._steps_near + 1 if distance <= _TOLERANCE_M else 0
+        self._steps_near = self._steps_near + 1 if distance <= TOLERANCE_M else 0
         info = self._info(distance)
         if self._has_goal:
             reached = self.compute_reward(senses.fingertip, self._target, info)
@@ -143,7 +143,7 @@ class FingerReachEnv(FingerEnv):
             info: Ignored.
         """
         distance = np.linalg.norm(np.asarray(achieved_goal) - np.asarray(desired_goal), axis=-1)
-        return -(distance > _TOLERANCE_M).astype(np.float64)
+        return -(distance > TOLERANCE_M).astype(np.float64)
 
     def _observation(self, senses: FingerSenses) -> Any:
         if self._has_goal:
@@ -156,7 +156,7 @@ class FingerReachEnv(FingerEnv):
 
     def _info(self, distance: float) -> dict[str, Any]:
         return {
-            "is_success": self._steps_near * CONTROL_DT >= _HELD_S - 1e-9,
+            "is_success": self._steps_near >= HELD_STEPS,
             "distance": distance,
             "target": self._target.copy(),
         }

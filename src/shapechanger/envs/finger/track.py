@@ -147,9 +147,10 @@ RANDOM: Final = "random"
 """Value of `path` for another path at each reset."""
 
 _TARGET: Final = Element("task", "target")
-# Time in which the fingertip reaches the path's speed, not counted in the error, s.
-_SETTLES_S: Final = 0.5
-_TOLERANCE_M: Final = 0.003
+SETTLING_STEPS: Final = 25
+"""Steps in which the fingertip reaches the path's speed, not counted in the error: 0.5 s."""
+FOLLOWS_M: Final = 0.003
+"""Largest root mean square of the error of a finger that follows its path, m."""
 # Frames show this much of a path that does not end, s, and the trail of one second.
 _DRAWN_S: Final = 5.0
 _DRAWN_POINTS: Final = 97
@@ -158,7 +159,8 @@ _LINE_M: Final = 0.0005
 _TRAIL_M: Final = 0.0007
 _PATH_COLOUR: Final = (0.10, 0.55, 0.25, 1.0)
 _TRAIL_COLOUR: Final = (0.35, 0.20, 0.60, 1.0)
-_SEEN_S: Final = np.array([0.0, CONTROL_DT, *PREVIEW_S])
+SEEN_S: Final = np.array([0.0, CONTROL_DT, *PREVIEW_S])
+"""Times of the points that a step needs, s from now: the target, and those observed."""
 
 
 class FingerTrackEnv(FingerEnv):
@@ -234,6 +236,15 @@ class FingerTrackEnv(FingerEnv):
         """The present path."""
         return self._path
 
+    @property
+    def path_is_random(self) -> bool:
+        """Whether each reset draws another path."""
+        return self._is_random
+
+    def start_angles(self, t: float) -> NDArray[np.float64]:
+        """Return the angles at which an episode starts at a time of the path, s; rad, (4,)."""
+        return angles_for(self._path.at(t), self._begin)[0]
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
@@ -260,8 +271,7 @@ class FingerTrackEnv(FingerEnv):
             self._path, self._begin = draw_path(self.np_random)
         # An open path is followed from its beginning.
         self._t = self.np_random.uniform(0.0, self._path.duration_s) if self._path.closed else 0.0
-        start, _ = angles_for(self._path.at(self._t), self._begin)
-        senses = self._place({"posture": start, **(options or {})})
+        senses = self._place({"posture": self.start_angles(self._t), **(options or {})})
         self._squares, self._counted, self._steps = 0.0, 0, 0
         self._look()
         self.plant.mark(self._points[0])
@@ -285,7 +295,7 @@ class FingerTrackEnv(FingerEnv):
         self._look()
         point = self._points[0]
         distance, terms = self._terms(point)
-        if self._steps * CONTROL_DT > _SETTLES_S:
+        if self._steps > SETTLING_STEPS:
             self._squares += distance**2
             self._counted += 1
         self.plant.mark(point)
@@ -300,7 +310,7 @@ class FingerTrackEnv(FingerEnv):
 
     def _look(self) -> None:
         """Compute the present and coming points of the path."""
-        self._points = self._path.at(self._t + _SEEN_S)
+        self._points = self._path.at(self._t + SEEN_S)
 
     def _observation(self, senses: FingerSenses) -> NDArray[np.float64]:
         offsets = (self._points[1:] - senses.fingertip).ravel()
@@ -309,7 +319,7 @@ class FingerTrackEnv(FingerEnv):
     def _info(self, distance: float) -> dict[str, Any]:
         rms = math.sqrt(self._squares / self._counted) if self._counted else math.inf
         return {
-            "is_success": rms < _TOLERANCE_M,
+            "is_success": rms < FOLLOWS_M,
             "distance": distance,
             "rms": rms,
             "target": self._points[0].copy(),

@@ -18,6 +18,7 @@ from shapechanger.errors import UnknownName, VectorEnvError
 
 if TYPE_CHECKING:
     from shapechanger.bodies.families import BodyLike
+    from shapechanger.envs.finger.env import FingerLike
     from shapechanger.envs.warp.env import WarpVectorEnv
 
 _BACKENDS: Final = ("threads", "warp")
@@ -44,7 +45,7 @@ def make_vec(
     *,
     backend: Literal["warp"],
     device: str | None = None,
-    bodies: Sequence[BodyLike] | None = None,
+    bodies: Sequence[BodyLike | FingerLike] | None = None,
     autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     **arguments: Any,
 ) -> WarpVectorEnv: ...
@@ -57,7 +58,7 @@ def make_vec(
     backend: str = "threads",
     threads: int | None = None,
     device: str | None = None,
-    bodies: Sequence[BodyLike] | None = None,
+    bodies: Sequence[BodyLike | FingerLike] | None = None,
     autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     copy: bool = True,
     **arguments: Any,
@@ -75,7 +76,8 @@ def make_vec(
         device: Of the backend `warp`: `cpu`, `cuda:0`, ...; None for the first GPU, or the CPU
             where there is none.
         bodies: One body per env instead of one for all. With threads, lengths and masses may
-            differ, spaces may not; on a device they may, too.
+            differ, spaces may not; on a device they may, too. Those of fingers, on a device alone,
+            are their parameters.
         autoreset_mode: When to reset an env whose episode has ended, as in Gymnasium.
         copy: Whether to return copies of the observations; otherwise the next step overwrites them.
             On a device they are always copies.

@@ -12,7 +12,6 @@ import torch
 from torch import Tensor
 
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
-from shapechanger.envs.warp.starts import DeviceStarts
 from shapechanger.envs.warp.tasks import DeviceTask
 from shapechanger.envs.warp.worlds import Worlds
 from shapechanger.errors import VectorEnvError
@@ -28,7 +27,7 @@ class BatchKind(NamedTuple):
         first: One of them, with which the others are compared.
         model: Its compiled model.
         task: Its task.
-        frame_skip: Physics steps per action.
+        frame_skip: Physics steps of each `Worlds.step`.
         observation_layout: Name, unit and range of each number of an observation.
         action_layout: Name, unit and range of each number of an action.
         action_space: Space of one action.
@@ -67,7 +66,7 @@ class DeviceStep(NamedTuple):
         rewards: Shape (n,).
         terminated: Shape (n,).
         diverged: Shape (n,).
-        infos: Tensors of shape (n,).
+        infos: Tensors of shape (n, ...).
     """
 
     observations: Tensor
@@ -106,13 +105,11 @@ class WarpBatch:
         self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, size, np.float32)
         self.single_action_space = kind.action_space
         self.worlds = Worlds(kind.model, bodies, kind.frame_skip, device, kind.task.contact_forces)
-        self._starts = DeviceStarts(
-            kind.model, self.worlds, kind.task.noise_scale, kind.task.normal_velocities
-        )
+        self._task.attach(kind.model, self.worlds)
         self._constants = {
             name: torch.as_tensor(
                 np.stack([body.constants[name] for body in bodies]),
-                dtype=torch.float32,
+                dtype=kind.task.precision,
                 device=device,
             )
             for name in kind.first.constants
@@ -141,8 +138,7 @@ class WarpBatch:
             actions: Shape (n, nu).
         """
         worlds, task = self.worlds, self._task
-        worlds.ctrl[:] = actions
-        worlds.step()
+        task.act(worlds, self._constants, actions)
         rewards, terminated, infos = task.outcome(worlds, self._before, actions, self._constants)
         observations = task.observations(worlds)
         self._before = task.place(worlds).clone()
@@ -154,7 +150,8 @@ class WarpBatch:
         observations = torch.where(observations.isfinite(), observations, 0.0)
         if bool(diverged.any()):
             worlds.clear(diverged)
-            worlds.qpos[diverged] = self._constants["init_qpos"][diverged]
+            poses = self._constants["init_qpos"].to(worlds.qpos.dtype)
+            worlds.qpos[diverged] = poses[diverged]
         return DeviceStep(observations, rewards, terminated | diverged, diverged, infos)
 
     def start(
@@ -170,15 +167,15 @@ class WarpBatch:
         Returns:
             Observations, shape (n, size), and infos; only the rows of `mask` are of the start.
         """
-        worlds = self.worlds
-        qpos, qvel = self._starts.draw(self._constants, seeds, episodes)
-        worlds.clear(mask)
-        worlds.qpos[mask], worlds.qvel[mask] = qpos[mask], qvel[mask]
-        self._starts.settle(mask, self._constants)
+        self.worlds.clear(mask)
+        self._task.start(self.worlds, self._constants, mask, seeds, episodes)
         return self._started(mask)
 
     def set_state(self, qpos: Tensor, qvel: Tensor) -> None:
-        """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear all else."""
+        """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear all else.
+
+        Fingers have more than that: start them with `start`.
+        """
         everywhere = torch.ones(self.worlds.count, dtype=torch.bool, device=qpos.device)
         self.worlds.clear(everywhere)
         self.worlds.qpos[:], self.worlds.qvel[:] = qpos, qvel

@@ -25,6 +25,8 @@ _SHARED_OPTIONS: Final = (
     *("integrator", "cone", "jacobian", "solver", "iterations", "ls_iterations"),
     *("noslip_iterations", "ccd_iterations", "disableflags", "enableflags"),
 )
+ARMS: Final = "wrap_prm"
+"""Moment arms of tendons over joints, which worlds have their own of; see `tendon_arms`."""
 # Read by sleeping bodies and by sensors alone, which our tasks do not have.
 _UNREAD: Final = ("dof_length", "site_size")
 
@@ -84,6 +86,7 @@ def _per_world() -> Iterator[str]:
     for field in dataclasses.fields(mjw.Model):
         if _is_array(field) and _per_row(field) and not field.name.startswith(_DRAWN):
             yield field.name
+    yield ARMS
 
 
 def _is_array(field: Any) -> bool:
@@ -107,11 +110,17 @@ def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
         elif _is_array(field):
             array: NDArray[Any] = np.asarray(value)
             # Of the rows, only the shape is shared.
-            yield name, str(array.shape).encode() + (b"" if _per_row(field) else array.tobytes())
+            own = _per_row(field) or (name == ARMS and _only_joints(model))
+            yield name, str(array.shape).encode() + (b"" if own else array.tobytes())
     for name in _SHARED_OPTIONS:
         yield f"opt.{name}", str(getattr(model.opt, name)).encode()
     for name, pattern in _switches(model).items():
         yield name, np.asarray(pattern).tobytes()
+
+
+def _only_joints(model: mujoco.MjModel) -> bool:
+    """Return whether no tendon has a pulley, whose divisor is in the place of the moment arms."""
+    return bool(np.all(model.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT))
 
 
 def _switches(model: mujoco.MjModel) -> dict[str, Any]:

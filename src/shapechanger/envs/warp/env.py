@@ -13,13 +13,13 @@ from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
 from shapechanger.bodies.families import BodyLike
+from shapechanger.envs.finger.env import FingerLike
 from shapechanger.envs.vector.checks import masked_options, one_seed_each
 from shapechanger.envs.warp.batch import BatchKind, WarpBatch, require_fitting
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
-from shapechanger.envs.warp.reader import BodyReader
+from shapechanger.envs.warp.reader import Reader
 from shapechanger.errors import BadAction, UnknownName, VectorEnvError
 from shapechanger.layout import Layout
-from shapechanger.morphology import Body
 
 _OPTIONS = ("bodies", "reset_mask")
 
@@ -52,7 +52,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     Attributes:
         device: Name of the device.
         batches: The worlds, by the shapes of their arrays.
-        bodies: The edits of each world's body.
+        bodies: The edits of each world's body; for a finger its parameters.
         made_from: The spec of the CPU env, or None.
         observation_layout: Name, unit and range of each number of an observation of the first
             batch.
@@ -66,8 +66,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
     def __init__(
         self,
-        reader: BodyReader,
-        bodies: Sequence[BodyLike | None],
+        reader: Reader,
+        bodies: Sequence[BodyLike | FingerLike | None],
         *,
         device: str,
         autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
@@ -80,7 +80,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self.bodies = [reader.body(body) for body in bodies]
         kinds: list[BatchKind] = []
         members: list[list[int]] = []
-        found: dict[Body, tuple[DeviceBody, int]] = {}
+        found: dict[Any, tuple[DeviceBody, int]] = {}
         for number, body in enumerate(self.bodies):
             if body not in found:
                 read, kind = reader.read(body)
@@ -191,7 +191,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._begun = True
         return self._out(observations), _masked(infos, mask)
 
-    def _change_bodies(self, numbers: list[int], bodies: Sequence[BodyLike]) -> None:
+    def _change_bodies(self, numbers: list[int], bodies: Sequence[BodyLike | FingerLike]) -> None:
         """Give worlds other bodies, after all of them have been compiled and found to fit."""
         if len(bodies) != len(numbers):
             raise VectorEnvError(
@@ -409,11 +409,16 @@ def _place_among(kinds: list[BatchKind], body: DeviceBody) -> int:
     return len(kinds)
 
 
+def _like(mask: Tensor, value: Tensor) -> Tensor:
+    """Return a mask, shape (n,), with as many dimensions as a value, shape (n, ...)."""
+    return mask.view(-1, *[1] * (value.dim() - 1))
+
+
 def _masked(infos: dict[str, Tensor], mask: Tensor) -> dict[str, Any]:
     """Return infos, zero outside of a mask, with the mask under `_key` of each key."""
     found: dict[str, Any] = {}
     for name, value in infos.items():
-        found[name] = torch.where(mask, value, torch.zeros_like(value))
+        found[name] = torch.where(_like(mask, value), value, torch.zeros_like(value))
         found[f"_{name}"] = mask
     return found
 
@@ -429,6 +434,6 @@ def _merged(found: dict[str, Any], infos: dict[str, Tensor], mask: Tensor) -> di
     merged = dict(found)
     for name, value in infos.items():
         here = found.get(name, torch.zeros_like(value))
-        merged[name] = torch.where(mask, value, here)
+        merged[name] = torch.where(_like(mask, value), value, here)
         merged[f"_{name}"] = found.get(f"_{name}", torch.zeros_like(mask)) | mask
     return merged

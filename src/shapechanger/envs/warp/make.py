@@ -9,9 +9,10 @@ import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 
 from shapechanger.bodies.families import BodyLike
+from shapechanger.envs.finger.env import FingerLike
 from shapechanger.envs.warp.devices import find_device
 from shapechanger.envs.warp.env import WarpVectorEnv
-from shapechanger.envs.warp.reader import BodyReader
+from shapechanger.envs.warp.reader import make_reader
 from shapechanger.errors import VectorEnvError
 
 # What an env on a device does not have, with the reason.
@@ -27,7 +28,7 @@ def make_warp(
     num_envs: int,
     *,
     device: str | None,
-    bodies: Sequence[BodyLike] | None,
+    bodies: Sequence[BodyLike | FingerLike] | None,
     autoreset_mode: AutoresetMode,
     arguments: dict[str, Any],
 ) -> WarpVectorEnv:
@@ -50,6 +51,6 @@ def make_warp(
         if arguments.get(name) is not None:
             raise VectorEnvError(f"backend='warp' takes no {name}: {reason}.")
     place = find_device(device)
-    reader = BodyReader(env_id, make, arguments)
-    given: Sequence[BodyLike | None] = [None] * num_envs if bodies is None else bodies
+    reader = make_reader(env_id, make, arguments)
+    given: Sequence[BodyLike | FingerLike | None] = [None] * num_envs if bodies is None else bodies
     return WarpVectorEnv(reader, given, device=place, autoreset_mode=autoreset_mode)

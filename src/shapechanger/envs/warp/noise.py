@@ -36,28 +36,30 @@ def _mixed(numbers: Tensor) -> Tensor:
     return numbers ^ _shifted(numbers, 31)
 
 
-def uniforms(seeds: Tensor, episodes: Tensor, stream: int, count: int) -> Tensor:
+def uniforms(seeds: Tensor, episodes: Tensor, stream: int | Tensor, count: int) -> Tensor:
     """Return numbers in [0, 1), shape (n, count), float64.
 
     Args:
         seeds: The seed of each world, shape (n,), int64.
         episodes: How many episodes each world has begun, shape (n,), int64.
-        stream: Which numbers of the episode; other streams are independent.
+        stream: Which numbers of the episode, also one per world, shape (n,); other streams are
+            independent.
         count: How many numbers a world gets.
     """
-    key = _mixed(_mixed(_mixed(seeds) + episodes * _STEP) + stream * _STEP)
+    streams = torch.as_tensor(stream, device=seeds.device)
+    key = _mixed(_mixed(_mixed(seeds) + episodes * _STEP) + streams * _STEP)
     places = torch.arange(1, count + 1, device=seeds.device) * _STEP
     bits = _shifted(_mixed(key[:, None] + places), 64 - _MANTISSA)
     return bits.to(torch.float64) * 2.0**-_MANTISSA
 
 
-def normals(seeds: Tensor, episodes: Tensor, stream: int, count: int) -> Tensor:
+def normals(seeds: Tensor, episodes: Tensor, stream: int | Tensor, count: int) -> Tensor:
     """Return normally distributed numbers (Box and Muller), shape (n, count), float64.
 
     Args:
         seeds: The seed of each world, shape (n,), int64.
         episodes: How many episodes each world has begun, shape (n,), int64.
-        stream: Which numbers of the episode.
+        stream: Which numbers of the episode, also one per world, shape (n,).
         count: How many numbers a world gets.
     """
     drawn = uniforms(seeds, episodes, stream, 2 * count)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 import gymnasium as gym
 
@@ -11,16 +11,60 @@ from shapechanger.bodies.families import BodyLike
 from shapechanger.envs.vector.checks import describe_body
 from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
-from shapechanger.envs.warp.tasks import find_device_task
+from shapechanger.envs.warp.finger import FINGERS
+from shapechanger.envs.warp.finger_reader import FingerReader
+from shapechanger.envs.warp.tasks import DeviceTask, find_device_task
 from shapechanger.errors import SpaceMismatch
 from shapechanger.morphology import Body
+
+
+class Reader(Protocol):
+    """Compiles bodies, which compare and hash, and reads what a device needs to know about them.
+
+    Attributes:
+        spec: The spec of the CPU env, with its time limit.
+    """
+
+    spec: Any
+
+    def body(self, value: Any) -> Any:
+        """Return a body as it is kept, such as a tuple of edits; that of the arguments for None."""
+        ...
+
+    def read(self, body: Any) -> tuple[DeviceBody, BatchKind]:
+        """Compile a body, and return it with the kind of a batch that begins with it."""
+        ...
+
+    def close(self) -> None:
+        """Close the CPU envs."""
+        ...
+
+
+def make_reader(
+    env_id: str, make: Callable[[dict[str, Any]], gym.Env[Any, Any]], arguments: dict[str, Any]
+) -> Reader:
+    """Return what reads the bodies of a task.
+
+    Args:
+        env_id: Full id of the task.
+        make: Makes a CPU env of it from arguments.
+        arguments: Arguments of the CPU env.
+
+    Raises:
+        VectorEnvError: If the task has no batched functions.
+    """
+    first = make(arguments)
+    if type(first.unwrapped) in FINGERS:
+        return FingerReader(first)
+    return BodyReader(first, find_device_task(first, env_id), make, arguments)
 
 
 class BodyReader:
     """Compiles bodies with CPU envs, and reads what a device needs to know about them.
 
     Args:
-        env_id: Full id of the task.
+        first: A CPU env of the task.
+        task: Its batched functions.
         make: Makes a CPU env of it from arguments.
         arguments: Arguments of the CPU env.
 
@@ -30,14 +74,14 @@ class BodyReader:
 
     def __init__(
         self,
-        env_id: str,
+        first: gym.Env[Any, Any],
+        task: type[DeviceTask],
         make: Callable[[dict[str, Any]], gym.Env[Any, Any]],
         arguments: dict[str, Any],
     ) -> None:
         self._arguments = arguments
         self._make = make
-        first = make(arguments)
-        self._task = find_device_task(first, env_id)
+        self._task = task
         self.spec = first.spec
         # One CPU env for each pair of spaces; it changes its body.
         self._envs: list[Any] = [first.unwrapped]

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, Final, NamedTuple, cast
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ class DeviceOutcome(NamedTuple):
     Attributes:
         rewards: Shape (n,).
         terminated: Shape (n,).
-        infos: Tensors of shape (n,).
+        infos: Tensors of shape (n, ...).
     """
 
     rewards: Tensor
@@ -49,30 +50,64 @@ class DeviceOutcome(NamedTuple):
 
 
 class DeviceTask(ABC):
-    """Observation, reward and end of a task.
+    """Start, action, observation, reward and end of a task in the worlds of one batch.
 
     Args:
         env: A CPU env of the task, with any body of the batch.
 
     Attributes:
-        noise_scale: Scale of the noise of start states.
         normal_velocities: Whether start velocities are drawn normally, else uniformly.
+        precision: Type of the bodies' constants.
         contact_forces: Whether the task reads `cfrc_ext`.
         start_forces: Whether the first observation reads forces.
     """
 
     normal_velocities: ClassVar[bool] = False
+    precision: ClassVar[torch.dtype] = torch.float32
     contact_forces: ClassVar[bool] = False
     start_forces: ClassVar[bool] = False
 
     def __init__(self, env: Any) -> None:
         self._env = env
-        self.noise_scale = float(env._reset_noise_scale)
 
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:
         """Return the numbers of the task that depend on the body of a CPU env."""
         return {**DeviceStarts.constants(env), "dt": np.array(env.dt)}
+
+    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+        """Serve worlds from here on.
+
+        Args:
+            model: A body of the batch.
+            worlds: The worlds.
+
+        Raises:
+            VectorEnvError: If they cannot start.
+        """
+        scale = float(self._env._reset_noise_scale)
+        self._starts = DeviceStarts(model, worlds, scale, self.normal_velocities)
+
+    def start(
+        self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
+    ) -> None:
+        """Put some worlds, whose state is clear, into start states.
+
+        Args:
+            worlds: The worlds.
+            constants: Numbers of each world's body.
+            mask: Which worlds, shape (n,).
+            seeds: The seed of each world, shape (n,).
+            episodes: How many episodes each world has begun, shape (n,).
+        """
+        qpos, qvel = self._starts.draw(constants, seeds, episodes)
+        worlds.qpos[mask], worlds.qvel[mask] = qpos[mask], qvel[mask]
+        self._starts.settle(mask, constants)
+
+    def act(self, worlds: Worlds, constants: Constants, actions: Tensor) -> None:
+        """Apply actions, shape (n, nu), and step the physics."""
+        worlds.ctrl[:] = actions
+        worlds.step()
 
     def place(self, worlds: Worlds) -> Tensor:
         """Return what the reward needs from before the physics; a view."""
@@ -96,7 +131,7 @@ class DeviceTask(ABC):
         """
 
     def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
-        """Return the infos of a reset, tensors of shape (n,)."""
+        """Return the infos of a reset, tensors of shape (n, ...)."""
         return {}
 
 
@@ -355,7 +390,7 @@ def find_device_task(env: gym.Env[Any, Any], env_id: str) -> type[DeviceTask]:
         ]
         raise VectorEnvError(
             f"{env_id} has no batched functions, which backend='warp' needs: there are those of "
-            f"{', '.join(known)}."
+            f"{', '.join(known)}, Finger and FingerTrack."
         )
     return task
 

@@ -11,9 +11,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shapechanger.envs.warp.bodies import DeviceBody, static_geoms
+from shapechanger.envs.warp.bodies import ARMS, DeviceBody, static_geoms
 from shapechanger.envs.warp.contact_frames import follow_capsules
 from shapechanger.envs.warp.devices import mjw, on, wp
+from shapechanger.envs.warp.tendon_arms import follow_arms
 
 _G: Final = mujoco.mjtGeom
 
@@ -50,7 +51,7 @@ class Worlds:
     Args:
         model: A body of the batch.
         bodies: The body of each world.
-        frame_skip: Physics steps per action.
+        frame_skip: Physics steps of each `step`.
         device: Name of the device.
         contact_forces: Whether `cfrc_ext` is computed after each step.
 
@@ -58,6 +59,10 @@ class Worlds:
         qpos: Shape (n, nq).
         qvel: Shape (n, nv).
         ctrl: Shape (n, nu).
+        act: States of the actuators, shape (n, na).
+        actuator_force: Shape (n, nu).
+        history: Former controls with their times, shape (n, nhistory).
+        time: s, shape (n,).
         qacc: Shape (n, nv).
         xpos: Places of the bodies, m, shape (n, nbody, 3).
         site_xpos: Places of the sites, m, shape (n, nsite, 3).
@@ -83,6 +88,7 @@ class Worlds:
         self._warm = False
         self._static = torch.as_tensor(static_geoms(model), device=device)
         follow_capsules()
+        follow_arms()
         with on(device):
             self._model = mjw.put_model(model)
             self._model.opt.warn_overflow = 0  # There is room for all contacts.
@@ -92,6 +98,10 @@ class Worlds:
         self.qpos = self._view(data.qpos)
         self.qvel = self._view(data.qvel)
         self.ctrl = self._view(data.ctrl)
+        self.act = self._view(data.act)
+        self.actuator_force = self._view(data.actuator_force)
+        self.history = self._view(data.history)
+        self.time = self._view(data.time)
         self.qacc = self._view(data.qacc)
         self.xpos = self._view(data.xpos)
         self.site_xpos = self._view(data.site_xpos)
@@ -102,7 +112,10 @@ class Worlds:
         # What else of the state a restart clears.
         self._cleared = [
             self._view(array)
-            for array in (data.act, data.qacc_warmstart, data.ctrl, data.qvel, data.cfrc_ext)
+            for array in (
+                *(data.act, data.qacc_warmstart, data.ctrl, data.qvel, data.cfrc_ext),
+                data.time,
+            )
             if array.size
         ]
         self._rows: dict[str, Tensor] = {}
@@ -118,7 +131,12 @@ class Worlds:
         Args:
             name: Name of a field of the model, such as `geom_size`.
         """
-        return self._rows.get(name, self._view(self._array(name)))
+        return self._rows.get(name, self._by_world(name, self._array(name)))
+
+    def _by_world(self, name: str, array: Any) -> Tensor:
+        """Return an array that is not yet wide, with a leading dimension."""
+        view = self._view(array)
+        return view[None] if name == ARMS else view
 
     def _array(self, name: str) -> Any:
         owner, _, field = name.rpartition(".")
@@ -137,7 +155,7 @@ class Worlds:
             array = self._array(name)
             if not array.size:
                 continue
-            row = self._view(array)[0]
+            row = self._by_world(name, array)[0]
             values = _stacked([body.rows[name] for body in bodies], row)
             if name not in self._rows:
                 if bool((values == row).all()):
@@ -152,11 +170,13 @@ class Worlds:
 
     def _widen(self, name: str, array: Any) -> None:
         """Give a field of the model one row per world."""
+        shape = (self.count * array.size,) if name == ARMS else (self.count, *array.shape[1:])
         with on(self.device):
-            wide = wp.empty((self.count, *array.shape[1:]), dtype=array.dtype)
+            wide = wp.empty(shape, dtype=array.dtype)
         wide._is_batched = True  # As mujoco-warp marks them.
-        view = self._rows[name] = self._view(wide)
-        view[:] = self._view(array)
+        former = self._by_world(name, array)
+        view = self._rows[name] = self._view(wide).view(self.count, *former.shape[1:])
+        view[:] = former
         owner, _, field = name.rpartition(".")
         setattr(self._model.opt if owner else self._model, field, wide)
         self._graph = None  # It holds the former array.
