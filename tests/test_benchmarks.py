@@ -56,6 +56,7 @@ def test_a_wrong_name_in_only_gets_the_nearest(monkeypatch: pytest.MonkeyPatch) 
         run.main()
 
 
+@pytest.mark.filterwarnings("ignore:Values in x were outside:RuntimeWarning")  # SciPy 1.15.
 def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
     """Tensions hold a straight knuckle above a bent finger, and do not bring it there."""
     hook = fingertip(np.radians([0.0, 0.0, 85.0, 55.0]), PHALANX_LENGTH_M)

@@ -362,8 +362,8 @@ def test_a_window_opens(display: str) -> None:
     assert run.stdout.splitlines() == ["(80, 60)", "True", "True", "True", "closed"]
 
 
-# From Python 3.12 on, compiling MoviePy 1 for the first time warns.
-@pytest.mark.filterwarnings("ignore::SyntaxWarning")
+# Compiling MoviePy 1 for the first time warns, before Python 3.12 of a deprecation.
+@pytest.mark.filterwarnings("ignore::SyntaxWarning", "ignore:invalid escape:DeprecationWarning")
 def test_gymnasium_records_videos(tmp_path: Path) -> None:
     """`RecordVideo` works with the extra `sim`."""
     env = RecordVideo(
