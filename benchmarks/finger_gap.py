@@ -13,7 +13,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, Literal, cast
+from typing import Any, Final, Literal
 
 import msgspec
 import numpy as np
@@ -32,7 +32,6 @@ from shapechanger.transfer.executor import Processes
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 from shapechanger.transfer.learners.presets import learner_settings
-from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
 from shapechanger.transfer.runs import RunResult, load_result
 from shapechanger.transfer.study import make_plan, run_study
@@ -42,7 +41,7 @@ STEPS: Final = 61_440
 # Steps of the arms that learn in simulated fingers: with half of them, identified is 6 % worse.
 SIMULATED: Final = 614_400
 RIGS: Final = 5
-FOLLOW_STEPS: Final = 6144  # Two minutes.
+RIG_STEPS: Final = 6144
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
 # Zero-shot success below this counts as a gap.
 _MILD: Final = 0.5
@@ -51,14 +50,12 @@ _RECOVERED: Final = 0.8
 _RECOVERED_IN_GAP: Final = 0.9
 _TUNED: Final = 0.7
 _FOLLOWED: Final = 2.0
-_MINUTES: Final = 30.0
 # Distance within which a target counts as reached, m, as in `Finger-v1`.
 _NEAR_M: Final = 0.005
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
 
 
 _WHERE: Final = "fingers of the gap real-like"
-_RIGS: Final = "twins of a rig, real-like"
 _GAP_ARMS: Final = (*ARMS, "randomised", "identified")
 _SCRATCH: Final = "scratch"
 _IDENTIFIED: Final = "identified"
@@ -208,36 +205,13 @@ def _chatter(run: RunResult) -> float:
 
 
 def rig() -> list[Row]:
-    """Measure the same arms through link, daemon, guard and servo bus, on twins of a rig.
-
-    `ONLY` and `ENDED=1` are those of `gap`.
-    """
+    """Measure the same through link, daemon, guard and servo bus, with two minutes per rig."""
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
+    arms: tuple[str, ...] = ("scratch", "zero-shot", "identified")
     out = Path("results", "finger-rig")
-    wanted = asked("arm or row", (*_GAP_ARMS, _RIG_ONLY))
-    arms = tuple(arm for arm in _GAP_ARMS if arm in (*wanted, _SCRATCH))
-    plan = _plan(target, "ppo-rig", arms, RIGS, STEPS, evaluations=2)
-    if "ENDED" not in os.environ:
-        _run(plan, out)
-    runs = _ended(plan, out)
-    rows = [
-        *rows_of(runs, _RIGS, {"identified": _RECOVERED, "fine-tune": _TUNED}),
-        *_half_way(runs, _RIGS),
-    ]
-    if _RIG_ONLY in wanted:
-        rows.append(_rig_only_row(target, plan.seeds, _RIGS))
-    if all(len(runs.get(arm, [])) == plan.seeds for arm in arms):
-        minutes = sum(run.wall_s for ended in runs.values() for run in ended) / 60.0
-        rows.append(
-            Row(
-                f"{_RIGS}: minutes on two cores for one finger, with {', '.join(arms)}",
-                f"{minutes / plan.seeds / 2.0:.0f}",
-                f"mean of {plan.seeds} fingers, two runs at a time",
-                "< 30",
-                minutes / plan.seeds / 2.0 < _MINUTES,
-            )
-        )
-    return rows
+    plan = _plan(target, "ppo-rig", arms, RIGS, RIG_STEPS)
+    _run(plan, out)
+    return rows_of(_ended(plan, out), "twins of a rig, real-like", {"identified": _RECOVERED})
 
 
 def follow() -> list[Row]:
@@ -252,7 +226,7 @@ def follow() -> list[Row]:
     target = EnvRef("shapechanger/RemoteFingerTrack-v1", {"twin": "real-like", **circle})
     out = Path("results", "finger-follow")
     arms = ("scratch", "zero-shot", "identified")
-    plan = _plan(target, "ppo-rig", arms, RIGS, FOLLOW_STEPS, source=source, policy="track")
+    plan = _plan(target, "ppo-rig", arms, RIGS, RIG_STEPS, source=source, policy="track")
     _run(plan, out, policy="track")
     errors: list[tuple[float, float]] = []
     shipped: list[float] = []
@@ -297,17 +271,13 @@ def _plan(
     *,
     source: EnvRef = _FINGER,
     policy: Shipped = "reach",
-    evaluations: int | None = None,
     source_steps: int | None = None,
 ) -> Plan:
-    """Plan a study of a shipped policy, with so many evaluations if not as often as usual."""
-    settings = cast("PpoSettings", learner_settings(learner))
-    if evaluations is not None:
-        settings = msgspec.structs.replace(settings, eval_every=steps // evaluations)
+    """Plan a study of a shipped policy."""
     return make_plan(
         TransferTask(source, target),
         learner,
-        settings,
+        learner_settings(learner),
         seeds=int(os.environ.get("SEEDS", seeds)),
         steps=steps,
         source_steps=source_steps,

@@ -14,9 +14,9 @@ from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners import DemonstrationFile
 from shapechanger.transfer.learners.cloning import CloneLearner
-from shapechanger.transfer.learners.policy_file import save_policy
+from shapechanger.transfer.learners.policy_file import load_policy, save_policy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.plan import Plan, TransferTask
+from shapechanger.transfer.plan import Plan, Run, TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 from tests.transfer.studies import SMALL, TINY, tiny_plan
@@ -141,3 +141,21 @@ def test_invalid_policy_files_are_refused(clone_file: Path, tmp_path: Path) -> N
     (tmp_path / "damaged.safetensors").write_bytes(damaged)
     with pytest.raises(PolicyError, match=r"damaged\.safetensors"):
         _plan(tmp_path / "damaged.safetensors")
+
+
+def test_source_steps_are_those_of_arms_that_train_their_own(
+    ppo_file: Path, tmp_path: Path
+) -> None:
+    """Beside a given policy they count where another policy learns in the source."""
+    arms = ("scratch", "zero-shot", "randomised")
+    plan = tiny_plan(source_policy=ppo_file, source_steps=64, arms=arms)
+    assert (plan.source_steps, plan.own_steps) == (32, 64)
+    assert [plan.source_steps_of(arm) for arm in ("zero-shot", "randomised")] == [32, 64]
+    assert [plan.steps_of(kind) for kind in ("zero-shot", "randomised")] == [0, 64]
+    study = run_study(plan, tmp_path / "study", source_policy=ppo_file, executor=Serial())
+    trained = load_policy(Run("randomised", 0).policy_file(tmp_path / "study"))
+    assert trained.card.steps == 64
+    # Its total steps are its own: it is behind scratch by them.
+    assert study.summaries["randomised"] != study.summaries["zero-shot"]
+    with pytest.raises(StudyError, match="no arm trains a policy of its own"):
+        tiny_plan(source_policy=ppo_file, source_steps=64)

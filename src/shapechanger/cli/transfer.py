@@ -59,7 +59,8 @@ class Transfer:
     """Target steps of a run; the learner's own number if not given."""
     source_steps: int | None = None
     """Source steps of a source policy; the learner's own number if not given: half as many as
-    target steps, and more for a rig."""
+    target steps, and more for a rig. Beside --source-policy, those of arms that train a policy of
+    their own, such as identified."""
     quick: bool = False
     """Two seeds and an eighth of the steps: a check that everything works, not a result."""
     out: Path | None = None

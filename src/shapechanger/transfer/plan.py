@@ -54,6 +54,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
         settings: Its settings, the same in every arm.
         steps: Target steps of each run of scratch and fine-tune.
         source_steps: Training steps of each source policy.
+        own_steps: Training steps of methods that train a policy of their own in the source, such as
+            identified, beside a given source policy; 0 for `source_steps`.
         seeds: Number of runs of each arm.
         arms: The arms, by the names of their methods; scratch is always one, because the others are
             compared with it.
@@ -80,6 +82,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     settings: Settings
     steps: int
     source_steps: int
+    own_steps: int = 0
     seeds: int
     arms: tuple[str, ...] = ARMS
     seed: int = 0
@@ -134,13 +137,20 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
             return self.source_steps
         return self.steps if kind not in NO_SKILL and load_method(kind).learns_on_target else 0
 
+    def source_steps_of(self, kind: str) -> int:
+        """Source steps of the policy that an arm begins with, or trains itself."""
+        own = self.own_steps and not load_method(kind).uses_source_policy
+        return self.own_steps if own else self.source_steps
+
     def trains(self, kind: str) -> bool:
         """Return whether a kind of run trains a policy."""
         return kind == SOURCE or (kind not in NO_SKILL and load_method(kind).trains)
 
     def steps_of(self, kind: str) -> int:
         """Env steps that a kind of run trains for, on any body."""
-        return (self.last_step_of(kind) or self.source_steps) if self.trains(kind) else 0
+        if not self.trains(kind):
+            return 0
+        return self.last_step_of(kind) or self.source_steps_of(kind)
 
     def extends(self, other: Plan) -> bool:
         """Return whether this is the other study with more seeds or arms, or both.

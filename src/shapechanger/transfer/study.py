@@ -174,7 +174,8 @@ def make_plan(
         settings: Its settings.
         seeds: Number of runs of each arm, at least 2.
         steps: Target steps of a run; None for the learner's default.
-        source_steps: Source steps of a source policy; None for the learner's default.
+        source_steps: Source steps of a source policy; None for the learner's default. Beside a
+            given one, those of arms that train a policy of their own.
         source_policy: File of a given source policy; None to train one for each seed.
         arms: The arms to compare, by the names of their methods.
         seed: The seed from which the seeds of all runs are drawn.
@@ -205,6 +206,7 @@ def make_plan(
     wanted = settings.steps if steps is None else steps
     require_budget(wanted, settings, "target")
     budget = settings.whole_updates(wanted)
+    own_steps = 0 if source_steps is None or source_policy is None else source_steps
     option = "source_steps" if source_steps is None else ""
     if source_steps is None:
         source_steps = settings.source_steps or settings.whole_updates(budget // 2)
@@ -217,6 +219,15 @@ def make_plan(
                 f"The given policy was trained in {origin.env}, and the source is {task.source}: "
                 "name the env and the body that it was trained in."
             )
+        if own_steps:
+            require_budget(own_steps, settings, "source")
+            methods = [load_method(arm) for arm in arms]
+            if all(one.uses_source_policy or not one.uses_source for one in methods):
+                raise StudyError(
+                    "Source steps have no effect beside a given source policy: no arm trains a "
+                    "policy of its own there, as randomised and identified do."
+                )
+            own_steps = settings.whole_updates(own_steps)
         source_budget, digest = origin.steps, _digest(source_policy)
     else:
         require_budget(source_steps, settings, "source", option)
@@ -240,6 +251,7 @@ def make_plan(
         settings=settings,
         steps=budget,
         source_steps=source_budget,
+        own_steps=own_steps,
         seeds=seeds,
         arms=tuple(arms),
         seed=seed,
@@ -472,7 +484,7 @@ def _summaries(study: Study) -> dict[str, Summary]:
             scratch,
             curves[arm],
             reference,
-            source_steps=plan.source_steps if load_method(arm).uses_source else 0,
+            source_steps=plan.source_steps_of(arm) if load_method(arm).uses_source else 0,
             rng=np.random.default_rng(plan.seed),
             last_k=last_k,
         )

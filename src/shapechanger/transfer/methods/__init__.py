@@ -93,7 +93,7 @@ class MethodRun:
         self.learner = learner
         self.settings = plan.settings
         self.steps = plan.steps
-        self.source_steps = plan.source_steps
+        self.source_steps = plan.source_steps_of(run.kind)
         self.seed = plan.seed_of(run)
         self.folder = run.folder(study)
         self.report = report
