@@ -24,8 +24,8 @@ mjw: Any = mujoco_warp
 """The module `mujoco_warp`."""
 
 if wp.config.log_level == wp.LOG_INFO:
-    # By default Warp prints a banner, a line for each kernel that it compiles, and a warning where
-    # there is no CUDA driver.
+    # By default Warp prints a banner and a line for each kernel that it compiles. The warning where
+    # there is no CUDA driver comes from its compiled library, whatever the level.
     wp.config.log_level = wp.LOG_ERROR
 
 
