@@ -457,7 +457,7 @@ def _compiled(
 
 
 def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
-    """Replace the search of what the wheels meet, a third of a step, by pairs with the ground."""
+    """Pair wheels with the ground, since searching for all they meet takes a third of a step."""
     ground = spec.geom("world/ground")
     for geom in spec.geoms:
         if geom.contype & ground.conaffinity and geom.name.startswith("vehicle/"):
