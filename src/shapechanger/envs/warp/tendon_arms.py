@@ -1,7 +1,7 @@
 """Tendons over joints whose moment arms differ between worlds.
 
-mujoco-warp 4.0 keeps the moment arms of fixed tendons, `wrap_prm`, once for all worlds. Its kernel
-is replaced by one that finds the arms of each world behind one another, or those of all.
+mujoco-warp 4.0 keeps the moment arms of fixed tendons, `wrap_prm`, once for all worlds. What it
+computes from them is written again, with the arms of each world.
 """
 
 # Warp reads the annotations, so they must not become strings.
@@ -11,42 +11,62 @@ from typing import Any
 
 from shapechanger.envs.warp.devices import mjw, wp
 
+_theirs: Any = mjw._src.smooth.tendon
+
 
 @wp.kernel
-def _joint_tendon(
-    jnt_qposadr: wp.array[int],
-    jnt_dofadr: wp.array[int],
-    ten_J_rownnz: wp.array[int],
-    ten_J_rowadr: wp.array[int],
-    ten_J_colind: wp.array[int],
-    wrap_objid: wp.array[int],
-    wrap_prm: wp.array[float],
-    tendon_jnt_adr: wp.array[int],
-    wrap_jnt_adr: wp.array[int],
-    qpos_in: wp.array2d[float],
-    ten_J_out: wp.array2d[float],
-    ten_length_out: wp.array2d[float],
+def _write_tendon(
+    first: wp.array[int],
+    count: wp.array[int],
+    joints: wp.array[int],
+    arms: wp.array[float],
+    angle_of: wp.array[int],
+    dof_of: wp.array[int],
+    row_of: wp.array[int],
+    entries: wp.array[int],
+    columns: wp.array[int],
+    angles: wp.array2d[float],
+    jacobian: wp.array2d[float],
+    lengths: wp.array2d[float],
 ):
-    """Add a joint's part to the length of a tendon, and write its part of the moment arms."""
-    worldid, wrapid = wp.tid()
-    tenid = tendon_jnt_adr[wrapid]
-    wrapjntid = wrap_jnt_adr[wrapid]
-    joint = wrap_objid[wrapjntid]
-    arm = wrap_prm[(worldid * wrap_objid.shape[0]) % wrap_prm.shape[0] + wrapjntid]
-    wp.atomic_add(ten_length_out[worldid], tenid, arm * qpos_in[worldid, jnt_qposadr[joint]])
-    dofadr = jnt_dofadr[joint]
-    rowadr = ten_J_rowadr[tenid]
-    for k in range(ten_J_rownnz[tenid]):
-        if ten_J_colind[rowadr + k] == dofadr:
-            ten_J_out[worldid, rowadr + k] = arm
-            break
+    """Write the length of a tendon in a world, the sum of arms by angles, and its derivative."""
+    world, tendon = wp.tid()
+    own = world * joints.shape[0]  # Its world's arms are behind those of the worlds before.
+    length = 0.0
+    for i in range(first[tendon], first[tendon] + count[tendon]):
+        length += arms[own + i] * angles[world, angle_of[joints[i]]]
+    lengths[world, tendon] = length
+    for entry in range(row_of[tendon], row_of[tendon] + entries[tendon]):
+        derivative = 0.0
+        for i in range(first[tendon], first[tendon] + count[tendon]):
+            if dof_of[joints[i]] == columns[entry]:
+                derivative += arms[own + i]
+        jacobian[world, entry] = derivative
 
 
 def follow_arms() -> None:
-    """Let mujoco-warp read the moment arms of each world."""
-    mjw._src.smooth._joint_tendon = _kernel
+    """Let mujoco-warp compute tendons with the moment arms of each world."""
+    mjw._src.smooth.tendon = _tendon
 
 
-def _kernel(deterministic: bool = False) -> Any:
-    """Return the kernel, in the place of one that adds in the same order each time."""
-    return _joint_tendon
+def _tendon(model: Any, data: Any) -> None:
+    """Compute the tendons, and again where each world has arms of its own."""
+    _theirs(model, data)
+    if model.wrap_prm.size == data.nworld * model.wrap_objid.size and data.nworld > 1:
+        wp.launch(
+            _write_tendon,
+            dim=(data.nworld, model.ntendon),
+            inputs=[
+                model.tendon_adr,
+                model.tendon_num,
+                model.wrap_objid,
+                model.wrap_prm,
+                model.jnt_qposadr,
+                model.jnt_dofadr,
+                model.ten_J_rowadr,
+                model.ten_J_rownnz,
+                model.ten_J_colind,
+                data.qpos,
+            ],
+            outputs=[data.ten_J, data.ten_length],
+        )
