@@ -32,12 +32,12 @@ def _write_tendon(
     """Write the length of a tendon in a world, the sum of arms by angles, and its derivative."""
     world, tendon = wp.tid()
     own = world * joints.shape[0]  # Its world's arms are behind those of the worlds before.
-    length = 0.0
+    length = float(0.0)  # noqa: UP018  # Warp tells variables from constants by this.
     for i in range(first[tendon], first[tendon] + count[tendon]):
         length += arms[own + i] * angles[world, angle_of[joints[i]]]
     lengths[world, tendon] = length
     for entry in range(row_of[tendon], row_of[tendon] + entries[tendon]):
-        derivative = 0.0
+        derivative = float(0.0)  # noqa: UP018
         for i in range(first[tendon], first[tendon] + count[tendon]):
             if dof_of[joints[i]] == columns[entry]:
                 derivative += arms[own + i]
