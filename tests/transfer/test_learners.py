@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +119,24 @@ def test_a_file_alone_calls_no_function(tmp_path: Path) -> None:
     save_policy(policy, path)
     with pytest.raises(CorruptStudy, match="a function, which a file may not call"):
         load_policy(path)
+
+
+def test_a_file_alone_imports_no_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file may not name a module that nobody has imported, unless the caller names it too."""
+    (tmp_path / "own_a2c.py").write_text(
+        "from stable_baselines3 import A2C\nclass Own(A2C): pass\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    policy, _, settings = trained("stable_baselines3:A2C")
+    own = msgspec.structs.replace(settings, algorithm="own_a2c:Own")
+    card = msgspec.structs.replace(policy.card, settings=own)
+    path = tmp_path / "policy.safetensors"
+    save_policy(replace(policy, card=card), path)
+    with pytest.raises(CorruptStudy, match="import own_a2c first, since a file may not"):
+        load_policy(path)
+    assert "own_a2c" not in sys.modules
+    assert type(load_policy(path, "own_a2c:Own").model).__name__ == "Own"
+    monkeypatch.delitem(sys.modules, "own_a2c")
 
 
 @pytest.mark.parametrize("learner", LEARNERS[:3])

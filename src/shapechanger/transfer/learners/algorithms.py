@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from importlib import import_module
 from typing import Any, Final
 
@@ -25,6 +26,8 @@ except ImportError as error:
     raise MissingExtra("stable-baselines3 and sb3-contrib", "learn") from error
 
 _SHIPPED: Final[dict[str, type[BaseAlgorithm]]] = {"PPO": PPO, "SAC": SAC, "TQC": TQC}
+# Packages that a file may name; importing any other could run any code.
+_FILES_MAY_IMPORT: Final = ("stable_baselines3", "sb3_contrib")
 # Arguments that are not settings.
 _GIVEN: Final = ("self", "policy", "env", "envs", "seed", "_init_setup_model")
 
@@ -79,11 +82,18 @@ def _is_class(algorithm: object) -> bool:
 
 
 def require_class(algorithm: str) -> None:
-    """Refuse the name of an algorithm that is not a class of models.
+    """Refuse the name of an algorithm that is not a class of models, before anything is imported.
 
     Raises:
-        ValueError: If it is a function, or cannot be imported.
+        ValueError: If it is a function, cannot be imported, or belongs to a module that is neither
+            of Stable-Baselines3 or sb3-contrib nor already imported.
     """
+    module = algorithm.partition(":")[0]
+    own = algorithm not in _SHIPPED and module not in sys.modules
+    if own and module.partition(".")[0] not in _FILES_MAY_IMPORT:
+        raise ValueError(
+            f"its algorithm is {algorithm}: import {module} first, since a file may not"
+        )
     try:
         known = _is_class(_load(algorithm))
     except UnknownName as error:

@@ -197,13 +197,14 @@ def save_policy(policy: TrainedPolicy, path: Path) -> None:
     write_atomic(path, tensor_bytes(tensors, msgspec.json.encode(policy.card)))
 
 
-def load_policy(path: Path, function: str = "") -> TrainedPolicy:
+def load_policy(path: Path, algorithm: str = "") -> TrainedPolicy:
     """Read what `save_policy` wrote.
 
     Args:
         path: The file.
-        function: The function that may be called to build the model, as `module:function`. A file
-            alone may only name classes of models.
+        algorithm: An algorithm of yours, a class or function as `module:name`, that the file may
+            name. A file alone may only name classes of models, of Stable-Baselines3, sb3-contrib
+            or a module that is already imported.
 
     Raises:
         CorruptStudy: If the file is missing, is not such a policy, or has been changed.
@@ -212,7 +213,7 @@ def load_policy(path: Path, function: str = "") -> TrainedPolicy:
         content, tensors = read_tensors(path)
         card = msgspec.json.decode(content, type=PolicyCard)
         _require_numbers(card, tensors)
-        model = _model(card, tensors, function)
+        model = _model(card, tensors, algorithm)
         return TrainedPolicy(model, _read_statistics(card, tensors), card)
     except FileNotFoundError as error:
         raise CorruptStudy(f"There is no policy file {path}.") from error
@@ -246,10 +247,10 @@ def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
         raise ValueError(f"its card has {settings.n_envs} envs, more than {_MOST_ENVS}")
 
 
-def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], function: str) -> BaseAlgorithm:
+def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str) -> BaseAlgorithm:
     """Build the model that the card describes, with the weights of the file."""
     settings = card.settings
-    if settings.algorithm != function:
+    if settings.algorithm != algorithm:
         require_class(settings.algorithm)
     spaces: list[gym.spaces.Box] = []
     for side, layout in (("observation", card.observation), ("action", card.action)):
