@@ -44,13 +44,12 @@ def test_a_device_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
         shapechanger.make_vec("Ant", 2, backend="warp", device="cpuu")
 
 
-@pytest.mark.parametrize("name", ["Humanoid", "Car"])
-def test_a_task_without_batched_functions(name: str) -> None:
+def test_a_task_without_batched_functions() -> None:
     """The error lists the tasks that have some."""
     with pytest.raises(
-        VectorEnvError, match=r"no batched functions.*Ant, AmputatedAnt.*Swimmer.* FingerTrack"
+        VectorEnvError, match=r"no batched functions.*Ant, AmputatedAnt.*Humanoid.* FingerTrack"
     ):
-        shapechanger.make_vec(name, 2, backend="warp", device="cpu")
+        shapechanger.make_vec("Car", 2, backend="warp", device="cpu")
 
 
 class _HigherReward(AntEnv):

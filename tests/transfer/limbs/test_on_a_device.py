@@ -11,7 +11,7 @@ import pytest
 import torch
 
 import shapechanger
-from shapechanger.errors import StudyError, TransplantError, UnknownName, VectorEnvError
+from shapechanger.errors import StudyError, TransplantError, UnknownName
 from shapechanger.morphology import JointRange
 from shapechanger.morphology.body import to_json
 from shapechanger.transfer.env_ref import EnvRef
@@ -224,8 +224,6 @@ def test_what_it_refuses(policy: TrainedPolicy) -> None:
     cheetah = EnvRef("shapechanger/HalfCheetah-v1")
     with pytest.raises(TransplantError, match=r"of another family than that of .*HalfCheetah-v1"):
         _learner().train(cheetah, 48, 0, start=policy, body_map=_NO_MAP, on_evaluation=print)
-    with pytest.raises(VectorEnvError, match=r"Humanoid-v1 has no batched functions, .* Ant, "):
-        _learner().train(EnvRef("shapechanger/Humanoid-v1"), 48, 0, on_evaluation=print)
     with pytest.raises(UnknownName, match=r"No device matches 'cuda:99'\. .*There are: cpu"):
         _learner(device="cuda:99").train(BOTH, 48, 0, on_evaluation=print)
     with pytest.raises(StudyError, match="or give the rows of each body's limbs"):

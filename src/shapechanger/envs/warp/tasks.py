@@ -27,7 +27,13 @@ from shapechanger.envs.pendulum import (
     InvertedDoublePendulumEnv,
     InvertedPendulumEnv,
 )
-from shapechanger.envs.runners import HalfCheetahEnv, HopperEnv, SwimmerEnv, Walker2dEnv
+from shapechanger.envs.runners import (
+    HalfCheetahEnv,
+    HopperEnv,
+    HumanoidEnv,
+    SwimmerEnv,
+    Walker2dEnv,
+)
 from shapechanger.envs.warp.starts import DeviceStarts, length
 from shapechanger.envs.warp.worlds import Worlds
 from shapechanger.errors import VectorEnvError
@@ -276,6 +282,11 @@ class DeviceRunner(DeviceTask):
         """Return whether each body is healthy, shape (n,)."""
         return torch.ones(worlds.count, dtype=torch.bool, device=worlds.qpos.device)
 
+    def contact_cost(self, worlds: Worlds) -> Tensor | float:
+        """Return the cost of contact forces, shape (n,), or 0 for a task that has none."""
+        del worlds
+        return 0.0
+
     def outcome(
         self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
     ) -> DeviceOutcome:
@@ -288,6 +299,7 @@ class DeviceRunner(DeviceTask):
             _forward_reward_weight=env._forward_reward_weight,
             healthy_reward=healthy * getattr(env, "_healthy_reward", 0.0),
             control_cost=partial(_cost, env._ctrl_cost_weight),
+            contact_cost=self.contact_cost(worlds),
         )
         rewards, terms = _base(env)._get_rew(there, velocity[:, 0], actions)
         infos = self.start_infos(worlds, constants)
@@ -359,6 +371,63 @@ class DeviceHopper(DeviceWalker):
         return super().healthy(worlds, constants) & within
 
 
+# Blocks of numbers that a humanoid observes, each without the world's or the trunk's first rows.
+_BLOCKS: Final = {"cinert": 1, "cvel": 1, "qfrc_actuator": 6, "cfrc_ext": 1}
+
+
+class DeviceHumanoid(DeviceRunner):
+    """Humanoids, which are rewarded for the speed of their mass and healthy within heights."""
+
+    place_size = 2
+    contact_forces = True
+    start_forces = True
+
+    def __init__(self, env: Any) -> None:
+        super().__init__(env)
+        self._blocks = [
+            (name, first)
+            for name, first in _BLOCKS.items()
+            if getattr(env, f"_include_{name}_in_observation") is True
+        ]
+
+    @staticmethod
+    def constants(env: Any) -> dict[str, NDArray[Any]]:
+        """See `DeviceTask`."""
+        return DeviceWalker.constants(env)
+
+    def place(self, worlds: Worlds) -> Tensor:
+        """Return the place of the centre of mass, m, shape (n, 2)."""
+        mass = worlds.row("body_mass")
+        return (mass[..., None] * worlds.xipos[..., :2]).sum(dim=1) / mass.sum(dim=1)[:, None]
+
+    def observations(self, worlds: Worlds) -> Tensor:
+        """See `DeviceTask`."""
+        blocks = [getattr(worlds, name)[:, first:].flatten(1) for name, first in self._blocks]
+        return torch.cat([super().observations(worlds), *blocks], dim=1)
+
+    def healthy(self, worlds: Worlds, constants: Constants) -> Tensor:
+        """Return whether each body is healthy, shape (n,)."""
+        height = worlds.qpos[:, 2]
+        return (constants["low"] < height) & (height < constants["high"])
+
+    def contact_cost(self, worlds: Worlds) -> Tensor:
+        """Return the cost of contact forces within the range of the task, shape (n,)."""
+        env = self._env
+        cost = _cost(env._contact_cost_weight, worlds.cfrc_ext)
+        return cost.clamp(*env._contact_cost_range)
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        place = worlds.qpos[:, :2]
+        return {
+            "x_position": place[:, 0].clone(),
+            "y_position": place[:, 1].clone(),
+            "tendon_length": worlds.ten_length.clone(),
+            "tendon_velocity": worlds.ten_velocity.clone(),
+            "distance_from_origin": length(place),
+        }
+
+
 _TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
     AntEnv: DeviceAnt,
     ExtendedAntEnv: DeviceAnt,
@@ -368,6 +437,7 @@ _TASKS: Final[dict[type[Any], type[DeviceTask]]] = {
     HopperEnv: DeviceHopper,
     Walker2dEnv: DeviceWalker,
     SwimmerEnv: DeviceSwimmer,
+    HumanoidEnv: DeviceHumanoid,
 }
 
 

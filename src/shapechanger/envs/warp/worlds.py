@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any, Final, cast
 
@@ -65,6 +66,13 @@ class Worlds:
         time: s, shape (n,).
         qacc: Shape (n, nv).
         xpos: Places of the bodies, m, shape (n, nbody, 3).
+        xipos: Places of their centres of mass, m, shape (n, nbody, 3).
+        cinert: Inertias of the bodies about the centre of mass of all, and masses, shape
+            (n, nbody, 10).
+        cvel: Velocities of the bodies, rad/s and m/s, shape (n, nbody, 6).
+        qfrc_actuator: Forces of the actuators at the joints, shape (n, nv).
+        ten_length: Lengths of the tendons, shape (n, ntendon).
+        ten_velocity: Rates of change of these, shape (n, ntendon).
         site_xpos: Places of the sites, m, shape (n, nsite, 3).
         geom_xpos: Places of the geoms, m, shape (n, ngeom, 3).
         geom_xmat: Orientations of the geoms, shape (n, ngeom, 3, 3).
@@ -89,6 +97,10 @@ class Worlds:
         self._static = torch.as_tensor(static_geoms(model), device=device)
         follow_capsules()
         follow_arms()
+        if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
+            # mujoco-warp has no PGS. Newton's method solves the same problem, to its end.
+            model = copy.copy(model)
+            model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         with on(device):
             self._model = mjw.put_model(model)
             self._model.opt.warn_overflow = 0  # There is room for all contacts.
@@ -104,6 +116,12 @@ class Worlds:
         self.time = self._view(data.time)
         self.qacc = self._view(data.qacc)
         self.xpos = self._view(data.xpos)
+        self.xipos = self._view(data.xipos)
+        self.cinert = self._view(data.cinert)
+        self.cvel = self._view(data.cvel)
+        self.qfrc_actuator = self._view(data.qfrc_actuator)
+        self.ten_length = self._view(data.ten_length)
+        self.ten_velocity = self._view(data.ten_velocity)
         self.site_xpos = self._view(data.site_xpos)
         self.geom_xpos = self._view(data.geom_xpos)
         self.geom_xmat = self._view(data.geom_xmat)
