@@ -82,32 +82,13 @@ def gap() -> list[Row]:
         _run(plan, out)
     runs = _ended(plan, out)
     rows = [
-        *rows_of(runs, _WHERE, {"identified": _RECOVERED_IN_GAP, "fine-tune": _TUNED}),
+        *rows_of(runs, _WHERE, {"identified": _RECOVERED_IN_GAP, "fine-tune": _TUNED}, SIMULATED),
         *_half_way(runs, _WHERE),
+        *_chatter_rows(runs, _WHERE),
     ]
-    chatter = {arm: np.mean([_chatter(run) for run in ended]) for arm, ended in runs.items()}
-    rows.append(
-        Row(
-            f"{_WHERE}: mean change of a command per step, over its range",
-            f"{[*chatter.values()][-1]:.1%}",
-            ", ".join(f"{arm} {change:.1%}" for arm, change in chatter.items()),
-            "none",
-            True,
-        )
-    )
     if _IDENTIFIED in runs:
         rows += _ceiling(plan, runs[_IDENTIFIED], out)
-    shipped, late = load_policy(POLICIES["reach"]), _FINGER.having(_LATE)
-    delay_only = [info["is_success"] for info in played(shipped, late, TARGETS)]
-    rows.append(
-        Row(
-            "nominal finger with a delay of 10 ms: targets reached by the shipped policy",
-            f"{np.mean(delay_only):.0%}",
-            f"{TARGETS} targets",
-            "none",
-            True,
-        )
-    )
+    rows.append(_shipped_row("nominal finger with a delay of 10 ms", _FINGER.having(_LATE)))
     if _RIG_ONLY in wanted:
         rows.append(_rig_only_row(target, plan.seeds, _WHERE))
     return rows
@@ -134,6 +115,18 @@ def _rig_only_row(target: EnvRef, fingers: int, where: str) -> Row:
     ]
     name = f"{where}, policy that knows the rig's motors and delay only"
     return _row(name, dict(enumerate(np.mean(ends, axis=1))))
+
+
+def _shipped_row(where: str, env: EnvRef) -> Row:
+    """Return the success of the shipped policy in an env."""
+    reached = [info["is_success"] for info in played(load_policy(POLICIES["reach"]), env, TARGETS)]
+    return Row(
+        f"{where}: targets reached by the shipped policy",
+        f"{np.mean(reached):.0%}",
+        f"{TARGETS} targets",
+        "none",
+        True,
+    )
 
 
 def _ceiling(plan: Plan, identified: list[RunResult], out: Path) -> list[Row]:
@@ -200,9 +193,21 @@ def _share_row(name: str, runs: list[RunResult], steps: int | None = None) -> Ro
     return _row(name, {seed: end.success or 0.0 for seed, end in ends.items()})
 
 
-def _chatter(run: RunResult) -> float:
-    """Return the mean change of a command per step, over its range, at the end of a run."""
-    return 1.0 - run.curve[-1].measures[SMOOTHNESS.name]
+def _chatter_rows(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
+    """Return how much the policies of each arm change their commands, at the end of its runs."""
+    rows: list[Row] = []
+    for arm, ended in runs.items():
+        changes = np.array([1.0 - run.curve[-1].measures[SMOOTHNESS.name] for run in ended])
+        rows.append(
+            Row(
+                f"{where}, {arm}: mean change of a command per step, over its range",
+                f"{changes.mean():.1%}",
+                f"{changes.min():.1%} to {changes.max():.1%} over {len(changes)} fingers",
+                "none",
+                True,
+            )
+        )
+    return rows
 
 
 def rig() -> list[Row]:
@@ -214,9 +219,13 @@ def rig() -> list[Row]:
         _run(plan, out)
     runs = _ended(plan, out)
     where = "twins of a rig, real-like"
+    nominal = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "nominal"})
     return [
-        *rows_of(runs, where, {"identified": _RECOVERED, "fine-tune": _TUNED}),
+        *rows_of(runs, where, {"identified": _RECOVERED, "fine-tune": _TUNED}, SIMULATED),
         *_half_way(runs, where),
+        *_chatter_rows(runs, where),
+        _shipped_row("twin of a rig with the nominal finger", nominal),
+        _rig_only_row(target, plan.seeds, where),
     ]
 
 
@@ -315,7 +324,7 @@ def _ended(plan: Plan, out: Path) -> dict[str, list[RunResult]]:
 
 
 def rows_of(
-    runs: Mapping[str, list[RunResult]], where: str, least: Mapping[str, float]
+    runs: Mapping[str, list[RunResult]], where: str, least: Mapping[str, float], simulated: int
 ) -> list[Row]:
     """Return the success of each arm at its end next to its target; the nominal finger reaches all.
 
@@ -323,10 +332,13 @@ def rows_of(
         runs: The runs by arm.
         where: Its targets, in words.
         least: Least mean success of an arm, where one is asked.
+        simulated: Steps of arms that learn in simulated fingers.
     """
     rows: list[Row] = []
     for arm, ended in runs.items():
         row = _share_row(f"{where}, {arm}: targets reached within 5 mm", ended)
+        if arm in ("randomised", "identified"):
+            row = replace(row, spread=f"{row.spread}; after {simulated:,} simulated steps")
         share = float(np.mean([run.curve[-1].success or 0.0 for run in ended]))
         if arm in least:
             row = replace(row, target=f">= {least[arm]:.0%}", met=share >= least[arm])
