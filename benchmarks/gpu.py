@@ -1,6 +1,6 @@
-"""Speed of ants on a GPU, and what differing bodies cost in one batch.
+"""Speed of ants on a GPU, the time of a training there, and what differing bodies cost in a batch.
 
-Rounds of the second are paired: each steps both sides one after the other, in alternating order,
+Rounds of the last are paired: each steps both sides one after the other, in alternating order,
 from the same states, and gives one ratio.
 """
 
@@ -8,18 +8,29 @@ from __future__ import annotations
 
 import statistics
 import time
-from typing import Any, Final
+from typing import Any, Final, cast
 
+import msgspec
 import torch
 
 import shapechanger
 from benchmarks.row import Row
 from shapechanger.morphology import Stretch
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners import ignore
+from shapechanger.transfer.learners.evaluation import Evaluation
+from shapechanger.transfer.learners.presets import learner_settings
+from shapechanger.transfer.learners.rsl import RslLearner
+from shapechanger.transfer.learners.settings import RslPpoSettings
 
 # Of the speed, on a GPU.
 MANY: Final = 8192
 STEPS: Final = 100
 SPEED: Final = 300_000
+# Of the training.
+TRAINING: Final = 1_048_576
+LONGEST_S: Final = 60
+ON_A_GPU: Final = {"n_envs": 4096, "n_steps": 24, "batch_size": 24_576}
 # Of the ratio: worlds on a GPU and on the CPU, and rounds of steps.
 WORLDS: Final = {"cuda": 8192, "cpu": 64}
 ROUNDS: Final = 15
@@ -64,6 +75,32 @@ def steps_per_second() -> Row:
     return Row(name, f"{value:,.0f}", spread, target, value >= SPEED)
 
 
+def training_time() -> Row:
+    """Measure a training with PPO, its compiled kernels given, and what it has learned."""
+    name = f"Ant: seconds of PPO with rsl-rl for {TRAINING:,} steps on a GPU"
+    target = f"< {LONGEST_S}"
+    if not torch.cuda.is_available():
+        return Row(name, "not measured", "there is no GPU here", target, False)
+    settings = cast("RslPpoSettings", learner_settings("rsl-ppo"))
+    settings = msgspec.structs.replace(settings, **ON_A_GPU, eval_every=TRAINING)
+    short = msgspec.structs.replace(settings, eval_every=settings.update_steps)
+    ant = EnvRef("shapechanger/Ant-v1")
+    RslLearner("rsl-ppo", short).train(ant, settings.update_steps, 0, on_evaluation=ignore)
+    learner = RslLearner("rsl-ppo", settings)
+    found: list[Evaluation] = []
+    times: list[float] = []
+
+    def on_evaluation(evaluation: Evaluation) -> None:
+        found.append(evaluation)
+        times.append(time.perf_counter())
+
+    learner.train(ant, TRAINING, 0, on_evaluation=on_evaluation)
+    seconds = times[-1] - times[0]  # With the evaluation at the end, some seconds of a CPU env.
+    speeds = [one.value("forward speed") for one in found]
+    spread = f"forward speed {speeds[0]:.2f} to {speeds[-1]:.2f} m/s, seed 0, {_card()}"
+    return Row(name, f"{seconds:.0f}", spread, target, seconds < LONGEST_S)
+
+
 def cost_of_differing_bodies() -> Row:
     """Compare a batch in which every ant has its own legs with one of equal ants."""
     on = "cuda" if torch.cuda.is_available() else "cpu"
@@ -101,5 +138,5 @@ def _card() -> str:
 
 
 def gpu() -> list[Row]:
-    """Measure both."""
-    return [steps_per_second(), cost_of_differing_bodies()]
+    """Measure all three."""
+    return [steps_per_second(), training_time(), cost_of_differing_bodies()]
