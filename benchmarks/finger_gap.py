@@ -41,6 +41,8 @@ STEPS: Final = 61_440
 # Steps of the arms that learn in simulated fingers: with half of them identified reaches 85 %.
 SIMULATED: Final = 614_400
 RIGS: Final = 5
+# On a rig half of them are enough.
+RIG_SIMULATED: Final = 307_200
 # Two minutes on a bench, where only arms are compared that do not learn there.
 FOLLOW_STEPS: Final = 6144
 _FINGER: Final = EnvRef("shapechanger/Finger-v1")
@@ -214,14 +216,14 @@ def rig() -> list[Row]:
     """Measure the same through link, daemon, guard and servo bus; see `gap` for `ENDED`."""
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
     out = Path("results", "finger-rig")
-    plan = _plan(target, "ppo-finger", _GAP_ARMS, RIGS, STEPS, source_steps=SIMULATED)
+    plan = _plan(target, "ppo-finger", _GAP_ARMS, RIGS, STEPS, source_steps=RIG_SIMULATED)
     if "ENDED" not in os.environ:
         _run(plan, out)
     runs = _ended(plan, out)
     where = "twins of a rig, real-like"
     nominal = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "nominal"})
     return [
-        *rows_of(runs, where, {"identified": _RECOVERED, "fine-tune": _TUNED}, SIMULATED),
+        *rows_of(runs, where, {"identified": _RECOVERED, "fine-tune": _TUNED}, RIG_SIMULATED),
         *_half_way(runs, where),
         *_chatter_rows(runs, where),
         _shipped_row("twin of a rig with the nominal finger", nominal),

@@ -74,11 +74,12 @@ def test_numbers_follow_the_edits() -> None:
         _ant(()),
         _ant((Stretch("shank_1", 2.0), Gear("hip_2", 10.0), Mass("torso", 10.0))),
     )
-    ends = [
-        np.linalg.norm([_number(tree, "ankle_1", f"end {axis}") for axis in "xyz"])
+    one, other = (
+        [_number(tree, "ankle_1", name) for name in ("end x", "end y", "end z", "length")]
         for tree in (plain, changed)
-    ]
-    assert ends[1] == pytest.approx(2.0 * ends[0])
+    )
+    assert other == pytest.approx([*one[:3], 2.0 * one[3]])
+    assert np.linalg.norm(one[:3]) == pytest.approx(1.0)
     stronger = _number(changed, "hip_2", "strength") - _number(plain, "hip_2", "strength")
     assert stronger == pytest.approx(0.5, abs=0.01)
     assert _number(changed, "hip_4", "strength") == _number(plain, "hip_4", "strength")
@@ -112,7 +113,8 @@ def test_a_body_on_the_world() -> None:
     assert _number(tree, "along", "mass") == -3.0  # Of nothing.
     assert _number(tree, "around", "mass with limbs") == pytest.approx(math.log10(3.0), abs=1e-3)
     # The capsule's end is farther from the joint than the spheres.
-    assert _number(tree, "around", "end x") == pytest.approx(0.5)
+    reach = _number(tree, "around", "end x") * _number(tree, "around", "length")
+    assert reach == pytest.approx(0.5)
 
 
 def test_without_a_floor() -> None:

@@ -22,15 +22,19 @@ _LONG: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CY
 _MOVES_ONE_WAY: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
 LIMB_NUMBERS: Final = (
-    *("joint x", "joint y", "joint z"),  # From the trunk's origin, m.
+    *("joint x", "joint y", "joint z", "distance"),  # From the trunk's origin: direction, and m.
     *("axis x", "axis y", "axis z"),
-    *("end x", "end y", "end z"),  # From the joint to the farthest end of the limb, m.
+    *("end x", "end y", "end z", "length"),  # From the joint to the limb's farthest end: likewise.
     *("mass", "mass with limbs"),  # Decades above 1 kg.
     *("start", "lower", "upper"),  # Of the joint, rad or m; 0 for limits that it has not.
     *("strength", "damping", "armature"),  # Decades, so that each is about 1.
     *("limited", "slides", "depth"),
 )
-"""Meaning of the numbers of a limb; vectors are in the trunk's frame, in the start pose."""
+"""Meaning of the numbers of a limb; vectors are in the trunk's frame, in the start pose.
+
+Directions are apart from lengths, so that a leg in front on the left is the same for a policy
+whatever its size.
+"""
 
 TRUNK_NUMBERS: Final = ("mass", "mass with limbs", "start height", "radius", "friction", "gravity")
 """Meaning of the numbers of a trunk: decades above 1 kg, m, m, and ratios to 1 and 9.81 m/s²."""
@@ -140,9 +144,10 @@ def _limb_numbers(
     depth = sum(
         1 for above in _ancestors(model, body) if model.body_jntnum[above] and above != trunk
     )
-    vectors = [into_trunk @ each for each in (anchor - data.xpos[trunk], data.xaxis[joint], end)]
     numbers = (
-        *np.concatenate(vectors),
+        *_direction_and_length(into_trunk @ (anchor - data.xpos[trunk])),
+        *(into_trunk @ data.xaxis[joint]),
+        *_direction_and_length(into_trunk @ end),
         *(_decades(float(model.body_mass[bodies].sum())), _decades(model.body_subtreemass[body])),
         *(data.qpos[model.jnt_qposadr[joint]], lower, upper),
         math.log10(1.0 + strength) / 2.0,
@@ -180,6 +185,12 @@ def _farthest(
             if reach > length:
                 way, length = to_end, reach
     return way, length
+
+
+def _direction_and_length(vector: _Array) -> tuple[float, ...]:
+    """Return a unit vector and the length, m; zeros for no length."""
+    length = float(np.linalg.norm(vector))
+    return (*(vector / max(length, 1e-9)), length)
 
 
 def _decades(mass_kg: float) -> float:

@@ -20,7 +20,7 @@ from shapechanger.transfer.env_ref import HasTree, layouts_of
 
 _Floats = NDArray[np.float64]
 
-NUMBERS: Final = 20
+NUMBERS: Final = 22
 """Columns of a row for the numbers that describe a trunk or a limb."""
 
 DESCRIBED: Final = 2 + NUMBERS
