@@ -132,7 +132,7 @@ def test_a_file_alone_imports_no_module(tmp_path: Path, monkeypatch: pytest.Monk
     card = msgspec.structs.replace(policy.card, settings=own)
     path = tmp_path / "policy.safetensors"
     save_policy(replace(policy, card=card), path)
-    with pytest.raises(CorruptStudy, match="import own_a2c first, since a file may not"):
+    with pytest.raises(CorruptStudy, match=r"^A policy of own_a2c:Own needs the module own_a2c"):
         load_policy(path)
     assert "own_a2c" not in sys.modules
     assert type(load_policy(path, "own_a2c:Own").model).__name__ == "Own"

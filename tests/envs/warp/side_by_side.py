@@ -49,7 +49,8 @@ def many(name: str, **arguments: Any) -> tuple[WarpVectorEnv, list[Any]]:
         gym.make(f"shapechanger/{name}-v1", body=body, **arguments).unwrapped for body in turns
     ]
     for env in alone:
-        env.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # A device has no PGS.
+        if env.model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
+            env.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # As a device, which has no PGS.
     return worlds, alone
 
 

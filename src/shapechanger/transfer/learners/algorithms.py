@@ -10,7 +10,7 @@ from typing import Any, Final
 import gymnasium as gym
 import msgspec
 
-from shapechanger.errors import MissingExtra, StudyError, UnknownName
+from shapechanger.errors import CorruptStudy, MissingExtra, StudyError, UnknownName
 from shapechanger.transfer.learners.settings import (
     ImportedSettings,
     LimbSettings,
@@ -85,14 +85,16 @@ def require_class(algorithm: str) -> None:
     """Refuse the name of an algorithm that is not a class of models, before anything is imported.
 
     Raises:
-        ValueError: If it is a function, cannot be imported, or belongs to a module that is neither
-            of Stable-Baselines3 or sb3-contrib nor already imported.
+        ValueError: If it is a function, or cannot be imported.
+        CorruptStudy: If it belongs to a module that is neither of Stable-Baselines3 or sb3-contrib
+            nor already imported.
     """
     module = algorithm.partition(":")[0]
     own = algorithm not in _SHIPPED and module not in sys.modules
     if own and module.partition(".")[0] not in _FILES_MAY_IMPORT:
-        raise ValueError(
-            f"its algorithm is {algorithm}: import {module} first, since a file may not"
+        raise CorruptStudy(
+            f"A policy of {algorithm} needs the module {module}, which a file may not import: "
+            f"import it first, or name it too, as load_policy(path, {algorithm!r})."
         )
     try:
         known = _is_class(_load(algorithm))

@@ -217,6 +217,8 @@ def load_policy(path: Path, algorithm: str = "") -> TrainedPolicy:
         return TrainedPolicy(model, _read_statistics(card, tensors), card)
     except FileNotFoundError as error:
         raise CorruptStudy(f"There is no policy file {path}.") from error
+    except CorruptStudy:  # Which is a ValueError, too.
+        raise
     except (*UNREADABLE, *_UNBUILDABLE) as error:
         reason = str(error).partition("\n")[0].rstrip(".:") or "it needs more memory than there is"
         if isinstance(error, KeyError):
