@@ -72,17 +72,12 @@ def gap() -> list[Row]:
 
     The shipped policy in the nominal finger with a delay shows what a delay alone costs, and a
     policy of the nominal finger on the rig's motors what the other moment arms and joints cost.
-    With `ENDED=1` no run is started, and the rows are those of the runs that have ended.
+    `ONLY` names arms, or "rig" for that policy. With `ENDED=1` no run is started, and the rows are
+    those of the runs that have ended.
     """
     target = _FINGER.having({"gap": "real-like"})
     out = Path("results", "finger-gap")
-    wanted = asked("arm or row", (*_GAP_ARMS, _RIG_ONLY))
-    # A study always compares with scratch.
-    arms = tuple(arm for arm in _GAP_ARMS if arm in (*wanted, _SCRATCH))
-    plan = _plan(target, "ppo-finger", arms, FINGERS, STEPS, source_steps=SIMULATED)
-    if "ENDED" not in os.environ:
-        _run(plan, out)
-    runs = _ended(plan, out)
+    plan, runs = _arms(target, out, FINGERS, SIMULATED)
     rows = [
         *rows_of(runs, _WHERE, {"identified": _RECOVERED_IN_GAP, "fine-tune": _TUNED}, SIMULATED),
         *_half_way(runs, _WHERE),
@@ -91,9 +86,27 @@ def gap() -> list[Row]:
     if _IDENTIFIED in runs:
         rows += _ceiling(plan, runs[_IDENTIFIED], out)
     rows.append(_shipped_row("nominal finger with a delay of 10 ms", _FINGER.having(_LATE)))
-    if _RIG_ONLY in wanted:
-        rows.append(_rig_only_row(target, plan.seeds, _WHERE))
-    return rows
+    return [*rows, *_rig_only_rows(target, plan.seeds, _WHERE)]
+
+
+def _arms(
+    target: EnvRef, out: Path, fingers: int, simulated: int
+) -> tuple[Plan, dict[str, list[RunResult]]]:
+    """Run the arms that are asked for, and return the plan and the runs that have ended, by arm.
+
+    Args:
+        target: Env of the target fingers.
+        out: Folder of the study.
+        fingers: Number of seeds, each of which has another finger.
+        simulated: Steps of arms that learn in simulated fingers.
+    """
+    wanted = asked("arm or row", (*_GAP_ARMS, _RIG_ONLY))
+    # A study always compares with scratch.
+    arms = tuple(arm for arm in _GAP_ARMS if arm in (*wanted, _SCRATCH))
+    plan = _plan(target, "ppo-finger", arms, fingers, STEPS, source_steps=simulated)
+    if "ENDED" not in os.environ:
+        _run(plan, out)
+    return plan, _ended(plan, out)
 
 
 def _half_way(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
@@ -105,8 +118,10 @@ def _half_way(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
     ]
 
 
-def _rig_only_row(target: EnvRef, fingers: int, where: str) -> Row:
+def _rig_only_rows(target: EnvRef, fingers: int, where: str) -> list[Row]:
     """Return the success of a policy that knows the rig's motors and delay, but no finger."""
+    if _RIG_ONLY not in asked("arm or row", (*_GAP_ARMS, _RIG_ONLY)):
+        return []
     policy = load_policy(trained(_RIG_ONLY, 0))
     ends = [
         [
@@ -116,7 +131,7 @@ def _rig_only_row(target: EnvRef, fingers: int, where: str) -> Row:
         for seed in range(fingers)
     ]
     name = f"{where}, policy that knows the rig's motors and delay only"
-    return _row(name, dict(enumerate(np.mean(ends, axis=1))))
+    return [_row(name, dict(enumerate(np.mean(ends, axis=1))))]
 
 
 def _shipped_row(where: str, env: EnvRef) -> Row:
@@ -213,13 +228,10 @@ def _chatter_rows(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
 
 
 def rig() -> list[Row]:
-    """Measure the same through link, daemon, guard and servo bus; see `gap` for `ENDED`."""
+    """Measure the same through link, daemon, guard and servo bus; see `gap` for the variables."""
     target = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "real-like"})
     out = Path("results", "finger-rig")
-    plan = _plan(target, "ppo-finger", _GAP_ARMS, RIGS, STEPS, source_steps=RIG_SIMULATED)
-    if "ENDED" not in os.environ:
-        _run(plan, out)
-    runs = _ended(plan, out)
+    plan, runs = _arms(target, out, RIGS, RIG_SIMULATED)
     where = "twins of a rig, real-like"
     nominal = EnvRef("shapechanger/RemoteFinger-v1", {"twin": "nominal"})
     return [
@@ -227,7 +239,7 @@ def rig() -> list[Row]:
         *_half_way(runs, where),
         *_chatter_rows(runs, where),
         _shipped_row("twin of a rig with the nominal finger", nominal),
-        _rig_only_row(target, plan.seeds, where),
+        *_rig_only_rows(target, plan.seeds, where),
     ]
 
 

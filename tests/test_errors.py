@@ -5,11 +5,12 @@ from __future__ import annotations
 import builtins
 import pickle
 import re
+from pathlib import Path
 
 import pytest
 
 import shapechanger.errors as errors
-from shapechanger.errors import MissingExtra, ShapechangerError, UnknownName
+from shapechanger.errors import MissingExtra, ShapechangerError, UnknownName, no_policy_file
 
 _CLASSES = [
     name
@@ -90,3 +91,15 @@ def test_errors_can_be_pickled(error: ShapechangerError) -> None:
     """A pickled error keeps its message and its fields."""
     copy = pickle.loads(pickle.dumps(error))
     assert (type(copy), str(copy), vars(copy)) == (type(error), str(error), vars(error))
+
+
+def test_a_missing_policy_file_names_the_nearest(tmp_path: Path) -> None:
+    """The nearest file of the same kind is named, or a word that could stand in its place."""
+    for name in ("ant.safetensors", "ant.onnx", "cheetah.safetensors"):
+        (tmp_path / name).touch()
+    near = no_policy_file(tmp_path / "aant.safetensors")
+    assert near.endswith(f"; did you mean {tmp_path / 'ant.safetensors'}?")
+    assert no_policy_file(Path("referense"), ["reference"]) == (
+        "There is no policy file referense; did you mean reference?"
+    )
+    assert no_policy_file(Path("nowhere/x.onnx")) == "There is no policy file nowhere/x.onnx."

@@ -41,6 +41,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Final
 
 # A humanoid has some forty names; a longer list would hide the sentence.
@@ -204,6 +205,18 @@ class MissingExtra(ShapechangerError, ImportError):
     def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str]]:
         """Pickle the error with its two arguments, for worker processes."""
         return type(self), (self.package, self.extra)
+
+
+def no_policy_file(path: Path, words: Iterable[str] = ()) -> str:
+    """Return the message about a missing policy file, with the nearest name in its folder.
+
+    Args:
+        path: The file, which does not exist.
+        words: What could be given in place of a file, such as "reference".
+    """
+    siblings = (str(each) for each in path.parent.glob(f"*{path.suffix}"))
+    close = difflib.get_close_matches(str(path), [*words, *sorted(siblings)], n=1)
+    return f"There is no policy file {path}" + (f"; did you mean {close[0]}?" if close else ".")
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -26,7 +26,13 @@ from shapechanger.envs.catalogue import (
     find,
     find_task,
 )
-from shapechanger.errors import MorphologyError, OutputError, StudyError, UnknownName
+from shapechanger.errors import (
+    MorphologyError,
+    OutputError,
+    StudyError,
+    UnknownName,
+    no_policy_file,
+)
 from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Executor, Processes
@@ -251,12 +257,15 @@ def policy_file(given: Path, env: EnvRef) -> Path:
         env: The env.
 
     Raises:
+        StudyError: If there is no such file.
         UnknownName: If no reference policy ships for the env.
     """
-    if str(given) != _REFERENCE or given.exists():
+    if given.exists():
         return given
+    if str(given) == _REFERENCE:
+        return reference_policy(env.id)
 
-    return reference_policy(env.id)
+    raise StudyError(no_policy_file(given, [_REFERENCE]))
 
 
 def settings_of(given: Sequence[str]) -> dict[str, Any]:

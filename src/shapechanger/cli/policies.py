@@ -17,7 +17,7 @@ from shapechanger.cli.env_arguments import Body, EnvId, driven, env_ref, opened
 from shapechanger.cli.hub import PullPolicy, PushPolicy
 from shapechanger.cli.play import Watching
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
-from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError
+from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError, no_policy_file
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
@@ -409,7 +409,7 @@ def _load_zip(path: Path) -> Any:
             if data["policy_class"] is kind.policy_aliases["MlpPolicy"]:
                 return kind.load(path, device="cpu")
     except FileNotFoundError:
-        raise CorruptStudy(f"There is no policy file {path}.") from None
+        raise CorruptStudy(no_policy_file(path)) from None
     except Exception as error:  # A damaged pickle can raise anything.
         raise CorruptStudy(
             f"{path} is not a zip of Stable-Baselines3's PPO, SAC or TQC ({error})."

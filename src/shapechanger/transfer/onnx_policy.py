@@ -15,7 +15,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import CorruptStudy, MissingExtra, StudyError, TransplantError
+from shapechanger.errors import (
+    CorruptStudy,
+    MissingExtra,
+    StudyError,
+    TransplantError,
+    no_policy_file,
+)
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.files import write_atomic
@@ -247,7 +253,7 @@ class OnnxPolicy:
             facts = self._session.get_modelmeta().custom_metadata_map
             self.card = msgspec.json.decode(facts[_CARD], type=OnnxCard)
         except FileNotFoundError as error:
-            raise CorruptStudy(f"There is no policy file {path}.") from error
+            raise CorruptStudy(no_policy_file(path)) from error
         except Exception as error:  # The runtime's errors have no common base.
             reason = (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".")
             raise CorruptStudy(

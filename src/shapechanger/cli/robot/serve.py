@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import math
 import os
 import shutil
@@ -30,6 +29,7 @@ from shapechanger.errors import (
     RobotError,
     RobotRefused,
     UnknownName,
+    no_policy_file,
 )
 from shapechanger.link.address import Address, is_loopback, parse_address
 from shapechanger.remote.known_robots import KnownRobot, check_name, known_names, recall, remember
@@ -252,10 +252,7 @@ class Serve:
                     "`shapechanger policies export` writes one."
                 )
         elif not self.policy.exists():
-            known = [f"{name}{ENDING}" for name in policies_in(self.policy.parent)]
-            near = difflib.get_close_matches(self.policy.name, known, n=1)
-            hint = f"; did you mean {self.policy.with_name(near[0])}?" if near else "."
-            raise PolicyError(f"There is no policy file or folder {self.policy}{hint}")
+            raise PolicyError(no_policy_file(self.policy))
         elif self.policy.suffix != ENDING:
             raise PolicyError(
                 f"A policy on board is a file NAME{ENDING}, got {self.policy.name}: "

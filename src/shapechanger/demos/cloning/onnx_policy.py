@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import PolicyError, prepare
 from shapechanger.demos.episodes.files import cannot_write, write_atomic
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import MissingExtra, no_policy_file
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.policy import CameraPolicy
@@ -190,7 +190,7 @@ class OnnxClone:
             whole = msgspec.json.decode(facts[_CARD], type=OnboardCard)
             self._require_shapes(whole.clone)
         except FileNotFoundError as error:
-            raise PolicyError(f"There is no policy file {path}.") from error
+            raise PolicyError(no_policy_file(path)) from error
         except Exception as error:  # The runtime's errors have no common base.
             raise PolicyError(
                 f"{path} is not a cloned policy that `shapechanger policies export` has written: "

@@ -18,7 +18,7 @@ from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError, prepare
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.demos.episodes.files import cannot_write, write_atomic
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import MissingExtra, no_policy_file
 from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 
 try:
@@ -206,7 +206,7 @@ class CameraPolicy:
             card = msgspec.json.decode(content, type=CloneCard)
             return cls(_network(card, weights), card)
         except FileNotFoundError as error:
-            raise PolicyError(f"There is no policy file {path}.") from error
+            raise PolicyError(no_policy_file(path)) from error
         except (*UNREADABLE, CloningError, *_UNBUILDABLE) as error:
             # Messages of PyTorch fill a page; the first line is enough.
             reason = str(error).strip().partition("\n")[0].rstrip(".:") or type(error).__name__

@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import CorruptStudy, MissingExtra
+from shapechanger.errors import CorruptStudy, MissingExtra, no_policy_file
 from shapechanger.layout import Layout
 from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 from shapechanger.transfer.env_ref import EnvRef
@@ -216,7 +216,7 @@ def load_policy(path: Path, algorithm: str = "") -> TrainedPolicy:
         model = _model(card, tensors, algorithm)
         return TrainedPolicy(model, _read_statistics(card, tensors), card)
     except FileNotFoundError as error:
-        raise CorruptStudy(f"There is no policy file {path}.") from error
+        raise CorruptStudy(no_policy_file(path)) from error
     except CorruptStudy:  # Which is a ValueError, too.
         raise
     except (*UNREADABLE, *_UNBUILDABLE) as error:
