@@ -22,11 +22,11 @@ from playwright.sync_api import sync_playwright
 from benchmarks.row import Row
 from shapechanger.cli.suite import RunSuite, load_suite, suite_tasks
 from shapechanger.errors import StudyError
+from shapechanger.files import read_json, write_json
 from shapechanger.reports.charts import sweep_chart
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.reports.suite import gain_over_scratch
 from shapechanger.reports.verdict import direction, finals
-from shapechanger.transfer.files import read_json, write_json
 from shapechanger.transfer.metrics import (
     estimate_difference,
     jumpstart,

@@ -31,8 +31,8 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.envs.finger.oracle import FingerOracle
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.envs.vehicle.drivers import CLONES
+from shapechanger.files import read_json
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.files import read_json
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import STUDY_FILE, Study

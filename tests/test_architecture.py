@@ -44,6 +44,7 @@ _RULES = {
     "errors": _Rule(_names("layout link"), _names("numpy msgspec")),
     "layout": _Rule(_names("errors link"), _names("numpy msgspec")),
     "link": _Rule(_names("errors layout"), _names("numpy msgspec")),
+    "files": _Rule(_names("errors"), _names("msgspec")),
     "tensor_file": _Rule(_names("errors"), _names("numpy msgspec safetensors")),
     # Selection of the OpenGL library.
     "rendering": _Rule(_names("errors")),
@@ -65,11 +66,11 @@ _RULES = {
     "envs.warp": _Rule(_names("errors layout morphology bodies tasks envs"), never=_HARDWARE),
     # Transfer does not distinguish simulators from robots. Cloning is one of its learners.
     "transfer": _Rule(
-        _names("errors layout tasks demos shapechanger tensor_file"),
+        _names("errors files layout tasks demos shapechanger tensor_file"),
         never=_HARDWARE | _SIMULATORS,
     ),
     "reports": _Rule(
-        _names("errors layout transfer demos identify bodies"), never=_HARDWARE | _SIMULATORS
+        _names("errors files layout transfer demos identify bodies"), never=_HARDWARE | _SIMULATORS
     ),
     # The exam for third-party envs.
     "testing": _Rule(_names("errors layout transfer"), never=_HARDWARE | _SIMULATORS),
@@ -79,12 +80,14 @@ _RULES = {
     "twin": _Rule(_names("errors layout link robot remote morphology bodies tasks worlds")),
     # Observations and actions, not sockets or pins.
     "teleop": _Rule(_names("errors layout demos"), never=_HARDWARE | _HEAVY | {"socket"}),
-    "demos": _Rule(_names("errors layout tensor_file"), never=_HARDWARE | _SIMULATORS | {"socket"}),
+    "demos": _Rule(
+        _names("errors files layout tensor_file"), never=_HARDWARE | _SIMULATORS | {"socket"}
+    ),
     # Files in a repository of the Hugging Face Hub; what they hold is others' business.
     "hub": _Rule(_names("errors"), _names("huggingface_hub")),
     # The command line composes everything, and nothing imports it.
     "cli": _Rule(
-        _names("errors layout link morphology bodies tasks envs transfer robot remote twin")
+        _names("errors files layout link morphology bodies tasks envs transfer robot remote twin")
         | _names("teleop demos reports testing shapechanger rendering worlds identify hub")
     ),
     "identify": _Rule(

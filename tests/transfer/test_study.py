@@ -26,10 +26,10 @@ from shapechanger.errors import (
     StudyError,
     UnknownName,
 )
+from shapechanger.files import read_json
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.env_ref import EnvRef, certify_shift
 from shapechanger.transfer.executor import Job, OnProgress, Serial
-from shapechanger.transfer.files import read_json
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.plan import ARMS, Run, TransferTask
 from shapechanger.transfer.study import (

@@ -33,10 +33,10 @@ from shapechanger.errors import (
     UnknownName,
     no_policy_file,
 )
+from shapechanger.files import make_folder
 from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Executor, Processes
-from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.references import reference_policy
 
 EnvId = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")]

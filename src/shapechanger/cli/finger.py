@@ -13,8 +13,8 @@ from rich.table import Table
 from shapechanger.cli.console import print_table, say
 from shapechanger.cli.env_arguments import EnvId, env_ref, options_of, require_file, require_seed
 from shapechanger.errors import FingerError, OutputError, UnknownName
+from shapechanger.files import write_atomic
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.files import write_atomic
 
 if TYPE_CHECKING:
     from shapechanger.bodies.finger import FingerParameters

@@ -14,9 +14,9 @@ from shapechanger.cli.console import counted, say
 from shapechanger.cli.env_arguments import require_file
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.errors import HubError, StudyError
+from shapechanger.files import write_atomic
 from shapechanger.layout import Layout
 from shapechanger.reports.numbers import duration_text, shares_text
-from shapechanger.transfer.files import write_atomic
 
 _MAX_POLICY_BYTES: Final = 256 << 20  # As for the files of policies.
 _GIB: Final = 1 << 30

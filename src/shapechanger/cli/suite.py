@@ -40,10 +40,10 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.cli.transfer import run_steps, write_study_report
 from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
+from shapechanger.files import place_of, read_json, write_json
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.files import place_of, read_json, write_json
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.plan import SOURCE, Plan, TransferTask
 
@@ -481,8 +481,8 @@ class _Page:
     def add(self, name: str, study: Study) -> None:
         """Add a study that has ended, or replace it; write its report and the page."""
         from shapechanger.cli.films import film_study
+        from shapechanger.files import write_atomic
         from shapechanger.reports.suite import Sweep, suite_html
-        from shapechanger.transfer.files import write_atomic
 
         write_study_report(study, self._out / name)
         self._studies[name] = study

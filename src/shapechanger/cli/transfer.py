@@ -222,8 +222,8 @@ def write_study_report(study: Study, out: Path) -> Path:
     Returns:
         The page.
     """
+    from shapechanger.files import write_atomic
     from shapechanger.reports.study import study_html
-    from shapechanger.transfer.files import write_atomic
 
     path = out / "report.html"
     pictures, note = None, ""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 from shapechanger.demos.cloning.judge import Judgement, named
 from shapechanger.demos.cloning.learn import Training
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.files import write_json
 from shapechanger.reports.page import png_uri, render, svg_uri
-from shapechanger.transfer.files import write_json
 
 if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset

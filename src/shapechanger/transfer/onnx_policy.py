@@ -22,9 +22,9 @@ from shapechanger.errors import (
     TransplantError,
     no_policy_file,
 )
+from shapechanger.files import write_atomic
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import EnvRef
-from shapechanger.transfer.files import write_atomic
 
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.policy_file import TrainedPolicy

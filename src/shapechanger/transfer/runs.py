@@ -13,8 +13,8 @@ from typing import Final
 import msgspec
 
 from shapechanger.errors import CorruptStudy, StudyError
+from shapechanger.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.executor import ReportSteps
-from shapechanger.transfer.files import append_line, make_folder, read_json, write_json
 from shapechanger.transfer.learners import Learner
 from shapechanger.transfer.learners.cloning import CloneLearner
 from shapechanger.transfer.learners.evaluation import (

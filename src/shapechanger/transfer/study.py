@@ -22,6 +22,7 @@ from shapechanger.errors import (
     StudyError,
     UnknownName,
 )
+from shapechanger.files import make_folder, read_json, write_json
 from shapechanger.tasks.measure import RETURN, Measure
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import (
@@ -32,7 +33,6 @@ from shapechanger.transfer.env_ref import (
     is_reward_term,
 )
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
-from shapechanger.transfer.files import make_folder, read_json, write_json
 from shapechanger.transfer.learners.settings import RslSettings, Settings, require_budget
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise

@@ -28,8 +28,8 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.demos.statistics import summary
 from shapechanger.errors import DemosError, UnknownName
+from shapechanger.files import write_atomic
 from shapechanger.reports.numbers import duration_text, shares_text
-from shapechanger.transfer.files import write_atomic
 
 _WIDEST: Final = 400
 _MB: Final = 1e6

@@ -18,7 +18,7 @@ from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.dataset import count_steps, load_dataset
 from shapechanger.demos.episodes import EpisodeHeader
 from shapechanger.errors import DemosError, OutputError
-from shapechanger.transfer.files import write_atomic
+from shapechanger.files import write_atomic
 
 if TYPE_CHECKING:
     from shapechanger.cli.demos.waypoints import CanonicalView
@@ -302,8 +302,8 @@ class Evaluate:
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
             say(note)
         if self.report is not None:
+            from shapechanger.files import write_atomic
             from shapechanger.reports.clone import clone_html, write_numbers
-            from shapechanger.transfer.files import write_atomic
 
             require_file(self.report)
             page = clone_html(self.policy.name, policy, data, judgement, None, note)

@@ -19,7 +19,6 @@ from shapechanger.demos.episodes.files import (
     FRAMES,
     HEADER,
     STEPS,
-    cannot_write,
     is_episode,
     lock,
     write_all,
@@ -27,6 +26,7 @@ from shapechanger.demos.episodes.files import (
 from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import Step, decode_line, split_lines
 from shapechanger.errors import DemosError, RobotRefused, UnknownName
+from shapechanger.files import cannot_write
 from shapechanger.link.messages import EpisodeSummary, Piece
 from shapechanger.remote.known_robots import recall
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import PolicyError, prepare
-from shapechanger.demos.episodes.files import cannot_write, write_atomic
 from shapechanger.errors import MissingExtra, no_policy_file
+from shapechanger.files import cannot_write, write_atomic
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.policy import CameraPolicy

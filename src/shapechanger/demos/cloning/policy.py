@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError, prepare
 from shapechanger.demos.cloning.settings import CloneSettings
-from shapechanger.demos.episodes.files import cannot_write, write_atomic
 from shapechanger.errors import MissingExtra, no_policy_file
+from shapechanger.files import cannot_write, write_atomic
 from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 
 try:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from shapechanger.errors import DemosError, OutputError
+from shapechanger.files import cannot_write, write_atomic
 
 HEADER: Final = "episode.json"
 STEPS: Final = "steps.jsonl"
@@ -125,28 +126,6 @@ def write_all(fd: int, data: bytes) -> None:
         raise
 
 
-def write_atomic(path: Path, content: bytes) -> None:
-    """Write a file completely and flush it to disk, or leave the old one in place.
-
-    Args:
-        path: The file.
-        content: Its new content.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise cannot_write(path, error) from error
-
-
 def write_header(folder: Path, content: dict[str, Any]) -> None:
     """Write the header of an episode atomically.
 
@@ -159,13 +138,3 @@ def write_header(folder: Path, content: dict[str, Any]) -> None:
     """
     text = json.dumps(content, indent=1, ensure_ascii=False)
     write_atomic(folder / HEADER, f"{text}\n".encode())
-
-
-def cannot_write(path: Path, error: OSError) -> OutputError:
-    """Return the error to raise when a file cannot be written.
-
-    Args:
-        path: The file.
-        error: What the system said.
-    """
-    return OutputError(f"Cannot write {path}: {error.strerror or error}.")

@@ -19,13 +19,11 @@ from shapechanger.demos.episodes.files import (
     MAX_PICTURE_BYTES,
     MAX_TEXT_BYTES,
     STEPS,
-    cannot_write,
     free_path,
     is_episode,
     lock,
     read_file,
     write_all,
-    write_atomic,
     write_header,
 )
 from shapechanger.demos.episodes.records import (
@@ -36,6 +34,7 @@ from shapechanger.demos.episodes.records import (
     split_lines,
 )
 from shapechanger.errors import BrokenEpisode, DemosError, OutputError
+from shapechanger.files import cannot_write, write_atomic
 
 # Such a name cannot lead out of the folder.
 _FRAME_NAME: Final = re.compile(r"[0-9]{6,}\.jpg")

@@ -17,7 +17,6 @@ from shapechanger.demos.episodes.files import (
     FRAMES,
     MAX_PICTURE_BYTES,
     STEPS,
-    cannot_write,
     free_path,
     lock,
     write_all,
@@ -25,6 +24,7 @@ from shapechanger.demos.episodes.files import (
 )
 from shapechanger.demos.episodes.records import EpisodeHeader, Step, encode_line
 from shapechanger.errors import DemosError, OutputError
+from shapechanger.files import cannot_write
 
 _SYNC_PERIOD_S: Final = 1.0
 

@@ -20,9 +20,9 @@ from shapechanger.demos.episodes.files import (
     MAX_PICTURE_BYTES,
     MAX_TEXT_BYTES,
     STEPS,
-    cannot_write,
 )
 from shapechanger.errors import DemosError
+from shapechanger.files import cannot_write
 
 _FRAME: Final = re.compile(FRAMES + r"/\w[\w-]{0,63}\.jpg", re.ASCII)
 _PLAIN: Final = {tarfile.REGTYPE, tarfile.AREGTYPE}

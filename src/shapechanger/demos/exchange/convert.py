@@ -18,7 +18,7 @@ from shapechanger.demos.episodes import (
     episodes_of,
     read_episode,
 )
-from shapechanger.demos.episodes.files import cannot_write, is_episode
+from shapechanger.demos.episodes.files import is_episode
 from shapechanger.demos.exchange.csv_files import TABLE, is_csv, read_csv, write_csv
 from shapechanger.demos.exchange.files import cannot_read, new_folder
 from shapechanger.demos.exchange.keys_2017 import LABELS, is_2017, read_2017, write_2017
@@ -35,6 +35,7 @@ from shapechanger.demos.exchange.minari_import import read_minari
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episode, kept_steps
 from shapechanger.demos.exchange.tub import MANIFEST, is_tub, read_tub, write_tub
 from shapechanger.errors import DemosError, OutputError, UnknownName
+from shapechanger.files import cannot_write
 
 Format = Literal["2017", "tub", "minari", "lerobot", "csv", "mcap"]
 

@@ -15,11 +15,11 @@ from typing import Any, cast
 from shapechanger.demos.episodes.files import (
     MAX_PICTURE_BYTES,
     MAX_TEXT_BYTES,
-    cannot_write,
     read_file,
 )
 from shapechanger.demos.jpeg import decode_picture, picture_size
 from shapechanger.errors import DemosError, MissingExtra, OutputError
+from shapechanger.files import cannot_write
 
 
 def library(name: str, extra: str = "data") -> Any:

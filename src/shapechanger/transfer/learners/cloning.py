@@ -17,10 +17,10 @@ from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
 from shapechanger.errors import StudyError
+from shapechanger.files import make_folder
 from shapechanger.tensor_file import kind_of
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits, HasDemonstrator, layouts_of
-from shapechanger.transfer.files import make_folder
 from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,

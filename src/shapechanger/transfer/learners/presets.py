@@ -11,7 +11,7 @@ import msgspec
 
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError, UnknownName
-from shapechanger.transfer.files import place_of
+from shapechanger.files import place_of
 from shapechanger.transfer.learners.settings import (
     CloningSettings,
     ImportedSettings,

@@ -48,7 +48,7 @@ def make_folder(folder: Path) -> None:
 
 
 def write_atomic(path: Path, content: bytes) -> None:
-    """Write a file completely, or leave the old one in place.
+    """Write a file completely and flush it to disk, or leave the old one in place.
 
     Args:
         path: The file.
@@ -57,7 +57,8 @@ def write_atomic(path: Path, content: bytes) -> None:
     Raises:
         OutputError: If it cannot be written, for instance because the disk is full.
     """
-    part = path.with_name(f".{path.name}.part")
+    # Two processes may write the same file.
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with part.open("wb") as file:
             file.write(content)
@@ -66,7 +67,7 @@ def write_atomic(path: Path, content: bytes) -> None:
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise _cannot_write(path, error) from error
+        raise cannot_write(path, error) from error
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -96,7 +97,7 @@ def append_line(path: Path, value: Any) -> None:
         with path.open("ab") as file:
             file.write(msgspec.json.encode(value) + b"\n")
     except OSError as error:
-        raise _cannot_write(path, error) from error
+        raise cannot_write(path, error) from error
 
 
 def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
@@ -116,5 +117,11 @@ def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
         raise CorruptStudy(f"{path} cannot be read ({error}): {remedy}.") from error
 
 
-def _cannot_write(path: Path, error: OSError) -> OutputError:
+def cannot_write(path: Path, error: OSError) -> OutputError:
+    """Return the error to raise when a file cannot be written.
+
+    Args:
+        path: The file.
+        error: What the system said.
+    """
     return OutputError(f"Cannot write {path}: {error.strerror or error}.")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import CorruptStudy, OutputError
-from shapechanger.transfer.files import (
+from shapechanger.files import (
     append_line,
     make_folder,
     read_json,
