@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -240,3 +241,33 @@ def test_an_exported_policy_evaluates_the_same(
     with pytest.raises(SystemExit):
         main(["policies", "evaluate", str(exported), "--episodes", "0"])
     assert "at least one episode" in capsys.readouterr().err
+
+
+OWN = """
+from stable_baselines3 import A2C
+
+def build(envs, seed):
+    return A2C("MlpPolicy", envs, seed=seed, device="cpu", n_steps=64)
+"""
+
+
+def test_a_policy_of_ones_own_learner_is_evaluated_when_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its file alone does not import the user's module."""
+    (tmp_path / "own_a2c.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    small = ["steps_per_update=64", "eval_every=64", "eval_episodes=1"]
+    own = ["--learner", "own_a2c:build"]
+    train = ["train", "InvertedPendulum", *own, "--steps", "64", "--set", *small]
+    main([*train, "--out", "own.safetensors"])
+    monkeypatch.delitem(sys.modules, "own_a2c")
+    capsys.readouterr()
+    evaluate = ["policies", "evaluate", "own.safetensors", "--episodes", "1"]
+    with pytest.raises(SystemExit):
+        main(evaluate)
+    assert capsys.readouterr().err.endswith("or --learner own_a2c:build.\n")
+    assert "own_a2c" not in sys.modules
+    main([*evaluate, *own])
+    assert "length" in capsys.readouterr().out

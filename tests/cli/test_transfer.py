@@ -240,6 +240,7 @@ def test_play_writes_a_film_without_a_display(
             ["play", "Ant", "--policy", "none.safetensors"],
             "There is no policy file none.safetensors",
         ),
+        (["play", "Ant", "--policy", "referense"], "did you mean reference?"),
         (["play", "Ant", "--episodes", "0"], "at least one episode"),
         (["play", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),
         (["train", "Ant", "--seed", "-1"], "A seed is a whole number from 0"),

@@ -47,6 +47,14 @@ EnvOptions = Annotated[
     str, tyro.conf.arg(help="More arguments of the env as JSON, such as '{\"frame_skip\": 4}'.")
 ]
 """Option: more arguments of an env."""
+OwnLearner = Annotated[
+    str,
+    tyro.conf.arg(
+        help="The class or function of yours as module:name that the policy was trained with, "
+        "which its file alone may not import."
+    ),
+]
+"""Option: the algorithm that a policy's file names."""
 ExecutorKind = Annotated[
     Literal["processes", "ray"],
     tyro.conf.arg(help="Where runs run: in processes of this machine, or on a Ray cluster."),

@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.cli.console import say
-from shapechanger.cli.env_arguments import Body, EnvId, env_ref, opened, policy_file, require_seed
+from shapechanger.cli.env_arguments import (
+    Body,
+    EnvId,
+    OwnLearner,
+    env_ref,
+    opened,
+    policy_file,
+    require_seed,
+)
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
 from shapechanger.transfer.env_ref import EnvRef
@@ -28,6 +36,7 @@ class Watching:
     """Seed of the starts, and of random actions."""
     max_steps: int = 1000
     """Longest episode to show."""
+    learner: OwnLearner = ""
 
     def show(self, ref: EnvRef, policy: Path | None) -> None:
         """Show episodes in a window or write them as a film, and print the returns.
@@ -57,7 +66,7 @@ class Watching:
             if policy is None:
                 acting, act = env, random_actions(env.action_space, self.seed)
             else:
-                acting, act = acting_in(env, policy)
+                acting, act = acting_in(env, policy, self.learner)
             for episode in range(self.episodes):
                 observation, _ = acting.reset(seed=self.seed + episode)
                 worth, steps, over = 0.0, 0, False

@@ -13,7 +13,15 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import command_line, print_table, say
-from shapechanger.cli.env_arguments import Body, EnvId, driven, env_ref, opened
+from shapechanger.cli.env_arguments import (
+    Body,
+    EnvId,
+    OwnLearner,
+    allow_own_modules,
+    driven,
+    env_ref,
+    opened,
+)
 from shapechanger.cli.hub import PullPolicy, PushPolicy
 from shapechanger.cli.play import Watching
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
@@ -44,6 +52,7 @@ class Show:
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A policy, such as results/policies/Ant-v1.safetensors."""
+    learner: OwnLearner = ""
 
     def run(self) -> None:
         """Print the card."""
@@ -51,11 +60,12 @@ class Show:
         from shapechanger.transfer.learners.cloning import is_clone
         from shapechanger.transfer.learners.policy_file import load_policy
 
+        allow_own_modules(self.learner)
         if is_clone(self.file):
             card = CameraPolicy.load(self.file).card
             lines = _clone_lines(card)
         else:
-            policy = load_policy(self.file)
+            policy = load_policy(self.file, self.learner)
             card = policy.card
             lines = {
                 **_card_lines(card),
@@ -165,6 +175,7 @@ class EvaluatePolicy:
     """Id of another env, where it acts through the body map of same names; that of its training by
     default."""
     body: Body = ""
+    learner: OwnLearner = ""
     episodes: int = 10
     """Number of episodes; their starts are those of every evaluation."""
 
@@ -174,8 +185,8 @@ class EvaluatePolicy:
 
         if self.episodes < 1:
             raise StudyError("An evaluation takes at least one episode.")
-        with opened(_env_of(self.file, self.env, self.body)) as env:
-            acting, act = acting_in(env, self.file)
+        with opened(_env_of(self.file, self.env, self.body, self.learner)) as env:
+            acting, act = acting_in(env, self.file, self.learner)
             if isinstance(env.unwrapped, HasHeldOutStarts):
                 env.unwrapped.hold_out()
             found = evaluate(act, [acting], EVALUATION_SEED, episodes=self.episodes)
@@ -198,37 +209,40 @@ class PlayPolicy(Watching):
 
     def run(self) -> None:
         """Play and print the returns."""
-        self.show(_env_of(self.file, self.env, self.body), self.file)
+        self.show(_env_of(self.file, self.env, self.body, self.learner), self.file)
 
 
-def _env_of(file: Path, env: str, body: str) -> EnvRef:
+def _env_of(file: Path, env: str, body: str, learner: str = "") -> EnvRef:
     """Return the env that is named, else the one in which a policy was trained."""
-    trained_in = _trained_in(file)
+    trained_in = _trained_in(file, learner)
     # A policy of many bodies is seen in the family's own.
     if env or body or "bodies" in trained_in.kwargs:
         return driven(env_ref(env or trained_in.id, body))
     return driven(trained_in)
 
 
-def _trained_in(file: Path) -> EnvRef:
+def _trained_in(file: Path, learner: str) -> EnvRef:
     """Return the env of a policy's card."""
     from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.transfer.learners.cloning import is_clone
 
     if file.suffix == ".onnx" or not is_clone(file):
-        return load_any_policy(file).card.env
+        return load_any_policy(file, learner).card.env
     env = CameraPolicy.load(file).card.data.get("env")
     if env is None:
         raise StudyError(f"{file} learned from recordings of no env: name one with --env.")
     return env_ref(str(env))
 
 
-def acting_in(env: gym.Env[Any, Any], file: Path) -> tuple[gym.Env[Any, Any], Act]:
+def acting_in(
+    env: gym.Env[Any, Any], file: Path, learner: str = ""
+) -> tuple[gym.Env[Any, Any], Act]:
     """Return an env as a policy senses it, and the policy.
 
     Args:
         env: The env.
         file: A policy, a clone, or a policy that was exported as ONNX.
+        learner: An algorithm of the user's own that the file may name, as `module:name`.
 
     Raises:
         CorruptStudy: If the file cannot be read.
@@ -244,15 +258,16 @@ def acting_in(env: gym.Env[Any, Any], file: Path) -> tuple[gym.Env[Any, Any], Ac
             if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
                 clone.card.require_layouts(layout, clone.card.state_layout)
             return env, clone.predict_many
-    policy = load_any_policy(file)
+    policy = load_any_policy(file, learner)
     return _fitting(env, policy.card), policy.act
 
 
-def load_any_policy(file: Path) -> TrainedPolicy | OnnxPolicy:
+def load_any_policy(file: Path, learner: str = "") -> TrainedPolicy | OnnxPolicy:
     """Load a policy, or one that was exported as ONNX, without PyTorch.
 
     Args:
         file: The file.
+        learner: An algorithm of the user's own that the file may name, as `module:name`.
 
     Raises:
         CorruptStudy: If it cannot be read.
@@ -263,7 +278,8 @@ def load_any_policy(file: Path) -> TrainedPolicy | OnnxPolicy:
         return OnnxPolicy(file)
     from shapechanger.transfer.learners.policy_file import load_policy
 
-    return load_policy(file)
+    allow_own_modules(learner)
+    return load_policy(file, learner)
 
 
 def _fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any, Any]:
@@ -295,6 +311,7 @@ class ExportPolicy:
     """Id of the env of the body that a policy of limbs is exported for; that of its training by
     default. Other policies are exported for their own."""
     body: Body = ""
+    learner: OwnLearner = ""
     format: Literal["onnx"] = "onnx"
     """Its format."""
 
@@ -305,12 +322,13 @@ class ExportPolicy:
         from shapechanger.transfer.learners.cloning import is_clone
         from shapechanger.transfer.learners.policy_file import load_policy
 
+        allow_own_modules(self.learner)
         if is_clone(self.file):
             clone = CameraPolicy.load(self.file)
             body, control_hz = _learned_with(clone.card)
             export_clone(clone, self.out, body=body, control_hz=control_hz)
         else:
-            self._export(load_policy(self.file))
+            self._export(load_policy(self.file, self.learner))
         say(f"wrote {self.out}")
 
     def _export(self, policy: TrainedPolicy) -> None:

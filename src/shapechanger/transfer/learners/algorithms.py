@@ -94,7 +94,7 @@ def require_class(algorithm: str) -> None:
     if own and module.partition(".")[0] not in _FILES_MAY_IMPORT:
         raise CorruptStudy(
             f"A policy of {algorithm} needs the module {module}, which a file may not import: "
-            f"import it first, or name it too, as load_policy(path, {algorithm!r})."
+            f"name it too, as load_policy(path, {algorithm!r}) or --learner {algorithm}."
         )
     try:
         known = _is_class(_load(algorithm))
