@@ -12,6 +12,7 @@ from shapechanger.reports.verdict import (
     direction,
     is_flat,
     machine_text,
+    other_arms,
     verdict,
 )
 from shapechanger.transfer.metrics import Estimate
@@ -65,6 +66,15 @@ def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
     assert text.endswith(".")
     assert ". " not in text
     assert len(text.split()) <= 25
+
+
+def test_the_other_arms_have_a_sentence() -> None:
+    """Arms that do not learn on the target are judged by where they start."""
+    assert other_arms(make_study(arms=("scratch", "fine-tune"))) == ""
+    assert other_arms(make_study()) == "Of the other arms, zero-shot helped."
+    same = make_study(zero_shot=SCRATCH[:, :1])
+    assert other_arms(same) == "Of the other arms, zero-shot made no clear difference."
+    assert other_arms(make_study(scratch=FLAT, fine_tune=FLAT, zero_shot=FLAT[:, :1])) == ""
 
 
 def test_a_study_is_flat_only_if_no_arm_learns() -> None:

@@ -291,7 +291,7 @@ def _way_on(plan: Plan, out: Path) -> str:
 
 def _print(study: Study) -> None:
     """Print the table of measures and the verdict."""
-    from shapechanger.reports.verdict import measure_rows, verdict
+    from shapechanger.reports.verdict import measure_rows, other_arms, verdict
 
     table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
     # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
@@ -299,3 +299,5 @@ def _print(study: Study) -> None:
         table.add_row(row.arm, row.measure, row.target, row.total, row.unit)
     print_table(table, _FILE_WIDTH)
     say(f"\n{verdict(study)}")
+    if others := other_arms(study):
+        say(others)

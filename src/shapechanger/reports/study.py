@@ -23,6 +23,7 @@ from shapechanger.reports.verdict import (
     caveats,
     machine_text,
     measure_rows,
+    other_arms,
     verdict,
 )
 from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
@@ -62,6 +63,7 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
         title=f"{_short_name(plan.task.source)} → {_short_name(plan.task.target)}",
         plan=plan,
         verdict=verdict(study),
+        other_arms=other_arms(study),
         headline_arm=study.headline_arm,
         cards=_cards(study, measures),
         bodies=_bodies(study, pictures) if pictures is not None else [],

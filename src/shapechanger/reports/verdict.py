@@ -356,6 +356,31 @@ def verdict(study: Study) -> str:
     )
 
 
+def other_arms(study: Study) -> str:
+    """State in one sentence what the arms did that the verdict is not about; may be empty.
+
+    Each is judged by its total reward gain in target steps, and by its jumpstart if it does not
+    learn on the target.
+    """
+    others: dict[str, list[str]] = {found: [] for found in _TRANSFER.values()}
+    for arm, summary in study.summaries.items():
+        if arm != study.headline_arm:
+            measures = summary.in_target_steps
+            learns = study.curves(arm).n_evals > 1
+            estimate = measures.total_reward_gain if learns else measures.jumpstart
+            others[_TRANSFER[direction(estimate)]].append(arm)
+    parts = [f"{_joined(arms)} {found}" for found, arms in others.items() if arms]
+    if is_flat(study) or not parts:
+        return ""
+    return f"Of the other arms, {'; '.join(parts)}."
+
+
+def _joined(words: list[str]) -> str:
+    """Join words as in `a, b and c`."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def is_flat(study: Study) -> bool:
     """Return whether scratch starts within a tenth of its end, so that nothing can be compared.
 
