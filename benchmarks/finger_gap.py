@@ -23,9 +23,11 @@ from benchmarks.finger_learned import CIRCLE, TRACKS, played, trained
 from benchmarks.finger_reach import FINGERS, TARGETS, Statics, held_by_controller
 from benchmarks.row import Row, asked
 from shapechanger.bodies.finger import FingerParameters
+from shapechanger.cli import main
 from shapechanger.cli.transfer import write_study_report
 from shapechanger.envs.finger.env import SMOOTHNESS
 from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.files import read_json
 from shapechanger.reports.numbers import share_text
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Processes
@@ -34,7 +36,7 @@ from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_polic
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
 from shapechanger.transfer.runs import RunResult, load_result
-from shapechanger.transfer.study import make_plan, run_study
+from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 
 # Twenty minutes on a bench; arms are also evaluated after ten.
 STEPS: Final = 61_440
@@ -53,6 +55,8 @@ _RECOVERED: Final = 0.8
 _RECOVERED_IN_GAP: Final = 0.9
 _TUNED: Final = 0.7
 _FOLLOWED: Final = 2.0
+# Time that the whole command may take for a finger, min.
+_PATIENCE_MIN: Final = 30.0
 # Distance within which a target counts as reached, m, as in `Finger-v1`.
 _NEAR_M: Final = 0.005
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
@@ -240,6 +244,31 @@ def rig() -> list[Row]:
         *_chatter_rows(runs, where),
         _shipped_row("twin of a rig with the nominal finger", nominal),
         *_rig_only_rows(target, plan.seeds, where),
+    ]
+
+
+def command() -> list[Row]:
+    """Time the command of docs/finger.md, with its default arms and steps, on two fingers."""
+    out = Path("results", "finger-command")
+    arguments = ["transfer", "Finger", "RemoteFinger", "--target-options", '{"twin": "real-like"}']
+    workers = int(os.environ.get("WORKERS", os.cpu_count() or 1))
+    main([*arguments, "--seeds", "2", "--workers", str(workers), "--out", str(out)])
+    study = read_json(out / STUDY_FILE, Study, f"delete {out}")
+    ends = {arm: [run.curve[-1].success or 0.0 for run in study.of(arm)] for arm in study.plan.arms}
+    runs_min = sum(run.wall_s for run in study.runs) / 60.0
+    minutes = runs_min / study.plan.seeds / workers
+    reached = "; ".join(
+        f"{arm} {' and '.join(f'{share:.0%}' for share in shares)}" for arm, shares in ends.items()
+    )
+    return [
+        Row(
+            "transfer Finger RemoteFinger, twin real-like: minutes a finger",
+            f"{minutes:.0f} min",
+            f"{runs_min:.0f} min of runs for {study.plan.seeds} fingers, {workers} at a time; "
+            f"targets reached: {reached}",
+            "< 30 min",
+            minutes < _PATIENCE_MIN,
+        )
     ]
 
 

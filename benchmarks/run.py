@@ -162,6 +162,7 @@ SUITES: dict[str, Callable[[], list[Row]]] = {
     "exchange-video": exchange.video,
     "finger-gap": finger_gap.gap,
     "finger-rig": finger_gap.rig,
+    "finger-command": finger_gap.command,
     "finger-follow": finger_gap.follow,
     "finger-path": finger_path.path,
     "finger-physics": finger_physics.physics,
