@@ -63,9 +63,11 @@ _LATE: Final = {"parameters": {"command_delay": 0.010}}
 
 
 _WHERE: Final = "fingers of the gap real-like"
-_GAP_ARMS: Final = (*ARMS, "randomised", "identified")
 _SCRATCH: Final = "scratch"
 _IDENTIFIED: Final = "identified"
+# Arms that learn in simulated fingers.
+_SIMULATED_ARMS: Final = ("randomised", _IDENTIFIED)
+_GAP_ARMS: Final = (*ARMS, *_SIMULATED_ARMS)
 _RIG_ONLY: Final = "rig"
 
 Shipped = Literal["reach", "track"]
@@ -105,9 +107,11 @@ def _arms(
         simulated: Steps of arms that learn in simulated fingers.
     """
     wanted = asked("arm or row", (*_GAP_ARMS, _RIG_ONLY))
-    # A study always compares with scratch.
-    arms = tuple(arm for arm in _GAP_ARMS if arm in (*wanted, _SCRATCH))
-    plan = _plan(target, "ppo-finger", arms, fingers, STEPS, source_steps=simulated)
+    # A study compares scratch with another arm, and zero-shot takes the least time.
+    arms = tuple(arm for arm in _GAP_ARMS if arm in (*wanted, _SCRATCH, "zero-shot"))
+    learns = any(arm in _SIMULATED_ARMS for arm in arms)
+    source_steps = simulated if learns else None
+    plan = _plan(target, "ppo-finger", arms, fingers, STEPS, source_steps=source_steps)
     if "ENDED" not in os.environ:
         _run(plan, out)
     return plan, _ended(plan, out)
@@ -380,7 +384,7 @@ def rows_of(
     rows: list[Row] = []
     for arm, ended in runs.items():
         row = _share_row(f"{where}, {arm}: targets reached within 5 mm", ended)
-        if arm in ("randomised", "identified"):
+        if arm in _SIMULATED_ARMS:
             row = replace(row, spread=f"{row.spread}; after {simulated:,} simulated steps")
         share = float(np.mean([run.curve[-1].success or 0.0 for run in ended]))
         if arm in least:
