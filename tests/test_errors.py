@@ -67,6 +67,7 @@ def test_unknown_names_suggest_the_nearest(name: str, known: list[str], message:
     error = UnknownName("body", name, iter(known))
     assert str(error) == message
     assert (error.kind, error.name, error.known) == ("body", name, tuple(known))
+    assert str(UnknownName("body", name, known, "Or give none.")) == f"{message} Or give none."
 
 
 def test_long_lists_of_names_are_cut() -> None:
@@ -85,7 +86,8 @@ def test_missing_extras_name_the_command() -> None:
 
 
 @pytest.mark.parametrize(
-    "error", [UnknownName("body", "thgih", ["thigh"]), MissingExtra("mujoco", "sim")]
+    "error",
+    [UnknownName("body", "thgih", ["thigh"], "Or give none."), MissingExtra("mujoco", "sim")],
 )
 def test_errors_can_be_pickled(error: ShapechangerError) -> None:
     """A pickled error keeps its message and its fields."""

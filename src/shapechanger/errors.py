@@ -59,19 +59,22 @@ class UnknownName(ShapechangerError, ValueError):
         kind: Kind of name, such as "body" or "environment id".
         name: The name as given.
         known: The names that exist.
+        instead: What to do without such a name, as a sentence; may be empty.
     """
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: str, known: Iterable[str], instead: str = "") -> None:
         self.kind = kind
         self.name = name
         self.known = tuple(known)
+        self.instead = instead
         close = difflib.get_close_matches(name, self.known, n=1)
         hint = f" Did you mean {close[0]!r}?" if close else ""
-        super().__init__(f"No {kind} matches {name!r}.{hint} There are: {_listed(self.known)}.")
+        message = f"No {kind} matches {name!r}.{hint} There are: {_listed(self.known)}."
+        super().__init__(" ".join(filter(None, (message, instead))))
 
-    def __reduce__(self) -> tuple[type[UnknownName], tuple[str, str, tuple[str, ...]]]:
-        """Pickle the error with its three arguments, for worker processes."""
-        return type(self), (self.kind, self.name, self.known)
+    def __reduce__(self) -> tuple[type[UnknownName], tuple[str, str, tuple[str, ...], str]]:
+        """Pickle the error with its arguments, for worker processes."""
+        return type(self), (self.kind, self.name, self.known, self.instead)
 
 
 class LayoutError(ShapechangerError, ValueError):

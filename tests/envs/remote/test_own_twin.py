@@ -21,6 +21,12 @@ def test_an_unknown_twin_is_refused() -> None:
         gym.make(RIG, twin="real-lik")
 
 
+def test_without_a_rig_a_twin_is_proposed() -> None:
+    """The sentence names the argument that needs no rig."""
+    with pytest.raises(UnknownName, match='the argument twin, such as "real-like"'):
+        gym.make(RIG)
+
+
 @pytest.mark.parametrize("twin", ["", "nominal"])
 def test_finger_seed_needs_a_gap(twin: str) -> None:
     """`finger_seed` without a gap is refused, as for `Finger-v1`."""

@@ -21,7 +21,7 @@ from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.envs.finger.track import FingerTrackEnv
 from shapechanger.envs.remote.finger_rig import LengthApproach, RigSenses, StartApproach
-from shapechanger.envs.remote.vehicle import OnReset, RemoteVehicleEnv
+from shapechanger.envs.remote.vehicle import KNOWN_ROBOT, OnReset, RemoteVehicleEnv
 from shapechanger.errors import FingerError, RobotRefused, UnknownName
 from shapechanger.link.messages import Pace
 from shapechanger.robot.profile.load import find_profile
@@ -33,6 +33,9 @@ NOMINAL_TWIN: Final = "nominal"
 """Name of the twin with the parameters of the nominal finger."""
 
 _PROFILE: Final = "finger"
+_WITHOUT_A_RIG: Final = (
+    'Without a rig, the env serves a twin itself with the argument twin, such as "real-like".'
+)
 
 
 # Tolerance of the start posture, rad, and time limit, s. If gears stick, the episode begins where
@@ -139,8 +142,10 @@ class OnRig(FingerEnv):
         self._operator: Operator | None = None
         try:
             self._rig = _connected(access, pace)
-        except BaseException:
+        except BaseException as error:
             self._end_twin()
+            if isinstance(error, UnknownName) and error.kind == KNOWN_ROBOT:
+                raise UnknownName(error.kind, error.name, error.known, _WITHOUT_A_RIG) from None
             raise
         try:
             welcome = self._rig.welcome

@@ -27,6 +27,10 @@ OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], obje
 LATE: Final = 0.5
 """Delay of a step up to which its deadline is met, as a share of the control period."""
 
+KNOWN_ROBOT: Final = "known robot"
+"""Kind of the name of a robot, in errors."""
+
+_SERVE_A_TWIN: Final = "`shapechanger robot serve PROFILE --twin` serves a twin and makes it known."
 _WAYS_TO_RESET: Final = ("operator", "person", "routine")
 _LOCKSTEP_S: Final = 10.0  # Time limit of a step in lockstep, where a robot waits for the env.
 _NS_PER_S: Final = 1e9
@@ -482,4 +486,4 @@ def _resolve(robot: str) -> KnownRobot | str:
         return recall(robot)
     if "." in robot or ":" in robot or robot == "localhost":
         return robot
-    raise UnknownName("known robot", robot, known_names())
+    raise UnknownName(KNOWN_ROBOT, robot, known_names(), _SERVE_A_TWIN)
