@@ -349,7 +349,7 @@ def _undetermined(motors: Motors, known: FingerParameters | None) -> tuple[tuple
     undetermined = [
         ("joint_friction", "Acts like friction in the tendons; assumed nominal."),
         ("tendon_damping", f"Acts like friction in the tendons; assumed {damping}."),
-        ("motor_kg", f"Masked by stretch and damping; assumed {1e3 * kg:g} g."),
+        ("motor_kg", f"Masked by stretch and damping; assumed {1e3 * kg:.0f} g."),
         ("backlash", "Acts like an offset of a motor's zero; assumed none."),
     ]
     if known is not None and known.path is not None:
