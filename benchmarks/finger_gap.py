@@ -56,7 +56,7 @@ _RECOVERED_IN_GAP: Final = 0.9
 _TUNED: Final = 0.7
 _FOLLOWED: Final = 2.0
 # Time that the whole command may take for a finger, min.
-_PATIENCE_MIN: Final = 30.0
+_LIMIT_MIN: Final = 30.0
 # Distance within which a target counts as reached, m, as in `Finger-v1`.
 _NEAR_M: Final = 0.005
 _LATE: Final = {"parameters": {"command_delay": 0.010}}
@@ -78,8 +78,8 @@ def gap() -> list[Row]:
 
     The shipped policy in the nominal finger with a delay shows what a delay alone costs, and a
     policy of the nominal finger on the rig's motors what the other moment arms and joints cost.
-    `ONLY` names arms, or "rig" for that policy. With `ENDED=1` no run is started, and the rows are
-    those of the runs that have ended.
+    `ONLY` names arms, beside scratch and zero-shot, or "rig" for that policy. With `ENDED=1` no run
+    is started, and the rows are those of the runs that have ended.
     """
     target = _FINGER.having({"gap": "real-like"})
     out = Path("results", "finger-gap")
@@ -127,7 +127,7 @@ def _half_way(runs: Mapping[str, list[RunResult]], where: str) -> list[Row]:
 
 
 def _rig_only_rows(target: EnvRef, fingers: int, where: str) -> list[Row]:
-    """Return the success of a policy that knows the rig's motors and delay, but no finger."""
+    """Return the success of a policy that knows the rig's motors and delay only, if asked for."""
     if _RIG_ONLY not in asked("arm or row", (*_GAP_ARMS, _RIG_ONLY)):
         return []
     policy = load_policy(trained(_RIG_ONLY, 0))
@@ -271,7 +271,7 @@ def command() -> list[Row]:
             f"{runs_min:.0f} min of runs for {study.plan.seeds} fingers, {workers} at a time; "
             f"targets reached: {reached}",
             "< 30 min",
-            minutes < _PATIENCE_MIN,
+            minutes < _LIMIT_MIN,
         )
     ]
 

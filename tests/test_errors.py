@@ -104,4 +104,5 @@ def test_a_missing_policy_file_names_the_nearest(tmp_path: Path) -> None:
     assert no_policy_file(Path("referense"), ["reference"]) == (
         "There is no policy file referense; did you mean reference?"
     )
+    assert no_policy_file(tmp_path / "ant.**").endswith("ant.**.")  # No pattern of the glob.
     assert no_policy_file(Path("nowhere/x.onnx")) == "There is no policy file nowhere/x.onnx."

@@ -40,6 +40,7 @@ Each class also inherits from the builtin in brackets.
 from __future__ import annotations
 
 import difflib
+import glob
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
@@ -210,16 +211,17 @@ class MissingExtra(ShapechangerError, ImportError):
         return type(self), (self.package, self.extra)
 
 
-def no_policy_file(path: Path, words: Iterable[str] = ()) -> str:
+def no_policy_file(path: Path, words: Iterable[str] = (), what: str = "file") -> str:
     """Return the message about a missing policy file, with the nearest name in its folder.
 
     Args:
         path: The file, which does not exist.
         words: What could be given in place of a file, such as "reference".
+        what: What it could have been: "file", or "file or folder".
     """
-    siblings = (str(each) for each in path.parent.glob(f"*{path.suffix}"))
+    siblings = (str(each) for each in path.parent.glob(f"*{glob.escape(path.suffix)}"))
     close = difflib.get_close_matches(str(path), [*words, *sorted(siblings)], n=1)
-    return f"There is no policy file {path}" + (f"; did you mean {close[0]}?" if close else ".")
+    return f"There is no policy {what} {path}" + (f"; did you mean {close[0]}?" if close else ".")
 
 
 def _listed(names: tuple[str, ...]) -> str:

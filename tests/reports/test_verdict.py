@@ -71,9 +71,28 @@ def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
 def test_the_other_arms_have_a_sentence() -> None:
     """Arms that do not learn on the target are judged by where they start."""
     assert other_arms(make_study(arms=("scratch", "fine-tune"))) == ""
-    assert other_arms(make_study()) == "Of the other arms, zero-shot helped."
-    same = make_study(zero_shot=SCRATCH[:, :1])
-    assert other_arms(same) == "Of the other arms, zero-shot made no clear difference."
+    assert other_arms(make_study()) == "Of the other arms, zero-shot (400) helped."
+    same = other_arms(make_study(zero_shot=SCRATCH[:, :1]))
+    assert same.endswith(" made no clear difference.")
+
+
+def test_seeds_without_spread_are_not_called_unclear() -> None:
+    """Where all seeds are equal there is no interval, which is not the same as no difference."""
+    scratch = SCRATCH.copy()
+    scratch[:, 0] = 27.0
+    solved = np.full((len(scratch), 1), 1000.0)
+    study = make_study(scratch=scratch, zero_shot=solved)
+    words = "cannot be judged without an interval"
+    assert other_arms(study) == f"Of the other arms, zero-shot (1,000) {words}."
+    alone = make_study(scratch=scratch, zero_shot=solved, arms=("scratch", "zero-shot"))
+    assert verdict(alone) == (
+        f"Transfer {words} at the start: untrained on the target, zero-shot's return is 1,000 and "
+        "scratch's 27."
+    )
+
+
+def test_a_flat_study_says_nothing_of_its_arms() -> None:
+    """Neither does the sentence on the other arms."""
     assert other_arms(make_study(scratch=FLAT, fine_tune=FLAT, zero_shot=FLAT[:, :1])) == ""
 
 

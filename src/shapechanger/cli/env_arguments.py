@@ -50,8 +50,8 @@ EnvOptions = Annotated[
 OwnLearner = Annotated[
     str,
     tyro.conf.arg(
-        help="The class or function of yours as module:name that the policy was trained with, "
-        "which its file alone may not import."
+        help="Your class or function that the policy was trained with, as module:name; the file "
+        "alone may not import it."
     ),
 ]
 """Option: the algorithm that a policy's file names."""

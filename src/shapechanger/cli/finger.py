@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +36,9 @@ class Identify:
     `parameters`."""
     report: Path | None = None
     """The page to write; beside the log if not given."""
+    geared: bool = False
+    """Take the motors for geared servos, as the shipped rig has, where the log says nothing about
+    them. A log that `record` has written of a rig says it by itself."""
 
     def run(self) -> None:
         """Print the parameters, and write them and the report."""
@@ -47,6 +51,10 @@ class Identify:
             if path.resolve() == self.log.resolve():
                 raise OutputError(f"Cannot write {path}: it is the log.")
         log = load_log(self.log)
+        if self.geared and log.motors is None:
+            from shapechanger.envs.finger.gap import shipped_rig
+
+            log = dataclasses.replace(log, motors=shipped_rig())
         for path in files:
             require_file(path)
         found = identify(log, lambda words: say(f"{words} …", stderr=True))

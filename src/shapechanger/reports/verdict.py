@@ -305,6 +305,7 @@ def _terms(ends: list[Evaluation]) -> dict[str, float]:
 Direction = Literal["up", "down", "unclear"]
 
 _TRANSFER: Final = {"up": "helped", "down": "hurt", "unclear": "made no clear difference"}
+_NO_INTERVAL: Final = "cannot be judged without an interval"
 # Below this many seeds an interval is so wide that only large effects show.
 _FEW_SEEDS: Final = 5
 # A rise of scratch by less than this share of its end shows nothing.
@@ -323,6 +324,13 @@ def direction(estimate: Estimate) -> Direction:
     return "unclear"
 
 
+def _outcome(estimate: Estimate) -> str:
+    """Return what transfer did, as the verb of a sentence."""
+    if estimate.value is not None and estimate.low is None:
+        return _NO_INTERVAL
+    return _TRANSFER[direction(estimate)]
+
+
 def verdict(study: Study) -> str:
     """State in one sentence of at most 25 words whether transfer helped; numbers are in the table.
 
@@ -334,8 +342,7 @@ def verdict(study: Study) -> str:
     scratch = study.curves("scratch")
 
     def text(values: NDArray[np.float64]) -> str:
-        unit = "" if plan.unit == "1" else f" {plan.unit}"
-        return f"{float(f'{values.mean():.3g}'):,.10g}{unit}"
+        return _mean_text(values, plan.unit)
 
     if is_flat(study):
         return (
@@ -345,34 +352,41 @@ def verdict(study: Study) -> str:
     curves, measures = study.curves(arm), study.summaries[arm].in_target_steps
     if curves.n_evals == 1:
         return (
-            f"Transfer {_TRANSFER[direction(measures.jumpstart)]} at the start: untrained on the "
+            f"Transfer {_outcome(measures.jumpstart)} at the start: untrained on the "
             f"target, {arm}'s {plan.measure} is {text(curves.returns)} and scratch's "
             f"{text(scratch.returns[:, 0])}."
         )
     return (
-        f"Transfer {_TRANSFER[direction(measures.total_reward_gain)]}: over {count(plan.steps)} "
+        f"Transfer {_outcome(measures.total_reward_gain)}: over {count(plan.steps)} "
         f"target steps {arm}'s {plan.measure} averages {text(curves.auc())} and scratch's "
         f"{text(scratch.auc())}."
     )
 
 
 def other_arms(study: Study) -> str:
-    """State in one sentence what the arms did that the verdict is not about; may be empty.
+    """State in one sentence which of the arms that the verdict leaves out helped; may be empty.
 
-    Each is judged by its total reward gain in target steps, and by its jumpstart if it does not
-    learn on the target.
+    Each is judged by its total reward gain in target steps, or by its jumpstart if it does not
+    learn on the target. In brackets is its measure, averaged over the budget.
     """
-    others: dict[str, list[str]] = {found: [] for found in _TRANSFER.values()}
+    others: dict[str, list[str]] = {found: [] for found in (*_TRANSFER.values(), _NO_INTERVAL)}
     for arm, summary in study.summaries.items():
         if arm != study.headline_arm:
-            measures = summary.in_target_steps
-            learns = study.curves(arm).n_evals > 1
+            measures, curves = summary.in_target_steps, study.curves(arm)
+            learns = curves.n_evals > 1
             estimate = measures.total_reward_gain if learns else measures.jumpstart
-            others[_TRANSFER[direction(estimate)]].append(arm)
+            values = curves.auc() if learns else curves.returns
+            others[_outcome(estimate)].append(f"{arm} ({_mean_text(values, study.plan.unit)})")
     parts = [f"{_joined(arms)} {found}" for found, arms in others.items() if arms]
     if is_flat(study) or not parts:
         return ""
     return f"Of the other arms, {'; '.join(parts)}."
+
+
+def _mean_text(values: NDArray[np.float64], unit: str) -> str:
+    """Format the mean of a measure with its unit."""
+    mean = f"{float(f'{values.mean():.3g}'):,.10g}"
+    return mean if unit == "1" else f"{mean} {unit}"
 
 
 def _joined(words: list[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 
@@ -12,8 +13,10 @@ from shapechanger.bodies.finger import NOMINAL, TENDONS, FingerParameters, drive
 from shapechanger.bodies.finger.export import finger_mjcf
 from shapechanger.bodies.finger.parameters import PARAMETER_SETS
 from shapechanger.cli import main
-from shapechanger.envs.finger.gap import GAPS
-from shapechanger.identify import load_log
+from shapechanger.envs.finger.gap import GAPS, shipped_rig
+from shapechanger.errors import FingerError
+from shapechanger.identify import FingerLog, load_log
+from shapechanger.identify.log import save_log
 from tests.identify.logs import recorded
 
 
@@ -64,6 +67,26 @@ def test_invalid_logs_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "it is the log" in refused(capsys, "identify", log, "--report", log)
     assert "it is a folder" in refused(capsys, "identify", log, "--out", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["log.npz"]
+
+
+@pytest.mark.parametrize("says", [False, True])
+def test_motors_are_taken_for_geared_where_the_log_says_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, says: bool
+) -> None:
+    """`--geared` gives a log the shipped rig's motors, and leaves those that a log has."""
+    log, _ = recorded(2.4)
+    own = NOMINAL.replace(motor_kg=0.5)
+    save_log(dataclasses.replace(log, motors=own if says else None), tmp_path / "log.npz")
+    taken: list[FingerParameters | None] = []
+
+    def identify(log: FingerLog, _: object) -> None:
+        taken.append(log.motors)
+        raise FingerError("That is enough.")
+
+    monkeypatch.setattr("shapechanger.identify.identify", identify)
+    for option in ((), ("--geared",)):
+        assert "That is enough." in refused(capsys, "identify", tmp_path / "log.npz", *option)
+    assert taken == ([own, own] if says else [None, shipped_rig()])
 
 
 @pytest.mark.slow

@@ -138,7 +138,7 @@ def test_help(run: Run, command: str) -> None:
         ("selftest test-car.toml --wheels-up --jumper 20 28", "GPIO0 to GPIO27, got 28"),
         ("selftest test-car.toml --wheels-up --jumper 20 20", "A jumper joins two pins"),
         ("doctor test-car.toml --port 99999", "A port is 0"),
-        ("serve test-car.toml --twin --policy nowhere", "There is no policy file nowhere"),
+        ("serve test-car.toml --twin --policy nowhere", "There is no policy file or folder"),
         ("init", "Name the kind of the new robot"),
         ("init car --camera usb --name ../up", "name"),
         ("install nowhere.toml", "There is no file nowhere.toml"),

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import shapechanger  # noqa: F401 - Registers the ids.
-from shapechanger.bodies.finger import NOMINAL
-from shapechanger.envs.finger.gap import GAPS, with_gears
+from shapechanger.bodies.finger import NOMINAL, TENDONS
+from shapechanger.envs.finger.gap import GAPS, shipped_rig, with_gears
 from shapechanger.errors import FingerError, UnknownName
 from shapechanger.robot.profile.load import find_profile, load_profile
 
@@ -23,7 +23,7 @@ def test_an_unknown_twin_is_refused() -> None:
 
 def test_without_a_rig_a_twin_is_proposed() -> None:
     """The sentence names the argument that needs no rig."""
-    with pytest.raises(UnknownName, match='the argument twin, such as "real-like"'):
+    with pytest.raises(UnknownName, match='Without a rig, give twin="real-like"'):
         gym.make(RIG)
 
 
@@ -44,6 +44,16 @@ def test_a_geared_finger_is_within_its_gap() -> None:
         assert low < getattr(geared, name) < high
     drawn = gap.draw(np.random.default_rng(0))
     assert 0.5 < drawn.motor_kg / geared.motor_kg < 2.0
+
+
+def test_the_shipped_rig_has_the_tensions_and_the_path_of_its_profile() -> None:
+    """What `finger identify --geared` assumes is what a log of that rig says."""
+    rig = shipped_rig()
+    layout = load_profile(find_profile("finger")).action_layout()
+    spans = [(layout[name].gain, layout[name].gain_unit) for name in TENDONS]
+    assert [(most - rig.least_tension, "N") for most in rig.most_tension] == spans
+    assert rig == with_gears(rig)
+    assert rig.path == GAPS["real-like"].around.path
 
 
 def test_geared_fingers_have_the_path_of_the_shipped_rig() -> None:

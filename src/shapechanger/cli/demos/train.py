@@ -302,7 +302,6 @@ class Evaluate:
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
             say(note)
         if self.report is not None:
-            from shapechanger.files import write_atomic
             from shapechanger.reports.clone import clone_html, write_numbers
 
             require_file(self.report)

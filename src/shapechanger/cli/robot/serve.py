@@ -252,7 +252,7 @@ class Serve:
                     "`shapechanger policies export` writes one."
                 )
         elif not self.policy.exists():
-            raise PolicyError(no_policy_file(self.policy))
+            raise PolicyError(no_policy_file(self.policy, what="file or folder"))
         elif self.policy.suffix != ENDING:
             raise PolicyError(
                 f"A policy on board is a file NAME{ENDING}, got {self.policy.name}: "

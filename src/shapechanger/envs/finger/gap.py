@@ -11,9 +11,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL, CommandPath, FingerParameters
+from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, CommandPath, FingerParameters
 from shapechanger.bodies.finger.tensions import spans_all_torques, tensions_for_torque
 from shapechanger.errors import FingerError, UnknownName
+from shapechanger.robot.profile.load import find_profile, load_profile
 
 # Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
 # two hundred with arm errors of 25 %.
@@ -134,7 +135,10 @@ def _log_uniform(rng: np.random.Generator, bounds: Range) -> float:
 
 _DEGREE: Final = math.radians(1.0)
 
-# Rates and slew of the shipped profile "finger", and the resolution of its servos' tension.
+RIG: Final = "finger"
+"""Name of the shipped profile of a rig."""
+
+# Rates and slew of the shipped profile, and the resolution of its servos' tension.
 _RIG: Final = NOMINAL.replace(
     path=CommandPath(control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0)
 )
@@ -200,6 +204,18 @@ def with_gears(parameters: FingerParameters) -> FingerParameters:
         tendon_damping=sum(rig.tendon_damping) / 2,
         tendon_friction=sum(rig.tendon_friction) / 2,
         motor_lag=sum(rig.motor_lag) / 2,
+    )
+
+
+def shipped_rig() -> FingerParameters:
+    """Return the nominal finger on the shipped rig, with its motors, tensions and command path."""
+    outputs = {output.name: output.settings for output in load_profile(find_profile(RIG)).outputs}
+    servos = [outputs[name] for name in TENDONS]
+    return with_gears(
+        _RIG.replace(
+            most_tension=tuple(servo["most_tension_n"] for servo in servos),
+            least_tension=max(servo["pretension_n"] for servo in servos),
+        )
     )
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, CommandPath, FingerParameters
 from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
 from shapechanger.envs.finger.env import FingerEnv, check_posture
-from shapechanger.envs.finger.gap import GAPS, with_gears
+from shapechanger.envs.finger.gap import GAPS, RIG, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
@@ -32,9 +32,8 @@ from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 NOMINAL_TWIN: Final = "nominal"
 """Name of the twin with the parameters of the nominal finger."""
 
-_PROFILE: Final = "finger"
 _WITHOUT_A_RIG: Final = (
-    'Without a rig, the env serves a twin itself with the argument twin, such as "real-like".'
+    'Without a rig, give twin="real-like": the env then serves a simulated one itself.'
 )
 
 
@@ -455,5 +454,5 @@ def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
         raise FingerError("finger_seed selects a finger of a gap, so `twin` must name a gap.")
     drawn = ("--gap", twin, "--finger-seed", str(finger_seed or 0))
     return run_robot(
-        find_profile(_PROFILE), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
+        find_profile(RIG), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
     )
