@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Final, Literal, Self
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import LinkError, RobotError
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
@@ -157,6 +157,7 @@ _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
 _READY_S: Final = 60.0
 _END_S: Final = 10.0
 _POLL_S: Final = 0.02
+_LOG: Final = 2000  # Of the end of a log, characters.
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,8 +196,10 @@ class RunningRobot:
         """Return the robot."""
         return self
 
-    def __exit__(self, *_: object) -> None:
-        """Close the robot."""
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        """Close the robot; an error of the link gets the end of its log as a note."""
+        if isinstance(error, LinkError):
+            error.add_note(f"The log of the robot ends:\n{self.log_text()[-_LOG:]}")
         self.close()
 
     @property

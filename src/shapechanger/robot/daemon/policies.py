@@ -22,6 +22,7 @@ from shapechanger.link.address import Address
 from shapechanger.link.authentication import fingerprint_hex
 from shapechanger.link.messages import PolicyState
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.guard.priority import run_normally
 
 _log = logging.getLogger(__name__)
 
@@ -130,6 +131,8 @@ class PolicyRunner:
         process = await asyncio.create_subprocess_exec(
             *self._command, stdin=PIPE, stdout=PIPE, limit=_LONGEST
         )
+        # However much it computes, commands and pictures go first.
+        run_normally(process.pid)
         try:
             text = await self._listen(process, name)
         finally:

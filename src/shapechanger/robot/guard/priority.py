@@ -27,6 +27,17 @@ def run_early() -> None:
         os.nice(_NICENESS)
 
 
+def run_normally(pid: int) -> None:
+    """Switch a child process, which inherits the priority of its parent, back to normal priority.
+
+    Args:
+        pid: Process id, just after its start: threads that it has by then keep theirs.
+    """
+    with contextlib.suppress(ProcessLookupError):  # It has ended.
+        if os.getpriority(os.PRIO_PROCESS, pid) < 0:
+            os.setpriority(os.PRIO_PROCESS, pid, 0)
+
+
 def run_promptly(priority: int) -> None:
     """Switch this process to real-time scheduling and freeze its objects out of garbage collection.
 
