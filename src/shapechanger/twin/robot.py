@@ -197,7 +197,7 @@ class RunningRobot:
         return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
-        """Close the robot; an error of the link gets the end of its log as a note."""
+        """Close the robot, and add the end of its log to a `LinkError`, as a note."""
         if isinstance(error, LinkError):
             error.add_note(f"The log of the robot ends:\n{self.log_text()[-_LOG:]}")
         self.close()

@@ -28,10 +28,12 @@ def run_early() -> None:
 
 
 def run_normally(pid: int) -> None:
-    """Switch a child process, which inherits the priority of its parent, back to normal priority.
+    """Lower a child process, which inherits this process's priority, to normal priority.
+
+    Call this right after its start: threads that it already has keep their priority.
 
     Args:
-        pid: Process id, just after its start: threads that it has by then keep theirs.
+        pid: Its process id.
     """
     with contextlib.suppress(ProcessLookupError):  # It has ended.
         if os.getpriority(os.PRIO_PROCESS, pid) < 0:
