@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -31,6 +32,10 @@ BODIES: dict[str, list[Any]] = {
 }
 
 WORLDS = 8
+# Where the exam runs, such as cuda:0.
+DEVICE = os.environ.get("SHAPECHANGER_TEST_DEVICE", "cpu")
+# Infos that a device has after each step besides those of the CPU env.
+ALWAYS = {"final_obs", "final_info", "diverged"}
 
 # The device computes in single precision. Over the five or fewer physics steps of an action, the
 # largest differences seen in several hundred steps are 4e-5 of an observation's numbers and 6e-6 of
@@ -40,10 +45,10 @@ REWARD_TOLERANCE = 5e-5
 
 
 def many(name: str, **arguments: Any) -> tuple[WarpVectorEnv, list[Any]]:
-    """Return worlds on the CPU device that take turns with the bodies of a family, and CPU envs."""
+    """Return worlds on the device that take turns with the bodies of a family, and CPU envs."""
     turns = [BODIES[name][i % len(BODIES[name])] for i in range(WORLDS)]
     worlds = shapechanger.make_vec(
-        name, WORLDS, backend="warp", device="cpu", bodies=turns, **arguments
+        name, WORLDS, backend="warp", device=DEVICE, bodies=turns, **arguments
     )
     alone = [
         gym.make(f"shapechanger/{name}-v1", body=body, **arguments).unwrapped for body in turns
@@ -65,7 +70,7 @@ def set_all(worlds: WarpVectorEnv, alone: Sequence[Any], states: Any) -> None:
     qpos = torch.tensor(np.array([q for q, _ in states]), dtype=torch.float32)
     qvel = torch.tensor(np.array([v for _, v in states]), dtype=torch.float32)
     worlds.reset()
-    worlds.batches[0].set_state(qpos, qvel)
+    worlds.batches[0].set_state(qpos.to(DEVICE), qvel.to(DEVICE))
     for env, q, v in zip(alone, qpos.double().numpy(), qvel.double().numpy(), strict=True):
         mujoco.mj_resetData(env.model, env.data)
         env.set_state(q, v)
@@ -86,9 +91,15 @@ def visited(env: Any, rng: np.random.Generator, count: int) -> list[tuple[Any, A
 
 def apart(found: Any, expected: Any) -> float:
     """Return the largest difference of numbers, relative to 1 + their size; infinite ones agree."""
-    one, other = np.asarray(found, np.float64), np.asarray(expected, np.float64)
+    here = found.cpu() if isinstance(found, torch.Tensor) else found
+    one, other = np.asarray(here, np.float64), np.asarray(expected, np.float64)
     assert one.shape == other.shape
     finite = np.isfinite(other)
     assert np.array_equal(one[~finite], other[~finite])
     found = np.abs(one[finite] - other[finite]) / (1.0 + np.abs(other[finite]))
     return float(found.max(initial=0.0))
+
+
+def names_of(infos: dict[str, Any]) -> set[str]:
+    """Return the names of the infos of the task."""
+    return {name for name in infos if not name.startswith("_")} - ALWAYS

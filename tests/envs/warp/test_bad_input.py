@@ -74,6 +74,10 @@ def test_a_changed_task_has_no_batched_functions() -> None:
         ({"threads": 2}, "has no threads"),
         ({"copy": False}, "always copies observations"),
         ({"bodies": ["Ant"]}, "There are 2 envs and 1 bodies"),
+        ({"bodies": ["Ant"] * 2, "pool": ["Ant"]}, "either `bodies`, one per world, or a `pool`"),
+        ({"pool": []}, "a `pool` of some bodies"),
+        ({"njmax": 0}, "needs at least one njmax, got 0"),
+        ({"autoreset_mode": "NextStep"}, "no autoreset mode NextStep: its worlds start again"),
     ],
 )
 def test_arguments_without_meaning(arguments: dict[str, Any], sentence: str) -> None:

@@ -76,10 +76,10 @@ def test_a_body_drawn_at_a_reset_moves_as_one_made_with_it(ants: WarpVectorEnv) 
     states = [(env.init_qpos - 0.3 * np.eye(env.model.nq)[2], env.init_qvel) for env in alone]
     set_all(ants, alone, states)
     action = np.linspace(-1.0, 1.0, 8, dtype=np.float32)
-    observations, _, terminated, *_ = ants.step(np.tile(action, (3, 1)))
+    _, _, terminated, _, infos = ants.step(np.tile(action, (3, 1)))
     for i, env in enumerate(alone):
         observation, _, ended, *_ = env.step(action)
-        assert apart(observations[i], observation) < OBSERVATION_TOLERANCE
+        assert apart(infos["final_obs"][i], observation) < OBSERVATION_TOLERANCE
         assert bool(terminated[i]) == ended
 
 
@@ -167,7 +167,6 @@ def test_bodies_of_other_shapes_form_batches() -> None:
         backend="warp",
         device="cpu",
         bodies=["ExtendedAnt", "BigAnt", "ExtendedAnt"],
-        autoreset_mode="SameStep",
         max_episode_steps=2,
     )
     assert [batch.numbers.tolist() for batch in envs.batches] == [[0, 2], [1]]
@@ -201,3 +200,72 @@ def test_bodies_of_other_shapes_and_equal_spaces_share_tensors() -> None:
     assert torch.equal(one.reset(seed=4)[0][0], observations[2])
     with pytest.raises(VectorEnvError, match="because jnt_limited differ"):
         envs.reset(options={"bodies": ["Swimmer", "Swimmer", bound]})
+
+
+def test_a_pool_gives_each_episode_one_of_its_bodies() -> None:
+    """A world's body follows from its seed and episode, and is that of its simulation."""
+    pool: list[Any] = ["Ant", LONG, "BigAnt"]
+    made = [
+        shapechanger.make_vec(
+            "Ant", 4, backend="warp", device="cpu", pool=pool, max_episode_steps=2
+        )
+        for _ in range(2)
+    ]
+    compiled = {
+        tuple(made[0]._reader.body(body)): gym.make("shapechanger/Ant-v1", body=body).unwrapped
+        for body in pool
+    }
+    seen: list[list[Any]] = []
+    for envs in made:
+        seen.append([])
+        envs.reset(seed=5)
+        for _ in range(8):
+            seen[-1].append(envs.bodies)
+            for i, body in enumerate(envs.bodies):
+                model: Any = compiled[tuple(body)].model
+                np.testing.assert_allclose(
+                    model_rows(envs, "geom_size")[i], model.geom_size, rtol=1e-6
+                )
+            envs.step(torch.zeros(4, 8))
+    assert seen[0] == seen[1]
+    assert {tuple(body) for bodies in seen[0] for body in bodies} == set(compiled)
+    # Between restarts bodies stay.
+    assert seen[0][0] == seen[0][1] != seen[0][2]
+    with pytest.raises(VectorEnvError, match="draw their bodies from a pool"):
+        made[0].reset(options={"bodies": [*pool, "Ant"]})
+
+
+def test_a_pool_of_several_shapes_draws_within_each() -> None:
+    """A world keeps the spaces it was made with."""
+    envs = shapechanger.make_vec(
+        "Ant", 2, backend="warp", device="cpu", pool=["Ant", "ExtendedAnt", "BigAnt"]
+    )
+    names = [batch.kind.first.name.rpartition(" ")[2] for batch in envs.batches]
+    assert names == ["Ant", "ExtendedAnt"]
+    for seed in range(4):
+        envs.reset(seed=seed)
+        assert [len(body) > 1 for body in envs.bodies] == [False, True]
+    with pytest.raises(VectorEnvError, match=r"form 2 batches.* there are 1 worlds, so make more"):
+        shapechanger.make_vec("Ant", 1, backend="warp", device="cpu", pool=["Ant", "ExtendedAnt"])
+
+
+@pytest.mark.parametrize("limit", ["njmax", "nconmax"])
+def test_too_little_memory_for_constraints_is_said(limit: str) -> None:
+    """By default there is room for the worst case; less is an argument, and its overflow warns."""
+    arguments: Any = {limit: 1}
+    envs = shapechanger.make_vec("Ant", 2, backend="warp", device="cpu", **arguments)
+    envs.reset(seed=0)
+    envs._steps = 254  # The device is asked after 256 steps.
+    envs.batches[0].worlds.qpos[:, 2] = 0.1
+    envs.step(torch.zeros(2, 8))
+    with pytest.warns(UserWarning, match=f"2 worlds had more .* than {limit}=1 has memory for"):
+        envs.step(torch.zeros(2, 8))
+
+
+def test_there_is_memory_for_the_worst_case(ants: WarpVectorEnv) -> None:
+    """Each of an ant's capsules can touch the floor at both ends, with a pyramid of four rows."""
+    model: Any = gym.make("shapechanger/Ant-v1").unwrapped.model
+    capsules = int((model.geom_type == 3).sum())
+    limits = ants.batches[0].worlds.limits
+    assert limits["nconmax"] >= 2 * capsules + 1
+    assert limits["njmax"] >= 4 * (2 * capsules + 1) + 8

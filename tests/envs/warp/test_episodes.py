@@ -9,7 +9,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
-from gymnasium.vector import AutoresetMode
 
 import shapechanger
 from shapechanger.envs.warp import WarpVectorEnv
@@ -19,14 +18,13 @@ WORLDS = 3
 PUSH = torch.tensor([[3.0], [0.0], [0.0]])
 
 
-def pendulums(mode: str = "NextStep", **arguments: Any) -> WarpVectorEnv:
+def pendulums(**arguments: Any) -> WarpVectorEnv:
     """Return three pendulums; pushed with `PUSH`, the first one falls within some ten steps."""
     envs = shapechanger.make_vec(
         "InvertedPendulum",
         WORLDS,
         backend="warp",
         device="cpu",
-        autoreset_mode=mode,
         **arguments,
     )
     envs.reset(seed=0)
@@ -42,26 +40,9 @@ def until_a_fall(envs: WarpVectorEnv) -> Any:
     raise AssertionError("The pendulum does not fall.")
 
 
-def test_next_step_resets_in_the_step_after_the_end() -> None:
-    """The action of that step is ignored, its reward is 0, and its observation is of a start."""
-    envs = pendulums()
-    observations, rewards, terminated, truncated, infos = until_a_fall(envs)
-    assert terminated.tolist() == [True, False, False]
-    assert abs(float(observations[0, 1])) > 0.2
-    assert rewards.tolist() == [0.0, 1.0, 1.0]
-    envs.batches[0].worlds.qvel[0] = 77.0  # Nothing of the old episode is left.
-    nothing = torch.tensor([[np.nan], [0.0], [0.0]])
-    observations, rewards, terminated, truncated, infos = envs.step(nothing)
-    assert observations[0].abs().max() <= 0.01
-    assert rewards.tolist() == [0.0, 1.0, 1.0]
-    assert not terminated.any()
-    assert not truncated.any()
-    assert infos["_reward_survive"].tolist() == [False, True, True]
-
-
 def test_same_step_returns_the_start_and_keeps_the_end() -> None:
     """The last observation and info of an episode are in the infos, as in Gymnasium."""
-    envs = pendulums("SameStep")
+    envs = pendulums()
     observations, rewards, terminated, _, infos = until_a_fall(envs)
     assert terminated.tolist() == infos["_final_obs"].tolist() == [True, False, False]
     assert observations[0].abs().max() <= 0.01
@@ -72,33 +53,26 @@ def test_same_step_returns_the_start_and_keeps_the_end() -> None:
     assert not envs.step(PUSH)[2].any()
 
 
-def test_nothing_resets_where_that_is_disabled() -> None:
-    """Only a reset with a mask goes on, and it leaves the other worlds alone."""
-    envs = pendulums("Disabled")
-    _, _, terminated, truncated, _ = until_a_fall(envs)
-    with pytest.raises(gym.error.ResetNeeded, match="worlds 0 have ended"):
-        envs.step(PUSH)
-    before = envs.batches[0].worlds.qpos[1:].clone()
-    observations, _ = envs.reset(options={"reset_mask": terminated | truncated})
-    assert observations[0].abs().max() <= 0.01
-    assert torch.equal(envs.batches[0].worlds.qpos[1:], before)
-    assert not envs.step(PUSH)[2].any()
-
-
 def test_infos_of_a_restart_join_those_of_steps() -> None:
-    """Runners tell their place after a restart, in either mode, and their speed after a step."""
-    for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
-        envs = shapechanger.make_vec(
-            "Hopper", 2, backend="warp", device="cpu", autoreset_mode=mode, max_episode_steps=1
-        )
-        envs.reset(seed=0)
-        infos = envs.step(torch.zeros(2, 3))[-1]
-        if mode is AutoresetMode.NEXT_STEP:
-            infos = envs.step(torch.zeros(2, 3))[-1]
-        else:
-            assert infos["final_info"]["_x_velocity"].all()
-        assert infos["_x_position"].all()
-        assert not infos["_x_velocity"].any()
+    """Runners tell their place after a restart, and their speed after a step."""
+    envs = shapechanger.make_vec("Hopper", 2, backend="warp", device="cpu", max_episode_steps=1)
+    envs.reset(seed=0)
+    infos = envs.step(torch.zeros(2, 3))[-1]
+    assert infos["final_info"]["_x_velocity"].all()
+    assert infos["_x_position"].all()
+    assert not infos["_x_velocity"].any()
+
+
+def test_ends_and_divergence_are_always_in_the_infos() -> None:
+    """A learner reads them without asking whether they are there; task infos can be left out."""
+    for task_infos in (True, False):
+        envs = pendulums(task_infos=task_infos)
+        infos = envs.step(torch.zeros(WORLDS, 1))[-1]
+        for name in ("final_obs", "_final_obs", "diverged", "_diverged"):
+            assert len(infos[name]) == WORLDS
+        assert not infos["_final_obs"].any()
+        assert not infos["diverged"].any()
+        assert ("reward_survive" in infos) == task_infos
 
 
 def test_time_limits_are_those_of_the_id() -> None:
@@ -106,8 +80,7 @@ def test_time_limits_are_those_of_the_id() -> None:
     assert pendulums().max_episode_steps == 1000
     envs = pendulums(max_episode_steps=3)
     ends = [envs.step(torch.zeros(WORLDS, 1))[3].all() for _ in range(8)]
-    # The step that restarts counts for nothing.
-    assert [bool(end) for end in ends] == [False, False, True, False, False, False, True, False]
+    assert [bool(end) for end in ends] == [False, False, True, False, False, True, False, False]
 
 
 def test_a_seed_gives_the_same_world_anywhere() -> None:
@@ -161,10 +134,9 @@ def test_the_noise_never_changes() -> None:
     torch.testing.assert_close(drawn, expected, rtol=0.0, atol=1e-15)
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
-def test_a_world_that_diverges_restarts_alone(mode: str) -> None:
+def test_a_world_that_diverges_restarts_alone() -> None:
     """Its reward is 0, its number is true in `diverged`, and the others step as ever."""
-    whole, broken = pendulums(mode), pendulums(mode)
+    whole, broken = pendulums(), pendulums()
     still = torch.zeros(WORLDS, 1)
     broken.batches[0].worlds.qvel[1] = torch.nan
     expected, found = whole.step(still), broken.step(still)
@@ -174,14 +146,26 @@ def test_a_world_that_diverges_restarts_alone(mode: str) -> None:
     assert terminated.tolist() == [False, True, False]
     assert rewards[1] == 0.0
     assert observations.isfinite().all()
-    final = infos["final_info"] if mode == "SameStep" else infos
-    assert final["diverged"].tolist() == final["_diverged"].tolist() == [False, True, False]
-    if mode == "Disabled":
-        broken.reset(options={"reset_mask": terminated})
+    for told in (infos, infos["final_info"]):
+        assert told["diverged"].tolist() == told["_diverged"].tolist() == [False, True, False]
     for _ in range(5):
         found = broken.step(still)
-        assert "diverged" not in found[-1]
+        assert not found[-1]["diverged"].any()
         assert found[0].isfinite().all()
+
+
+def test_inference_mode_and_gradients_leave_no_trace() -> None:
+    """Worlds rolled out in inference mode step and reset outside of it, and build no graph."""
+    envs = pendulums()
+    with torch.inference_mode():
+        for _ in range(2):
+            envs.step(torch.zeros(WORLDS, 1))
+    envs.reset(seed=1)
+    actions = torch.zeros(WORLDS, 1, requires_grad=True)
+    observations, rewards, *_ = envs.step(actions)
+    assert not observations.requires_grad
+    assert not rewards.requires_grad
+    assert not envs.batches[0].worlds.qpos.requires_grad
 
 
 def test_huge_numbers_diverge_too() -> None:

@@ -66,7 +66,6 @@ def _worlds(bodies: list[str]) -> RslVecEnv:
         len(bodies),
         backend="warp",
         device="cpu",
-        autoreset_mode="SameStep",
         bodies=bodies,
         max_episode_steps=20,
     )
@@ -131,9 +130,7 @@ def test_worlds_of_equal_spaces_and_several_batches() -> None:
     """Where a vector env has one tensor for all batches, so have rows and actions."""
     bodies = ["Swimmer", to_json([JointRange("free_body_rot", -2.0, 2.0)])]
     swimmer = EnvRef("shapechanger/Swimmer-v1")
-    envs = shapechanger.make_vec(
-        "Swimmer", 2, backend="warp", device="cpu", autoreset_mode="SameStep", bodies=bodies
-    )
+    envs = shapechanger.make_vec("Swimmer", 2, backend="warp", device="cpu", bodies=bodies)
     assert len(envs.batches) == 2
     rows = rows_of_each([swimmer.having({"body": body}) for body in bodies])
     worlds = RslVecEnv(envs, 0, rows)

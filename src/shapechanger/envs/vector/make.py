@@ -32,7 +32,7 @@ def make_vec(
     backend: Literal["threads"] = "threads",
     threads: int | None = None,
     bodies: Sequence[BodyLike] | None = None,
-    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    autoreset_mode: AutoresetMode | str | None = None,
     copy: bool = True,
     **arguments: Any,
 ) -> ThreadVectorEnv: ...
@@ -46,7 +46,11 @@ def make_vec(
     backend: Literal["warp"],
     device: str | None = None,
     bodies: Sequence[BodyLike | FingerLike] | None = None,
-    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    pool: Sequence[BodyLike | FingerLike] | None = None,
+    nconmax: int | None = None,
+    njmax: int | None = None,
+    task_infos: bool = True,
+    autoreset_mode: AutoresetMode | str | None = None,
     **arguments: Any,
 ) -> WarpVectorEnv: ...
 
@@ -59,7 +63,11 @@ def make_vec(
     threads: int | None = None,
     device: str | None = None,
     bodies: Sequence[BodyLike | FingerLike] | None = None,
-    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    pool: Sequence[BodyLike | FingerLike] | None = None,
+    nconmax: int | None = None,
+    njmax: int | None = None,
+    task_infos: bool = True,
+    autoreset_mode: AutoresetMode | str | None = None,
     copy: bool = True,
     **arguments: Any,
 ) -> ThreadVectorEnv | WarpVectorEnv:
@@ -78,7 +86,16 @@ def make_vec(
         bodies: One body per env instead of one for all. With threads, lengths and masses may
             differ, spaces may not; on a device they may, too. Those of fingers, on a device alone,
             are their parameters.
-        autoreset_mode: When to reset an env whose episode has ended, as in Gymnasium.
+        pool: Of the backend `warp`, instead of `bodies`: any number of bodies, which are compiled
+            once and stay on the device. Each start of an episode draws one of them.
+        nconmax: Of the backend `warp`: how many contacts a world has memory for. None for as many
+            as it can ever have; with less memory steps are faster, and if a world ever has more
+            contacts a warning says so.
+        njmax: The same for rows of constraints.
+        task_infos: Of the backend `warp`: whether steps return the infos of the CPU env, which
+            cost time and no learner reads.
+        autoreset_mode: When to reset an env whose episode has ended, as in Gymnasium; None for
+            `NEXT_STEP` with threads and `SAME_STEP`, the only one there, on a device.
         copy: Whether to return copies of the observations; otherwise the next step overwrites them.
             On a device they are always copies.
         **arguments: Arguments of `gymnasium.make`, such as `render_mode` or `max_episode_steps`.
@@ -96,11 +113,15 @@ def make_vec(
         raise VectorEnvError(f"There are {count} envs and {len(bodies)} bodies.")
     if backend not in _BACKENDS:
         raise UnknownName("backend", backend, _BACKENDS)
-    made_from, mode = _known_id(env_id), _mode(autoreset_mode)
+    made_from, mode = _known_id(env_id), _mode(autoreset_mode, backend)
+    limits = {"nconmax": nconmax, "njmax": njmax}
+    given = {name: number for name, number in limits.items() if number is not None}
     chosen: dict[str, Any] = {}
     if backend == "warp":
         if threads is not None or not copy:
             raise VectorEnvError("backend='warp' has no threads, and always copies observations.")
+        if pool is not None and (bodies is not None or not len(pool)):
+            raise VectorEnvError("Give either `bodies`, one per world, or a `pool` of some bodies.")
         from shapechanger.envs.warp import make_warp
 
         envs = make_warp(
@@ -109,14 +130,19 @@ def make_vec(
             count,
             device=device,
             bodies=bodies,
-            autoreset_mode=mode,
+            pool=pool,
+            limits={name: _at_least_one(name, number) for name, number in given.items()},
+            task_infos=task_infos,
             arguments=arguments,
         )
         spec = copying.deepcopy(envs.made_from)
-        chosen |= {"backend": backend} | ({} if device is None else {"device": device})
+        chosen |= {"backend": backend, **given} | ({} if device is None else {"device": device})
+        chosen |= ({} if pool is None else {"pool": list(pool)}) | {"task_infos": task_infos}
     else:
-        if device is not None:
-            raise VectorEnvError("backend='threads' has no device: use backend='warp'.")
+        asked = {"device": device, "pool": pool, **limits}
+        for name, value in asked.items():
+            if value is not None:
+                raise VectorEnvError(f"backend='threads' has no {name}: use backend='warp'.")
         cores = _cores() if threads is None else _at_least_one("thread", threads)
         each: Sequence[dict[str, Any]] = [arguments] * count
         if bodies is not None:
@@ -170,9 +196,17 @@ def _at_least_one(what: str, number: int) -> int:
     return count
 
 
-def _mode(mode: AutoresetMode | str) -> AutoresetMode:
+def _mode(mode: AutoresetMode | str | None, backend: str) -> AutoresetMode:
+    if mode is None:
+        return AutoresetMode.SAME_STEP if backend == "warp" else AutoresetMode.NEXT_STEP
     try:
-        return AutoresetMode(mode)
+        wanted = AutoresetMode(mode)
     except ValueError:
         known = [known.value for known in AutoresetMode]
         raise UnknownName("autoreset mode", str(mode), known) from None
+    if backend == "warp" and wanted is not AutoresetMode.SAME_STEP:
+        raise VectorEnvError(
+            f"backend='warp' has no autoreset mode {wanted.value}: its worlds start again in the "
+            "step in which their episode ends, autoreset_mode='SameStep'."
+        )
+    return wanted

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 import gymnasium as gym
@@ -12,12 +12,16 @@ import torch
 from torch import Tensor
 
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
+from shapechanger.envs.warp.devices import without_gradients
+from shapechanger.envs.warp.noise import uniforms
 from shapechanger.envs.warp.tasks import DeviceTask
 from shapechanger.envs.warp.worlds import Worlds
 from shapechanger.errors import VectorEnvError
 from shapechanger.layout import Layout
 
 _MOST_LISTED: Final = 4
+# Stream of the random numbers that choose bodies; tasks use those from 0 on.
+_BODIES: Final = -1
 
 
 class BatchKind(NamedTuple):
@@ -82,11 +86,15 @@ class WarpBatch:
     Args:
         kind: What their bodies have in common.
         numbers: The number of each world in the vector env, shape (n,).
-        bodies: The body of each.
+        bodies: The bodies that the worlds can have.
+        chosen: The body of each world, an index of `bodies`, shape (n,).
         device: Name of the device.
+        redraws: Whether each start of an episode draws one of the bodies.
+        limits: Memory for contacts and constraints; see `Worlds`.
 
     Attributes:
         numbers: The number of each world in the vector env, shape (n,).
+        chosen: The body of each world, an index of the bodies it can have, shape (n,).
         worlds: Their physics, with views of positions, velocities and forces.
         observation_layout: Name, unit and range of each number of an observation.
         action_layout: Name, unit and range of each number of an action.
@@ -95,7 +103,15 @@ class WarpBatch:
     """
 
     def __init__(
-        self, kind: BatchKind, numbers: Tensor, bodies: Sequence[DeviceBody], device: str
+        self,
+        kind: BatchKind,
+        numbers: Tensor,
+        bodies: Sequence[DeviceBody],
+        chosen: Tensor,
+        device: str,
+        *,
+        redraws: bool = False,
+        limits: Mapping[str, int],
     ) -> None:
         self.kind = kind
         self.numbers = numbers
@@ -104,29 +120,50 @@ class WarpBatch:
         size = (kind.observation_layout.size,)
         self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, size, np.float32)
         self.single_action_space = kind.action_space
-        self.worlds = Worlds(kind.model, bodies, kind.frame_skip, device, kind.task.contact_forces)
+        self.worlds = Worlds(
+            kind.model,
+            bodies,
+            chosen,
+            kind.frame_skip,
+            device,
+            kind.task.contact_forces,
+            limits,
+        )
         self._task.attach(kind.model, self.worlds)
-        self._constants = {
-            name: torch.as_tensor(
-                np.stack([body.constants[name] for body in bodies]),
-                dtype=kind.task.precision,
-                device=device,
-            )
-            for name in kind.first.constants
-        }
+        self.chosen = chosen
+        self._redraws = redraws
+        self._hold_constants(bodies)
+        self._constants = {name: table[chosen] for name, table in self._tables.items()}
         self._before = self._task.place(self.worlds).clone()
 
-    def write(self, places: Tensor, bodies: Sequence[DeviceBody]) -> None:
-        """Give worlds other bodies; they must start again afterwards.
+    def _hold_constants(self, bodies: Sequence[DeviceBody]) -> None:
+        """Keep the numbers of the task of each body on the device."""
+        self._held = len(bodies)
+        self._tables = {
+            name: torch.as_tensor(
+                np.stack([body.constants[name] for body in bodies]),
+                dtype=self._task.precision,
+                device=self.worlds.device,
+            )
+            for name in bodies[0].constants
+        }
+
+    def change_bodies(self, bodies: Sequence[DeviceBody], chosen: Tensor) -> None:
+        """Replace the bodies that worlds can have; worlds with another one must start again.
 
         Args:
-            places: Their indices in this batch, shape (k,).
-            bodies: The body of each.
+            bodies: The bodies.
+            chosen: The body of each world, an index of `bodies`, shape (n,).
         """
-        self.worlds.write(places, bodies)
-        for name, tensor in self._constants.items():
-            values = np.stack([body.constants[name] for body in bodies])
-            tensor[places] = torch.as_tensor(values, dtype=tensor.dtype, device=tensor.device)
+        self.worlds.hold(bodies)
+        self._hold_constants(bodies)
+        self._choose(chosen)
+
+    def _choose(self, chosen: Tensor) -> None:
+        self.chosen = chosen
+        self.worlds.choose(chosen)
+        for name, table in self._tables.items():
+            self._constants[name].copy_(table[chosen])
 
     def step(self, actions: Tensor) -> DeviceStep:
         """Take one step in each world.
@@ -137,7 +174,7 @@ class WarpBatch:
         Args:
             actions: Shape (n, nu).
         """
-        worlds, task = self.worlds, self._task
+        worlds, task, actions = self.worlds, self._task, actions.detach()
         task.act(worlds, self._constants, actions)
         rewards, terminated, infos = task.outcome(worlds, self._before, actions, self._constants)
         observations = task.observations(worlds)
@@ -146,12 +183,11 @@ class WarpBatch:
         state = torch.cat([worlds.qpos, worlds.qvel, worlds.qacc], dim=1)
         # Also where a number is not one.
         diverged = ~((state.abs() <= limit).all(dim=1) & observations.isfinite().all(dim=1))
-        rewards = torch.where(diverged, 0.0, rewards)
-        observations = torch.where(observations.isfinite(), observations, 0.0)
-        if bool(diverged.any()):
-            worlds.clear(diverged)
-            poses = self._constants["init_qpos"].to(worlds.qpos.dtype)
-            worlds.qpos[diverged] = poses[diverged]
+        rewards = rewards.masked_fill(diverged, 0.0)
+        observations = observations.masked_fill(~observations.isfinite(), 0.0)
+        worlds.clear(diverged)
+        poses = self._constants["init_qpos"].to(worlds.qpos.dtype)
+        worlds.qpos.copy_(torch.where(diverged[:, None], poses, worlds.qpos))
         return DeviceStep(observations, rewards, terminated | diverged, diverged, infos)
 
     def start(
@@ -168,9 +204,13 @@ class WarpBatch:
             Observations, shape (n, size), and infos; only the rows of `mask` are of the start.
         """
         self.worlds.clear(mask)
+        if self._redraws:
+            drawn = uniforms(seeds, episodes, _BODIES, 1)[:, 0] * self._held
+            self._choose(torch.where(mask, drawn.to(torch.int64), self.chosen))
         self._task.start(self.worlds, self._constants, mask, seeds, episodes)
         return self._started(mask)
 
+    @without_gradients()
     def set_state(self, qpos: Tensor, qvel: Tensor) -> None:
         """Set positions (n, nq) and velocities (n, nv) of all worlds, and clear all else.
 
@@ -187,5 +227,5 @@ class WarpBatch:
             worlds.forward()
         else:
             worlds.kinematics()
-        self._before[mask] = self._task.place(worlds)[mask]
+        self._before = torch.where(mask[:, None], self._task.place(worlds), self._before)
         return self._task.observations(worlds), self._task.start_infos(worlds, self._constants)

@@ -10,6 +10,7 @@ from shapechanger.errors import MissingExtra, UnknownName
 
 try:
     import torch
+    from torch import Tensor
 except ImportError as error:
     raise MissingExtra("torch", "gpu") from error
 try:
@@ -46,6 +47,31 @@ def find_device(name: str | None) -> str:
     if wanted not in known:
         raise UnknownName("device", name, known)
     return wanted
+
+
+@contextmanager
+def without_gradients() -> Generator[None]:
+    """Make ordinary tensors without gradients, also inside `torch.inference_mode()`.
+
+    Tensors made in inference mode could not be changed outside of it.
+    """
+    with torch.inference_mode(mode=False), torch.no_grad():
+        yield
+
+
+def as_torch(array: Any) -> Tensor:
+    """Return a tensor that shares the memory of a Warp array."""
+    return cast("Tensor", wp.to_torch(array, requires_grad=False))
+
+
+def as_warp(tensor: Tensor, dtype: Any) -> Any:
+    """Return a Warp array that shares the memory of a tensor.
+
+    Args:
+        tensor: A contiguous tensor.
+        dtype: Warp's type of its numbers.
+    """
+    return wp.from_torch(tensor, dtype=dtype, requires_grad=False)
 
 
 @contextmanager

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, cast
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
@@ -17,11 +19,14 @@ from shapechanger.envs.finger.env import FingerLike
 from shapechanger.envs.vector.checks import masked_options, one_seed_each
 from shapechanger.envs.warp.batch import BatchKind, WarpBatch, require_fitting
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
+from shapechanger.envs.warp.devices import without_gradients
 from shapechanger.envs.warp.reader import Reader
 from shapechanger.errors import BadAction, UnknownName, VectorEnvError
 from shapechanger.layout import Layout
 
-_OPTIONS = ("bodies", "reset_mask")
+_OPTIONS: Final = ("bodies", "reset_mask")
+# Steps between two looks at whether the memory for contacts and constraints was too small.
+_LOOKS_EVERY: Final = 256
 
 Tensors = Tensor | tuple[Tensor, ...]
 """One tensor with a row per world, or one per batch where the spaces of the batches differ."""
@@ -36,23 +41,33 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     with a row per world; otherwise a tuple with one tensor per batch, in the order of `batches`.
     Rewards, ends and infos always have one number per world.
 
-    Infos are those of the CPU env: per key a tensor of shape (n,), and under `_key` which worlds
-    have it. A world whose simulation diverges is terminated with the reward 0 and `diverged`, as in
-    `ThreadVectorEnv`.
+    A world whose episode ends starts again in the same step (Gymnasium's autoreset mode
+    `SAME_STEP`). `infos["final_obs"]` has the observations before that, and `infos["_final_obs"]`
+    which worlds have ended; both are there after each step. A world whose simulation diverges is
+    terminated with the reward 0, and is true in `infos["diverged"]`, which is there after each step
+    too. The other infos are those of the CPU env: per key a tensor of shape (n,), and under `_key`
+    which worlds have it.
 
     Start states have the distribution of the CPU env, but not its numbers: they depend on the seed
-    of the world and on how many episodes it has begun since then, and on nothing else.
+    of the world and on how many episodes it has begun since then, and on nothing else. The body that
+    a world draws from a pool depends on the same two numbers.
+
+    A step asks the device one question, whether all actions are finite, and copies nothing to it.
 
     Args:
         reader: Compiles bodies.
-        bodies: The body of each world; None for that of the reader.
+        bodies: The body of each world, None for that of the reader; or, with `redraws`, the pool of
+            bodies.
+        num_envs: How many worlds there are.
         device: Name of the device.
-        autoreset_mode: When to reset a world whose episode has ended, as in Gymnasium.
+        redraws: Whether `bodies` is a pool, of which each start of an episode draws one.
+        limits: How many contacts (`nconmax`) and rows of constraints (`njmax`) a world has memory
+            for; as many as it can ever have where a number is missing.
+        task_infos: Whether steps and resets return the infos of the CPU env.
 
     Attributes:
         device: Name of the device.
         batches: The worlds, by the shapes of their arrays.
-        bodies: The edits of each world's body; for a finger its parameters.
         made_from: The spec of the CPU env, or None.
         observation_layout: Name, unit and range of each number of an observation of the first
             batch.
@@ -64,40 +79,36 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     single_observation_space: gym.Space[Any]
     single_action_space: gym.Space[Any]
 
+    @without_gradients()
     def __init__(
         self,
         reader: Reader,
         bodies: Sequence[BodyLike | FingerLike | None],
+        num_envs: int,
         *,
         device: str,
-        autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+        redraws: bool = False,
+        limits: Mapping[str, int] | None = None,
+        task_infos: bool = True,
     ) -> None:
-        self.num_envs = len(bodies)
+        self.num_envs = num_envs
         self.device = device
         self._reader = reader
-        self._mode = autoreset_mode
-        self.metadata = {"autoreset_mode": autoreset_mode}
-        self.bodies = [reader.body(body) for body in bodies]
-        kinds: list[BatchKind] = []
-        members: list[list[int]] = []
-        found: dict[Any, tuple[DeviceBody, int]] = {}
-        for number, body in enumerate(self.bodies):
-            if body not in found:
-                read, kind = reader.read(body)
-                place = _place_among(kinds, read)
-                if place == len(kinds):
-                    kinds.append(kind)
-                    members.append([])
-                found[body] = read, place
-            members[found[body][1]].append(number)
+        self._redraws = redraws
+        self._task_infos = task_infos
+        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+        self._groups = _grouped(reader, [reader.body(body) for body in bodies], num_envs)
         self.batches = tuple(
             WarpBatch(
-                kind,
-                torch.tensor(numbers, device=device),
-                [found[self.bodies[number]][0] for number in numbers],
+                group.kind,
+                torch.tensor(group.worlds, device=device),
+                list(group.bodies.values()),
+                torch.tensor(group.chosen, device=device),
                 device,
+                redraws=redraws,
+                limits=limits or {},
             )
-            for kind, numbers in zip(kinds, members, strict=True)
+            for group in self._groups
         )
         first = self.batches[0]
         self.observation_layout: Layout = first.observation_layout
@@ -122,8 +133,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._seeds = self._per_world(torch.int64)
         self._episodes = self._per_world(torch.int64)
         self._elapsed = self._per_world(torch.int64)
-        self._ended = self._per_world(torch.bool)
         self._seeded = self._begun = False
+        self._steps = 0
 
     def _size(self, batch: WarpBatch) -> int:
         return self.num_envs if self._flat else len(batch.numbers)
@@ -136,6 +147,16 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         return torch.zeros(self.num_envs, dtype=dtype, device=self.device)
 
     @property
+    def bodies(self) -> list[Any]:
+        """The edits of each world's body; for a finger its parameters."""
+        found: list[Any] = [None] * self.num_envs
+        for group, batch in zip(self._groups, self.batches, strict=True):
+            known = list(group.bodies)
+            for world, chosen in zip(group.worlds, _numbers(batch.chosen), strict=True):
+                found[world] = known[chosen]
+        return found
+
+    @property
     def max_episode_steps(self) -> int | None:
         """Steps after which an episode is truncated; None for never."""
         return self._limit
@@ -145,6 +166,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         """Steps of each world's episode so far, shape (n,); what is written here counts."""
         return self._elapsed
 
+    @without_gradients()
     def reset(
         self,
         *,
@@ -162,7 +184,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
 
         Returns:
             The observations of all worlds, and the infos of those that started again. The
-            observations of others are those of their present state.
+            observations of others are of their present state.
 
         Raises:
             VectorEnvError: If there are not as many seeds as worlds, as many bodies as worlds that
@@ -197,26 +219,27 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             raise VectorEnvError(
                 f"There are {len(numbers)} worlds that start again and {len(bodies)} bodies."
             )
-        places = {
-            number: (batch, place)
-            for batch in self.batches
-            for place, number in enumerate(_numbers(batch.numbers))
-        }
+        if self._redraws:
+            raise VectorEnvError(
+                "These worlds draw their bodies from a pool: make the vector env with `bodies` "
+                "instead of `pool` to choose them at a reset."
+            )
         edits = [self._reader.body(body) for body in bodies]
+        new = dict(zip(numbers, edits, strict=True))
         read = {body: self._reader.read(body)[0] for body in dict.fromkeys(edits)}
-        for number, body in zip(numbers, edits, strict=True):
-            require_fitting(places[number][0].kind, read[body])
-        for batch in self.batches:
-            mine = [
-                (places[number][1], body)
-                for number, body in zip(numbers, edits, strict=True)
-                if places[number][0] is batch
-            ]
-            if mine:
-                where = torch.tensor([place for place, _ in mine], device=self.device)
-                batch.write(where, [read[body] for _, body in mine])
-        for number, body in zip(numbers, edits, strict=True):
-            self.bodies[number] = body
+        for group in self._groups:
+            for world in group.worlds:
+                if world in new:
+                    require_fitting(group.kind, read[new[world]])
+        present = self.bodies
+        for group, batch in zip(self._groups, self.batches, strict=True):
+            if not any(world in new for world in group.worlds):
+                continue
+            each = [new.get(world, present[world]) for world in group.worlds]
+            group.bodies = {body: read.get(body) or group.bodies[body] for body in each}
+            place = {body: i for i, body in enumerate(group.bodies)}
+            chosen = torch.tensor([place[body] for body in each], device=self.device)
+            batch.change_bodies(list(group.bodies.values()), chosen)
 
     def _take_seeds(self, seeds: list[int | None]) -> None:
         """Take new seeds; a world with a new seed begins with its first episode."""
@@ -242,18 +265,16 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             Observations of each batch, and infos of all worlds; rows outside the mask are of the
             present state.
         """
-        observations: list[Tensor] = []
-        infos: list[dict[str, Tensor]] = []
-        for batch in self.batches:
-            numbers = batch.numbers
-            seen, info = batch.start(mask[numbers], self._seeds[numbers], self._episodes[numbers])
-            observations.append(seen)
-            infos.append(info)
+        starts = [
+            batch.start(*(self._rows(batch, each) for each in (mask, self._seeds, self._episodes)))
+            for batch in self.batches
+        ]
         self._episodes += mask
-        self._elapsed[mask] = 0
-        self._ended[mask] = False
-        return observations, self._gathered(infos)
+        self._elapsed.masked_fill_(mask, 0)
+        infos = self._gathered([info for _, info in starts]) if self._task_infos else {}
+        return [seen for seen, _ in starts], infos
 
+    @without_gradients()
     def step(self, actions: Any) -> tuple[Tensors, Tensor, Tensor, Tensor, dict[str, Any]]:
         """Take one step in each world.
 
@@ -270,50 +291,51 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             ClosedEnvironmentError: If the vector env is closed.
         """
         self._require_open()
-        self._require_running()
-        waits = self._mode is AutoresetMode.NEXT_STEP
-        waiting = self._ended.clone() if waits else torch.zeros_like(self._ended)
-        each = self._checked(actions, waiting)
+        if not self._begun:
+            raise gym.error.ResetNeeded("No episode is under way: call `reset` first.")
+        each = self._checked(actions)
         steps = [batch.step(action) for batch, action in zip(self.batches, each, strict=True)]
         observations = [step.observations for step in steps]
         rewards = self._gathered_one([step.rewards for step in steps])
         terminated = self._gathered_one([step.terminated for step in steps])
-        diverged = self._gathered_one([step.diverged for step in steps]) & ~waiting
-        infos = self._gathered([step.infos for step in steps])
+        diverged = self._gathered_one([step.diverged for step in steps])
         self._elapsed += 1
-        truncated = torch.zeros_like(terminated)
-        if self._limit is not None:
+        if self._limit is None:
+            truncated = torch.zeros_like(terminated)
+        else:
             truncated = self._elapsed >= self._limit
-        rewards = torch.where(waiting, 0.0, rewards)
-        terminated, truncated = terminated & ~waiting, truncated & ~waiting
-        found = _masked(infos, ~waiting)
-        if bool(diverged.any()):
-            found |= _masked({"diverged": diverged}, diverged)
-        self._ended = terminated | truncated
-        if bool(waiting.any()):
-            starts, infos = self._start(waiting)
-            observations = self._mixed(waiting, starts, observations)
-            found = _merged(found, infos, waiting)
-        elif self._mode is AutoresetMode.SAME_STEP and bool(self._ended.any()):
-            ended = self._ended.clone()
-            final = {
-                "final_obs": self._out(observations),
-                "final_info": {
-                    name: value & ended if name.startswith("_") else value
-                    for name, value in found.items()
-                },
-            }
-            starts, infos = self._start(ended)
-            observations = self._mixed(ended, starts, observations)
-            kept = {
-                name: value & ~ended if name.startswith("_") else value
-                for name, value in found.items()
-            }
-            found = _merged(kept, infos, ended)
-            found |= {**final, "_final_obs": ended, "_final_info": ended}
-        return self._out(observations), rewards, terminated, truncated, found
+        ended = terminated | truncated
+        # Whether an episode has ended is not asked: the answer would keep a GPU waiting.
+        starts, start_infos = self._start(ended)
+        infos: dict[str, Any] = {
+            **{"final_obs": self._out(observations), "_final_obs": ended},
+            **{"diverged": diverged, "_diverged": diverged},
+        }
+        if self._task_infos:
+            step_infos = self._gathered([step.infos for step in steps])
+            final_info = _masked({**step_infos, "diverged": diverged}, ended)
+            infos |= {"final_info": final_info, "_final_info": ended}
+            infos |= _merged(_masked(step_infos, ~ended), start_infos, ended)
+        self._steps += 1
+        if self._steps % _LOOKS_EVERY == 0:
+            self._warn_of_overflows()
+        observations = [
+            torch.where(self._rows(batch, ended)[:, None], start, seen)
+            for batch, start, seen in zip(self.batches, starts, observations, strict=True)
+        ]
+        return self._out(observations), rewards, terminated, truncated, infos
 
-    def _checked(self, actions: Any, ignored: Tensor) -> list[Tensor]:
+    def _warn_of_overflows(self) -> None:
+        for batch in self.batches:
+            for limit, count in batch.worlds.overflows().items():
+                warnings.warn(
+                    f"{count} worlds had more contacts or constraints than {limit}="
+                    f"{batch.worlds.limits[limit]} has memory for, and their physics is wrong "
+                    f"without the others: make the vector env with a larger {limit}.",
+                    stacklevel=3,
+                )
+
+    def _checked(self, actions: Any) -> list[Tensor]:
         """Return the actions of each batch, on the device.
 
         Raises:
@@ -321,7 +343,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         """
         if self._flat:
             whole = self._tensor(actions, (self.num_envs, self.action_layout.size), "")
-            each = [whole[batch.numbers] for batch in self.batches]
+            each = [self._rows(batch, whole) for batch in self.batches]
         else:
             given = cast("Sequence[Any]", actions if isinstance(actions, list | tuple) else ())
             if len(given) != len(self.batches):
@@ -333,15 +355,17 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
                 self._tensor(part, (len(batch.numbers), batch.action_layout.size), f" of batch {i}")
                 for i, (part, batch) in enumerate(zip(given, self.batches, strict=True))
             ]
-        for batch, part in zip(self.batches, each, strict=True):
-            bad = ~part.isfinite().all(dim=1) & ~ignored[batch.numbers]
-            if bool(bad.any()):
-                place = int(bad.nonzero()[0, 0])
+        bad = [~part.isfinite().all(dim=1) for part in each]
+        # The only question to the device in a step, before its physics.
+        found = torch.stack([one.any() for one in bad]).tolist()
+        for batch, part, any_bad, one in zip(self.batches, each, found, bad, strict=True):
+            if any_bad:
+                place = int(one.nonzero()[0, 0])
                 raise BadAction(
                     f"The action of world {int(batch.numbers[place])} has numbers that are not "
                     f"finite: {_numbers(part[place])}."
                 )
-        return [part.nan_to_num(0.0, 0.0, 0.0) for part in each]
+        return each
 
     def _tensor(self, actions: Any, shape: tuple[int, int], which: str) -> Tensor:
         try:
@@ -355,6 +379,10 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             )
         return tensor.to(torch.float32)
 
+    def _rows(self, batch: WarpBatch, values: Tensor) -> Tensor:
+        """Return the rows of a batch; a single batch has all, in the same order."""
+        return values if len(self.batches) == 1 else values[batch.numbers]
+
     def _gathered_one(self, parts: list[Tensor]) -> Tensor:
         """Return the rows of all batches as one tensor with a row per world."""
         if len(parts) == 1:
@@ -367,13 +395,6 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     def _gathered(self, parts: list[dict[str, Tensor]]) -> dict[str, Tensor]:
         return {name: self._gathered_one([part[name] for part in parts]) for name in parts[0]}
 
-    def _mixed(self, mask: Tensor, new: list[Tensor], old: list[Tensor]) -> list[Tensor]:
-        """Return the new rows where the mask is true, and the old ones elsewhere."""
-        return [
-            torch.where(mask[batch.numbers, None], one, other)
-            for batch, one, other in zip(self.batches, new, old, strict=True)
-        ]
-
     def _out(self, observations: list[Tensor]) -> Tensors:
         return self._gathered_one(observations) if self._flat else tuple(observations)
 
@@ -385,28 +406,60 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         if self.closed:
             raise gym.error.ClosedEnvironmentError("This vector env is closed: make another one.")
 
-    def _require_running(self) -> None:
-        if not self._begun:
-            raise gym.error.ResetNeeded("No episode is under way: call `reset` first.")
-        if self._mode is AutoresetMode.DISABLED and bool(self._ended.any()):
-            numbers = ", ".join(str(i) for i in _numbers(self._ended.nonzero().flatten()))
-            raise gym.error.ResetNeeded(
-                f"The episodes of worlds {numbers} have ended, and nothing resets them in this "
-                "mode: call `reset` with options={'reset_mask': terminations | truncations}."
-            )
-
 
 def _numbers(tensor: Tensor) -> list[Any]:
     """Return the numbers of a tensor of one dimension."""
     return cast("Any", tensor).tolist()
 
 
-def _place_among(kinds: list[BatchKind], body: DeviceBody) -> int:
-    """Return the number of the batch that a body fits, or that of a new one."""
-    for place, kind in enumerate(kinds):
-        if not differing_arrays(kind.first, body):
-            return place
-    return len(kinds)
+@dataclass(slots=True)
+class _Group:
+    """Worlds of one batch, and the bodies that they can have.
+
+    Attributes:
+        kind: What the bodies have in common.
+        bodies: What the device needs of each body, keyed by its edits.
+        worlds: The numbers of the worlds in the vector env.
+        chosen: The body of each world, a place among `bodies`.
+    """
+
+    kind: BatchKind
+    bodies: dict[Any, DeviceBody] = field(default_factory=dict[Any, DeviceBody])
+    worlds: list[int] = field(default_factory=list[int])
+    chosen: list[int] = field(default_factory=list[int])
+
+
+def _grouped(reader: Reader, bodies: Sequence[Any], num_envs: int) -> list[_Group]:
+    """Compile bodies, and group worlds that have them in turn by the shapes of their arrays.
+
+    Raises:
+        VectorEnvError: If there are fewer worlds than shapes.
+    """
+    groups: list[_Group] = []
+    group_of: dict[Any, _Group] = {}
+    for body in dict.fromkeys(bodies):
+        read, kind = reader.read(body)
+        group = next((g for g in groups if not differing_arrays(g.kind.first, read)), None)
+        if group is None:
+            group = _Group(kind)
+            groups.append(group)
+        group.bodies[body] = read
+        group_of[body] = group
+    place = {body: i for group in groups for i, body in enumerate(group.bodies)}
+    # A pool of more bodies than worlds is spread over them.
+    step = max(1, len(bodies) // num_envs)
+    for world in range(num_envs):
+        body = bodies[world * step % len(bodies)]
+        group_of[body].worlds.append(world)
+        group_of[body].chosen.append(place[body])
+    for group in groups:
+        if not group.worlds:
+            raise VectorEnvError(
+                f"No world has bodies like {group.kind.first.name}: the bodies of the pool form "
+                f"{len(groups)} batches, because their arrays differ, and there are {num_envs} "
+                "worlds, so make more."
+            )
+    return groups
 
 
 def _like(mask: Tensor, value: Tensor) -> Tensor:

@@ -56,13 +56,14 @@ class DeviceFinger(DeviceTask):
         # Where the former controls of each actuator are: after two settings and their times.
         samples = int(plant.model.actuator_history[0, 0])
         first = np.asarray(plant.model.actuator_historyadr) + 2 + samples
-        self._former = [[int(place) + i for i in range(samples)] for place in first]
+        self._former_places = first[:, None] + np.arange(samples)
 
     def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
         """See `DeviceTask`."""
         count, device = worlds.count, worlds.device
         zeros = partial(torch.zeros, dtype=self.precision, device=device)
         whole = partial(torch.zeros, count, dtype=torch.int64, device=device)
+        self._former = torch.as_tensor(self._former_places, dtype=torch.int64, device=device)
         drive = self._env.drive
         arrays = {
             name: torch.as_tensor(getattr(drive, name)) for name in ("offset", "gain", "rest")
@@ -80,22 +81,26 @@ class DeviceFinger(DeviceTask):
         self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
     ) -> None:
         """See `DeviceTask`."""
-        self._seeds[mask], self._episodes[mask], self._steps[mask] = seeds[mask], episodes[mask], 0
+        _put(self._seeds, mask, seeds)
+        _put(self._episodes, mask, episodes)
+        self._steps.masked_fill_(mask, 0)
         angles = self._begin(mask)
         lengths = -_turned(constants["arms"], angles)
         qpos = torch.cat([angles, constants["taut"] - lengths], dim=1) if self._gives else angles
         command = self._drive.command(constants["least"], lengths, torch.zeros_like(lengths))
         command = command.clip(-1.0, 1.0)
-        self._shares[mask] = 0.0
+        self._shares.masked_fill_(mask[:, None], 0.0)
         controls = command if self._held is None else self._controls(constants)
         held = controls.to(worlds.ctrl.dtype)
-        worlds.qpos[mask] = qpos.to(worlds.qpos.dtype)[mask]
-        worlds.ctrl[mask] = worlds.act[mask] = held[mask]
+        _put(worlds.qpos, mask, qpos)
+        _put(worlds.ctrl, mask, held)
+        _put(worlds.act, mask, held)
         if constants["history"].numel():
-            history = constants["history"].to(held.dtype)
+            history = constants["history"].to(held.dtype, copy=True)
             history[:, self._former] = held[:, :, None]
-            worlds.history[mask] = history[mask]
-        self._commands[mask], self._change[mask] = command[mask], 0.0
+            _put(worlds.history, mask, history)
+        _put(self._commands, mask, command)
+        self._change.masked_fill_(mask[:, None], 0.0)
         worlds.forward()
         self._measure(worlds, constants, mask)
 
@@ -222,18 +227,19 @@ class DeviceReach(DeviceFinger):
         """See `DeviceTask`."""
         super().attach(model, worlds)
         self._near = torch.zeros_like(self._steps)
-
-    def _begin(self, mask: Tensor) -> Tensor:
-        low, high, rest = (
-            torch.as_tensor(angles, dtype=self.precision, device=mask.device)
+        self._low, self._high, self._rest = (
+            torch.as_tensor(angles, dtype=self.precision, device=worlds.device)
             for angles in (*inner_range(), JOINT_REST)
         )
+
+    def _begin(self, mask: Tensor) -> Tensor:
+        low, high, rest = self._low, self._high, self._rest
         drawn = uniforms(self._seeds, self._episodes, _TARGETS, _J)
         free = low[:3] + (high - low)[:3] * drawn[:, :3]
         off = DIP_BAND * (2.0 * drawn[:, 3] - 1.0)
         posture = torch.stack(coupled(free[:, 0], free[:, 1], free[:, 2], off), dim=1)
-        self._target[mask] = _fingertip(posture.clip(low, high))[mask]
-        self._near[mask] = 0
+        _put(self._target, mask, _fingertip(posture.clip(low, high)))
+        self._near.masked_fill_(mask, 0)
         moved = 2.0 * uniforms(self._seeds, self._episodes, _STARTS, _J) - 1.0
         return (rest + START_SPREAD * moved).clip(low, high)
 
@@ -250,7 +256,8 @@ class DeviceTrack(DeviceFinger):
     """Fingers that follow a path.
 
     Paths are functions of NumPy: their points, and the first angles at them, are computed on the
-    CPU from times that are known there.
+    CPU from times that are known there. So a step asks the device which worlds have started, and
+    copies points to it.
     """
 
     def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
@@ -263,6 +270,8 @@ class DeviceTrack(DeviceFinger):
 
     def _begin(self, mask: Tensor) -> Tensor:
         chosen = mask.cpu().numpy()
+        if not chosen.any():
+            return self._angles
         if self._path.closed:
             drawn = uniforms(self._seeds, self._episodes, _STARTS, 1)[:, 0].cpu().numpy()
             self._times[chosen] = self._path.duration_s * drawn[chosen]
@@ -271,7 +280,7 @@ class DeviceTrack(DeviceFinger):
         angles = np.tile(JOINT_REST, (len(chosen), 1))
         for i in np.flatnonzero(chosen):
             angles[i] = self._angles_there(self._times[i])
-        self._squares[mask] = 0.0
+        self._squares.masked_fill_(mask, 0.0)
         self._look()
         return torch.as_tensor(angles, dtype=self.precision, device=mask.device)
 
@@ -309,6 +318,12 @@ class DeviceTrack(DeviceFinger):
 
 FINGERS: Final = {FingerReachEnv: DeviceReach, FingerTrackEnv: DeviceTrack}
 """Batched functions of fingers by the class of their CPU env."""
+
+
+def _put(target: Tensor, mask: Tensor, values: Tensor) -> None:
+    """Write rows of values, shape (n, ...), into the worlds of a mask, shape (n,)."""
+    chosen = mask.view(-1, *[1] * (target.dim() - 1))
+    target.copy_(torch.where(chosen, values.to(target.dtype), target))
 
 
 def _turned(arms: Tensor, angles: Tensor) -> Tensor:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import gymnasium as gym
-from gymnasium.vector import AutoresetMode
 
 from shapechanger.bodies.families import BodyLike
 from shapechanger.envs.finger.env import FingerLike
@@ -29,7 +28,9 @@ def make_warp(
     *,
     device: str | None,
     bodies: Sequence[BodyLike | FingerLike] | None,
-    autoreset_mode: AutoresetMode,
+    pool: Sequence[BodyLike | FingerLike] | None,
+    limits: dict[str, int],
+    task_infos: bool,
     arguments: dict[str, Any],
 ) -> WarpVectorEnv:
     """Make many worlds on a device.
@@ -40,7 +41,9 @@ def make_warp(
         num_envs: How many worlds.
         device: Name of the device; None for the first GPU, or the CPU where there is none.
         bodies: One body per world; None for that of `arguments` in all.
-        autoreset_mode: When to reset a world whose episode has ended.
+        pool: Bodies of which each start of an episode draws one, instead of `bodies`.
+        limits: Contacts (`nconmax`) and rows of constraints (`njmax`) that a world has memory for.
+        task_infos: Whether steps and resets return the infos of the CPU env.
         arguments: Arguments of the CPU env.
 
     Raises:
@@ -52,5 +55,13 @@ def make_warp(
             raise VectorEnvError(f"backend='warp' takes no {name}: {reason}.")
     place = find_device(device)
     reader = make_reader(env_id, make, arguments)
-    given: Sequence[BodyLike | FingerLike | None] = [None] * num_envs if bodies is None else bodies
-    return WarpVectorEnv(reader, given, device=place, autoreset_mode=autoreset_mode)
+    given: Sequence[BodyLike | FingerLike | None] = pool or bodies or [None]
+    return WarpVectorEnv(
+        reader,
+        given,
+        num_envs,
+        device=place,
+        redraws=pool is not None,
+        limits=limits,
+        task_infos=task_infos,
+    )

@@ -58,7 +58,8 @@ class DeviceStarts:
         self._worlds = worlds
         self._noise_scale = noise_scale
         self._normal_velocities = normal_velocities
-        self._limited = rules.limited_places.tolist()
+        device = worlds.qpos.device
+        self._limited = torch.as_tensor(rules.limited_places, device=device)
         self._quaternions = [
             int(address) + _QUATERNION_AT[int(kind)]
             for address, kind in zip(model.jnt_qposadr, model.jnt_type, strict=True)
@@ -76,6 +77,9 @@ class DeviceStarts:
                     f"{_G(int(model.geom_type[floor])).name} meets {_G(shape).name}."
                 )
             self._touching.setdefault((floor, shape), []).append(geom)
+        self._geoms = {
+            pair: torch.tensor(geoms, device=device) for pair, geoms in self._touching.items()
+        }
 
     @staticmethod
     def constants(env: Any) -> dict[str, NDArray[Any]]:
@@ -127,17 +131,17 @@ class DeviceStarts:
         for place in self._quaternions:
             part = within[:, place : place + 4]
             within[:, place : place + 4] = torch.nn.functional.normalize(part, dim=1)
-        qpos[mask] = within[mask]
+        qpos.copy_(torch.where(mask[:, None], within, qpos))
         if self._lift is not None:
             self._worlds.kinematics()
-            lack = (-self._floor_gap()).clamp_min(0.0)
-            qpos[mask, self._lift.place] += self._lift.up * lack[mask]
+            lack = (-self._floor_gap()).clamp_min(0.0).masked_fill(~mask, 0.0)
+            qpos[:, self._lift.place] += self._lift.up * lack
 
     def _floor_gap(self) -> Tensor:
         """Return the clearance of each body's lowest point above the floor, m, shape (n,)."""
         worlds = self._worlds
-        gap = torch.full((worlds.count,), torch.inf, device=worlds.qpos.device)
-        for (floor, shape), geoms in self._touching.items():
+        gap = worlds.qpos.new_full((worlds.count,), torch.inf)
+        for (floor, shape), geoms in self._geoms.items():
             up = worlds.geom_xmat[:, floor, :, 2]
             above = worlds.geom_xpos[:, geoms] - worlds.geom_xpos[:, floor, None]
             height = torch.einsum("ngi,ni->ng", above, up)

@@ -107,7 +107,9 @@ class DeviceTask(ABC):
             episodes: How many episodes each world has begun, shape (n,).
         """
         qpos, qvel = self._starts.draw(constants, seeds, episodes)
-        worlds.qpos[mask], worlds.qvel[mask] = qpos[mask], qvel[mask]
+        chosen = mask[:, None]
+        worlds.qpos.copy_(torch.where(chosen, qpos, worlds.qpos))
+        worlds.qvel.copy_(torch.where(chosen, qvel, worlds.qvel))
         self._starts.settle(mask, constants)
 
     def act(self, worlds: Worlds, constants: Constants, actions: Tensor) -> None:

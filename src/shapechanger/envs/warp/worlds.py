@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, cast
 
 import mujoco
@@ -14,7 +14,7 @@ from torch import Tensor
 
 from shapechanger.envs.warp.bodies import ARMS, DeviceBody, static_geoms
 from shapechanger.envs.warp.contact_frames import follow_capsules
-from shapechanger.envs.warp.devices import mjw, on, wp
+from shapechanger.envs.warp.devices import as_torch, mjw, on, wp
 from shapechanger.envs.warp.tendon_arms import follow_arms
 
 _G: Final = mujoco.mjtGeom
@@ -42,6 +42,11 @@ _CONTACTS: Final = {
 _MOST_CONTACTS: Final = 8
 # Most rows of one equality.
 _ROWS_PER_EQUALITY: Final = 6
+# Overflows of the memory for contacts and constraints, by which results are wrong.
+_OVERFLOWS: Final = {
+    "njmax": ("NEFC", "NJMAX_NNZ"),
+    "nconmax": ("BROADPHASE", "NARROWPHASE", "CCD"),
+}
 
 
 class Worlds:
@@ -51,12 +56,16 @@ class Worlds:
 
     Args:
         model: A body of the batch.
-        bodies: The body of each world.
+        bodies: The bodies that worlds can have.
+        numbers: The body of each world, an index of `bodies`, shape (n,).
         frame_skip: Physics steps of each `step`.
         device: Name of the device.
         contact_forces: Whether `cfrc_ext` is computed after each step.
+        limits: How many contacts (`nconmax`) and rows of constraints (`njmax`) a world has memory
+            for; as many as it can ever have where a number is missing.
 
     Attributes:
+        limits: How many contacts and rows of constraints a world has memory for.
         qpos: Shape (n, nq).
         qvel: Shape (n, nv).
         ctrl: Shape (n, nu).
@@ -84,16 +93,19 @@ class Worlds:
         self,
         model: mujoco.MjModel,
         bodies: Sequence[DeviceBody],
+        numbers: Tensor,
         frame_skip: int,
         device: str,
         contact_forces: bool,
+        limits: Mapping[str, int],
     ) -> None:
-        self.count = len(bodies)
+        self.count = len(numbers)
         self.device = device
         self._frame_skip = frame_skip
         self._contact_forces = contact_forces
-        self._graph: Any = None
-        self._warm = False
+        # The graph of each function, and the functions whose kernels are loaded.
+        self._graphs: dict[str, Any] = {}
+        self._warm: set[str] = set()
         self._static = torch.as_tensor(static_geoms(model), device=device)
         follow_capsules()
         follow_arms()
@@ -103,45 +115,47 @@ class Worlds:
             model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         with on(device):
             self._model = mjw.put_model(model)
-            self._model.opt.warn_overflow = 0  # There is room for all contacts.
-            contacts, rows = _room(model, self._model.nxn_geom_pair_filtered.numpy())
-            self._data: Any = mjw.make_data(model, nworld=self.count, nconmax=contacts, njmax=rows)
+            self._model.opt.warn_overflow = 0  # `overflows` reports them without printing.
+            most = _room(model, self._model.nxn_geom_pair_filtered.numpy())
+            self.limits = {**most, **limits}
+            self._data: Any = mjw.make_data(model, nworld=self.count, **self.limits)
         data = self._data
-        self.qpos = self._view(data.qpos)
-        self.qvel = self._view(data.qvel)
-        self.ctrl = self._view(data.ctrl)
-        self.act = self._view(data.act)
-        self.actuator_force = self._view(data.actuator_force)
-        self.history = self._view(data.history)
-        self.time = self._view(data.time)
-        self.qacc = self._view(data.qacc)
-        self.xpos = self._view(data.xpos)
-        self.xipos = self._view(data.xipos)
-        self.cinert = self._view(data.cinert)
-        self.cvel = self._view(data.cvel)
-        self.qfrc_actuator = self._view(data.qfrc_actuator)
-        self.ten_length = self._view(data.ten_length)
-        self.ten_velocity = self._view(data.ten_velocity)
-        self.site_xpos = self._view(data.site_xpos)
-        self.geom_xpos = self._view(data.geom_xpos)
-        self.geom_xmat = self._view(data.geom_xmat)
-        self.cfrc_ext = self._view(data.cfrc_ext)
-        self.qfrc_constraint = self._view(data.qfrc_constraint)
+        self._overflow = as_torch(data.overflow)
+        self.qpos = as_torch(data.qpos)
+        self.qvel = as_torch(data.qvel)
+        self.ctrl = as_torch(data.ctrl)
+        self.act = as_torch(data.act)
+        self.actuator_force = as_torch(data.actuator_force)
+        self.history = as_torch(data.history)
+        self.time = as_torch(data.time)
+        self.qacc = as_torch(data.qacc)
+        self.xpos = as_torch(data.xpos)
+        self.xipos = as_torch(data.xipos)
+        self.cinert = as_torch(data.cinert)
+        self.cvel = as_torch(data.cvel)
+        self.qfrc_actuator = as_torch(data.qfrc_actuator)
+        self.ten_length = as_torch(data.ten_length)
+        self.ten_velocity = as_torch(data.ten_velocity)
+        self.site_xpos = as_torch(data.site_xpos)
+        self.geom_xpos = as_torch(data.geom_xpos)
+        self.geom_xmat = as_torch(data.geom_xmat)
+        self.cfrc_ext = as_torch(data.cfrc_ext)
+        self.qfrc_constraint = as_torch(data.qfrc_constraint)
         # What else of the state a restart clears.
         self._cleared = [
-            self._view(array)
+            as_torch(array)
             for array in (
                 *(data.act, data.qacc_warmstart, data.ctrl, data.qvel, data.cfrc_ext),
                 data.time,
             )
             if array.size
         ]
+        # Fields with a row per world, and for each the rows of the bodies that worlds can have.
         self._rows: dict[str, Tensor] = {}
-        self.write(torch.arange(self.count, device=device), bodies)
-
-    @staticmethod
-    def _view(array: Any) -> Tensor:
-        return cast("Tensor", wp.to_torch(array, requires_grad=False))
+        self._tables: dict[str, Tensor] = {}
+        self._static_tables: dict[str, Tensor] = {}
+        self.hold(bodies)
+        self.choose(numbers)
 
     def row(self, name: str) -> Tensor:
         """Return an array of the model, shape (n or 1, ...), as of each world.
@@ -153,38 +167,59 @@ class Worlds:
 
     def _by_world(self, name: str, array: Any) -> Tensor:
         """Return an array that is not yet wide, with a leading dimension."""
-        view = self._view(array)
+        view = as_torch(array)
         return view[None] if name == ARMS else view
 
     def _array(self, name: str) -> Any:
         owner, _, field = name.rpartition(".")
         return getattr(self._model.opt if owner else self._model, field)
 
-    def write(self, worlds: Tensor, bodies: Sequence[DeviceBody]) -> None:
-        """Give worlds other bodies.
+    def hold(self, bodies: Sequence[DeviceBody]) -> None:
+        """Keep the numbers of bodies on the device, from which `choose` gathers.
 
-        A field of the model gets a row per world as soon as two worlds differ in it.
+        A field of the model gets a row per world as soon as two bodies differ in it.
 
         Args:
-            worlds: Their indices, shape (k,).
-            bodies: The body of each, with the shared arrays of this batch.
+            bodies: The bodies, with the shared arrays of this batch.
         """
         for name in bodies[0].rows:
             array = self._array(name)
             if not array.size:
                 continue
             row = self._by_world(name, array)[0]
-            values = _stacked([body.rows[name] for body in bodies], row)
+            table = _stacked([body.rows[name] for body in bodies], row)
             if name not in self._rows:
-                if bool((values == row).all()):
+                if bool((table == row).all()):
                     continue
                 self._widen(name, array)
-            self._rows[name][worlds] = values
+            self._tables[name] = table
         if self._static.numel():
             for name, view in (("geom_xpos", self.geom_xpos), ("geom_xmat", self.geom_xmat)):
                 like = view[0, self._static]
-                values = _stacked([body.static[name] for body in bodies], like)
-                view[worlds[:, None], self._static] = values
+                self._static_tables[name] = _stacked([body.static[name] for body in bodies], like)
+
+    def choose(self, numbers: Tensor) -> None:
+        """Give each world one of the held bodies, without asking the device anything.
+
+        Args:
+            numbers: Indices of the held bodies, shape (n,).
+        """
+        for name, table in self._tables.items():
+            self._rows[name].copy_(table[numbers])
+        for name, table in self._static_tables.items():
+            cast("Tensor", getattr(self, name))[:, self._static] = table[numbers]
+
+    def overflows(self) -> dict[str, int]:
+        """Return in how many worlds the memory was too small since the last call, by limit."""
+        flags = self._overflow.clone()
+        self._overflow.zero_()
+        found: dict[str, int] = {}
+        for limit, names in _OVERFLOWS.items():
+            bits = sum(int(getattr(mjw.OverflowType, name)) for name in names)
+            count = int((flags & bits != 0).sum())
+            if count:
+                found[limit] = count
+        return found
 
     def _widen(self, name: str, array: Any) -> None:
         """Give a field of the model one row per world."""
@@ -193,11 +228,12 @@ class Worlds:
             wide = wp.empty(shape, dtype=array.dtype)
         wide._is_batched = True  # As mujoco-warp marks them.
         former = self._by_world(name, array)
-        view = self._rows[name] = self._view(wide).view(self.count, *former.shape[1:])
+        view = self._rows[name] = as_torch(wide).view(self.count, *former.shape[1:])
         view[:] = former
         owner, _, field = name.rpartition(".")
         setattr(self._model.opt if owner else self._model, field, wide)
-        self._graph = None  # It holds the former array.
+        self._graphs.clear()  # They hold the former array.
+        self._warm.clear()  # Some kernels depend on which arrays are wide.
 
     def clear(self, mask: Tensor) -> None:
         """Clear velocities, controls, warm starts and forces, as MuJoCo's own reset does.
@@ -206,22 +242,27 @@ class Worlds:
             mask: Which worlds, shape (n,).
         """
         for view in self._cleared:
-            view[mask] = 0.0
+            view.masked_fill_(mask.view(-1, *[1] * (view.dim() - 1)), 0.0)
 
     def step(self) -> None:
         """Step the physics of an action."""
+        self._run("step", self._step)
+
+    def _run(self, name: str, function: Callable[[], None]) -> None:
+        """Run a function of the device, as a graph from the second time on."""
         with on(self.device):
-            if self.device == "cpu" or not self._warm:
-                # The first steps compile kernels, which cannot be captured.
-                self._step()
-                self._warm = True
+            if name not in self._warm:
+                # The first call compiles kernels.
+                function()
+                self._warm.add(name)
                 return
-            if self._graph is None:
+            if name not in self._graphs:
                 # Torch's usual stream is CUDA's legacy one, which cannot be captured.
-                with wp.ScopedStream(wp.Stream(self.device)), wp.ScopedCapture() as capture:
-                    self._step()
-                self._graph = capture.graph
-            wp.capture_launch(self._graph)
+                own = None if self.device == "cpu" else wp.Stream(self.device)
+                with wp.ScopedStream(own), wp.ScopedCapture() as capture:
+                    function()
+                self._graphs[name] = capture.graph
+            wp.capture_launch(self._graphs[name])
 
     def _step(self) -> None:
         for _ in range(self._frame_skip):
@@ -231,13 +272,11 @@ class Worlds:
 
     def kinematics(self) -> None:
         """Compute the places of bodies, geoms and sites from `qpos`."""
-        with on(self.device):
-            mjw.kinematics(self._model, self._data)
+        self._run("kinematics", lambda: mjw.kinematics(self._model, self._data))
 
     def forward(self) -> None:
         """Compute all that follows from the state, forces included."""
-        with on(self.device):
-            mjw.forward(self._model, self._data)
+        self._run("forward", lambda: mjw.forward(self._model, self._data))
 
 
 def _stacked(arrays: Sequence[NDArray[Any]], like: Tensor) -> Tensor:
@@ -246,8 +285,8 @@ def _stacked(arrays: Sequence[NDArray[Any]], like: Tensor) -> Tensor:
     return torch.as_tensor(stacked, dtype=like.dtype, device=like.device)
 
 
-def _room(model: mujoco.MjModel, pairs: NDArray[Any]) -> tuple[int, int]:
-    """Return how many contacts, and rows of constraints, a world can have at the most.
+def _room(model: mujoco.MjModel, pairs: NDArray[Any]) -> dict[str, int]:
+    """Return the most contacts (`nconmax`) and rows of constraints (`njmax`) of a world.
 
     Args:
         model: The model.
@@ -263,4 +302,5 @@ def _room(model: mujoco.MjModel, pairs: NDArray[Any]) -> tuple[int, int]:
         rows += count * max(1, 2 * (condim - 1))
     rows += int(model.jnt_limited.sum()) + 2 * int(model.ntendon)
     rows += int(np.count_nonzero(model.dof_frictionloss)) and int(model.nv)
-    return max(1, contacts), max(1, rows + _ROWS_PER_EQUALITY * int(model.neq))
+    rows += _ROWS_PER_EQUALITY * int(model.neq)
+    return {"nconmax": max(1, contacts), "njmax": max(1, rows)}

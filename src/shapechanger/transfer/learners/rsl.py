@@ -71,20 +71,18 @@ class RslVecEnv(VecEnv):
     are moved to its edge, as Stable-Baselines3 does.
 
     Args:
-        envs: The worlds, with the autoreset mode `SameStep`; they are reset.
+        envs: The worlds; they are reset.
         seed: Seed of the first world; None for seeds of the system.
         rows: The rows of each world's body, for a policy of limbs, which then observes rows and
             gives a number from -1 to 1 for each limb; None for the body's own numbers.
 
     Raises:
-        StudyError: If the worlds have another autoreset mode, or several spaces and no rows.
+        StudyError: If the worlds have several spaces and no rows.
     """
 
     def __init__(
         self, envs: Any, seed: int | None = None, rows: Sequence[LimbRows] | None = None
     ) -> None:
-        if envs.metadata["autoreset_mode"].value != "SameStep":
-            raise StudyError("rsl-rl takes worlds with autoreset_mode='SameStep'.")
         seen = envs.reset(seed=seed)[0]
         if rows is None and isinstance(seen, tuple):
             raise StudyError(
@@ -192,7 +190,7 @@ class RslLearner(Sb3Learner):
             settings.n_envs,
             backend="warp",
             device=settings.device or None,
-            autoreset_mode="SameStep",
+            task_infos=False,
             **made.kwargs,
         )
         eval_envs = evaluation_envs(env, settings)
@@ -282,6 +280,60 @@ class _LimbModel(MLPModel):
         return LimbPolicy.over_motors(self.distribution._distribution.log_prob(outputs), self._rows)
 
 
+class _Returns:
+    """Discounted returns of worlds, by whose deviation rewards are divided as in `VecNormalize`.
+
+    Everything stays on the device, in the precision and order of `RunningMeanStd`.
+
+    Args:
+        count: How many worlds.
+        device: Name of the device.
+        statistics: The statistics to begin with and to write back to; None leaves rewards alone.
+        gamma: Discount of a step.
+    """
+
+    def __init__(
+        self, count: int, device: str, statistics: VecNormalize | None, gamma: float
+    ) -> None:
+        self._statistics: Any = statistics
+        self._gamma = gamma
+        self._returns = torch.zeros(count, device=device)
+        if statistics is not None:
+            found: Any = statistics.ret_rms
+            self._mean, self._var, self._count = (
+                torch.tensor(float(number), dtype=torch.float64, device=device)
+                for number in (found.mean, found.var, found.count)
+            )
+
+    def scaled(self, rewards: Tensor, ends: Tensor) -> Tensor:
+        """Return the rewards of a step, shape (n,), divided by the deviation of the returns.
+
+        Args:
+            rewards: Shape (n,).
+            ends: Whose episodes have ended, shape (n,).
+        """
+        if self._statistics is None:
+            return rewards
+        self._returns = self._returns * self._gamma + rewards
+        found = self._returns.double()
+        delta, count = found.mean() - self._mean, found.numel()
+        whole = self._count + count
+        squares = self._var * self._count + found.var(unbiased=False) * count
+        squares = squares + delta.square() * self._count * count / whole
+        self._mean, self._var = self._mean + delta * count / whole, squares / whole
+        self._count = whole
+        self._returns = self._returns.masked_fill(ends, 0.0)
+        scale = (self._var + self._statistics.epsilon).sqrt()
+        return (rewards / scale).clamp(-_CLIPPED_REWARD, _CLIPPED_REWARD).to(rewards.dtype)
+
+    def write_back(self) -> None:
+        """Give the statistics the present numbers."""
+        if self._statistics is not None:
+            found: Any = self._statistics.ret_rms
+            found.mean, found.var = self._mean.cpu().numpy(), self._var.cpu().numpy()
+            found.count = float(self._count)
+
+
 class _Training:
     """rsl-rl's PPO with the weights and statistics of a model of Stable-Baselines3.
 
@@ -326,7 +378,7 @@ class _Training:
             group["eps"] = _ADAMS_EPSILON
         self._ppo.train_mode()
         self._seen = seen
-        self._returns = torch.zeros(envs.num_envs, device=device)
+        self._returns = _Returns(envs.num_envs, device, self._statistics, settings.gamma)
 
     def _networks(self, seen: TensorDict) -> tuple[Any, Any]:
         """Return an actor and a critic of the shapes of the model's."""
@@ -366,25 +418,11 @@ class _Training:
             for step in range(self._settings.n_steps):
                 actions = self._ppo.act(self._seen)
                 self._seen, rewards, ends, extras = self._envs.step(actions)
-                scaled = self._scaled(rewards, ends)
+                scaled = self._returns.scaled(rewards, ends)
                 self._ppo.process_env_step(self._seen, scaled, ends, extras)
                 on_steps(done + (step + 1) * self._envs.num_envs)
             self._ppo.compute_returns(self._seen)
         self._ppo.update()
-
-    def _scaled(self, rewards: Tensor, ends: Tensor) -> Tensor:
-        """Divide rewards by the deviation of the discounted return, as `VecNormalize` does."""
-        statistics: Any = self._statistics
-        if statistics is None:
-            return rewards
-        self._returns = self._returns * self._settings.gamma + rewards
-        found = self._returns.double()
-        statistics.ret_rms.update_from_moments(
-            float(found.mean()), float(found.var(unbiased=False)), found.numel()
-        )
-        self._returns[ends] = 0.0
-        scale = float(np.sqrt(statistics.ret_rms.var + statistics.epsilon))
-        return (rewards / scale).clamp(-_CLIPPED_REWARD, _CLIPPED_REWARD)
 
     def _pairs(self) -> list[tuple[Any, Any]]:
         """Return modules of rsl-rl's networks, each with that of Stable-Baselines3's policy."""
@@ -425,6 +463,7 @@ class _Training:
             for ours, theirs in self._pairs():
                 theirs.load_state_dict(cast("dict[str, Any]", ours.state_dict()))
             self._model.policy.log_std.copy_(self._actor.distribution.log_std_param)
+        self._returns.write_back()
         if self._statistics is not None and self._statistics.norm_obs:
             normaliser, found = self._actor.obs_normalizer, cast("Any", self._statistics.obs_rms)
             found.mean = normaliser._mean[0].double().cpu().numpy()

@@ -1,0 +1,90 @@
+"""A step asks the device one question and copies nothing to it, as a pretended device counts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import pytest
+import torch
+
+import shapechanger
+from shapechanger.morphology import Stretch
+from tests.envs.warp.pretended_device import pretended_device
+
+LONG = [Stretch("*shank*", 1.2)]
+
+
+def _actions(envs: Any, number: int) -> Any:
+    generator = torch.Generator().manual_seed(number)
+    parts = [
+        2.0 * torch.rand(len(batch.numbers), batch.action_layout.size, generator=generator) - 1.0
+        for batch in envs.batches
+    ]
+    moved = [part.to(envs.device) for part in parts]
+    return moved if isinstance(envs.action_space, gym.spaces.Tuple) else moved[0]
+
+
+def test_the_pretended_device_notices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Questions, copies, NumPy and mixtures of devices are counted or fail as on a GPU."""
+    with pretended_device(monkeypatch) as device:
+        there = torch.arange(3.0, device="cuda:0")
+        assert there.device.type == "cuda"
+        assert bool((there > 1.0).any())
+        there[there > 1.0] = there[:1]
+        there[[0, 1]] = 5.0
+        there + torch.ones(3)
+        assert sum(device.questions.values()) == 2
+        assert sum(device.copies.values()) == 1
+        assert sum(device.mixed.values()) == 1
+        with pytest.raises(TypeError, match="to NumPy"):
+            there.numpy()
+        assert there.cpu().numpy().shape == (3,)
+
+
+@pytest.mark.parametrize(
+    ("name", "questions", "copies", "arguments"),
+    [
+        ("Ant", 1, 0, {}),
+        ("Ant", 1, 0, {"bodies": ["Ant", "ExtendedAnt", LONG]}),
+        ("Ant", 1, 0, {"pool": ["Ant", LONG]}),
+        ("Ant", 1, 0, {"task_infos": False}),
+        ("HalfCheetah", 1, 0, {}),
+        ("Hopper", 1, 0, {}),
+        ("Walker2d", 1, 0, {}),
+        ("Swimmer", 1, 0, {}),
+        ("InvertedPendulum", 1, 0, {}),
+        ("InvertedDoublePendulum", 1, 0, {}),
+        ("Humanoid", 1, 0, {}),
+        ("Finger", 1, 0, {}),
+        # Its paths are functions of NumPy: which worlds started, their starts, and points.
+        ("FingerTrack", 2, 1, {}),
+    ],
+)
+def test_a_step_does_not_wait(
+    name: str,
+    questions: int,
+    copies: int,
+    arguments: dict[str, Any],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Neither ends, restarts nor divergence add a question; no tensors of two devices meet."""
+    with pretended_device(monkeypatch) as device:
+        envs = shapechanger.make_vec(name, 3, backend="warp", max_episode_steps=4, **arguments)
+        envs.reset(seed=0)
+        ended = 0
+        for number in range(6):
+            actions = _actions(envs, number)
+            if number == 2:
+                envs.batches[0].worlds.qvel[0] = torch.nan
+            device.forget()
+            _, _, terminated, truncated, infos = envs.step(actions)
+            counted = dict(device.questions), dict(device.copies), dict(device.mixed)
+            if name != "FingerTrack" or not bool((terminated | truncated).any()):
+                assert sum(counted[0].values()) == questions, counted
+                assert sum(counted[1].values()) == copies, counted
+            assert not counted[2]
+            assert bool(infos["diverged"][0]) == (number == 2)
+            ended += int((terminated | truncated).sum())
+        assert ended >= 3
+        envs.close()
