@@ -11,190 +11,84 @@ import json
 import os
 import platform
 import shlex
-import subprocess
 import sys
-import tempfile
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
+from functools import partial
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import mujoco
-from gymnasium.envs.mujoco.mujoco_env import expand_model_path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import (
-    atlas,
-    cloning_real,
-    console,
-    corrections,
-    exchange,
-    finger_gap,
-    finger_identify,
-    finger_learned,
-    finger_oracle,
-    finger_path,
-    finger_physics,
-    finger_reach,
-    finger_speed,
-    generalist,
-    gpu,
-    references,
-    robot_faults,
-    robots,
-    speed,
-    speed_vector,
-    vehicles,
-    vehicles_studies,
-    vehicles_twin,
-    waypoints,
-)
+import shapechanger
 from benchmarks.row import Row
-from shapechanger.bodies.ant import ANT
 from shapechanger.errors import UnknownName
-from shapechanger.morphology import compile_body
-from shapechanger.morphology.effective import fingerprint
 
 RESULTS = Path(__file__).parent / "results"
-ROUNDS = 30
 
 
-def times_ms(work: Callable[[], object]) -> list[float]:
-    """Return the milliseconds of each round, sorted."""
-    work()
-    times: list[float] = []
-    for _ in range(ROUNDS):
-        began = time.perf_counter()
-        work()
-        times.append(1e3 * (time.perf_counter() - began))
-    return sorted(times)
+def _suite(module: str, function: str) -> Callable[[], Iterable[Row]]:
+    """Return a suite whose module is imported when it runs, since each needs other packages."""
+    return partial(_run, module, function)
 
 
-def timed_row(name: str, work: Callable[[], object], limit_ms: float) -> Row:
-    """Return the row of a function with a time limit."""
-    times = times_ms(work)
-    median = times[len(times) // 2]
-    spread = f"{times[0]:.2f} to {times[-1]:.2f} ms in {ROUNDS} rounds"
-    return Row(name, f"{median:.2f} ms", spread, f"< {limit_ms:g} ms", median < limit_ms)
+def _run(module: str, function: str) -> Iterable[Row]:
+    return getattr(import_module(f"benchmarks.{module}"), function)()
 
 
-def bodies() -> list[Row]:
-    """Time edits and compilation."""
-    ant_xml = expand_model_path("ant.xml")
-    spec = ANT.load(ant_xml)
-    rows = [
-        timed_row(
-            f"edit and compile {name}",
-            lambda body=body: compile_body(spec, body),
-            10.0,
-        )
-        for name, body in ANT.bodies.items()
-    ]
-    bare = times_ms(lambda: mujoco.MjModel.from_xml_path(ant_xml))
-    whole = times_ms(lambda: compile_body(ANT.load(ant_xml), ANT.bodies["ExtendedAnt"]))
-    ratio = whole[0] / bare[0]
-    rows.append(
-        Row(
-            "load, edit and compile ExtendedAnt, over loading ant.xml",
-            f"{ratio:.2f}x",
-            f"best of {ROUNDS} rounds each",
-            "< 6x",
-            ratio < 6.0,
-        )
-    )
-    model = compile_body(spec)
-    rows.append(timed_row("fingerprint of Ant", lambda: fingerprint(model), 20.0))
-    return rows
-
-
-def demo() -> list[Row]:
-    """Run the demo as a user does."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "demo"
-        command = ["shapechanger", "transfer", "InvertedPendulum", "BigInvertedPendulum"]
-        command += ["--seeds", "5", "--source-steps", "16384", "--steps", "16384"]
-        call = f"import sys; sys.argv = {command!r} + ['--out', {str(out)!r}]; "
-        began = time.monotonic()
-        subprocess.run(
-            [sys.executable, "-c", call + "from shapechanger.cli import main; main()"],
-            check=True,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        took = time.monotonic() - began
-        study = json.loads((out / "study.json").read_text())
-    finals = [
-        run["curve"][-1]["mean_return"] for run in study["runs"] if run["run"]["kind"] == "scratch"
-    ]
-    solved = sum(final >= 900.0 for final in finals)
-    ends = ", ".join(f"{final:.0f}" for final in finals)
-    gain = study["summaries"]["fine-tune"]["in_target_steps"]["total_reward_gain"]
-    return [
-        Row("make demo, 5 seeds an arm", f"{took:.0f} s", "one round", "< 60 s", took < 60.0),
-        Row("scratch reaches 900", f"{solved} of {len(finals)} seeds", ends, "4 of 5", solved >= 4),
-        Row(
-            "demo: total reward gain of fine-tune, score",
-            f"{gain['value']:+.2f}",
-            f"[{gain['low']:+.2f}, {gain['high']:+.2f}]",
-            "none: whatever comes out",
-            True,
-        ),
-    ]
-
-
-SUITES: dict[str, Callable[[], list[Row]]] = {
-    "atlas-ants": atlas.ants,
-    "atlas-methods": atlas.methods,
-    "atlas-pendulums": atlas.pendulums,
-    "atlas-replay": atlas.replay,
-    "atlas-shank": atlas.shank,
-    "atlas-controls": atlas.controls,
-    "atlas-claims": atlas.claims,
-    "atlas-pages": atlas.pages,
-    "bodies": bodies,
-    "cloning-real": cloning_real.real,
-    "console": console.console,
-    "corrections": corrections.corrections,
-    "demo": demo,
-    "exchange-video": exchange.video,
-    "finger-gap": finger_gap.gap,
-    "finger-rig": finger_gap.rig,
-    "finger-command": finger_gap.command,
-    "finger-follow": finger_gap.follow,
-    "finger-path": finger_path.path,
-    "finger-physics": finger_physics.physics,
-    "finger-reach": finger_reach.causes,
-    "finger-oracle": finger_oracle.oracle,
-    "finger-speed": finger_speed.against_myosuite,
-    "finger-learned": finger_learned.learned,
-    "finger-identify": finger_identify.identified,
-    "gpu": gpu.gpu,
-    "references": references.references,
-    "generalist": generalist.generalist,
-    "speed": speed.single,
-    "speed-vector": speed_vector.vector,
-    "robot-link": robots.link,
-    "robot-fuzz": robots.fuzz,
-    "robot-hold": robots.hold,
-    "robot-faults": robot_faults.faults,
-    "vehicles-frames": vehicles.frames,
-    "vehicles-fast": vehicles.fast,
-    "vehicles-students": vehicles.students,
-    "vehicles-expert": vehicles.expert,
-    "vehicles-clone": vehicles.clone,
-    "vehicles-on-board": vehicles_twin.on_board,
-    "vehicles-twin": vehicles_twin.twin,
-    "vehicles-pairs": vehicles_studies.pairs,
-    "vehicles-lenses": vehicles_studies.lenses,
-    "vehicles-waypoints": waypoints.pairs,
-    "vehicles-waypoints-labels": waypoints.labels,
-    "vehicles-waypoints-worlds": waypoints.worlds,
-    "vehicles-waypoints-robot": waypoints.whole_robot,
-    "vehicles-waypoints-remote": waypoints.remote,
-    "vehicles-waypoint-studies": vehicles_studies.waypoints,
+SUITES: dict[str, Callable[[], Iterable[Row]]] = {
+    "atlas-ants": _suite("atlas", "ants"),
+    "atlas-methods": _suite("atlas", "methods"),
+    "atlas-pendulums": _suite("atlas", "pendulums"),
+    "atlas-replay": _suite("atlas", "replay"),
+    "atlas-shank": _suite("atlas", "shank"),
+    "atlas-controls": _suite("atlas", "controls"),
+    "atlas-claims": _suite("atlas", "claims"),
+    "atlas-pages": _suite("atlas", "pages"),
+    "bodies": _suite("bodies", "bodies"),
+    "cloning-real": _suite("cloning_real", "real"),
+    "console": _suite("console", "console"),
+    "corrections": _suite("corrections", "corrections"),
+    "demo": _suite("demo", "demo"),
+    "exchange-video": _suite("exchange", "video"),
+    "finger-gap": _suite("finger_gap", "gap"),
+    "finger-rig": _suite("finger_gap", "rig"),
+    "finger-command": _suite("finger_gap", "command"),
+    "finger-follow": _suite("finger_gap", "follow"),
+    "finger-path": _suite("finger_path", "path"),
+    "finger-physics": _suite("finger_physics", "physics"),
+    "finger-reach": _suite("finger_reach", "causes"),
+    "finger-oracle": _suite("finger_oracle", "oracle"),
+    "finger-speed": _suite("finger_speed", "against_myosuite"),
+    "finger-learned": _suite("finger_learned", "learned"),
+    "finger-identify": _suite("finger_identify", "identified"),
+    "gpu": _suite("gpu", "gpu"),
+    "references": _suite("references", "references"),
+    "generalist": _suite("generalist", "generalist"),
+    "speed": _suite("speed", "single"),
+    "speed-vector": _suite("speed_vector", "vector"),
+    "robot-link": _suite("robots", "link"),
+    "robot-fuzz": _suite("robots", "fuzz"),
+    "robot-hold": _suite("robots", "hold"),
+    "robot-faults": _suite("robot_faults", "faults"),
+    "vehicles-frames": _suite("vehicles", "frames"),
+    "vehicles-fast": _suite("vehicles", "fast"),
+    "vehicles-students": _suite("vehicles", "students"),
+    "vehicles-expert": _suite("vehicles", "expert"),
+    "vehicles-clone": _suite("vehicles", "clone"),
+    "vehicles-on-board": _suite("vehicles_twin", "on_board"),
+    "vehicles-twin": _suite("vehicles_twin", "twin"),
+    "vehicles-pairs": _suite("vehicles_studies", "pairs"),
+    "vehicles-lenses": _suite("vehicles_studies", "lenses"),
+    "vehicles-waypoints": _suite("waypoints", "pairs"),
+    "vehicles-waypoints-labels": _suite("waypoints", "labels"),
+    "vehicles-waypoints-worlds": _suite("waypoints", "worlds"),
+    "vehicles-waypoints-robot": _suite("waypoints", "whole_robot"),
+    "vehicles-waypoints-remote": _suite("waypoints", "remote"),
+    "vehicles-waypoint-studies": _suite("vehicles_studies", "waypoints"),
 }
 
 
@@ -214,18 +108,36 @@ def _processor() -> str:
     return next(names, platform.processor() or platform.machine())
 
 
-def kept(path: Path, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the rows of a former result, with new ones in place of those of the same name.
+def _former(suite: str) -> dict[str, Any] | None:
+    """Return the former result of a suite, if `ONLY` leaves some of its rows as they were."""
+    path = RESULTS / f"{suite}.json"
+    return json.loads(path.read_text()) if "ONLY" in os.environ and path.exists() else None
+
+
+def _write(suite: str, rows: list[Row], former: dict[str, Any] | None) -> None:
+    """Write the rows of a suite with the facts of the machine."""
+    measured = [asdict(row) for row in rows]
+    facts = {
+        "command": f"{_asked()}python -m benchmarks.run {suite}",
+        "machine": f"{platform.system()}, {os.cpu_count()} cores of {_processor()}",
+        "python": platform.python_version(),
+        "versions": {package: version(package) for package in ("mujoco", "gymnasium", "torch")}
+        | {"shapechanger": shapechanger.__version__},
+        "rows": measured if former is None else kept(former, measured),
+    }
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / f"{suite}.json").write_text(json.dumps(facts, indent=1) + "\n")
+
+
+def kept(former: dict[str, Any], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the rows of a former result, with new ones instead of those of the same name.
 
     A row that is kept from a former run has its command as `measured_by`.
 
     Args:
-        path: The former result, which need not exist.
+        former: The former result.
         rows: The new rows.
     """
-    if not path.exists():
-        return rows
-    former = json.loads(path.read_text())
     new = {row["name"]: row for row in rows}
     merged = {
         row["name"]: {**row, "measured_by": row.get("measured_by", former["command"])}
@@ -242,26 +154,17 @@ def main() -> None:
             sys.exit(str(UnknownName("suite", name, SUITES)))
     table = Table("measured", "value", "spread", "target", "met", box=None)
     for name in names:
+        rows: list[Row] = []
+        former = _former(name)
         try:
-            rows = SUITES[name]()
+            for row in SUITES[name]():
+                yes = "yes" if row.met else "NO"
+                table.add_row(row.name, row.value, row.spread, row.target, yes)
+                # After each row, so that a run that is cut off keeps its results.
+                rows.append(row)
+                _write(name, rows, former)
         except UnknownName as error:  # In `ONLY`.
             sys.exit(str(error))
-        for row in rows:
-            table.add_row(row.name, row.value, row.spread, row.target, "yes" if row.met else "NO")
-        RESULTS.mkdir(exist_ok=True)
-        path = RESULTS / f"{name}.json"
-        measured = [asdict(row) for row in rows]
-        facts = {
-            "command": f"{_asked()}python -m benchmarks.run {name}",
-            "machine": f"{platform.system()}, {os.cpu_count()} cores of {_processor()}",
-            "python": platform.python_version(),
-            "versions": {
-                package: version(package)
-                for package in ("shapechanger", "mujoco", "gymnasium", "torch")
-            },
-            "rows": kept(path, measured) if "ONLY" in os.environ else measured,
-        }
-        path.write_text(json.dumps(facts, indent=1) + "\n")
     Console().print(table)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -46,6 +47,14 @@ def test_rows_that_only_leaves_out_are_kept(
     assert "ONLY" not in a["measured_by"]
     assert (b["name"], b["value"]) == ("speed, b", "2")
     assert "measured_by" not in b
+
+
+def test_every_suite_is_a_function_of_its_module() -> None:
+    """Modules are imported only when their suite runs, so a wrong name would show late."""
+    for name, suite in run.SUITES.items():
+        module, function = cast("Any", suite).args
+        source = Path(run.__file__).with_name(f"{module}.py").read_text()
+        assert f"def {function}(" in source, name
 
 
 def test_a_wrong_name_in_only_gets_the_nearest(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -57,7 +57,7 @@ def _marked(value: Any) -> bool:
 def _mark(value: Any) -> Any:
     for tensor in tree_leaves(value):
         if isinstance(tensor, torch.Tensor):
-            tensor.__dict__["_pretended"] = True
+            tensor._pretended = True  # pyright: ignore[reportAttributeAccessIssue]
     return value
 
 
@@ -83,7 +83,7 @@ class PretendedDevice(TorchFunctionMode):
         self.mixed: Counter[str] = Counter()
 
     def forget(self) -> None:
-        """Begin to count anew."""
+        """Start counting from zero."""
         for counter in (self.questions, self.copies, self.mixed):
             counter.clear()
 
@@ -138,8 +138,8 @@ class PretendedDevice(TorchFunctionMode):
         if name in _READS and there:
             self._note_index(name, args)
         elif there and target is None and name not in _FREE:
-            if any(not _marked(tensor) and tensor.dim() > 0 for tensor in tensors):
-                self.mixed[f"{name} at {_line()}"] += 1
+            here = [tensor for tensor in tensors if not _marked(tensor) and tensor.dim() > 0]
+            self.mixed[f"{name} at {_line()}"] += bool(here)
 
     def _note_index(self, name: str, args: Any) -> None:
         indices = args[1] if isinstance(args[1], tuple) else (args[1],)

@@ -7,9 +7,11 @@ from typing import Any
 import gymnasium as gym
 import pytest
 import torch
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import shapechanger
 from shapechanger.morphology import Stretch
+from shapechanger.transfer.learners.rsl import RslVecEnv, _Returns  # pyright: ignore[reportPrivateUsage]
 from tests.envs.warp.pretended_device import pretended_device
 
 LONG = [Stretch("*shank*", 1.2)]
@@ -33,7 +35,7 @@ def test_the_pretended_device_notices(monkeypatch: pytest.MonkeyPatch) -> None:
         assert bool((there > 1.0).any())
         there[there > 1.0] = there[:1]
         there[[0, 1]] = 5.0
-        there + torch.ones(3)
+        assert len(there + torch.ones(3)) == 3
         assert sum(device.questions.values()) == 2
         assert sum(device.copies.values()) == 1
         assert sum(device.mixed.values()) == 1
@@ -83,8 +85,28 @@ def test_a_step_does_not_wait(
             if name != "FingerTrack" or not bool((terminated | truncated).any()):
                 assert sum(counted[0].values()) == questions, counted
                 assert sum(counted[1].values()) == copies, counted
-            assert not counted[2]
+            assert not any(counted[2].values()), counted
             assert bool(infos["diverged"][0]) == (number == 2)
             ended += int((terminated | truncated).sum())
         assert ended >= 3
         envs.close()
+
+
+def test_a_learner_adds_no_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scaling rewards by the deviation of returns stays on the device."""
+    with pretended_device(monkeypatch) as device:
+        envs = RslVecEnv(
+            shapechanger.make_vec("Ant", 3, backend="warp", max_episode_steps=3, task_infos=False),
+            seed=0,
+        )
+        spaces = DummyVecEnv([lambda: gym.make("CartPole-v1")])
+        returns = _Returns(3, "cuda:0", VecNormalize(spaces), 0.99)
+        actions = torch.zeros(3, 8).to("cuda:0")
+        for _ in range(4):
+            device.forget()
+            _, rewards, ends, _ = envs.step(actions)
+            scaled = returns.scaled(rewards, ends)
+            assert scaled.device.type == "cuda"
+            assert sum(device.questions.values()) == 1, device.questions
+            assert not sum(device.copies.values()), device.copies
+            assert not sum(device.mixed.values()), device.mixed

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any, Final, NamedTuple, cast
 
 import mujoco
@@ -81,12 +82,16 @@ def differing_arrays(one: DeviceBody, other: DeviceBody) -> list[str]:
     return [name for name in names if one.shared.get(name) != other.shared.get(name)]
 
 
-def _per_world() -> Iterator[str]:
-    """Yield the fields of mujoco-warp's model that have a row per world."""
-    for field in dataclasses.fields(mjw.Model):
-        if _is_array(field) and _per_row(field) and not field.name.startswith(_DRAWN):
-            yield field.name
-    yield ARMS
+@cache
+def _fields() -> list[Any]:
+    """Return the fields of mujoco-warp's model that are not for drawing."""
+    return [f for f in dataclasses.fields(mjw.Model) if not f.name.startswith(_DRAWN)]
+
+
+@cache
+def _per_world() -> list[str]:
+    """Return the names of the fields that have a row per world."""
+    return [*(f.name for f in _fields() if _is_array(f) and _per_row(f)), ARMS]
 
 
 def _is_array(field: Any) -> bool:
@@ -100,9 +105,9 @@ def _per_row(field: Any) -> bool:
 
 def _shared(model: mujoco.MjModel) -> Iterator[tuple[str, bytes]]:
     """Yield the name and the bytes of all that mujoco-warp keeps once for all worlds."""
-    for field in dataclasses.fields(mjw.Model):
+    for field in _fields():
         name = field.name
-        if name.startswith(_DRAWN) or name in _UNREAD or not hasattr(model, name):
+        if name in _UNREAD or not hasattr(model, name):
             continue
         value: Any = getattr(model, name)
         if field.type is int or field.type is bool:

@@ -49,8 +49,8 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     which worlds have it.
 
     Start states have the distribution of the CPU env, but not its numbers: they depend on the seed
-    of the world and on how many episodes it has begun since then, and on nothing else. The body that
-    a world draws from a pool depends on the same two numbers.
+    of the world and on how many episodes it has begun since then, and on nothing else. The body
+    that a world draws from a pool depends on the same two numbers.
 
     A step asks the device one question, whether all actions are finite, and copies nothing to it.
 
@@ -357,7 +357,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             ]
         bad = [~part.isfinite().all(dim=1) for part in each]
         # The only question to the device in a step, before its physics.
-        found = torch.stack([one.any() for one in bad]).tolist()
+        found = _numbers(torch.stack([one.any() for one in bad]))
         for batch, part, any_bad, one in zip(self.batches, each, found, bad, strict=True):
             if any_bad:
                 place = int(one.nonzero()[0, 0])

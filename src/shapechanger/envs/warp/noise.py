@@ -1,8 +1,8 @@
 """Random numbers of many worlds: functions of each world's seed and episode alone.
 
 A world's numbers depend on neither its place in a batch nor the number of worlds, and a GPU draws
-the numbers of the CPU, up to the rounding of its logarithm and cosine. They come from SplitMix64 as a
-function of a counter (Steele, Lea and Flood, OOPSLA 2014), with 53 bits each.
+the numbers of the CPU, up to the rounding of its logarithm and cosine. They come from SplitMix64 as
+a function of a counter (Steele, Lea and Flood, OOPSLA 2014), with 53 bits each.
 """
 
 # Warp reads the annotations, so they must not become strings.

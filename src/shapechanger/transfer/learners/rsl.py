@@ -293,7 +293,7 @@ class _Returns:
     """
 
     def __init__(
-        self, count: int, device: str, statistics: VecNormalize | None, gamma: float
+        self, count: int, device: Any, statistics: VecNormalize | None, gamma: float
     ) -> None:
         self._statistics: Any = statistics
         self._gamma = gamma
