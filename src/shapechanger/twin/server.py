@@ -6,7 +6,7 @@ import logging
 import select
 import socket
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final, Literal
 
 import msgspec
@@ -40,7 +40,7 @@ START_NS: Final = 1_000_000_000
 """First time of the twin's clock; not 0, which could be taken for "never"."""
 
 _MAX_OUTBOX: Final = 256
-"""Messages kept for a client that does not read; beyond it edges are lost, as in the kernel."""
+"""Messages kept for a client that does not read, before edges are merged."""
 _READABLE: Final = select.EPOLLIN | select.EPOLLHUP | select.EPOLLERR
 
 _log = logging.getLogger(__name__)
@@ -69,7 +69,8 @@ class BoardConnection:
     def __init__(self, connected: socket.socket) -> None:
         connected.setblocking(False)
         self._socket = connected
-        self._outbox: deque[bytes] = deque()
+        # Encoded messages, each with its edges; () in replies and grants.
+        self._outbox: deque[tuple[bytes, Sequence[Edge]]] = deque()
         self.role: Role = "clock"
         self.pid = 0
         self.inputs: set[int] = set()
@@ -109,24 +110,27 @@ class BoardConnection:
 
     def send(self, event: BoardEvent) -> None:
         """Send a message, now or when the client reads."""
-        self._outbox.append(encode(event))
+        edges = event.edges if isinstance(event, InputEdges) else ()
+        self._outbox.append((encode(event), edges))
         self.flush()
 
-    def send_edges(self, edges: Iterable[Edge], levels: Mapping[int, int]) -> None:
+    def send_edges(self, edges: Iterable[Edge]) -> None:
         """Send the edges of the client's inputs.
+
+        A client that does not read loses edges, as in the kernel, but never a reply or a grant:
+        beyond 256 messages, only the last of the waiting edges of each input is kept.
 
         Args:
             edges: All edges, in order of time.
-            levels: Level of each input after them.
         """
         wanted = [edge for edge in edges if edge.pin in self.inputs]
         if not wanted:
             return
         if len(self._outbox) >= _MAX_OUTBOX:
-            # The client is too slow: it gets the last levels, without the edges that led to them.
-            self._outbox.pop()
-            t = wanted[-1].t
-            wanted = [Edge(t, pin, levels.get(pin, 0)) for pin in sorted(self.inputs)]
+            waiting = [edge for _, edges in self._outbox for edge in edges]
+            last = {edge.pin: edge for edge in (*waiting, *wanted) if edge.pin in self.inputs}
+            self._outbox = deque(message for message in self._outbox if not message[1])
+            wanted = sorted(last.values())
         for start in range(0, len(wanted), MAX_EDGES):
             self.send(InputEdges(wanted[start : start + MAX_EDGES]))
 
@@ -134,7 +138,7 @@ class BoardConnection:
         """Send waiting messages as far as the client reads."""
         while self._outbox:
             try:
-                self._socket.send(self._outbox[0])
+                self._socket.send(self._outbox[0][0])
             except BlockingIOError:
                 return
             except OSError:
@@ -217,7 +221,7 @@ class BoardServer:
         """Send the edges of inputs to the clients that claimed them."""
         if edges:
             for connection in self.connections:
-                connection.send_edges(edges, self._pins.sensors.levels)
+                connection.send_edges(edges)
                 self._watch(connection)
 
     def send(self, connection: BoardConnection, event: BoardEvent) -> None:

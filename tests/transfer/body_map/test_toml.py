@@ -78,6 +78,23 @@ def test_toml_round_trip(built: BodyMap) -> None:
     assert BodyMap.from_toml(built.to_toml(), *layouts) == built
 
 
+def test_torques_of_equal_gears_survive() -> None:
+    """A conversion by a factor of 1 between two units is read back as it was made."""
+    sides = pendulum_observation(), pendulum_observation()
+    before = Layout((Feature("motor", "N·m", -1.0, 1.0, gain=2.0, gain_unit="N·m"),))
+    after = Layout((Feature("motor", "1", -1.0, 1.0, gain=2.0, gain_unit="N·m"),))
+    built = BodyMap.between(*sides, before, after, units="torque")
+    assert 'units = "exact"' in built.to_toml()
+    assert BodyMap.from_toml(built.to_toml(), *sides, before, after) == built
+
+
+def test_exact_rules_are_not_checked() -> None:
+    """`units = "exact"` accepts scales of 1 between units and constants beyond the range."""
+    text = 'units = "exact"\n[action]\n"foot_*/motor" = { hold = 3.0 }'
+    built = BodyMap.from_toml(text, *GROWN)
+    assert {e.rule for e in built.action if e.feature.startswith("foot")} == {Hold(3.0)}
+
+
 def test_the_text_is_short() -> None:
     """Partners of the same name have no line."""
     text = BodyMap.between(*GROWN, rules={"foot_1/motor": "learn"}).to_toml()

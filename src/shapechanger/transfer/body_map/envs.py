@@ -39,7 +39,7 @@ def body_map(
         observation_rules: Rules of source observation features only.
         action_rules: Rules of target action features only.
         otherwise: The rule of features that nothing matches.
-        units: What the action numbers preserve: their value, or the torque.
+        units: Treatment of scales and constants, see `BodyMap.between`.
 
     Raises:
         LayoutError: If an env publishes no layouts.

@@ -178,7 +178,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
             action_rules: Rules of target action features only; they take precedence.
             otherwise: The rule of features that nothing matches.
             units: "same" passes action numbers on unchanged. "torque" scales them by source gain
-                over target gain, so that they give the same torque as in the source.
+                over target gain, so that they give the same torque as in the source. "exact" uses
+                each scale and constant as given, without a check of units and ranges.
 
         Raises:
             MapError: If a partner has another unit or shape, if a rule changes nothing, or if no
@@ -382,7 +383,8 @@ class BodyMap(msgspec.Struct, frozen=True, dict=True):
 
     def to_toml(self) -> str:
         """Write the rules as TOML, without the layouts, for editing by hand."""
-        return write_toml(self.observation, self.action)
+        halves = (self._observation_side, self.observation), (self._action_side, self.action)
+        return write_toml(halves)
 
     @classmethod
     def from_toml(

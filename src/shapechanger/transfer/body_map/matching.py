@@ -2,7 +2,7 @@
 
 The TOML form:
 
-    units = "same"                      # or "torque"
+    units = "same"                      # or "torque" or "exact"
     otherwise = "zero"                  # or "hold", "learn", { hold = 0.6 }
 
     [observation]                       # source observation features, or globs of them
@@ -27,7 +27,7 @@ import fnmatch
 import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final, Literal, NamedTuple, TypeVar
+from typing import Any, Final, Literal, NamedTuple, TypeVar, get_args
 
 import msgspec
 
@@ -47,7 +47,8 @@ from shapechanger.transfer.body_map.rules import (
     expand_template,
 )
 
-Units = Literal["same", "torque"]
+Units = Literal["same", "torque", "exact"]
+"""Treatment of scales and constants, see `BodyMap.between`."""
 
 _COPY: Final = "copy "
 _MOST_NAMES_LISTED: Final = 8
@@ -64,7 +65,7 @@ def resolve(
         rules: Rules by name or glob; the first glob that matches counts. A key that is the exact
             name of a feature is not a glob.
         otherwise: The rule of the remaining features: zero, hold or learn.
-        units: What a scale of 1 preserves, see `BodyMap.between`.
+        units: Treatment of scales and constants, see `BodyMap.between`.
 
     Raises:
         MapError: If a rule does not fit its feature, or nothing matches.
@@ -84,7 +85,8 @@ def resolve(
         if pattern is None:
             entries.append(MapEntry(feature.name, constant_rule(otherwise, feature), BY_DEFAULT))
             continue
-        rule = _suited(_read(rules[pattern], pattern, feature, side), feature, side, units)
+        rule = _read(rules[pattern], pattern, feature, side, units)
+        rule = _suited(rule, feature, side, units)
         entries.append(MapEntry(feature.name, rule, _by_rule(pattern)))
     _require_match(side, entries)
     return tuple(entries)
@@ -155,11 +157,13 @@ def constant_rule(like: RuleLike, feature: Feature) -> Rule:
             )
 
 
-def _read(like: RuleLike, pattern: str, feature: Feature, side: Side) -> Rule:
+def _read(like: RuleLike, pattern: str, feature: Feature, side: Side, units: Units) -> Rule:
     """Read the rule of `pattern` for `feature`."""
     match like:
         case Copy(name, scale):
             pass
+        case Hold() if units == "exact":
+            return like
         case Zero() | Hold() | Learn() | "hold" | "zero" | "learn":
             return constant_rule(like, feature)
         case str() if like.startswith(_COPY):
@@ -185,6 +189,8 @@ def _suited(rule: Rule, feature: Feature, side: Side, units: Units) -> Rule:
 
 def _conversion(scale: float, copied: Feature, feature: Feature, side: Side, units: Units) -> float:
     """Factor, besides the scale, that converts a number of `copied` to one of `feature`."""
+    if units == "exact":
+        return 1.0
     if units == "torque" and side.name == "action":
         if copied.gain_unit != feature.gain_unit:
             raise MapError(
@@ -249,7 +255,7 @@ class MapText(NamedTuple):
     """A map in TOML, before it is resolved for two bodies.
 
     Attributes:
-        units: What a scale of 1 preserves.
+        units: Treatment of scales and constants.
         otherwise: The rule of the remaining features.
         observation: Rules of source observation features.
         action: Rules of target action features.
@@ -278,7 +284,7 @@ def read_toml(text: str) -> MapText:
     action = _as("action", table.get("action", {}), dict[str, Any])
     units = _as("units", table.get("units", "same"), str)
     return MapText(
-        units=_one_of("units", units, ("same", "torque")),
+        units=_one_of("units", units, get_args(Units)),
         otherwise=_rule("otherwise", table.get("otherwise", "zero")),
         observation={name: _rule(name, value) for name, value in observation.items()},
         action={name: _rule(name, value) for name, value in action.items()},
@@ -286,20 +292,33 @@ def read_toml(text: str) -> MapText:
     )
 
 
-def write_toml(observation: Iterable[MapEntry], action: Iterable[MapEntry]) -> str:
+def write_toml(halves: Sequence[tuple[Side, tuple[MapEntry, ...]]]) -> str:
     """Write rules as TOML; a partner of the same name has no line.
 
     Args:
-        observation: Entries of the source observation.
-        action: Entries of the target action.
+        halves: The halves of the map, with their entries.
     """
-    lines = ['units = "same"', 'otherwise = "zero"']
-    for heading, entries in (("observation", observation), ("action", action)):
+    units = "same" if all(_is_plain(e, side) for side, each in halves for e in each) else "exact"
+    lines = [f'units = "{units}"', 'otherwise = "zero"']
+    for side, entries in halves:
         explicit = [entry for entry in entries if entry.rule != Copy(entry.feature)]
         if explicit:
-            lines += ["", f"[{heading}]"]
+            lines += ["", f"[{side.name}]"]
             lines += [f"{_quoted(entry.feature)} = {_value(entry.rule)}" for entry in explicit]
     return "\n".join(lines) + "\n"
+
+
+def _is_plain(entry: MapEntry, side: Side) -> bool:
+    """Return whether an entry passes the checks of `units = "same"`."""
+    feature = side.into[entry.feature]
+    try:
+        if isinstance(entry.rule, Copy):
+            _suited(entry.rule, feature, side, "same")
+        else:
+            constant_rule(entry.rule, feature)
+    except MapError:  # For example after a conversion to torques by a factor of 1.
+        return False
+    return True
 
 
 def _value(rule: Rule) -> str:
