@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.errors import UnknownName
+from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds.lens import LENSES, Lens, Picture, blur, dirt, find_lens, glare, night
 
 _ALL = pytest.mark.parametrize("change", LENSES.values(), ids=LENSES)
@@ -19,7 +19,9 @@ def _picture(height: int = 120, width: int = 160) -> Picture:
 
 
 @_ALL
-@pytest.mark.parametrize("size", [(120, 160), (64, 64), (33, 47)])
+@pytest.mark.parametrize(
+    "size", [(120, 160), (64, 64), (33, 47), (1, 1), (1, 300), (300, 1), (409, 427), (1080, 1920)]
+)
 def test_lenses_keep_size_and_type(change: Lens, size: tuple[int, int]) -> None:
     """A lens keeps the shape and dtype."""
     before = _picture(*size)
@@ -29,7 +31,16 @@ def test_lenses_keep_size_and_type(change: Lens, size: tuple[int, int]) -> None:
     assert after.dtype == np.uint8
     assert not np.may_share_memory(before, after)
     np.testing.assert_array_equal(before, kept)
-    assert not np.array_equal(before, after)
+    if before.size > 3:  # A blur of one pixel is that pixel.
+        assert not np.array_equal(before, after)
+
+
+@_ALL
+@pytest.mark.parametrize("shape", [(12, 16), (12, 16, 1), (12, 16, 4), (2, 12, 16, 3)])
+def test_lenses_refuse_what_is_no_colour_picture(change: Lens, shape: tuple[int, ...]) -> None:
+    """A grey picture, one with an alpha channel and a batch are refused."""
+    with pytest.raises(WorldError, match=r"takes a picture of shape \(H, W, 3\), uint8, got"):
+        change(np.zeros(shape, np.uint8), 0)
 
 
 @_ALL

@@ -1,7 +1,7 @@
 """Camera faults: pure functions on pictures, for bad light and a bad lens.
 
 They change pictures only, never the world, to test how well policies generalize to other pictures.
-All take and return pictures of shape (H, W, 3), uint8.
+All take and return pictures of shape (H, W, 3), uint8, of any size, and raise `WorldError` on others.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
-from shapechanger.errors import UnknownName
+from shapechanger.errors import UnknownName, WorldError
 
 Picture = NDArray[np.uint8]
 
@@ -39,7 +39,8 @@ _SPOTS: Final = (8, 14)
 _SPOT_RADIUS: Final = (0.02, 0.085)
 _SPOT_DEPTH: Final = (0.45, 0.85)
 _DIRT: Final = np.array([52.0, 46.0, 34.0], np.float32)
-# Noise is cut from one long strip, because drawing it for each picture would dominate the time.
+# Noise is cut from one long strip, because drawing it for each picture would dominate the time. It
+# has this length, or twice the picture's.
 _STRIP: Final = 1 << 19
 _KEPT: Final = 64
 
@@ -51,6 +52,7 @@ def night(picture: Picture, seed: int) -> Picture:
         picture: Shape (H, W, 3).
         seed: Seed of the fault, at least 0.
     """
+    _require_picture(picture)
     dark = np.empty(picture.shape, np.float32)
     for channel, table in enumerate(_night_tables()):
         dark[..., channel] = table[picture[..., channel]]
@@ -65,6 +67,7 @@ def glare(picture: Picture, seed: int) -> Picture:
         picture: Shape (H, W, 3).
         seed: Seed of the fault, at least 0.
     """
+    _require_picture(picture)
     added = _glare(seed, *picture.shape[:2])
     return _bytes(picture + added)
 
@@ -77,6 +80,7 @@ def blur(picture: Picture, seed: int) -> Picture:
         seed: Has no effect.
     """
     del seed
+    _require_picture(picture)
     variance = (_BLUR * picture.shape[1]) ** 2
     # Two box filters over w = 2 r + 1 pixels have the variance 2 (w^2 - 1) / 12 = 2 (r^2 + r) / 3.
     reach = max(1, round(0.5 * (np.sqrt(6.0 * variance + 1.0) - 1.0)))
@@ -93,6 +97,7 @@ def dirt(picture: Picture, seed: int) -> Picture:
         picture: Shape (H, W, 3).
         seed: Seed of their places, at least 0.
     """
+    _require_picture(picture)
     keeps, mud = _dirt(seed, *picture.shape[:2])
     return _bytes(picture * keeps + mud)
 
@@ -115,6 +120,14 @@ def find_lens(name: str) -> Lens:
         raise UnknownName("lens", name, LENSES) from None
 
 
+def _require_picture(picture: NDArray[Any]) -> None:
+    if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3:
+        raise WorldError(
+            "A lens takes a picture of shape (H, W, 3), uint8, got "
+            f"{picture.shape}, {picture.dtype}."
+        )
+
+
 def _bytes(levels: NDArray[np.floating[Any]]) -> Picture:
     """Levels rounded and clipped to 0 to 255; `levels` is overwritten."""
     levels += 0.5
@@ -127,17 +140,18 @@ def _night_tables() -> tuple[NDArray[np.float32], ...]:
     return tuple((255.0 * s * level**_NIGHT_GAMMA).astype(np.float32) for s in _NIGHT_SHARE)
 
 
-@functools.cache
-def _strip() -> NDArray[np.float32]:
-    return np.random.default_rng(20_26).standard_normal(_STRIP, np.float32)
+@functools.lru_cache(4)
+def _strip(length: int) -> NDArray[np.float32]:
+    return np.random.default_rng(20_26).standard_normal(length, np.float32)
 
 
 def _noise(picture: Picture, seed: int) -> NDArray[np.float32]:
     """Standard normal noise of the picture's shape, a function of the seed and the picture."""
     # Different pictures nearly always have different sums.
     mixed = (int(picture.sum(dtype=np.int64)) * 2_654_435_761 + seed * 40_503) & 0xFFFF_FFFF
-    start = mixed % (_STRIP - picture.size)
-    return _strip()[start : start + picture.size].reshape(picture.shape)
+    strip = _strip(max(_STRIP, 2 * picture.size))
+    start = mixed % (strip.size - picture.size)
+    return strip[start : start + picture.size].reshape(picture.shape)
 
 
 @functools.lru_cache(_KEPT)
