@@ -25,10 +25,11 @@ _LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehi
 _STANDING_MPS: Final = 0.1
 _STANDING_RADPS: Final = 0.1
 _AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
-# Of a fit to a drive: largest change of the steering in so many steps, and the least share of the
-# turning that the steering must explain.
+# Of a fit to a drive: largest change of the steering within the lag of the turn, the jitter of the
+# steps' times, and the least share of the turning that the steering must explain.
 _CHANGE: Final = 0.1
-_STEADY: Final = 2
+_LAG_S: Final = 0.1
+_JITTER_S: Final = 0.02
 _EXPLAINED: Final = 0.5
 _ROUNDING: Final = 1e-9
 
@@ -99,7 +100,9 @@ def measure_response(
     command = np.zeros(2, np.float32)
     turning: list[tuple[float, float]] = []
     rates: list[float] = []
-    for step in range(round(_SECONDS * env.metadata["render_fps"])):
+    step = -1  # Since the commands began, which a reset interrupts.
+    for _ in range(round(_SECONDS * env.metadata["render_fps"])):
+        step += 1
         if step % _HOLD == 0:
             command = np.array((rng.uniform(-0.5, 0.5), rng.uniform(0.4, 0.8)), np.float32)
         seen, _, terminated, truncated, _ = env.step(command)
@@ -108,32 +111,39 @@ def measure_response(
             rates.append(-float(seen[yaw_rate_at]))
         if terminated or truncated:
             env.reset()
+            step = -1
     per_metre, per_second = nnls(np.array(turning), np.array(rates))[0]
     return SteeringResponse(float(per_metre), float(per_second))
 
 
 def fit_response(
-    steering: NDArray[np.floating], speed: NDArray[np.floating], yaw_rate: NDArray[np.floating]
+    steering: NDArray[np.floating],
+    speed: NDArray[np.floating],
+    yaw_rate: NDArray[np.floating],
+    times_s: NDArray[np.floating] | None = None,
 ) -> SteeringResponse:
-    """Fit how a vehicle turns to a drive, in steps of 1/20 s.
+    """Fit how a vehicle turns to one or more drives.
 
-    Only steps count in which the steering has not changed for 0.1 s, because the turn lags behind
-    it. Those in which something was not measured are left out, too.
+    Only steps count in which the steering is known not to have changed for 0.1 s, because the turn
+    lags behind it: neither the first of an episode, nor the first after a gap. Those in which
+    something was not measured are left out, too.
 
     Args:
         steering: Steering that the outputs had, -1 to 1, positive to the right, shape (n,).
         speed: Speed along the heading, m/s, shape (n,).
         yaw_rate: Rate of turn, rad/s, positive to the left, shape (n,).
+        times_s: Time of each step since the start of its episode, s, shape (n,); an episode begins
+            where time does not go on. None for one episode in steps of 1/20 s.
 
     Raises:
         StudyError: If the drive does not tell it.
     """
     from scipy.optimize import nnls
 
+    if times_s is None:
+        times_s = np.arange(len(steering)) / 20.0
     rows = np.stack((steering * speed, steering, -yaw_rate), axis=1).astype(np.float64)
-    steady = np.isfinite(rows).all(axis=1)
-    for steps in range(1, _STEADY + 1):
-        steady &= np.abs(steering - np.roll(steering, steps)) < _CHANGE
+    steady = np.isfinite(rows).all(axis=1) & _is_steady(steering, times_s)
     turning, rates = rows[steady, :2], rows[steady, 2]
     numbers, error = nnls(turning, rates) if len(rates) else (np.zeros(2), 0.0)
     explained = 1.0 - error**2 / max(float(rates @ rates), _ROUNDING)
@@ -143,6 +153,23 @@ def fit_response(
             f"and {_EXPLAINED:.0%} are needed: drive curves to both sides."
         )
     return SteeringResponse(float(numbers[0]), float(numbers[1]))
+
+
+def _is_steady(steering: NDArray[np.floating], times_s: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Return at which steps the steering has not changed for as long as the turn lags behind."""
+    passed_s = np.diff(times_s)
+    usual_s = float(np.median(passed_s)) if len(passed_s) else 0.0
+    whole = (passed_s > 0.0) & (passed_s <= max(_LAG_S + _JITTER_S, 1.5 * usual_s))
+    stretch = np.concatenate(([0], np.cumsum(~whole)))  # Number of the stretch without gaps.
+    _, begins = np.unique(stretch, return_index=True)
+    steady = times_s - times_s[begins][stretch] >= _LAG_S - _JITTER_S
+    for steps in range(1, len(steering)):
+        recent = times_s[steps:] - times_s[:-steps] <= _LAG_S + _JITTER_S
+        recent &= stretch[steps:] == stretch[:-steps]
+        if not recent.any():
+            break
+        steady[steps:] &= ~recent | (np.abs(steering[steps:] - steering[:-steps]) < _CHANGE)
+    return steady
 
 
 _COLUMNS, _ROWS = CANONICAL_SIZE

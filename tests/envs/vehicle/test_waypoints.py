@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from shapechanger.bodies.vehicles import vehicle_model
 from shapechanger.envs.catalogue import WAYPOINT_ENVS
@@ -119,6 +121,47 @@ def test_the_response_is_fitted_to_a_drive(body: str) -> None:
     found = fit_response(steering, speed, yaw_rate)
     assert found.per_metre == pytest.approx(_BODIES[body].per_metre, abs=0.05)
     assert found.per_second == pytest.approx(_BODIES[body].per_second, abs=0.05)
+
+
+@settings(max_examples=30)
+@given(
+    lengths=st.lists(st.integers(1, 60), min_size=1, max_size=6),
+    hz=st.sampled_from([5.0, 10.0, 20.0, 50.0]),
+    lags=st.booleans(),
+    gap=st.integers(0, 60),
+)
+def test_lags_do_not_cross_borders_of_episodes(
+    *, lengths: list[int], hz: float, lags: bool, gap: int
+) -> None:
+    """The turn lags at the start of each episode and after a gap, and no fit is misled by it."""
+    lengths = [*lengths, 60]  # One that is long enough at each rate.
+    lag = max(1, round(0.1 * hz))
+    columns: list[list[float]] = [[], [], []]
+    for place, length in enumerate(lengths):
+        times = np.arange(length) / hz
+        begins = [0]
+        if gap < length:  # Steps that somebody dropped.
+            times[gap:] += 3.0
+            begins.append(gap)
+        yaw_rate = np.full(length, -1.0)
+        for begin in begins:
+            yaw_rate[begin : begin + lag] *= not lags
+        for column, new in zip(
+            columns, (np.full(length, (-1.0) ** place), yaw_rate, times), strict=True
+        ):
+            column += new.tolist()
+    steering, yaw_rate, times = map(np.array, columns)
+    yaw_rate *= steering
+    found = fit_response(0.5 * steering, np.ones(len(steering)), yaw_rate, times)
+    assert found.per_metre + found.per_second == pytest.approx(2.0)
+
+
+def test_the_first_steps_of_a_drive_do_not_follow_its_last() -> None:
+    """Without times a drive is one episode, whose first 0.1 s say nothing."""
+    yaw_rate = np.full(40, -1.0)
+    yaw_rate[:2] = 0.0
+    found = fit_response(np.full(40, 0.5), np.ones(40), yaw_rate)
+    assert found.per_metre + found.per_second == pytest.approx(2.0)
 
 
 def test_a_drive_that_does_not_tell_the_response_is_refused() -> None:

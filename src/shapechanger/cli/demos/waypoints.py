@@ -192,7 +192,7 @@ def _fitted(data: Dataset) -> SteeringResponse:
             f"{_MEASURE}."
         )
     try:
-        return fit_response(*(_column(data, name) for name in _MOTION))
+        return fit_response(*(_column(data, name) for name in _MOTION), data.times_s)
     except StudyError as error:
         raise DemosError(f"{str(error).rstrip('.')}: {_MEASURE}.") from error
 
