@@ -1,7 +1,8 @@
 """Camera faults: pure functions on pictures, for bad light and a bad lens.
 
 They change pictures only, never the world, to test how well policies generalize to other pictures.
-All take and return pictures of shape (H, W, 3), uint8, of any size, and raise `WorldError` on others.
+All take and return pictures of shape (H, W, 3), uint8, of any size, and refuse others with
+a `WorldError`.
 """
 
 from __future__ import annotations

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.judge import in_thirds, judge, macro_f1
 from shapechanger.demos.cloning.learn import best_temperature, learn
 from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.layout import Feature, Layout
 from tests.demos.cloning.data import QUICK, STEERS, stripes
 
 
@@ -64,6 +71,71 @@ def test_regression_is_correct_in_the_same_third() -> None:
         "straight still",
         "right back",
     ]
+
+
+class Answers:
+    """A policy with given outputs for the steps in order."""
+
+    def __init__(self, done: NDArray[np.float64]) -> None:
+        self._done = done
+        self.card = SimpleNamespace(require_layouts=lambda *_: None, classes=(), head="regression")
+
+    def outputs(self, *_: object) -> NDArray[np.float64]:
+        """Return the outputs, which the metrics of regression do not use."""
+        return self._done
+
+    predict_many = outputs
+
+
+def scores(done: NDArray[np.float64], wanted: NDArray[np.float64], layout: Layout) -> list[float]:
+    """Return all metrics of outputs, each better the larger it is."""
+    data = dataclasses.replace(
+        stripes(len(wanted), 0), actions=wanted, pictures=None, action_layout=layout
+    )
+    report = judge(Answers(done), data)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+    return [report.accuracy, report.within, report.macro_f1, *(-np.array(report.errors))]
+
+
+UNBOUNDED = Layout((Feature("left", "N·m"), Feature("right", "N·m", high=1.0)))
+
+
+@settings(max_examples=50)
+@given(
+    seed=st.integers(0, 10_000),
+    steps=st.integers(1, 12),
+    layout=st.sampled_from([STEERS, UNBOUNDED]),
+    absurd=st.sampled_from([-1e6, -100.0, -3.3, 3.3, 100.0, 1e6]),
+    unrelated=st.booleans(),
+)
+def test_no_metric_gains_from_an_absurd_output(
+    *, seed: int, steps: int, layout: Layout, absurd: float, unrelated: bool
+) -> None:
+    """However good or bad the outputs are, replacing them by absurd ones improves no metric."""
+    rng = np.random.default_rng(seed)
+    wanted = rng.uniform(-1.0, 1.0, (steps, 2))
+    done = rng.uniform(-1.0, 1.0, (steps, 2)) if unrelated else wanted.copy()
+    before = scores(done, wanted, layout)
+    for step in rng.permutation(steps):
+        done = done.copy()
+        done[step, rng.integers(2)] = absurd
+        after = scores(done, wanted, layout)
+        assert all(b <= a + 1e-12 for a, b in zip(before, after, strict=True))
+        before = after
+
+
+@settings(max_examples=50)
+@given(seed=st.integers(0, 10_000), by=st.floats(0.0, 100.0))
+def test_no_metric_gains_when_a_right_output_moves(seed: int, by: float) -> None:
+    """Moving an output away from the driver's action never improves a metric."""
+    rng = np.random.default_rng(seed)
+    wanted = rng.uniform(-1.0, 1.0, (20, 2))
+    done = np.where(rng.random((20, 1)) < 0.5, wanted, rng.uniform(-1.0, 1.0, (20, 2)))
+    worse = done.copy()
+    right = int(np.argmin(np.abs(done - wanted).max(axis=1)))
+    worse[right, rng.integers(2)] += by * rng.choice([-1.0, 1.0])
+    for layout in (STEERS, UNBOUNDED):
+        before, after = scores(done, wanted, layout), scores(worse, wanted, layout)
+        assert all(b <= a + 1e-12 for a, b in zip(before, after, strict=True))
 
 
 def test_regression_is_judged_by_errors() -> None:

@@ -31,25 +31,38 @@ _WORDS: Final = {
     "throttle": ("back", "still", "forward"),
 }
 _PLACES: Final = ("low", "middle", "high")
+OUT_OF_RANGE: Final = "out of range"
+"""Class of an action that is in no third."""
 
 
-def in_thirds(actions: NDArray[np.float64], layout: Layout) -> tuple[list[str], NDArray[np.int64]]:
+def in_thirds(
+    actions: NDArray[np.float64], layout: Layout, driver: NDArray[np.float64] | None = None
+) -> tuple[list[str], NDArray[np.int64]]:
     """Return the third of its range that each value is in, one class per combination that occurs.
+
+    An action with a value outside its range, by more than the tolerance, is in the class
+    `OUT_OF_RANGE`.
 
     Args:
         actions: Shape (n, m).
-        layout: Meaning of the values; the extreme action replaces a missing bound.
+        layout: Meaning of the values.
+        driver: The driver's actions, shape (n, m), whose extremes replace missing bounds; None for
+            `actions`.
 
     Returns:
         The names of the classes, and the class index of each action, shape (n,).
     """
-    low, high = _ranges(actions, layout)
+    low, high = _ranges(actions if driver is None else driver, layout)
     share = (actions - low) / np.where(high > low, high - low, 1.0)
     third = (share > 1.0 / 3.0).astype(np.int64) + (share > 2.0 / 3.0)
+    outside = ~(np.abs(share - 0.5) <= 0.5 * (1.0 + _TOLERANCE)).all(axis=1)
+    third[outside] = -1
     found, numbers = np.unique(third, axis=0, return_inverse=True)
     parts = [name for feature in layout for name in [feature.name] * feature.size]
     names = [
-        " ".join(_word(name, int(place)) for name, place in zip(parts, row, strict=True))
+        OUT_OF_RANGE
+        if row[0] < 0
+        else " ".join(_word(name, int(place)) for name, place in zip(parts, row, strict=True))
         for row in found
     ]
     return names, numbers.reshape(-1).astype(np.int64)
@@ -147,8 +160,9 @@ class Judgement(msgspec.Struct, frozen=True, kw_only=True):
         steps: Number of steps.
         accuracy: Share of steps with the driver's class. For continuous actions, the share in which
             all values are in the same third of their range as the driver's, such as left, straight
-            and right.
-        macro_f1: Mean F1 score over all classes that the driver or the policy chose.
+            and right. The range is the layout's, or where that has no bound the driver's.
+        macro_f1: Mean F1 score over all classes that the driver or the policy chose; for continuous
+            actions over the driver's.
         always: Accuracy of always choosing the driver's most frequent class on these steps.
         classes: Names of the classes, or of the thirds that occur.
         confusion: Number of steps by the driver's class (rows) and the policy's (columns).
@@ -205,10 +219,11 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
     done = policy.predict_many(pictures, states).astype(np.float64)
     layout = data.action_layout
     apart = np.abs(done - wanted)
-    both = np.concatenate((wanted, done))
-    low, high = _ranges(both, layout)
+    # From the driver alone: an absurd output would widen the range, and make all others seem right.
+    low, high = _ranges(wanted, layout)
     half = 0.5 * (high - low)
     relative = apart / np.where(half > 0.0, half, 1.0)
+    absurd: NDArray[np.bool_] | None = None
     calibration: tuple[Bin, ...] = ()
     ece: float | None = None
     if policy.card.classes:
@@ -225,8 +240,10 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
         given = np.where(truth < out.shape[1], out[np.arange(len(out)), known], 0.0)
         wrongness = 1.0 - given + (did != truth)
     else:
-        names, numbers = in_thirds(both, layout)
+        both = np.concatenate((np.clip(wanted, low, high), done))
+        names, numbers = in_thirds(both, layout, wanted)
         truth, did = numbers[: len(wanted)], numbers[len(wanted) :]
+        absurd = did == (names.index(OUT_OF_RANGE) if OUT_OF_RANGE in names else -1)
         wrongness = relative.max(axis=1)
     confusion = np.zeros((len(names), len(names)), np.int64)
     np.add.at(confusion, (truth, did), 1)
@@ -237,7 +254,7 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
         head=policy.card.head,
         steps=len(wanted),
         accuracy=float((truth == did).mean()),
-        macro_f1=macro_f1(did, truth),
+        macro_f1=macro_f1(did, truth, absurd),
         always=float(confusion.sum(axis=1).max() / len(wanted)),
         classes=tuple(names),
         confusion=tuple(tuple(map(int, row)) for row in confusion),
@@ -253,17 +270,23 @@ def judge(policy: CameraPolicy, data: Dataset, which: NDArray[np.bool_] | None =
     )
 
 
-def macro_f1(done: NDArray[np.int64], truth: NDArray[np.int64]) -> float:
+def macro_f1(
+    done: NDArray[np.int64], truth: NDArray[np.int64], absurd: NDArray[np.bool_] | None = None
+) -> float:
     """Return the mean F1 score over every class that occurs in either array.
 
     Args:
         done: Chosen classes, shape (n,).
         truth: Correct classes, shape (n,).
+        absurd: Mask of outputs that belong to no class, shape (n,). Each counts as a wrong choice
+            of every class, and only classes of `truth` count: the score would otherwise improve
+            when a wrong choice becomes an absurd one. None if each output is a class.
     """
     scores: list[float] = []
-    for one in np.union1d(done, truth):
+    for one in np.union1d(done, truth) if absurd is None else np.unique(truth):
         hits = float(((done == one) & (truth == one)).sum())
-        scores.append(2.0 * hits / float((done == one).sum() + (truth == one).sum()))
+        chosen = done == one if absurd is None else (done == one) | absurd
+        scores.append(2.0 * hits / float(chosen.sum() + (truth == one).sum()))
     return float(np.mean(scores))
 
 
