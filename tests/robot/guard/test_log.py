@@ -1,9 +1,11 @@
 """The non-blocking log of guard and supervisor."""
 
+import contextlib
 import fcntl
 import logging
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -53,11 +55,77 @@ def test_a_line_is_cut_to_the_size_of_a_pipe(pipe: tuple[int, int]) -> None:
     assert data.endswith(b"\n")
 
 
-def test_a_log_without_a_reader_raises_nothing() -> None:
-    """Writing to a pipe whose reader is closed is ignored."""
+class _Unprintable:
+    """An argument whose text cannot be made."""
+
+    def __init__(self, error: Exception) -> None:
+        self._error = error
+
+    def __str__(self) -> str:
+        raise self._error
+
+
+@pytest.mark.parametrize(
+    ("words", "args", "error"),
+    [
+        ("%s", (_Unprintable(RuntimeError()),), "RuntimeError"),
+        ("%s", (_Unprintable(MemoryError()),), "MemoryError"),
+        ("%d", ("three",), "TypeError"),
+        ("%s %s", ("one",), "TypeError"),
+        ("%q", (1,), "ValueError"),
+    ],
+)
+def test_a_line_that_cannot_be_formatted_is_replaced(
+    pipe: tuple[int, int], words: str, args: tuple[object, ...], error: str
+) -> None:
+    """The line names its place and the error, and the guard goes on."""
+    read, write = pipe
+    record = logging.LogRecord("robot", logging.INFO, "/x/rules.py", 7, words, args, None)
+    _Lines(write).handle(record)
+    assert os.read(read, 1 << 16) == f"A line of rules.py:7 fails: {error}.\n".encode()
+
+
+@contextlib.contextmanager
+def _broken(kind: str, folder: Path) -> Iterator[int]:
+    """Yield a descriptor that cannot be written to."""
     read, write = os.pipe()
-    os.close(read)
+    match kind:
+        case "no reader":
+            os.close(read)
+            read = os.open(os.devnull, os.O_RDONLY)
+        case "closed":
+            os.close(write)
+            # Not reused by another file during the test.
+            write = os.open(os.devnull, os.O_RDONLY)
+        case "read-only":
+            (folder / "log").touch()
+            os.close(write)
+            write = os.open(folder / "log", os.O_RDONLY)
+        case _:
+            os.close(write)
+            write = os.open("/dev/full", os.O_WRONLY)
     try:
-        _emit(_Lines(write), "Hello.")
+        yield write
     finally:
+        os.close(read)
         os.close(write)
+
+
+@pytest.mark.parametrize("kind", ["no reader", "closed", "read-only", "full disk"])
+def test_a_log_that_cannot_be_written_raises_nothing(kind: str, tmp_path: Path) -> None:
+    """Lines are lost and counted, whatever becomes of the descriptor, and of any text."""
+    with _broken(kind, tmp_path) as fd:
+        lines = _Lines(fd)
+        for words in ("Hello.", "\ud800", "\0", "a\nb", "x" * 100_000):
+            _emit(lines, words)
+        assert lines._lost == 5
+
+
+def test_a_descriptor_that_closes_later_raises_nothing() -> None:
+    """Nothing tells the log that its descriptor is closed."""
+    read, write = os.pipe()
+    lines = _Lines(write)
+    os.close(write)
+    os.close(read)
+    _emit(lines, "Hello.")
+    assert lines._lost == 1

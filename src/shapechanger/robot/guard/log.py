@@ -16,7 +16,7 @@ _STDERR: Final = 2
 
 
 class _Lines(logging.Handler):
-    """Write lines without blocking, and count those that are dropped.
+    """Write lines without blocking, and count those that are dropped; never raise.
 
     The descriptor is shared with other processes, so it must not become O_NONBLOCK. A line is no
     longer than what a writable pipe accepts without blocking.
@@ -30,7 +30,10 @@ class _Lines(logging.Handler):
         self._lost = 0
 
     def emit(self, record: logging.LogRecord) -> None:
-        text = self.format(record)
+        try:
+            text = self.format(record)
+        except Exception as error:  # An argument's own, when it is printed.
+            text = f"A line of {record.filename}:{record.lineno} fails: {type(error).__name__}."
         if self._lost:
             text = f"{text} ({self._lost} lines before it were lost.)"
         if self._write(text):
