@@ -159,12 +159,13 @@ def _is_steady(steering: NDArray[np.floating], times_s: NDArray[np.floating]) ->
     """Return at which steps the steering has not changed for as long as the turn lags behind."""
     passed_s = np.diff(times_s)
     usual_s = float(np.median(passed_s)) if len(passed_s) else 0.0
-    whole = (passed_s > 0.0) & (passed_s <= max(_LAG_S + _JITTER_S, 1.5 * usual_s))
+    jitter_s = min(0.5 * usual_s, _JITTER_S)
+    whole = (passed_s > 0.0) & (passed_s <= max(_LAG_S + jitter_s, 1.5 * usual_s))
     stretch = np.concatenate(([0], np.cumsum(~whole)))  # Number of the stretch without gaps.
     _, begins = np.unique(stretch, return_index=True)
-    steady = times_s - times_s[begins][stretch] >= _LAG_S - _JITTER_S
+    steady = times_s - times_s[begins][stretch] >= _LAG_S - jitter_s
     for steps in range(1, len(steering)):
-        recent = times_s[steps:] - times_s[:-steps] <= _LAG_S + _JITTER_S
+        recent = times_s[steps:] - times_s[:-steps] <= _LAG_S + jitter_s
         recent &= stretch[steps:] == stretch[:-steps]
         if not recent.any():
             break
