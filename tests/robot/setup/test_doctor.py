@@ -1,19 +1,24 @@
 """Checks of a robot before it drives."""
 
+import re
 import socket
 import threading
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, Self, cast
 
 import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
+from shapechanger.robot.hardware import RealClock
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.doctor import Finding, examine_robot
 from shapechanger.robot.setup.systemd import unit_name
 from tests.robot.profile.texts import finger_text, read
+from tests.robots import write_profile
 
 _CAMERA = CameraPlan("pattern")
 _MOTOR = OutputPlan("drive", "hbridge", "wheels", {"throttle": 1.0}, settings={"forward": 22})
@@ -184,3 +189,100 @@ def test_servos_without_a_watchdog_need_a_power_switch(tmp_path: Path) -> None:
     bare = _found(tmp_path, replace(rig, enable_pin=None))["enable line"]
     assert bare.level == "missing"
     assert "Fit the one-shot" in bare.sentence
+
+
+class _Stuck:
+    """Hardware and camera of which one method never returns, or raises.
+
+    Args:
+        where: Name of the method.
+        error: What it raises; None to hang until `freed`.
+        freed: Ends the hanging.
+    """
+
+    def __init__(self, where: str, error: Exception | None, freed: threading.Event) -> None:
+        self._where = where
+        self._error = error
+        self._freed = freed
+        self.clock = RealClock()
+
+    def _maybe(self, method: str) -> None:
+        if method == self._where:
+            if self._error is not None:
+                raise self._error
+            self._freed.wait()
+        elif method in {"pin_factory", "i2c"}:
+            raise RobotError(f"Not here: {method}.")
+
+    def open(self, plan: CameraPlan) -> Self:
+        """Open the camera."""
+        del plan
+        self._maybe("open")
+        return self
+
+    def read(self) -> Frame:
+        """Read a frame of the camera."""
+        self._maybe("read")
+        return Frame(b"\xff\xd8", 1)
+
+    def pin_factory(self) -> Any:
+        """Return no factory."""
+        self._maybe("pin_factory")
+
+    def i2c(self, bus: int) -> Any:
+        """Open no bus."""
+        del bus
+        self._maybe("i2c")
+
+    servo_pins = servo_port = pin_factory
+
+    def close(self) -> None:
+        """Close the camera, or the hardware."""
+        self._maybe("close")
+
+
+@pytest.fixture
+def freed() -> Iterator[threading.Event]:
+    """An event that ends all hanging after the test."""
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+@pytest.mark.parametrize("where", ["open", "read", "pin_factory", "i2c", "close"])
+@pytest.mark.parametrize("error", [None, OSError(5, "Input/output error"), ValueError("Odd.")])
+def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    freed: threading.Event,
+    where: str,
+    error: Exception | None,
+) -> None:
+    """Each check has a deadline, its failure is a finding, and all others are made."""
+    limit_s = 0.05 if error is None else 5.0
+    monkeypatch.setattr("shapechanger.robot.setup.doctor._CAMERA_S", limit_s)
+    for name in ("dev/gpiochip0", "dev/i2c-1"):
+        _write(tmp_path, name, "")
+    robot = load_profile(write_profile(tmp_path).path).guard_plan()
+    guard = replace(robot, outputs=(*robot.outputs, replace(_SERVO, name="turn")))
+
+    def findings(stuck: _Stuck) -> list[Finding]:
+        return list(
+            examine_robot(
+                guard,
+                _CAMERA,
+                0,
+                tmp_path,
+                stuck.open,
+                hardware=lambda: cast("Any", stuck),
+                motors_off=True,
+                limit_s=limit_s,
+            )
+        )
+
+    found = findings(_Stuck(where, error, freed))
+    words = "No answer within|no frame within" if error is None else "Input/output|Odd"
+    assert any(re.search(words, one.sentence) for one in found if one.level == "missing")
+    sound = findings(_Stuck("", None, freed))
+    assert {one.check for one in found} >= {one.check for one in sound}
+    assert found[-1].check == "port"

@@ -11,7 +11,6 @@ import os
 import re
 import socket
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -22,7 +21,14 @@ from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.setup.systemd import unit_name, unit_word
-from shapechanger.robot.setup.wiring import Level, Results, examine_wiring
+from shapechanger.robot.setup.wiring import (
+    CHECK_S,
+    Level,
+    Results,
+    examine_wiring,
+    finish_in_time,
+    run_checks,
+)
 
 if TYPE_CHECKING:  # The drivers need gpiozero, which may be missing.
     from shapechanger.robot.drivers.as5600 import As5600, JointEncoder
@@ -61,8 +67,11 @@ def examine_robot(
     hardware: Callable[[], Hardware] = RealHardware,
     *,
     motors_off: bool = False,
+    limit_s: float = CHECK_S,
 ) -> Iterator[Finding]:
     """Check all that the robot's safety and function depend on.
+
+    A check that fails or hangs is a finding, and the others go on.
 
     Args:
         guard: Outputs, sensors and limits of the robot.
@@ -73,6 +82,7 @@ def examine_robot(
         profile: The robot's profile, which the systemd unit must name; None to skip this check.
         hardware: Opens its pins and buses.
         motors_off: Whether the motors have no supply, so that their resistors can be tested.
+        limit_s: Time for each check, s.
     """
     checks: list[tuple[str, Results]] = [
         ("computer", _computer(root)),
@@ -94,9 +104,8 @@ def examine_robot(
         checks += [("I2C speed", _bus_speed(boot_config(root)))]
     if plans and opened is not None:
         checks += [("encoders", _encoders(plans, root, opened))]
-    for check, results in checks:
-        for level, sentence in results:
-            yield Finding(check, level, sentence)
+    for check, level, sentence in run_checks(checks, limit_s):
+        yield Finding(check, level, sentence)
     if opened is not None:
         try:
             for check, level, sentence in examine_wiring(
@@ -105,14 +114,22 @@ def examine_robot(
                 motors_off=motors_off,
                 has_pins=any((root / "dev").glob("gpiochip*")),
                 has_bus=lambda bus: _has_bus(bus, root),
+                limit_s=limit_s,
             ):
                 yield Finding(check, level, sentence)
         finally:
-            opened.close()
+            closed = run_checks([("wiring", _close(opened))], limit_s)
+            unclosed = [Finding(check, level, sentence) for check, level, sentence in closed]
+        yield from unclosed
     elif not is_free:
         words = "The robot may be served now, so its pins and buses were left alone."
         yield Finding("wiring", "unknown", words)
     yield Finding("port", "good" if is_free else "missing", port_words)
+
+
+def _close(hardware: Hardware) -> Results:
+    hardware.close()
+    yield from ()
 
 
 def needs_pins(guard: GuardPlan) -> bool:
@@ -305,19 +322,24 @@ def _packages(guard: GuardPlan, camera: CameraPlan | None) -> Results:
 
 
 def _camera(plan: CameraPlan, look: Callable[[CameraPlan], Camera]) -> Results:
-    with ThreadPoolExecutor(1) as reader:
+    late = f"{plan.driver} sent no frame within {_CAMERA_S:g} s."
+    try:
+        camera = look(plan)
         try:
-            camera = look(plan)
-            try:
-                frame = reader.submit(camera.read).result(_CAMERA_S)
-            finally:
-                camera.close()  # Also ends a `read` that still waits.
-        except TimeoutError:
-            yield "missing", f"{plan.driver} sent no frame within {_CAMERA_S:g} s."
-        except ShapechangerError as error:
-            yield "missing", f"{plan.driver}: {error}"
-        else:
-            yield "good", f"{plan.driver} sent a frame of {len(frame.jpeg)} bytes."
+            yield from finish_in_time(_frame(plan, camera), _CAMERA_S, late)
+        finally:
+            camera.close()  # Also ends a `read` that still waits.
+    except ShapechangerError as error:
+        yield "missing", f"{plan.driver}: {error}"
+
+
+def _frame(plan: CameraPlan, camera: Camera) -> Results:
+    try:
+        frame = camera.read()
+    except ShapechangerError as error:
+        yield "missing", f"{plan.driver}: {error}"
+    else:
+        yield "good", f"{plan.driver} sent a frame of {len(frame.jpeg)} bytes."
 
 
 def _geometry(plan: CameraPlan) -> Results:

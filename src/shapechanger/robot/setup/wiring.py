@@ -5,11 +5,14 @@ They need the pins and buses for themselves, so the robot must not be served mea
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from queue import Empty, SimpleQueue
+from threading import Thread
 from typing import Final, Literal
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.sensor import open_sensor
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
@@ -19,6 +22,9 @@ from shapechanger.robot.hardware import Hardware
 
 Level = Literal["good", "missing", "unknown"]
 Results = Iterator[tuple[Level, str]]
+
+CHECK_S: Final = 10.0
+"""Time for each check, s; a bus whose servos are all silent needs the longest, some seconds."""
 
 _MODE1: Final = 0x00  # First register of a PCA9685; reading it changes nothing.
 _NO_BATTERY_V: Final = 1.0
@@ -203,6 +209,63 @@ def servo_bus(guard: GuardPlan, hardware: Hardware) -> Results:
     yield "good", f"All {len(servos)} servos answer."
 
 
+def finish_in_time(results: Results, limit_s: float, late: str) -> Results:
+    """Yield the results of a check until it ends, fails or is late.
+
+    The check runs in a thread of its own, which is left behind if its driver hangs.
+
+    Args:
+        results: The check.
+        limit_s: Time for all of it, s.
+        late: Sentence if it is late.
+    """
+    found: SimpleQueue[tuple[Level, str] | Exception | None] = SimpleQueue()
+
+    def run() -> None:
+        try:
+            for result in results:
+                found.put(result)
+            found.put(None)
+        except Exception as error:  # Of any driver; it becomes a finding.
+            found.put(error)
+
+    Thread(target=run, name="check", daemon=True).start()
+    until_s = time.monotonic() + limit_s
+    while True:
+        try:
+            result = found.get(timeout=max(0.0, until_s - time.monotonic()))
+        except Empty:
+            yield "missing", late
+            return
+        match result:
+            case None:
+                return
+            case ShapechangerError():
+                yield "missing", str(result)
+                return
+            case Exception():
+                yield "missing", f"The check fails: {type(result).__name__}: {result}."
+                return
+            case _:
+                yield result
+
+
+def run_checks(
+    checks: Iterable[tuple[str, Results]], limit_s: float
+) -> Iterator[tuple[str, Level, str]]:
+    """Yield name, level and sentence of each result; no check keeps the next from running.
+
+    Args:
+        checks: Names and checks.
+        limit_s: Time for each, s.
+    """
+    for check, results in checks:
+        late = f"No answer within {limit_s:g} s: its device or driver hangs. Look at its wires and "
+        late += "supply, restart the computer, and check again."
+        for level, sentence in finish_in_time(results, limit_s, late):
+            yield check, level, sentence
+
+
 def examine_wiring(
     guard: GuardPlan,
     hardware: Hardware,
@@ -210,6 +273,7 @@ def examine_wiring(
     motors_off: bool,
     has_pins: bool = True,
     has_bus: Callable[[int], bool] = lambda _: True,
+    limit_s: float = CHECK_S,
 ) -> Iterator[tuple[str, Level, str]]:
     """Yield name, level and sentence of each check of the wiring.
 
@@ -219,6 +283,7 @@ def examine_wiring(
         motors_off: Whether the motors have no supply, so that their resistors can be tested.
         has_pins: Whether this machine has pins.
         has_bus: Tells whether it has an I2C bus with that number, which this user may open.
+        limit_s: Time for each check, s.
     """
     checks: list[tuple[str, Results]] = []
     if driven_pins(guard) or _enables(guard):
@@ -240,9 +305,4 @@ def examine_wiring(
         if there or plan.driver == "cpu_temperature":
             checks.append(("sensor", read_sensor(plan, guard, hardware)))
     checks.append(("servo bus", servo_bus(guard, hardware)))
-    for check, results in checks:
-        try:
-            for level, sentence in results:
-                yield check, level, sentence
-        except RobotError as error:
-            yield check, "missing", str(error)
+    yield from run_checks(checks, limit_s)
