@@ -306,13 +306,13 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         """Exclude the newest steps of this episode.
 
         Args:
-            seconds: How far to go back, s.
+            seconds: How far to go back, s; see `EpisodeWriter.undo`.
 
         Returns:
             Number of excluded steps.
 
         Raises:
-            DemosError: If no episode is being recorded.
+            DemosError: If no episode is being recorded, or `seconds` is not positive and finite.
         """
         return self._open().undo(seconds)
 

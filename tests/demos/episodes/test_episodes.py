@@ -1,7 +1,10 @@
 """Episode writer and reader: round trips, and refusals."""
 
 import dataclasses
+import errno
 import math
+import os
+import re
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -18,6 +21,8 @@ from shapechanger.demos.episodes import (
     mark,
     read_episode,
 )
+from shapechanger.demos.episodes.files import free_path
+from shapechanger.demos.episodes.writer import Syncer
 from shapechanger.errors import BrokenEpisode, DemosError, OutputError
 from tests.demos.episodes.making import header, picture, recorded, step
 
@@ -114,6 +119,133 @@ def test_undo_drops_the_newest_seconds(tmp_path: Path) -> None:
     assert len(read.steps) == 61
     assert [s.index for s in read.kept] == [*range(20), 60]
     assert writer.dropped == 40
+
+
+_TIMES_S = st.lists(st.floats(0.0, 3.0), min_size=1, max_size=12).map(sorted)
+
+
+@settings(max_examples=60)
+@given(
+    times_s=_TIMES_S,
+    began_ns=st.sampled_from([0, 10**9, 1_700_000_000 * 10**9]),
+    undone=st.lists(st.floats(0.0, 1e300, exclude_min=True), min_size=1, max_size=3),
+    has_clock=st.booleans(),
+)
+def test_undo_excludes_what_is_later(
+    *,
+    times_s: list[float],
+    began_ns: int,
+    undone: list[float],
+    has_clock: bool,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    """Each undo excludes the newest kept step and all less than so many seconds before it."""
+    times_ns = [began_ns + round(1e9 * at_s) for at_s in times_s]
+    if not has_clock:  # Steps of 1/20 s.
+        times_ns = [50_000_000 * number for number in range(len(times_s))]
+    recording = tmp_path_factory.mktemp("recording")
+    with EpisodeWriter.create(recording, header(), spare_bytes=0) as writer:
+        for number, at_ns in enumerate(times_ns):
+            one = dataclasses.replace(step(number), decided_ns=None)
+            writer.add(dataclasses.replace(one, captured_ns=at_ns if has_clock else None))
+        kept = list(enumerate(times_ns))
+        for seconds in undone:
+            before = len(kept)
+            kept = [one for one in kept if kept[-1][1] - one[1] >= 1e9 * seconds]
+            assert writer.undo(seconds) == before - len(kept)
+            assert (before == 0) or len(kept) < before
+    assert [one.index for one in read_episode(writer.path).kept] == [index for index, _ in kept]
+
+
+@pytest.mark.parametrize(
+    "seconds", [0.0, -0.0, -1e-300, -1.0, -math.inf, math.nan, math.inf], ids=str
+)
+def test_undo_refuses_what_is_no_duration(tmp_path: Path, seconds: float) -> None:
+    """Nothing is excluded by a duration that is not positive, or not finite."""
+    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
+        writer.add(step(0))
+        with pytest.raises(DemosError, match=rf"must be (positive|finite), got {seconds}\."):
+            writer.undo(seconds)
+    assert len(read_episode(writer.path).kept) == 1
+
+
+@settings(max_examples=60)
+@given(
+    stem=st.one_of(
+        st.sampled_from(
+            [
+                "x",
+                "x-2-foo",
+                "x-0007",
+                "x-9999",
+                "x-20261124",
+                "x-²",
+                "x-٣٤٥٦",
+                "-",
+                "-0001",
+                "a\nb",
+            ]
+        ),
+        st.text("x-019 ", min_size=1, max_size=9),
+    ),
+    number=st.integers(1, 5),
+    kind=st.sampled_from(["folder", "file", "dangling link"]),
+)
+def test_a_free_path_is_found_beside_any_others(
+    stem: str, number: int, kind: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Whatever a name ends with and whatever has it, the next path is free and begins like it."""
+    folder = tmp_path_factory.mktemp("recording")
+    (folder / f"{stem}-odd").mkdir()
+    for _ in range(number):
+        path = free_path(folder, stem, ".part")
+        assert not os.path.lexists(path)
+        assert path.name.startswith(re.sub("-[0-9]{4}$", "", stem))
+        match kind:
+            case "folder":
+                path.mkdir()
+            case "file":
+                path.touch()
+            case _:
+                path.symlink_to(folder / "nothing")
+    assert len(list(folder.iterdir())) == number + 1
+
+
+def test_counting_goes_on_from_a_counted_name(tmp_path: Path) -> None:
+    """Four digits after a dash are a number; dates and others are part of the name."""
+    for stem, following in (
+        ("20261124T1200Z-0001", "20261124T1200Z-0002"),
+        ("drive-20261124", "drive-20261124-0001"),
+        ("drive-12", "drive-12-0001"),
+        ("drive-9999", "drive-9999-0001"),
+    ):
+        (tmp_path / stem).mkdir()
+        assert free_path(tmp_path, stem).name == following
+
+
+def test_a_missing_picture_does_not_keep_the_others_from_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All other pictures and the steps are flushed, and so they are if the disk fails at one."""
+    flushed: list[str] = []
+
+    def fsync(fd: int) -> None:
+        name = Path(f"/proc/self/fd/{fd}").readlink().name
+        flushed.append(name)
+        if name == "bad.jpg":
+            raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr("shapechanger.demos.episodes.writer.os.fsync", fsync)
+    fd = os.open(tmp_path / "steps", os.O_CREAT | os.O_RDWR)
+    syncer = Syncer(fd)
+    for name in ("a.jpg", "bad.jpg", "b.jpg"):
+        (tmp_path / name).touch()
+    for name in ("missing.jpg", "a.jpg", "bad.jpg", "b.jpg"):
+        syncer.add(tmp_path / name)
+    syncer.sync()
+    assert flushed == ["a.jpg", "bad.jpg", "b.jpg", "steps"]
+    syncer.close()
+    os.close(fd)
 
 
 def test_undo_of_nothing_drops_nothing(tmp_path: Path) -> None:

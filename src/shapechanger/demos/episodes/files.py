@@ -6,6 +6,7 @@ import errno
 import fcntl
 import json
 import os
+import re
 import stat
 from pathlib import Path
 from typing import Any, Final
@@ -60,17 +61,20 @@ def free_path(folder: Path, stem: str, ending: str = "") -> Path:
 
     Args:
         folder: The folder.
-        stem: Wanted name without its ending, such as "steps"; if it ends with a number after a
-            dash, such as "20261124-0001", counting goes on there.
+        stem: Wanted name without its ending, such as "steps"; if it ends with four digits after a
+            dash, such as "20261124-0001", counting goes on there. No other end of a name is a
+            number that was counted.
         ending: Ending of the name, such as ".jsonl".
 
     Raises:
         OutputError: If all numbers are taken.
     """
     path = folder / f"{stem}{ending}"
-    begun, dash, digits = stem.rpartition("-")
-    begun, number = (begun, int(digits)) if dash and digits.isdigit() else (stem, 0)
-    while path.exists():
+    counted = re.fullmatch(r"(.*)-([0-9]{4})", stem, re.DOTALL)
+    begun, number = (counted[1], int(counted[2])) if counted else (stem, 0)
+    if number == _MOST_OF_A_NAME:  # The next number would have five digits.
+        begun, number = stem, 0
+    while os.path.lexists(path):
         if (number := number + 1) > _MOST_OF_A_NAME:
             raise OutputError(f"{folder} has too many files with names like {stem}{ending}.")
         path = folder / f"{begun}-{number:04d}{ending}"

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import binascii
 import contextlib
+import math
 import os
 import threading
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
+from itertools import takewhile
 from pathlib import Path
 from typing import Final, Self
 
@@ -53,17 +55,18 @@ class Syncer:
             self._waiting.append(path)
 
     def sync(self) -> None:
-        """Flush now."""
+        """Flush now; a file that is missing or fails does not keep the others from it."""
         with self._lock:
             waiting, self._waiting = self._waiting, []
-        # The next write reports a failing disk; an error here would have no recipient.
-        with contextlib.suppress(OSError):
-            for path in waiting:
+        for path in waiting:
+            # The next write reports a failing disk; an error here would have no recipient.
+            with contextlib.suppress(OSError):
                 fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
                 try:
                     os.fsync(fd)
                 finally:
                     os.close(fd)
+        with contextlib.suppress(OSError):
             os.fsync(self._fd)
 
     def close(self) -> None:
@@ -108,8 +111,9 @@ class EpisodeWriter:
         self._lock, self._fd = locks
         self._spare_bytes = spare_bytes
         self._before: Step | None = None
-        # Index and time, s, of each kept step, for `undo`.
-        self._times: list[tuple[int, float]] = []
+        # Index and time, ns, of each kept step, for `undo`. Floats of seconds since 1970 would be
+        # too coarse.
+        self._times: list[tuple[int, int]] = []
         self._syncer: Syncer | None = Syncer(self._fd)
 
     @classmethod
@@ -166,7 +170,7 @@ class EpisodeWriter:
     @property
     def seconds(self) -> float:
         """Duration of the kept steps, s."""
-        return self._times[-1][1] - self._times[0][1] if self._times else 0.0
+        return (self._times[-1][1] - self._times[0][1]) / _NS_PER_S if self._times else 0.0
 
     def add(self, step: Step, jpeg: bytes | None = None) -> int:
         """Append a step.
@@ -197,7 +201,7 @@ class EpisodeWriter:
         step = replace(step, index=self.steps, **self._frame(jpeg))
         self._append(step.to_json())
         self._before = step
-        self._times.append((step.index, self._time_s(step)))
+        self._times.append((step.index, self._time_ns(step)))
         self.steps += 1
         return step.index
 
@@ -215,29 +219,35 @@ class EpisodeWriter:
         self.marks += 1
 
     def undo(self, seconds: float = 5.0) -> int:
-        """Exclude the newest steps; they stay in the file.
+        """Exclude the newest kept step, and those less than `seconds` before it.
+
+        They stay in the file.
 
         Args:
-            seconds: How far to go back from the newest kept step, s; positive.
+            seconds: How far to go back from the newest kept step, s; positive and finite.
 
         Returns:
             Number of excluded steps.
 
         Raises:
-            DemosError: If `seconds` is not positive.
+            DemosError: If `seconds` is not positive, or not finite.
             OutputError: If it cannot be written.
         """
         self._require_open()
         if not seconds > 0.0:
             raise DemosError(f"seconds to undo must be positive, got {seconds}.")
+        if not math.isfinite(seconds):
+            raise DemosError(f"seconds to undo must be finite, got {seconds}.")
         if not self._times:
             return 0
-        since_s = self._times[-1][1] - seconds
-        gone = [index for index, at_s in self._times if at_s > since_s]
-        self._append({"kind": "drop", "first": gone[0], "last": self.steps - 1, "why": "undo"})
-        del self._times[-len(gone) :]
-        self.dropped += len(gone)
-        return len(gone)
+        newest_ns = self._times[-1][1]
+        later = (newest_ns - at_ns < seconds * _NS_PER_S for _, at_ns in reversed(self._times))
+        count = sum(takewhile(bool, later))
+        first = self._times[-count][0]
+        self._append({"kind": "drop", "first": first, "last": self.steps - 1, "why": "undo"})
+        del self._times[-count:]
+        self.dropped += count
+        return count
 
     def close(self, outcome: str = "") -> None:
         """Close the episode; further calls do nothing.
@@ -301,9 +311,9 @@ class EpisodeWriter:
                 return f"time runs backwards, from {earlier} to {later} ns ({name})"
         return ""
 
-    def _time_s(self, step: Step) -> float:
+    def _time_ns(self, step: Step) -> int:
         at_ns = step.clock_ns
-        return step.index / self._header.control_hz if at_ns is None else at_ns / _NS_PER_S
+        return round(step.index * _NS_PER_S / self._header.control_hz) if at_ns is None else at_ns
 
     def _require_open(self) -> None:
         if self._syncer is None:
