@@ -7,6 +7,8 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from shapechanger.errors import WorldError
@@ -70,6 +72,24 @@ def test_random_errors_are_within_their_ranges() -> None:
         assert -most <= values.min() < -0.8 * most
         assert 0.8 * most < values.max() <= most
     assert drawn[7] == CameraJitter.random(np.random.default_rng(7))
+
+
+_ERRORS = st.one_of(st.floats(-2.0, 2.0), st.floats())
+
+
+@given(jitter=st.builds(CameraJitter, _ERRORS, _ERRORS, _ERRORS, _ERRORS, _ERRORS))
+def test_a_refused_error_changes_nothing(jitter: CameraJitter) -> None:
+    """An error is added completely, or not at all."""
+    model = mujoco.MjModel.from_xml_string(_MODEL)
+    before = model.cam_pos.copy(), model.cam_quat.copy()
+    try:
+        move_camera(model, "eye", jitter)
+    except WorldError:
+        np.testing.assert_array_equal(model.cam_pos, before[0])
+        np.testing.assert_array_equal(model.cam_quat, before[1])
+    else:
+        np.testing.assert_allclose(model.cam_pos, before[0] + [0.0, jitter.left_m, jitter.up_m])
+        assert np.isfinite(model.cam_quat).all()
 
 
 @pytest.mark.parametrize(

@@ -109,11 +109,12 @@ def test_it_follows_a_new_course() -> None:
     assert _changed(first, second).mean() > 0.2
 
 
-@pytest.mark.parametrize("size", [(0, 48), (64, 5000)])
+@pytest.mark.parametrize("size", [(0, 48), (0, 5), (-3, 7), (7, 0), (0, 5000), (64, 5000)])
 def test_a_size_out_of_range_is_refused(size: tuple[int, int]) -> None:
-    """The size is in the message."""
+    """The message has the size that was asked for."""
     world = MujocoWorld("car", size=None)
-    with pytest.raises(RenderError, match=r"cannot be|4096"):
+    limit = "cannot be" if min(size) < 1 else "at most 4096 pixels a side, got"
+    with pytest.raises(RenderError, match=f"{limit} {size[0]} x {size[1]}"):
         world.outside(*size)
     world.close()
 

@@ -40,8 +40,7 @@ class _Renderer:
 
     def __init__(self, size: tuple[int, int], hidden: int) -> None:
         self._width, self._height = size
-        if min(size) < 1:
-            raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
+        _require_pixels(size)
         self._gl: Any = None
         self._wanted: mujoco.MjModel | None = None
         self._rect = mujoco.MjrRect(0, 0, *size)
@@ -174,6 +173,7 @@ class OutsideCamera(_Renderer):
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
+        _require_pixels(size)  # Before it is supersampled, so that the error has the asked size.
         if max(size) > _LARGEST:
             raise RenderError(
                 f"A view from outside has at most {_LARGEST} pixels a side, got "
@@ -234,6 +234,11 @@ class OutsideCamera(_Renderer):
                 geom.modelrbound = -_BEHIND_ALL_M
 
 
+def _require_pixels(size: tuple[int, int]) -> None:
+    if min(size) < 1:
+        raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
+
+
 def _free(gl: Any) -> None:
     gl.free()
 
@@ -274,7 +279,7 @@ class CameraJitter:
 
 
 def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> None:
-    """Add an error to the pose of a camera.
+    """Add an error to the pose of a camera; a refused error changes nothing.
 
     Args:
         model: Compiled model to change.
@@ -286,13 +291,14 @@ def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> Non
             floor.
     """
     place = model.camera(camera)
-    place.pos += (0.0, jitter.left_m, jitter.up_m)
+    position = place.pos + np.array((0.0, jitter.left_m, jitter.up_m))
     turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad
-    if not np.isfinite([*place.pos, *turns]).all():
+    if not np.isfinite([*position, *turns]).all():
         raise WorldError(f"The error of a camera's pose must be finite, got {jitter}.")
-    if place.pos[2] < _LOWEST_M or np.abs(place.pos).max() > _FARTHEST_M:
-        where = ", ".join(f"{x:.3f}" for x in place.pos)
+    if position[2] < _LOWEST_M or np.abs(position).max() > _FARTHEST_M:
+        where = ", ".join(f"{x:.3f}" for x in position)
         raise WorldError(f"The camera would be off its vehicle or in the floor, at ({where}) m.")
+    place.pos[:] = position
     # A MuJoCo camera looks along -z of its frame, with x to the right and y up.
     turned = np.empty(4)
     for axis, angle in (
