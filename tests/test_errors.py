@@ -7,10 +7,21 @@ import pickle
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import shapechanger.errors as errors
-from shapechanger.errors import MissingExtra, ShapechangerError, UnknownName, no_policy_file
+from shapechanger.errors import (
+    LARGEST_SEED,
+    MissingExtra,
+    ShapechangerError,
+    StudyError,
+    UnknownName,
+    check_seed,
+    no_policy_file,
+)
 
 _CLASSES = [
     name
@@ -106,3 +117,35 @@ def test_a_missing_policy_file_names_the_nearest(tmp_path: Path) -> None:
     )
     assert no_policy_file(tmp_path / "ant.**").endswith("ant.**.")  # No pattern of the glob.
     assert no_policy_file(Path("nowhere/x.onnx")) == "There is no policy file nowhere/x.onnx."
+
+
+@given(seed=st.integers(0, LARGEST_SEED), kind=st.sampled_from([int, np.int64, np.uint64]))
+def test_whole_numbers_are_seeds(seed: int, kind: type[int]) -> None:
+    """Python's and NumPy's integers from 0 to 2^32 - 1 are seeds, as the integers that they are."""
+    found = check_seed(kind(seed), StudyError)
+    assert (type(found), found) == (int, seed)
+
+
+@given(
+    seed=st.one_of(
+        st.integers(max_value=-1),
+        st.integers(LARGEST_SEED + 1),
+        st.floats(),
+        st.booleans(),
+        st.text(),
+        st.binary(),
+        st.none(),
+        st.sampled_from([2**63, 2**64, np.float64(3.0), np.bool_(1), "3", [3], np.array([1, 2])]),
+    )
+)
+def test_nothing_else_is_a_seed(seed: object) -> None:
+    """All else is refused in a sentence with the range and what was given."""
+    with pytest.raises(StudyError, match=r"A seed is a whole number from 0 to 4294967295, got ."):
+        check_seed(seed, StudyError)
+
+
+def test_a_generator_may_take_any_whole_number() -> None:
+    """Without a largest seed, seeds of any length are accepted, and others are still refused."""
+    assert check_seed(2**80, StudyError, largest=None) == 2**80
+    with pytest.raises(StudyError, match=r"It must be a whole number from 0, got -1\."):
+        check_seed(-1, StudyError, "It must be", largest=None)

@@ -41,12 +41,19 @@ from __future__ import annotations
 
 import difflib
 import glob
+import operator
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 # A humanoid has some forty names; a longer list would hide the sentence.
 _MOST_NAMES_LISTED: Final = 40
+
+LARGEST_SEED: Final = 2**32 - 1
+"""The largest seed that NumPy's, PyTorch's and Stable-Baselines3's generators all accept."""
+
+LARGEST_RESET_SEED: Final = 2**63 - 1
+"""The largest seed of an env among many, whose seeds may be a tensor of 64-bit integers."""
 
 
 class ShapechangerError(Exception):
@@ -209,6 +216,33 @@ class MissingExtra(ShapechangerError, ImportError):
     def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str]]:
         """Pickle the error with its two arguments, for worker processes."""
         return type(self), (self.package, self.extra)
+
+
+def check_seed(
+    seed: Any,
+    error: type[ShapechangerError],
+    kind: str = "A seed is",
+    largest: int | None = LARGEST_SEED,
+) -> int:
+    """Return a seed as an integer.
+
+    Args:
+        seed: A whole number, of Python or NumPy; not a truth value.
+        error: Error to raise.
+        kind: Beginning of its message, such as "The seed of a course must be".
+        largest: The largest seed; None if a generator takes any, as NumPy's do.
+
+    Raises:
+        ShapechangerError: The given error, if it is not a whole number in this range.
+    """
+    try:
+        number = -1 if isinstance(seed, bool) else operator.index(seed)
+    except TypeError:
+        number = -1
+    if number < 0 or (largest is not None and number > largest):
+        end = "" if largest is None else f" to {largest}"
+        raise error(f"{kind} a whole number from 0{end}, got {seed!r}.")
+    return number
 
 
 def no_policy_file(path: Path, words: Iterable[str] = (), what: str = "file") -> str:

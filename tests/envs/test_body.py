@@ -9,7 +9,7 @@ import pickle
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import gymnasium.envs.mujoco
@@ -467,3 +467,15 @@ def test_every_env_accepts_fast_model(name: str) -> None:
         assert again.fast_model is False
         observation, _ = env.reset(seed=0)
         np.testing.assert_array_equal(observation, again.reset(seed=0)[0])
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, True, "3", [3]])
+def test_what_is_no_seed_is_refused(seed: Any) -> None:
+    """A seed is refused before anything changes; NumPy's integers are those of Python."""
+    with contextlib.closing(gym.make("shapechanger/Ant-v1", disable_env_checker=True)) as env:
+        with pytest.raises(EnvArgumentError, match="A seed is a whole number from 0, got "):
+            env.reset(seed=seed)
+        with pytest.raises(EnvArgumentError, match="A seed is a whole number from 0, got "):
+            env.unwrapped.drawn_bodies(2, seed, "training")  # type: ignore[attr-defined]
+        same = [env.reset(seed=cast("Any", one))[0] for one in (2**63, np.uint64(2**63))]
+        np.testing.assert_array_equal(*same)

@@ -222,6 +222,13 @@ def test_one_seed_is_refused() -> None:
         tiny_plan(seeds=1)
 
 
+@pytest.mark.parametrize("seed", [-1, 2**32, 2**63, 2**64, 0.5, True, "3"])
+def test_a_seed_of_a_study_fits_every_generator(seed: Any) -> None:
+    """What a generator would refuse after hours is refused in the plan."""
+    with pytest.raises(StudyError, match="A seed is a whole number from 0 to 4294967295, got "):
+        tiny_plan(seed=seed)
+
+
 def test_unknown_arms_and_scratch_left_out_are_refused() -> None:
     """Unknown arms, and studies without scratch, are refused."""
     with pytest.raises(UnknownName, match="'fine-tune'"):

@@ -31,6 +31,7 @@ from shapechanger.errors import (
     OutputError,
     StudyError,
     UnknownName,
+    check_seed,
     no_policy_file,
 )
 from shapechanger.files import make_folder
@@ -71,8 +72,6 @@ ClusterAddress = Annotated[
 _REFERENCE: Final = "reference"
 # Suffixes of files that are robots of the user's own.
 _MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
-# The largest seed that both PyTorch and NumPy accept.
-_LARGEST_SEED: Final = 2**32 - 1
 
 
 def env_ref(env_id: str, body: str = "") -> EnvRef:
@@ -323,8 +322,7 @@ def require_seed(seed: int) -> None:
     Raises:
         StudyError: If it is negative or too large.
     """
-    if not 0 <= seed <= _LARGEST_SEED:
-        raise StudyError(f"A seed is a whole number from 0 to {_LARGEST_SEED}, got {seed}.")
+    check_seed(seed, StudyError)
 
 
 def _has_module(env_id: str) -> bool:

@@ -12,7 +12,13 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import EnvArgumentError, MissingExtra, SpaceMismatch, UnknownName
+from shapechanger.errors import (
+    EnvArgumentError,
+    MissingExtra,
+    SpaceMismatch,
+    UnknownName,
+    check_seed,
+)
 from shapechanger.rendering import choose_gl, require_screen
 
 try:
@@ -57,6 +63,11 @@ BAD_STATE: Final = slice(
 
 # Arguments of every env that Gymnasium's constructors do not have, with their defaults.
 _OWN_ARGUMENTS: Final[dict[str, Any]] = {"shadows": None, "fast_model": True, "towards": None}
+
+
+def _seed_of(seed: Any) -> int:
+    """Return a seed as an integer; Gymnasium accepts no NumPy integers."""
+    return check_seed(seed, EnvArgumentError, largest=None)
 
 
 class Reshapable(MujocoEnv):
@@ -216,7 +227,10 @@ class Reshapable(MujocoEnv):
             SpaceMismatch: If the new body would change a space.
             UnknownName: If there is no such option or body.
             MorphologyError: If the body cannot be built.
+            EnvArgumentError: If the seed is not a whole number from 0.
         """
+        if seed is not None:
+            seed = _seed_of(seed)
         for name in options or {}:
             if name != "body":
                 raise UnknownName("option of reset", name, ("body",))
@@ -409,8 +423,11 @@ class Reshapable(MujocoEnv):
             count: How many.
             seed: Seed of the draws.
             split: Part of the family to draw from.
+
+        Raises:
+            EnvArgumentError: If the seed is not a whole number from 0.
         """
-        return [to_json(body) for body in self.family.sample(count, seed, split)]
+        return [to_json(body) for body in self.family.sample(count, _seed_of(seed), split)]
 
     @property
     def tree(self) -> Tree:

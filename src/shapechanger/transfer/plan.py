@@ -9,7 +9,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-from shapechanger.errors import StudyError
+from shapechanger.errors import StudyError, check_seed
 from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
@@ -70,7 +70,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
             with others.
 
     Raises:
-        StudyError: If there are fewer than two seeds, or nothing to compare.
+        StudyError: If there are fewer than two seeds, or nothing to compare, or the seed is not a
+            whole number from 0 to 2^32 - 1.
         UnknownName: If there is no such method.
     """
 
@@ -93,6 +94,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     versions: dict[str, str]
 
     def __post_init__(self) -> None:
+        check_seed(self.seed, StudyError)
         if self.seeds < _MIN_SEEDS:
             raise StudyError(
                 f"A study needs at least {_MIN_SEEDS} seeds for its intervals, got {self.seeds}."

@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 import msgspec
 
-from shapechanger.errors import RobotError
+from shapechanger.errors import RobotError, check_seed
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.board_client import BoardClient
@@ -157,8 +157,10 @@ def start_board(
         place: Place of the vehicle; None for the plain room.
 
     Raises:
-        RobotError: If it does not start, or the folder cannot be used.
+        RobotError: If it does not start, the folder cannot be used, or the seed is not a whole
+            number from 0 to 2^32 - 1.
     """
+    seed = check_seed(seed, RobotError)
     TwinWiring(wiring, one_shot_ms)  # Raises for a robot that the twin does not know.
     at = BoardAt(Path(folder).absolute())
     if len(os.fsencode(at.socket_path)) > _MAX_SOCKET_PATH:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -154,6 +154,26 @@ def test_wrong_numbers_of_seeds_and_values_are_refused(ants: ThreadVectorEnv) ->
         ants.reset(seed=[1, 2])
     with pytest.raises(VectorEnvError, match="3 envs and 2 values"):
         ants.set_attr("speed", [1, 2])
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [-1, 2**63 - 2, 2**64, 1.5, True, "123", b"123", np.float32(3.0), [0, 1, -1], [0, 1, 2**63]],
+)
+def test_what_is_no_seed_is_refused(ants: ThreadVectorEnv, seed: Any) -> None:
+    """Seeds are whole numbers from 0, and no more than a device holds in 64 bits."""
+    before = ants.reset(seed=3)[0].copy()
+    with pytest.raises(VectorEnvError, match=r"A seed is a whole number from 0 to 92\d+, got "):
+        ants.reset(seed=seed)
+    np.testing.assert_array_equal(ants.reset(seed=3)[0], before)
+
+
+def test_integers_of_numpy_are_seeds(ants: ThreadVectorEnv) -> None:
+    """A number or an array of NumPy gives the same episodes as Python's integers."""
+    expected = ants.reset(seed=[7, 8, 9])[0].copy()
+    for seed in (7, np.int64(7), np.array(7), np.array([7, 8, 9]), range(7, 10)):
+        np.testing.assert_array_equal(ants.reset(seed=cast("Any", seed))[0], expected)
+    ants.reset(seed=2**63 - 3)
 
 
 def test_reset_is_needed_first() -> None:

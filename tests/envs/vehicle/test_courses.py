@@ -80,6 +80,7 @@ def test_invalid_courses_are_refused() -> None:
         ({"course": -1}, "The seed of a course must be a whole number from 0, got -1"),
         ({"start": -1}, "The seed of a start must be a whole number from 0, got -1"),
         ({"start": 0.5}, "The seed of a start must be a whole number from 0, got 0.5"),
+        ({"start": True}, "The seed of a start must be a whole number from 0, got True"),
     ],
 )
 def test_invalid_options_are_refused(options: dict[str, Any], sentence: str) -> None:

@@ -97,6 +97,9 @@ def test_a_seed_gives_the_same_world_anywhere() -> None:
     assert torch.equal(third[1], first[1])
     with pytest.raises(ValueError, match="3 envs and 2 seeds"):
         envs.reset(seed=[1, 2])
+    envs.reset(seed=2**63 - 3)
+    with pytest.raises(ValueError, match=r"A seed is a whole number from 0 to 92\d+, got 922"):
+        envs.reset(seed=2**63)
 
 
 def test_worlds_without_seeds_differ() -> None:

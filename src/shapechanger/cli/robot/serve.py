@@ -29,6 +29,7 @@ from shapechanger.errors import (
     RobotError,
     RobotRefused,
     UnknownName,
+    check_seed,
     no_policy_file,
 )
 from shapechanger.link.address import Address, is_loopback, parse_address
@@ -152,6 +153,8 @@ class Serve:
         for option, given in asked.items():
             if given and not self.twin:
                 raise RobotError(f"{option} needs --twin.")
+        for seed in (self.seed, self.finger_seed or 0):
+            check_seed(seed, RobotError)
         if self.finger_seed is not None and not self.gap:
             raise RobotError("--finger-seed selects a finger of a --gap: give --gap, too.")
         if self.gap and self.world:

@@ -27,7 +27,7 @@ from shapechanger.demos.cloning.judge import AskedHead, output_fields
 from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
-from shapechanger.errors import MissingExtra
+from shapechanger.errors import MissingExtra, check_seed
 
 try:
     import torch
@@ -242,8 +242,10 @@ def learn(
         The policy, and the course of the training.
 
     Raises:
-        CloningError: If the data are unsuitable.
+        CloningError: If the data are unsuitable, or the seed is not a whole number from 0 to
+            2^32 - 1.
     """
+    seed = check_seed(seed, CloningError)
     began = time.monotonic()
     which = np.ones(len(data.actions), np.bool_) if learned is None else learned
     if not which.any():

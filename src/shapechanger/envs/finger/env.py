@@ -34,7 +34,7 @@ from shapechanger.envs.finger.gap import (
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.renderer import Renderer, body_reach, draw
-from shapechanger.errors import FingerError, UnknownName
+from shapechanger.errors import FingerError, UnknownName, check_seed
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.rendering import choose_gl, require_screen
 from shapechanger.tasks.finger import FingerSenses, FingertipReward, features_of_senses
@@ -129,7 +129,13 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         if self._gap is None:
             self._use(as_finger(parameters))
         else:
-            self._use(self._gap.draw(np.random.default_rng(finger_seed or 0)))
+            chosen = check_seed(
+                0 if finger_seed is None else finger_seed,
+                FingerError,
+                "finger_seed must be",
+                largest=None,
+            )
+            self._use(self._gap.draw(np.random.default_rng(chosen)))
         self._senses: FingerSenses | None = None
         self._change = np.zeros(len(TENDONS))  # Of the command, in the newest step.
         self.action_layout = Layout(

@@ -22,7 +22,7 @@ from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.envs.finger.track import FingerTrackEnv
 from shapechanger.envs.remote.finger_rig import LengthApproach, RigSenses, StartApproach
 from shapechanger.envs.remote.vehicle import KNOWN_ROBOT, OnReset, RemoteVehicleEnv
-from shapechanger.errors import FingerError, RobotRefused, UnknownName
+from shapechanger.errors import FingerError, RobotRefused, UnknownName, check_seed
 from shapechanger.link.messages import Pace
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.tasks.finger import FingerSenses
@@ -445,14 +445,17 @@ def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
 
     Raises:
         UnknownName: If there is no such gap.
-        FingerError: If a seed is given without a gap.
+        FingerError: If a seed is given without a gap, or is not a whole number from 0 to 2^32 - 1.
         RobotError: If the twin does not start.
     """
     if twin not in ("", NOMINAL_TWIN, *GAPS):
         raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))
     if twin not in GAPS and finger_seed is not None:
         raise FingerError("finger_seed selects a finger of a gap, so `twin` must name a gap.")
-    drawn = ("--gap", twin, "--finger-seed", str(finger_seed or 0))
+    chosen = check_seed(
+        0 if finger_seed is None else finger_seed, FingerError, "finger_seed must be"
+    )
+    drawn = ("--gap", twin, "--finger-seed", str(chosen))
     return run_robot(
         find_profile(RIG), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
     )

@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import SpaceMismatch, VectorEnvError
+from shapechanger.errors import LARGEST_RESET_SEED, SpaceMismatch, VectorEnvError, check_seed
 
 _LONGEST_BODY: Final = 60
 
@@ -93,15 +93,23 @@ def one_seed_each(seed: int | Sequence[int | None] | None, num_envs: int) -> lis
         num_envs: How many envs there are.
 
     Raises:
-        VectorEnvError: If there are not as many seeds as envs.
+        VectorEnvError: If there are not as many seeds as envs, or one is not a whole number from 0
+            to 2^63 - 1.
     """
     if seed is None:
         return [None] * num_envs
-    if isinstance(seed, int | np.integer):
-        return [int(seed) + i for i in range(num_envs)]
-    if len(seed) != num_envs:
-        raise VectorEnvError(f"There are {num_envs} envs and {len(seed)} seeds.")
-    return list(seed)
+    given: Any = seed  # Not checked at run time.
+    is_one = not isinstance(given, Sequence | np.ndarray) or isinstance(given, str | bytes)
+    if is_one or np.ndim(cast("Any", given)) == 0:
+        first = check_seed(given, VectorEnvError, largest=LARGEST_RESET_SEED - (num_envs - 1))
+        return [first + i for i in range(num_envs)]
+    each = cast("Sequence[Any]", given)
+    if len(each) != num_envs:
+        raise VectorEnvError(f"There are {num_envs} envs and {len(each)} seeds.")
+    return [
+        None if one is None else check_seed(one, VectorEnvError, largest=LARGEST_RESET_SEED)
+        for one in each
+    ]
 
 
 def masked_options(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shapechanger.bodies.vehicles import require_fit, vehicle_model
 from shapechanger.envs.vehicle.drivers import Demonstrator, ExpertDriver, VehicleDemonstrator
-from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError
+from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError, check_seed
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.worlds.camera import CameraJitter
@@ -51,23 +51,8 @@ def check_frame_size(size: Sequence[int]) -> tuple[int, int]:
     return wide, high
 
 
-def check_seed(what: str, seed: Any) -> int:
-    """Return a seed as an integer.
-
-    Args:
-        what: What it is the seed of, for the message: "course" or "start".
-        seed: A whole number from 0.
-
-    Raises:
-        WorldError: If it is anything else.
-    """
-    try:
-        number = operator.index(seed)
-    except TypeError:
-        number = -1
-    if number < 0:
-        raise WorldError(f"The seed of a {what} must be a whole number from 0, got {seed!r}.")
-    return number
+def _seed_of(what: str, seed: Any) -> int:
+    return check_seed(seed, WorldError, f"The seed of a {what} must be", largest=None)
 
 
 def resolve_profile(
@@ -151,7 +136,7 @@ class CourseSampler:
         else:
             given: Any = courses  # May be a single seed where nothing checks types.
             seeds = cast("Iterable[Any]", given if isinstance(given, Iterable) else (given,))
-            self._seeds = tuple(check_seed("course", seed) for seed in seeds)
+            self._seeds = tuple(_seed_of("course", seed) for seed in seeds)
         if not self._seeds:
             raise WorldError("There are no courses to draw from: give at least one seed.")
         self._randomise = randomise
@@ -188,8 +173,8 @@ class CourseSampler:
         look = Look.random(world, rng) if self._randomise else None
         camera = CameraJitter.random(rng) if self._randomise else None
         return EpisodeSetup(
-            check_seed("course", options.get("course", course)),
-            check_seed("start", options.get("start", start)),
+            _seed_of("course", options.get("course", course)),
+            _seed_of("start", options.get("start", start)),
             look,
             camera,
         )

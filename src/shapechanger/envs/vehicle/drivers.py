@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.errors import WorldError, check_seed
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.expert import CourseExpert, Disturbance
 from shapechanger.worlds.expert.traits import traits_of
@@ -42,12 +43,16 @@ class Demonstrator(ABC):
         world: The world of the vehicle.
         seed: Seed of the mistakes.
         sway: Size of the mistakes, see `Disturbance`; None for what the expert can correct.
+
+    Raises:
+        WorldError: If the seed is not a whole number from 0.
     """
 
     def __init__(self, world: MujocoWorld, seed: int, sway: float | None = None) -> None:
         self._world = world
         self._sway = traits_of(world.vehicle.name).sway if sway is None else sway
-        self._seeds = np.random.default_rng(seed)
+        kind = "The seed of a driver must be"
+        self._seeds = np.random.default_rng(check_seed(seed, WorldError, kind, largest=None))
         self.begin()
 
     def begin(self) -> None:
