@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import math
+import re
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from shapechanger.errors import LayoutError, UnknownName
 from shapechanger.layout import Element, Feature, Layout
@@ -135,3 +139,28 @@ def test_infinite_bounds_are_omitted_from_json() -> None:
         layout = Layout((Feature("a", "m", -infinity, infinity),))
         assert Layout.from_json(layout.to_json()) == layout
         assert "null" not in layout.to_json()
+
+
+_NAMES = st.text("ab[]*?!0-", min_size=1, max_size=6)
+
+
+@given(names=st.lists(_NAMES, min_size=1, max_size=5, unique=True), pattern=_NAMES)
+def test_every_name_selects_its_feature(names: list[str], pattern: str) -> None:
+    """Whatever characters a name has, it selects its feature, and so does the name of a hint."""
+    layout = Layout(tuple(Feature(name, "1") for name in names))
+    for name in names:
+        assert [feature.name for feature in layout.matching(name)] == [name]
+    try:
+        layout.matching(pattern)
+    except UnknownName as error:
+        hinted = re.search(r"Did you mean ('.*?'|\".*?\")\? There", str(error))
+        assert hinted is None or layout.matching(ast.literal_eval(hinted[1]))
+
+
+def test_a_hint_for_a_typo_is_a_name_that_matches() -> None:
+    """Names with brackets can be used as they are hinted."""
+    layout = Layout((Feature("wheel[0]", "1"), Feature("wheel[1]", "1")))
+    with pytest.raises(UnknownName, match=r"Did you mean 'wheel\[0\]'"):
+        layout.matching("wheel0]")
+    assert layout.matching("wheel[0]") == (layout["wheel[0]"],)
+    assert len(layout.matching("wheel*")) == 2

@@ -23,7 +23,6 @@ from shapechanger.errors import LayoutError, UnknownName
 
 ElementKind = Literal["body", "joint", "actuator", "tendon", "sensor", "camera", "task"]
 
-_GLOB_CHARACTERS: Final = frozenset("*?[")
 _LOWEST: Final = -math.inf
 _HIGHEST: Final = math.inf
 
@@ -180,10 +179,12 @@ class Layout(msgspec.Struct, frozen=True):
     def matching(self, pattern: str) -> tuple[Feature, ...]:
         """Return the features whose name is `pattern` or matches it, such as `hip_*/angle`.
 
+        The exact name of a feature is not a glob, even if it has brackets, as in `wheel[0]`.
+
         Raises:
             UnknownName: If there is none.
         """
-        if _GLOB_CHARACTERS.isdisjoint(pattern):
+        if pattern in self:
             return (self[pattern],)
         found = tuple(f for f in self.features if fnmatch.fnmatchcase(f.name, pattern))
         if not found:
