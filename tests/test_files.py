@@ -2,18 +2,102 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import pytest
 
-from shapechanger.errors import CorruptStudy, OutputError
+from shapechanger.cli.suite import load_suite
+from shapechanger.errors import CorruptStudy, OutputError, ShapechangerError
 from shapechanger.files import (
     append_line,
     make_folder,
     read_json,
+    read_text,
     write_atomic,
     write_json,
 )
+from shapechanger.layout import Feature, Layout
+from shapechanger.morphology import Remove, from_json, to_json
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.tasks.paths.sources import from_csv
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.learners.presets import resolve_learner
+
+_Z = Layout((Feature("z", "m"), Feature("Größe", "m")))
+
+
+def _suite(path: Path) -> Any:
+    return msgspec.to_builtins(load_suite(str(path)))
+
+
+_READERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
+    "suite.toml": (
+        'pairs = [["Ant", "BigAnt"]]\nlearner = "sac"\nsteps = 1000  # größer\n',
+        _suite,
+    ),
+    "learner.toml": (
+        'preset = "sac"  # größer\n',
+        lambda path: msgspec.to_builtins(resolve_learner(str(path), {})[1]),
+    ),
+    "profile.toml": (
+        find_profile("lab-car").read_text(encoding="utf-8") + "# größer\n",
+        lambda path: load_profile(path).guard_plan(),
+    ),
+    "path.csv": (
+        "t,x,y,z\n" + "".join(f"{n / 10},{0.05 + n / 1000},0.0,0.02\n" for n in range(9)),
+        lambda path: from_csv(path).duration_s,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", _READERS)
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-be", "latin-1"])
+@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
+def test_other_encodings_are_read_or_refused(
+    tmp_path: Path, name: str, encoding: str, line_end: str
+) -> None:
+    """A byte-order mark changes nothing, and no encoding gives another content."""
+    text, read = _READERS[name]
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    expected = read(path)
+    text = text.replace("\n", line_end)
+    data = text.encode(encoding, errors="replace")
+    if encoding == "utf-16-be":
+        data = b"\xfe\xff" + data
+    path.write_bytes(data)
+    if encoding == "utf-8-sig" or data == text.encode():
+        assert read(path) == expected
+    else:
+        with pytest.raises(ShapechangerError, match="UTF-8"):
+            read(path)
+
+
+def test_texts_may_begin_with_a_byte_order_mark() -> None:
+    """Maps and bodies are given as text, in which a file's mark may be left."""
+    layouts = _Z, _Z, _Z, _Z
+    text = '[observation]\n"Größe" = "zero"\n'
+    assert BodyMap.from_toml(f"\ufeff{text}", *layouts) == BodyMap.from_toml(text, *layouts)
+    body = to_json([Remove("bein")])
+    assert from_json(f"\ufeff{body}") == from_json(body)
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (b"\xff\xfea\0", "it is UTF-16, so save it as UTF-8"),
+        (b"\xfe\xff\0a", "it is UTF-16, so save it as UTF-8"),
+        (b"a\xe4", "byte 1 is not UTF-8, so save it as UTF-8"),
+    ],
+)
+def test_text_in_another_encoding_is_named(tmp_path: Path, data: bytes, sentence: str) -> None:
+    """The message says how to save the file."""
+    (tmp_path / "a.toml").write_bytes(data)
+    with pytest.raises(ValueError, match=sentence):
+        read_text(tmp_path / "a.toml")
 
 
 def test_json_round_trip(tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
-"""Atomic writes, and reads whose errors name the file."""
+"""Atomic writes, text from users, and reads whose errors name the file."""
 
 from __future__ import annotations
 
+import codecs
 import os
 import re
 from pathlib import Path
@@ -30,6 +31,25 @@ def place_of(text: str, error: Exception) -> str:
     lines = enumerate(text.splitlines(), 1)
     found = next((at for at, line in lines if word and word.search(line.partition("#")[0])), None)
     return f", line {found}" if found else ""
+
+
+def read_text(path: Path) -> str:
+    """Read a text file of a user, whose editor may have put a byte-order mark in front of it.
+
+    Args:
+        path: The file, in UTF-8.
+
+    Raises:
+        OSError: If it cannot be read.
+        ValueError: If it has another encoding; the message can end a sentence.
+    """
+    data = path.read_bytes()
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        is_utf_16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        found = "it is UTF-16" if is_utf_16 else f"byte {error.start} is not UTF-8"
+        raise ValueError(f"{found}, so save it as UTF-8") from None
 
 
 def make_folder(folder: Path) -> None:

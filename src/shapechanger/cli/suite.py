@@ -40,7 +40,7 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.cli.transfer import run_steps, write_study_report
 from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
-from shapechanger.files import place_of, read_json, write_json
+from shapechanger.files import place_of, read_json, read_text, write_json
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
@@ -131,10 +131,10 @@ def load_suite(name: str) -> SuiteFile:
     """
     path = _SHIPPED / f"{name}.toml" if name in shipped_suites() else Path(name)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except FileNotFoundError:
         raise UnknownName("suite", name, shipped_suites()) from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise StudyError(f"The suite {path} cannot be read: {error}.") from error
     try:
         return msgspec.convert(tomllib.loads(text), SuiteFile)
@@ -163,7 +163,7 @@ def _placed(name: str) -> Generator[None]:
         yield
     except (StudyError, UnknownName) as error:
         path = Path(name)
-        if where := path.is_file() and place_of(path.read_text(encoding="utf-8"), error):
+        if where := path.is_file() and place_of(read_text(path), error):
             raise StudyError(f"{path}{where}: {error}") from error
         raise
 

@@ -83,7 +83,8 @@ def from_json(text: str | bytes) -> Body:
         MorphologyError: If the text is not such a list, or a number is out of its range.
     """
     try:
-        parsed: Any = json.loads(text)
+        # A text that was read from a file may begin with a byte-order mark.
+        parsed: Any = json.loads(text.removeprefix("\ufeff") if isinstance(text, str) else text)
     except (ValueError, RecursionError) as error:  # Not JSON, not UTF-8, or nested too deeply.
         raise MorphologyError(f"A body must be a JSON list of edits: {error}.") from error
     items = cast("list[Any]", parsed if isinstance(parsed, list) else [parsed])

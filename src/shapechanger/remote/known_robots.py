@@ -132,7 +132,7 @@ def recall(name: str) -> KnownRobot:
     if os.name == "posix" and path.stat().st_mode & _OTHERS:
         raise LinkError(f"Other users can read the key in {path}: run `chmod 600 {path}`.")
     try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8"))
+        fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise LinkError(f"Cannot read {path}: {error}.") from None
     if set(fields) != set(_FIELDS) or not all(isinstance(v, str) for v in fields.values()):

@@ -276,7 +276,7 @@ def read_toml(text: str) -> MapText:
         MapError: If it is not valid TOML, or has an unknown key, word or type.
     """
     try:
-        table = tomllib.loads(text)
+        table = tomllib.loads(text.removeprefix("\ufeff"))  # Windows editors prepend a mark.
     except tomllib.TOMLDecodeError as error:
         raise MapError(f"This is not TOML: {error}.") from error
     _check_keys("key", table, MapText._fields)

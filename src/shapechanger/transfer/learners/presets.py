@@ -11,7 +11,7 @@ import msgspec
 
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError, UnknownName
-from shapechanger.files import place_of
+from shapechanger.files import place_of, read_text
 from shapechanger.transfer.learners.settings import (
     CloningSettings,
     ImportedSettings,
@@ -265,11 +265,11 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Sett
 def _read_learner(path: Path, changed: Mapping[str, Any]) -> tuple[str, Settings]:
     """Read a TOML file that names a preset or an algorithm, and changes some of its settings."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         given = tomllib.loads(text)
     except FileNotFoundError:
         raise UnknownName("learner", str(path), LEARNERS) from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError) as error:  # TOMLDecodeError is one, too.
         raise StudyError(f"The learner {path} cannot be read: {error}.") from error
     start = given.pop("preset", None) or given.pop("algorithm", None)
     if not isinstance(start, str) or start.endswith(".toml"):
