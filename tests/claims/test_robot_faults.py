@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,10 +18,68 @@ from tests.robots import write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
-TOLERANCE = 10.0
-"""Factor on the promised time of a stop, for a busy machine."""
+MARGIN_MS = 5.0
+"""Margin on the promised time of a stop, which has the guard's tick of 10 ms in it.
+
+The ledger and the times of faults have the same clock, CLOCK_MONOTONIC. A fault is dated before it
+is made, and a level when it reaches the board: one system call or message each, far below 1 ms,
+but a process of normal priority may wait for a time slice in between.
+"""
 
 TRIALS = 2
+
+# Runs at the guard's priority and sleeps for 1 ms at a time. A line asks it for its longest delay.
+_WITNESS = """
+import select, sys, time
+from shapechanger.robot.guard.priority import GUARD, run_promptly
+run_promptly(GUARD)
+longest_s, before_s = 0.0, time.monotonic()
+while True:
+    asked = select.select([sys.stdin], [], [], 1e-3)[0]
+    now_s = time.monotonic()
+    longest_s, before_s = max(longest_s, now_s - before_s - 1e-3), now_s
+    if asked:
+        if not sys.stdin.readline():
+            break
+        print(1e3 * longest_s, flush=True)
+        longest_s = 0.0
+"""
+
+
+class Witness:
+    """A process that tells how long this machine kept a process of the guard's priority waiting.
+
+    Nothing can stop in time while its machine runs nothing. The promise is about the robot, so this
+    time is added to it, instead of a factor for the worst machine.
+    """
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _WITNESS],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def longest_ms(self) -> float:
+        """Return the longest delay since the last call, ms."""
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None
+        assert stdout is not None
+        stdin.write("\n")
+        stdin.flush()
+        return float(stdout.readline())
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.communicate()
+
+
+@pytest.fixture(scope="module")
+def witness() -> Iterator[Witness]:
+    """A witness of this machine's delays."""
+    with contextlib.closing(Witness()) as made:
+        yield made
 
 
 @pytest.fixture(scope="module")
@@ -29,18 +90,20 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_the_robot_stops(trial: Trial, name: str) -> None:
-    """The stop is in time, and the robot never drives without a fresh command."""
+def test_the_robot_stops(trial: Trial, witness: Witness, name: str) -> None:
+    """The stop is within the promised time, and the robot never drives without a fresh command."""
     fault = FAULTS[name]
     drove = 0
     # Repeat trials in which the robot had stopped before the fault.
     for _ in range(2 * TRIALS):
+        witness.longest_ms()
         result = trial.run(fault)
+        margin_ms = MARGIN_MS + witness.longest_ms()
         drove += result.drove
-        assert result.stopped_ms <= TOLERANCE * result.limit_ms, result
+        assert result.stopped_ms <= result.limit_ms + margin_ms, result
         # Beyond the deadline of the last command an output may be as late as a stop may.
         late_ms = [(i.end_ns - i.start_ns) / 1e6 for i in result.unauthorised]
-        assert sum(late_ms) <= (TOLERANCE - 1.0) * fault.within_ms, result
+        assert sum(late_ms) <= margin_ms, result
         if drove == TRIALS:
             break
     assert drove == TRIALS
