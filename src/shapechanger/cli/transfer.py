@@ -28,8 +28,10 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
+from shapechanger.files import read_text
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.presets import resolve_learner
+from shapechanger.transfer.learners.settings import Settings, study_budgets
 from shapechanger.transfer.methods import load_method, method_names
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 
@@ -106,6 +108,12 @@ class Transfer:
 
     def run(self) -> None:
         """Run the study, print its table, and write its report."""
+        self._require_sense()
+        allow_own_modules(self.learner, *self.arms)
+        task = self._task()
+        learner, settings, steps = self._learner(task)
+        # Budgets are refused before PyTorch is imported and envs are opened, which takes seconds.
+        study_budgets(settings, steps, self.source_steps, is_given=bool(self.source_policy))
         from shapechanger.transfer.study import (
             inspect_task,
             is_folder_of,
@@ -113,14 +121,11 @@ class Transfer:
             unfinished_runs,
         )
 
-        self._require_sense()
-        allow_own_modules(self.learner, *self.arms)
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
-        task = self._task()
         traits = inspect_task(task)
         given = self.source_policy and policy_file(self.source_policy, task.source)
-        plan = self._plan(task, traits, given)
+        plan = self._plan(task, learner, settings, steps, traits, given)
         _ = traits.shift  # An empty shift is refused before anything is written.
         executor = executor_of(self.executor, self.workers, self.address)
         out = self.out or Path("results", f"{_name(plan.task.source)}-to-{_name(plan.task.target)}")
@@ -167,19 +172,30 @@ class Transfer:
             target.having(options_of(self.target_options, "--target-options")),
         )
 
-    def _plan(self, task: TransferTask, traits: TaskTraits, given: Path | None) -> Plan:
-        """The plan of the study."""
-        from shapechanger.transfer.study import default_arms, make_plan
-
+    def _learner(self, task: TransferTask) -> tuple[str, Settings, int | None]:
+        """Return the learner's name, its settings, and the steps in the target if they are set."""
         learner, settings = resolve_learner(
             self.learner or default_learner(task.target), settings_of(self.set)
         )
-        steps, seeds = self.steps, self.seeds
-        if self.quick:
-            shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
-            settings = settings.for_budget(shortest)
-            steps = shortest if steps is None else steps
-            seeds = _QUICK_SEEDS if seeds is None else seeds
+        if not self.quick:
+            return learner, settings, self.steps
+        shortest = settings.whole_updates(settings.steps // _QUICK_DIVISOR)
+        settings = settings.for_budget(shortest)
+        return learner, settings, shortest if self.steps is None else self.steps
+
+    def _plan(
+        self,
+        task: TransferTask,
+        learner: str,
+        settings: Settings,
+        steps: int | None,
+        traits: TaskTraits,
+        given: Path | None,
+    ) -> Plan:
+        """The plan of the study."""
+        from shapechanger.transfer.study import default_arms, make_plan
+
+        seeds = _QUICK_SEEDS if self.quick and self.seeds is None else self.seeds
         return make_plan(
             task,
             learner,
@@ -256,8 +272,8 @@ def _split_rule(text: str) -> tuple[str, str]:
 def _read(path: Path) -> str:
     """Read a text file."""
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        return read_text(path)
+    except (OSError, ValueError) as error:
         raise MapError(f"The body map {path} cannot be read: {error}.") from error
 
 

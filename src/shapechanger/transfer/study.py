@@ -33,7 +33,7 @@ from shapechanger.transfer.env_ref import (
     is_reward_term,
 )
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
-from shapechanger.transfer.learners.settings import RslSettings, Settings, require_budget
+from shapechanger.transfer.learners.settings import RslSettings, Settings, study_budgets
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, NO_SKILL, SOURCE, Plan, Run, TransferTask
@@ -195,6 +195,9 @@ def make_plan(
         SpaceMismatch: If the given policy belongs to another body, or a layout does not fit its
             space.
     """
+    budget, source_budget = study_budgets(
+        settings, steps, source_steps, is_given=source_policy is not None
+    )
     if traits is None:
         traits = inspect_task(task)
     learns = learner_of(learner, settings)
@@ -203,14 +206,7 @@ def make_plan(
     for arm in arms:
         load_method(arm).require(traits.source, traits.target, settings)
     measured = _measure(task.target, traits.target, measure)
-    wanted = settings.steps if steps is None else steps
-    require_budget(wanted, settings, "target")
-    budget = settings.whole_updates(wanted)
     own_steps = 0 if source_steps is None or source_policy is None else source_steps
-    option = "source_steps" if source_steps is None else ""
-    if source_steps is None:
-        source_steps = settings.source_steps or settings.whole_updates(budget // 2)
-    source_budget = settings.whole_updates(source_steps)
     digest = ""
     if source_policy is not None:
         origin = learns.origin(source_policy)
@@ -220,7 +216,6 @@ def make_plan(
                 "name the env and the body that it was trained in."
             )
         if own_steps:
-            require_budget(own_steps, settings, "source")
             methods = [load_method(arm) for arm in arms]
             if all(one.uses_source_policy or not one.uses_source for one in methods):
                 raise StudyError(
@@ -229,8 +224,6 @@ def make_plan(
                 )
             own_steps = settings.whole_updates(own_steps)
         source_budget, digest = origin.steps, _digest(source_policy)
-    else:
-        require_budget(source_steps, settings, "source", option)
     layouts = (
         traits.source.observation_layout,
         traits.target.observation_layout,

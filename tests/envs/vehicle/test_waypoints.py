@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from contextlib import closing
 from pathlib import Path
 
@@ -192,6 +193,23 @@ def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
     path.write_text("\n".join(line for line in lines if not line.startswith("pitch_deg")))
     with pytest.raises(ProfileError, match=r"\[camera\] needs pitch_deg for waypoints: .* camera"):
         WaypointEnv("car", robot=path)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "missing"),
+    [(("wheel",), "speed"), (("motion",), "yaw_rate"), (("wheel", "motion"), "speed and yaw_rate")],
+)
+def test_a_full_robot_without_its_sensors_is_refused(
+    tmp_path: Path, sensors: tuple[str, ...], missing: str
+) -> None:
+    """Waypoints of the full robot need its own measurements, and the error names them."""
+    text = find_profile("lab-car").read_text(encoding="utf-8")
+    for sensor in sensors:
+        text = re.sub(rf"^\[sensor\.{sensor}\]\n(?:[^\[\n].*\n|\n)*", "", text, flags=re.MULTILINE)
+    path = tmp_path / "car.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ProfileError, match=f"car.toml has no sensor of {missing}, which waypoints"):
+        WaypointEnv("car", robot=path, full_robot=True)
 
 
 def test_the_measured_response_matches_the_geometry() -> None:

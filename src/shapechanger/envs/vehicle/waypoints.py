@@ -67,11 +67,22 @@ def _geometry(profile: Profile) -> CameraGeometry:
 def _response_of(
     vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, full_robot: bool
 ) -> SteeringResponse:
-    """Measure the response of a simulated vehicle, once in a process."""
+    """Measure the response of a simulated vehicle, once in a process.
+
+    Raises:
+        ProfileError: If the robot does not measure its speed and its rate of turn.
+    """
     common: dict[str, Any] = {"world": world, "robot": robot, "courses": (0,), "put_back": True}
     env = VehicleEnv(vehicle, image=False, **common) if full_robot else RangesEnv(vehicle, **common)
     try:
         places = env.observation_layout.slices
+        missing = [name for name in ("speed", "yaw_rate") if name not in places]
+        if missing:
+            raise ProfileError(
+                f"{resolve_profile(vehicle, robot, _SIZE).path} has no sensor of "
+                f"{' and '.join(missing)}, which waypoints need on the full robot: add it to the "
+                "profile, or leave out full_robot."
+            )
         return measure_response(env, places["speed"].start, places["yaw_rate"].start)
     finally:
         env.close()
@@ -140,13 +151,13 @@ class WaypointEnv(DrivingEnv):
             "world": world, "robot": robot, "courses": courses, "randomise": randomise,
             "put_back": put_back,
         }  # fmt: skip
+        self.response = _response_of(vehicle, world, robot, full_robot)
         self._env: VehicleEnv | RangesEnv = (
             VehicleEnv(vehicle, size=_SIZE, state=True, **common)
             if full_robot
             else RangesEnv(vehicle, camera=_SIZE, **common)
         )
         self.parts, self._world, self._draw = self._env.parts, self._env.world, self._env._draw
-        self.response = _response_of(vehicle, world, robot, full_robot)
         self.render_mode = render_mode
         self._turns_on_the_spot = body.turning_radius_m == 0.0
         self._rectifier = Rectifier(_geometry(resolve_profile(vehicle, robot, _SIZE)), _SIZE)

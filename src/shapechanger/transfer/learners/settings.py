@@ -363,3 +363,29 @@ def require_budget(steps: int, settings: Settings, which: str = "", option: str 
             f"A budget of {budget} is smaller than one evaluation, which comes every "
             f"{settings.eval_every} steps: give at least that{option and f' as {option}'}."
         )
+
+
+def study_budgets(
+    settings: Settings, steps: int | None, source_steps: int | None, *, is_given: bool
+) -> tuple[int, int]:
+    """Return the budgets in the target and in the source, as whole updates.
+
+    Args:
+        settings: Settings of the learner.
+        steps: Steps in the target; None for those of the settings.
+        source_steps: Steps in the source; None for those of the settings, or half of the target's.
+        is_given: Whether the source policy is given, and not trained.
+
+    Raises:
+        StudyError: If one ends before the first evaluation.
+    """
+    wanted = settings.steps if steps is None else steps
+    require_budget(wanted, settings, "target")
+    budget = settings.whole_updates(wanted)
+    option = "source_steps" if source_steps is None else ""
+    before = source_steps
+    if before is None:
+        before = settings.source_steps or settings.whole_updates(budget // 2)
+    if not is_given or source_steps:
+        require_budget(before, settings, "source", option)
+    return budget, settings.whole_updates(before)
