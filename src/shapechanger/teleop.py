@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import codecs
+import enum
+import math
 import os
+import re
 import select
 import sys
 import termios
+import time
 import tty
 from dataclasses import dataclass
 from typing import Final, Self
@@ -93,30 +98,216 @@ class HeldKeys:
         self._held.clear()
 
 
+STOPS: Final = frozenset({"space", "escape"})
+"""Keys that stop the robot."""
+
+OTHER: Final = "other"
+"""Name of everything without a meaning of its own: function keys, Alt and Ctrl combinations, pasted
+text, mouse reports and replies of the terminal."""
+
+ESCAPE_WAIT_S: Final = 0.05
+"""Time after which an escape character is the key Escape, s. Terminals send a sequence at once, so
+its second character follows within a few milliseconds, also over SSH."""
+
+REST_WAIT_S: Final = 0.5
+"""Time that a sequence waits for its next character, s. Later characters are keys again, because
+Alt+[ looks like the beginning of a sequence that never ends."""
+
 _ARROWS: Final = {"A": "up", "B": "down", "C": "right", "D": "left"}
 _ESCAPE: Final = "\x1b"
+_NAMES: Final = {" ": "space", "\x00": "space", "\r": "enter", "\n": "enter"}  # NUL: Ctrl+Space.
+# Control strings: DCS, SOS, OSC, PM and APC. Only an OSC may end with BEL (xterm's "ctlseqs").
+_STRINGS: Final = frozenset("PX]^_")
+# Characters that follow a CSI sequence without parameters: F1 to F5 of Linux' console, and mouse
+# reports in the encoding of X10 and with highlights (xterm's "ctlseqs").
+_TAILS: Final = {"[": 1, "M": 3, "t": 2, "T": 6}
+# Escape and Space where a program has left kitty's protocol or xterm's modifyOtherKeys enabled;
+# ":3" is a release.
+_STOP_CODES: Final = re.compile(r"(27|32)(?:;(?!\d*:3)[\d:;]*)?u|27;\d+;(27|32)~")
 
 
 class NoTerminal(ShapechangerError, RuntimeError):
     """No terminal to read keys from."""
 
 
-def keys_in(text: str) -> list[str]:
-    r"""Parse terminal input into keys: letters in lower case, "up", "space", "escape".
+class _State(enum.Enum):
+    GROUND = enum.auto()
+    ESCAPE = enum.auto()  # After an escape character.
+    CSI = enum.auto()  # Up to a final character.
+    SS3 = enum.auto()  # The same, and other sequences of the form ESC, intermediates, final.
+    STRING = enum.auto()  # Up to ST.
+    TAIL = enum.auto()  # A number of characters that mean nothing.
 
-    >>> keys_in("wW\x1b[A \x1b")
-    ['w', 'w', 'up', 'space', 'escape']
+
+class KeyParser:
+    r"""Parser of terminal input into keys.
+
+    Sequences are parsed whole (ECMA-48 and xterm's "ctlseqs"), however the reads split them, and
+    an unknown one is `OTHER` and never letters. Only Space and Escape count within a sequence or
+    within pasted text, because a stop must never be lost.
+
+    >>> KeyParser().feed(b"wW\x1b[A\x1b[1;5D \x1be", now_s=0.0)
+    ['w', 'w', 'up', 'other', 'space', 'other']
     """
-    keys: list[str] = []
-    while text:
-        if text[:2] in {"\x1b[", "\x1bO"} and text[2:3] in _ARROWS:
-            keys.append(_ARROWS[text[2]])
-            text = text[3:]
-            continue
-        names = {" ": "space", _ESCAPE: "escape", "\r": "enter", "\n": "enter"}
-        keys.append(names.get(text[0], text[0].lower()))
-        text = text[1:]
-    return keys
+
+    def __init__(self) -> None:
+        # A byte that is not UTF-8 becomes a lone surrogate.
+        self._decoder = codecs.getincrementaldecoder("utf-8")("surrogateescape")
+        self._state = _State.GROUND
+        self._text = ""  # Of a CSI or SS3 sequence, or the introducer of a string.
+        self._left = 0  # Characters of a tail.
+        self._begun_s = 0.0
+        self._last_s = 0.0
+        self._is_reported = False  # The sequence was reported as Escape: its rest is nothing.
+        self._is_pasted = False
+
+    @property
+    def due_s(self) -> float:
+        """Time at which `expire` returns keys, s; infinity if nothing is pending."""
+        if self._state is _State.GROUND:
+            return math.inf
+        if self._state is _State.ESCAPE and not self._is_reported:
+            return self._begun_s + ESCAPE_WAIT_S
+        return self._last_s + REST_WAIT_S
+
+    def feed(self, data: bytes, now_s: float) -> list[str]:
+        """Parse input.
+
+        Args:
+            data: The bytes.
+            now_s: Time at which they were read, s.
+
+        Returns:
+            The keys: letters in lower case, "up", "down", "left", "right", "space", "escape",
+            "enter" and `OTHER`.
+        """
+        keys = self.expire(now_s)
+        for char in self._decoder.decode(data):
+            key = self._key(char, now_s)
+            if key is not None:
+                keys.append(OTHER if self._is_pasted and key not in STOPS else key)
+        self._last_s = now_s
+        return keys
+
+    def expire(self, now_s: float) -> list[str]:
+        """Return the keys of sequences whose rest did not come in time.
+
+        Args:
+            now_s: Present time, s.
+        """
+        keys: list[str] = []
+        if self._state is _State.ESCAPE and not self._is_reported and now_s >= self.due_s:
+            keys.append("escape")
+            self._is_reported = True
+            self._is_pasted = False  # The end of the pasted text was lost.
+        if self._state is not _State.GROUND and now_s >= self.due_s:
+            if not self._is_reported:
+                keys.append(OTHER)
+            self._state = _State.GROUND
+        return keys
+
+    def _key(self, char: str, now_s: float) -> str | None:
+        """Advance by one character, and return the key that it completes."""
+        code = ord(char) - 0xDC00 if "\udc80" <= char <= "\udcff" else ord(char)
+        is_byte = code != ord(char)
+        if char in {" ", "\x00"}:
+            if self._state is _State.ESCAPE:
+                self._state = _State.SS3
+            return "space"
+        if char == _ESCAPE:
+            was_alone = self._state is _State.ESCAPE and not self._is_reported
+            self._begin(_State.ESCAPE, now_s)
+            self._is_reported = was_alone
+            return "escape" if was_alone else None
+        if 0x80 <= code < 0xA0:  # C1 controls: ESC and a character of seven bits.
+            if self._state is _State.STRING and code != 0x9C:
+                return None
+            introducer = chr(code - 0x40)
+            if is_byte and introducer not in {"[", "O", "\\", *_STRINGS}:
+                return self._two_bytes(now_s)
+            self._begin(_State.ESCAPE, now_s)
+            return self._step(introducer)
+        if is_byte and self._state is _State.GROUND:
+            return self._two_bytes(now_s)
+        return self._step(char)
+
+    def _begin(self, state: _State, now_s: float) -> None:
+        self._state, self._begun_s, self._text, self._is_reported = state, now_s, "", False
+
+    def _two_bytes(self, now_s: float) -> None:
+        """Begin a character of another encoding, whose second byte may be that of a letter."""
+        self._begin(_State.TAIL, now_s)
+        self._left = 1
+
+    def _end(self, key: str = OTHER) -> str | None:
+        self._state = _State.GROUND
+        return None if self._is_reported else key
+
+    def _step(self, char: str) -> str | None:
+        """Advance by one character that begins no sequence."""
+        is_final = "@" <= char <= "~"
+        match self._state:
+            case _State.GROUND:
+                return _NAMES.get(char, char.lower() if "!" <= char <= "~" else OTHER)
+            case _State.ESCAPE:
+                if char in _STRINGS:
+                    self._state, self._text = _State.STRING, char
+                elif char == "[":
+                    self._state = _State.CSI
+                elif char == "O" or "!" <= char <= "/":
+                    self._state = _State.SS3
+                else:
+                    return self._end()  # Alt and a key, or the end of a string.
+            case _State.CSI if is_final and not self._text and char in _TAILS:
+                self._state, self._left = _State.TAIL, _TAILS[char]
+            case _State.CSI | _State.SS3 if is_final:
+                return self._end(self._meaning(self._text + char))
+            case _State.CSI | _State.SS3:
+                self._text += char
+            case _State.STRING:
+                if char == "\x07" and self._text == "]":
+                    return self._end()
+            case _State.TAIL:
+                self._left -= 1
+                if not self._left:
+                    return self._end()
+        return None
+
+    def _meaning(self, text: str) -> str:
+        """Return the key of a CSI or SS3 sequence without its introducer."""
+        if text in {"200~", "201~"} and self._state is _State.CSI:
+            self._is_pasted = text == "200~"
+        stop = _STOP_CODES.fullmatch(text)
+        if stop is not None:
+            return "escape" if "27" in stop.groups() else "space"
+        return _ARROWS.get(text, OTHER)
+
+
+def keys_in(text: str) -> list[str]:
+    r"""Parse a whole input into keys.
+
+    >>> keys_in("w\x1b[1;5D\x1b")
+    ['w', 'other', 'escape']
+    """
+    parser = KeyParser()
+    return parser.feed(text.encode(), 0.0) + parser.expire(REST_WAIT_S)
+
+
+def _as_typed(keys: list[str]) -> list[str]:
+    """Return the keys of one read that a person can have meant.
+
+    A stop cancels the others. Three different keys at once are pasted text or old keys of a link
+    that stood still: many terminals mark pasted text, and some do not.
+    """
+    stops = [key for key in keys if key in STOPS]
+    if stops:
+        return stops[:1]
+    return keys if len({*keys} - {"enter", OTHER}) <= _AT_ONCE else [OTHER]
+
+
+_AT_ONCE: Final = 2
+_MARK_PASTES: Final = "\x1b[?2004h"
+_LEAVE_PASTES: Final = "\x1b[?2004l"
 
 
 class Terminal:
@@ -131,14 +322,20 @@ class Terminal:
             raise NoTerminal("Driving with keys needs a terminal, and the standard input is none.")
         self._fd = sys.stdin.fileno()
         self._before = termios.tcgetattr(self._fd)
+        self._parser = KeyParser()
 
     def __enter__(self) -> Self:
-        """Disable echo and line editing."""
+        """Disable echo, line editing and Ctrl-S, and discard the keys pressed before."""
         tty.setcbreak(self._fd)
+        mode = termios.tcgetattr(self._fd)
+        mode[0] &= ~termios.IXON  # Ctrl-S would hold up the output, and with it the keys.
+        termios.tcsetattr(self._fd, termios.TCSAFLUSH, mode)
+        self._write(_MARK_PASTES)
         return self
 
     def __exit__(self, *_: object) -> None:
         """Restore the terminal."""
+        self._write(_LEAVE_PASTES)
         termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
 
     def keys(self, wait_s: float) -> list[str]:
@@ -147,9 +344,26 @@ class Terminal:
         Raises:
             NoTerminal: If the terminal was closed.
         """
-        if not select.select([self._fd], [], [], max(0.0, wait_s))[0]:
-            return []
-        data = os.read(self._fd, 1024)
-        if not data:
-            raise NoTerminal("The terminal has gone away.")
-        return keys_in(data.decode(errors="replace"))
+        until_s = time.monotonic() + wait_s
+        while True:
+            now_s = time.monotonic()
+            keys = self._parser.expire(now_s)
+            if data := self._read(0.0 if keys else min(until_s, self._parser.due_s) - now_s):
+                keys += self._parser.feed(data, time.monotonic())
+            if keys or time.monotonic() >= until_s:
+                return _as_typed(keys)
+
+    def _read(self, wait_s: float) -> bytes:
+        """Return all input that is there, waiting for it up to a time."""
+        data = b""
+        while select.select([self._fd], [], [], 0.0 if data else max(0.0, wait_s))[0]:
+            more = os.read(self._fd, 4096)
+            if not more:
+                raise NoTerminal("The terminal has gone away.")
+            data += more
+        return data
+
+    def _write(self, text: str) -> None:
+        if sys.stdout.isatty():
+            sys.stdout.write(text)
+            sys.stdout.flush()

@@ -231,6 +231,7 @@ def _play_on_robot(episode: Episode, name: str) -> None:
         RobotClient.connect(known, role="person", frames=False) as robot,
     ):
         _require_fit(episode, robot.welcome)
+        terminal.keys(0.0)  # Keys pressed before this line was shown are no consent.
         say(
             f"{episode.seconds:.1f} s of {episode.path.name}, replayed without looking: "
             f"{robot.welcome.robot} starts from where it stands now.\n"

@@ -33,7 +33,7 @@ from shapechanger.robot.setup.calibration import (
     wheel_changes,
     with_widest_pulses,
 )
-from shapechanger.teleop import Terminal
+from shapechanger.teleop import STOPS, Terminal
 
 if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
@@ -95,15 +95,15 @@ def _live_line() -> Live:
 
 
 def _end_if_asked(key: str, robot: RobotClient | None = None) -> None:
-    """Quit on Q; on Space, stop the robot and wait until the stop is visible."""
-    if key == "space" and robot is not None:
+    """Quit on Q; on Space or Escape, stop the robot and wait until the stop is visible."""
+    if key in STOPS and robot is not None:
         robot.emergency_stop("calibrate")
         for _ in range(_STOP_LOOKS):
             newest = robot.newest
             robot.acknowledge()
             if not robot.observation(newest.message.seq if newest else 0).message.armed:
                 break
-    if key in {"q", "space"}:
+    if key == "q" or key in STOPS:
         raise _Ended
 
 
@@ -142,7 +142,7 @@ class Calibration:
         """
         say(
             "Lift the robot so that nothing can drive away. Enter accepts, N skips this output, "
-            "Q ends without writing, Space stops everything and ends."
+            "Q ends without writing, Space and Escape stop everything and end."
         )
         try:
             for output in self._profile.outputs:

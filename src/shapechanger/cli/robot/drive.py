@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.known_robots import KnownRobot, recall
-from shapechanger.teleop import DIRECTIONS, HeldKeys, Terminal
+from shapechanger.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
 
 if TYPE_CHECKING:
     from shapechanger.cli.robot.pilot import DrivingPolicy, PolicyDriver
@@ -99,14 +100,17 @@ def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:
 
 
 _HELP: Final = (
-    "W A S D or arrows drive · E arms · Space stops everything · X disarms · + and - set the cap · "
-    "P lets a waiting program drive · R records · M marks · U undoes 5 s · Q quits"
+    "W A S D or arrows drive · E arms · Space and Escape stop everything · X disarms · "
+    "+ and - set the cap · P lets a waiting program drive · R records · M marks · U undoes 5 s · "
+    "Q quits"
 )
 _CAP_STEP: Final = 0.1
 # s. A program waiting in `reset` takes a free robot within this time.
 _TAKEN_WITHIN_S: Final = 2.0
 # Consecutive observations in which a key has no effect and the robot gives no reason.
 _UNMOVED_LOOKS: Final = 10
+# Keys that may move the robot, and act once while they are held.
+_ONCE: Final = frozenset({"e", "p"})
 _BY_KEYS: Final = frozenset({"steering", "throttle"})
 
 
@@ -135,6 +139,7 @@ class Driving:
         self._state = Layout.from_json(robot.welcome.state_layout)
         self._terminal = terminal
         self._keys = HeldKeys()
+        self._pressed = ("", -math.inf)  # The newest key and its time, s.
         self._cap = cap
         self._pilot = pilot
         self._note = ""
@@ -147,6 +152,7 @@ class Driving:
             LinkError: If the link is lost, or the pilot's is.
         """
         console = plain_console()
+        self._terminal.keys(0.0)  # Keys pressed before this line was shown are no orders.
         console.print(_HELP)
         seq = 0
         with Live(console=console, refresh_per_second=10, transient=True) as live:
@@ -185,16 +191,20 @@ class Driving:
 
     def _act(self, key: str, seen: Observation) -> None:
         """Handle one key press."""
+        now_s = time.monotonic()
+        before, before_s = self._pressed
+        self._pressed = (key, now_s)
+        if key in _ONCE and key == before and now_s - before_s < FIRST_HOLD_S:
+            return  # The terminal repeats a held key.
         if key in DIRECTIONS:
             # A driving key takes the robot from a policy immediately.
             if not seen.mine and seen.holder_role == "program":
                 self._robot.take()
-            self._keys.press(key, time.monotonic())
+            self._keys.press(key, now_s)
             return
         self._note = ""
-        if key == "space":
-            self._keys.let_go()
-            self._robot.emergency_stop("A person pressed Space.")
+        if key in STOPS:
+            self._stop(key)
         elif key == "x":
             self._keys.let_go()
             self._robot.disarm()
@@ -217,11 +227,20 @@ class Driving:
         elif key == "u":
             self._robot.undo()
 
+    def _stop(self, key: str) -> None:
+        self._keys.let_go()
+        self._robot.emergency_stop(f"A person pressed {key.capitalize()}.")
+
     def _hand_over(self) -> str:
         """Hand the robot to a waiting program, arm it, and describe the outcome."""
         self._robot.release()
         until_s = time.monotonic() + _TAKEN_WITHIN_S
         while time.monotonic() < until_s:
+            for key in self._terminal.keys(0.0):
+                self._pressed = (key, time.monotonic())
+                if key in STOPS:
+                    self._stop(key)
+                    return ""
             seen = self._robot.ask().message
             if seen.holder and not seen.mine:
                 self._robot.arm()
