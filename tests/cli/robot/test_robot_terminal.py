@@ -15,6 +15,7 @@ from shapechanger.twin.robot import run_robot
 from tests.cli.robot.typing import Person
 from tests.remote.robot import eventually
 from tests.robots import CAR, IN_A_ROOM, PATIENT_CAR, changed, write_profile
+from tests.teleop.sequences import UNKNOWN
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
@@ -78,11 +79,12 @@ mix = { throttle = 1.0 }
 
 
 def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """E arms, W drives, X disarms, Space stops, Q leaves."""
+    """E arms, W drives, X disarms, Space and Escape stop, Q leaves, and sequences do nothing."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with (
         run_robot(write_profile(tmp_path, PATIENT_CAR), arguments=IN_A_ROOM) as robot,
         robot.operator() as operator,
+        robot.client(frames=False) as watcher,
     ):
         known = robot.known
         remember(KnownRobot("car", known.address, known.key, known.fingerprint))
@@ -91,17 +93,39 @@ def test_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         with Person(
             ("robot", "drive", "car", "--cap", "1.0"), tmp_path, {"XDG_CONFIG_HOME": str(tmp_path)}
         ) as person:
+
+            def press_unknown_sequences(first: int) -> None:
+                """Press a third of them in two writes each; the robot must stay as it is."""
+                before = watcher.ask().message
+                for n, sequence in enumerate(UNKNOWN[first::3]):
+                    if sequence not in {b"\x03", b"\x1a"}:  # Ctrl-C and Ctrl-Z are signals.
+                        place = n % len(sequence)
+                        person.press(sequence[:place])
+                        person.press(sequence[place:])
+                        seen = watcher.ask().message
+                        assert not any(seen.commanded), sequence
+                        assert seen.armed == before.armed, sequence
+                        assert seen.holder == before.holder, sequence
+
             person.read_until("not armed")
+            press_unknown_sequences(0)
             person.press("e")
             read = person.read_until("\rarmed · cap 1.0")
             person.press("w")
             person.wait_for(lambda: operator.where().travelled_m - start > 0.1)
             # Without key repeats, driving stops.
             person.wait_for(lambda: operator.where().speed < 0.05)
+            press_unknown_sequences(1)
             person.press("x")
             read = person.read_until("not armed", read)
             person.press(" ")
+            read = person.read_until("EMERGENCY STOP", read)
+            person.press("e")
+            read = person.read_until("\rarmed · cap 1.0", read)
+            person.press("\x1b")
             person.read_until("EMERGENCY STOP", read)
+            press_unknown_sequences(2)
+            assert watcher.ask().message.emergency
             person.press("q")
             assert person.end() == 0
 
@@ -261,9 +285,9 @@ def test_an_esc_goes_beyond_the_cap_only_when_asked(tmp_path: Path) -> None:
     assert drive["forward_us"] == pytest.approx(1500 + 0.5 * 900)
 
 
-@pytest.mark.parametrize("key", ["q", " "])
+@pytest.mark.parametrize("key", ["q", " ", "\x1b"])
 def test_ending_writes_nothing_and_goes_no_further(tmp_path: Path, key: str) -> None:
-    """Q and Space end the calibration and discard results; N skips one output."""
+    """Q, Space and Escape end the calibration and discard results; N skips one output."""
     second = MOTOR.partition("[action.throttle]")
     text = SERVO + "\n" + second[1] + second[2]
     profile = write_profile(tmp_path, text)

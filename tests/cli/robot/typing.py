@@ -63,9 +63,9 @@ class Person:
         """Output so far, without escape sequences."""
         return _ESCAPES.sub("", self._text)
 
-    def press(self, keys: str) -> None:
+    def press(self, keys: str | bytes) -> None:
         """Press keys."""
-        os.write(self._main, keys.encode())
+        os.write(self._main, keys.encode() if isinstance(keys, str) else keys)
 
     def read_until(self, words: str, after: int = 0, seconds: float = 40.0) -> int:
         """Wait for a text, and return the index of its end."""

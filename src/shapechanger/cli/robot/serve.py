@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import os
 import shutil
 import socket
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -49,6 +51,7 @@ from shapechanger.twin.world.place import Place
 from shapechanger.worlds.course import HOME, require_element
 
 _HERE: Final = "127.0.0.1"
+_LOOK_EVERY_S: Final = 0.1
 _EVERYWHERE: Final = "0.0.0.0"
 _ROOM: Final = "room"
 # A twin's clock is paused while it renders, and a guard that waits for it is alive.
@@ -117,27 +120,45 @@ class Serve:
             self._require_policy(DaemonPlan.from_dict(plan.daemon))
             if board is None:
                 require_pins(profile.guard_plan())
-            _require_free(str(plan.daemon["host"]), self.port)
+            port = _require_free(str(plan.daemon["host"]), self.port)
             with contextlib.suppress(OSError):  # A full disk loses messages, not the robot.
                 if board is not None:
                     say(f"twin of {profile.name}: ledger {board.ledger_path}")
-                    self._make_known(profile.name)
+                    self._make_known(profile.name, plan, port)
                 sys.stdout.flush()
             # Replaces this process, which has loaded much that a supervisor does not need.
             os.execv(plan.python, supervisor_command(plan, plan_fd(plan)))
 
-    def _make_known(self, name: str) -> None:
-        """Store the twin's address and key for this machine, as `init` does, and print that."""
-        # With any free port, or without TLS, the address is passed on by the caller.
-        if not self.port or self.insecure:
+    def _make_known(self, name: str, plan: ServePlan, port: int) -> None:
+        """Let another process store the twin's address for this machine once it can be reached.
+
+        This process becomes the supervisor. A robot that does not start must not take the name from
+        one that runs.
+        """
+        # Without TLS, or with credentials of its own and any free port, the caller passes the
+        # address on.
+        if self.insecure or (self.credentials is not None and not self.port):
             return
         try:
             check_name(name)
         except LinkError:  # Not every name of a robot is that of a file.
             return
+        plan.daemon["port"] = port  # A daemon that is started again keeps it.
         credentials = load_credentials(self.credentials or credentials_folder(name))
         host = _HERE if self.host in {"", "0.0.0.0", "::"} else self.host
-        say(make_known(robot_at(str(Address(host, self.port)), name, credentials)))
+        robot = robot_at(str(Address(host, port)), name, credentials)
+        sys.stdout.flush()
+        served_by = os.getpid()
+        if child := os.fork():
+            os.waitpid(child, 0)
+            return
+        try:
+            # A child of init: the supervisor has no child that it does not know.
+            if not os.fork() and _is_reached(Path(plan.daemon["ready_file"]), port, served_by):
+                say(make_known(robot))
+        finally:
+            sys.stdout.flush()
+            os._exit(0)
 
     def _refuse_contradictions(self) -> None:
         """Refuse options that only apply to a twin."""
@@ -194,6 +215,9 @@ class Serve:
         folder = self.credentials or credentials_folder(profile.name)
         is_twin = board is not None
         policies, policy = self._policies()
+        ready_file = self.ready_file
+        if ready_file is None and board is not None:
+            ready_file = board.folder / f"ready-{os.getpid()}.json"
         credentials = (
             make_credentials(folder, profile.name) if is_twin else load_credentials(folder)
         )
@@ -218,7 +242,7 @@ class Serve:
             key_file=str(credentials.key_file),
             insecure=self.insecure,
             discovery=self.announce,
-            ready_file=str(self.ready_file.absolute()) if self.ready_file else "",
+            ready_file=str(ready_file.absolute()) if ready_file else "",
             recordings=str((self.recordings or recordings_folder(profile.name)).absolute()),
             turning=profile.turning,
             policies=policies,
@@ -275,8 +299,28 @@ def _limit(slew_per_s: float) -> float:
     return slew_per_s if math.isfinite(slew_per_s) else 0.0
 
 
-def _require_free(host: str, port: int) -> None:
-    """Check that an address is free before starting anything."""
+def _is_reached(ready_file: Path, port: int, served_by: int) -> bool:
+    """Wait until a robot can be reached at a port, or until its supervisor has ended.
+
+    Args:
+        ready_file: File that its daemon writes; another robot's may be there.
+        port: The port.
+        served_by: Process id of the supervisor.
+    """
+    os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # The twin ends when the last file is closed.
+    while True:
+        with contextlib.suppress(OSError, ValueError, LookupError, TypeError):
+            if json.loads(ready_file.read_text())["port"] == port:
+                return True
+        try:
+            os.kill(served_by, 0)
+        except ProcessLookupError:
+            return False
+        time.sleep(_LOOK_EVERY_S)
+
+
+def _require_free(host: str, port: int) -> int:
+    """Check that an address is free before starting anything, and return its port."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
@@ -285,6 +329,7 @@ def _require_free(host: str, port: int) -> None:
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.bind(address)
             listener.listen(1)
+            return listener.getsockname()[1]
     except OSError as error:
         raise RobotError(
             f"Cannot listen at {host} port {port}: {error.strerror or error}. "
