@@ -69,15 +69,17 @@ class Watching:
                 acting, act = acting_in(env, policy, self.learner)
             for episode in range(self.episodes):
                 observation, _ = acting.reset(seed=self.seed + episode)
-                worth, steps, over = 0.0, 0, False
+                worth, steps, over, why = 0.0, 0, False, ""
                 while not over and steps < self.max_steps:
                     action = act(np.asarray(observation)[None])[0]
-                    observation, reward, terminated, truncated, _ = acting.step(action)
+                    observation, reward, terminated, truncated, info = acting.step(action)
                     worth, steps = worth + float(reward), steps + 1
                     over = terminated or truncated
+                    if terminated and (reason := info.get("stop_reason")):  # Of a vehicle.
+                        why = f": {reason}"
                     if out is not None:
                         frames.append(cast("NDArray[Any]", env.render()))
-                say(f"episode {episode}: return {worth:.1f} in {steps} steps")
+                say(f"episode {episode}: return {worth:.1f} in {steps} steps{why}")
             if out is not None:
                 from shapechanger.cli.pictures import write_film
 
