@@ -7,6 +7,7 @@ import json
 import math
 from typing import Any, Final, Self
 
+import msgspec
 from playwright.sync_api import Browser, Page, TimeoutError
 
 from shapechanger.robot.profile.load import load_profile
@@ -48,6 +49,7 @@ class Console:
         page: The page.
         errors: Errors of its scripts and of the browser, such as policy violations.
         requested: The addresses that it requested.
+        sent: The messages that it sent to the robot.
     """
 
     def __init__(
@@ -67,6 +69,8 @@ class Console:
         self.requested: list[str] = []
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", lambda message: self._on_console(message.type, message.text))
+        self.sent: list[dict[str, Any]] = []
+        self.page.on("websocket", lambda socket: socket.on("framesent", self._on_sent))
         self.page.on("request", lambda request: self.requested.append(request.url))
         if script:
             self.page.add_init_script(script)
@@ -86,6 +90,9 @@ class Console:
     def _on_console(self, kind: str, text: str) -> None:
         if kind == "error" and not any(words in text for words in _PROVOKED):
             self.errors.append(text)
+
+    def _on_sent(self, message: str | bytes) -> None:
+        self.sent.append(msgspec.msgpack.decode(message))
 
     def await_state(self, seconds: float = 60.0, /, **state: str) -> None:
         """Wait until the page is in a state, such as `robot="armed"`."""

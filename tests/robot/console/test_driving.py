@@ -176,7 +176,7 @@ def test_the_stick_works_with_mouse_and_touch(car: RunningRobot, visit: Visit) -
 
 
 _PAD = """
-globalThis.pad = { connected: true, axes: [0, 0, 0, 0], buttons:
+globalThis.pad = { connected: true, mapping: "standard", axes: [0, 0, 0, 0], buttons:
   Array.from({ length: 16 }, () => ({ pressed: false, value: 0 })) };
 navigator.getGamepads = () => [globalThis.pad];
 """

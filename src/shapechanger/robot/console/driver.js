@@ -1,7 +1,10 @@
 // Driving: one answer to each observation, and stops at once.
 
+import { letterAt } from "./letters.js";
+
 const TAKEN_WITHIN_MS = 2_000; // Time in which a waiting program takes control.
 const LEASE_MS = 2_000;
+const ARMED_MS = 2_000; // Time in which an order to arm has an effect.
 const PAUSE_MS = 1_000; // A held input does not count after a longer pause.
 const LEAST_MS = 15; // Between extra commands while the stick moves.
 
@@ -12,6 +15,7 @@ export class Driver extends EventTarget {
   #seq = 0;
   #seenMs = 0;
   #saidMs = 0;
+  #armMs = -Infinity;
   #isTaking = false;
   #isHidden = false;
 
@@ -32,7 +36,7 @@ export class Driver extends EventTarget {
 
   /** True if the person's input moves the robot. */
   get isDriving() {
-    return Boolean(this.mine && this.seen?.armed && !this.seen.emergency && !this.#isHidden);
+    return this.mine && isArmed(this.seen) && !this.#isHidden;
   }
 
   /** True if a program has control. */
@@ -54,6 +58,7 @@ export class Driver extends EventTarget {
   observe(observation) {
     const nowMs = performance.now();
     const wasDriving = this.isDriving;
+    const wasArmed = isArmed(this.seen);
     const pauseMs = nowMs - this.#seenMs;
     this.#seenMs = nowMs;
     this.seen = observation;
@@ -61,6 +66,11 @@ export class Driver extends EventTarget {
     if (wasDriving && pauseMs > PAUSE_MS) {
       this.#pilot.letGo();
       this.#note("The robot sent nothing for a while: let go, and press again to drive on.");
+    }
+    // What was held while somebody else armed the robot is no order to drive.
+    if (isArmed(observation) && !wasArmed) {
+      if (nowMs - this.#armMs > ARMED_MS) this.#pilot.letGo();
+      this.#armMs = -Infinity;
     }
     if (!this.isDriving) this.#pilot.follow(observation.action_applied);
     if (this.isDriving) this.#command();
@@ -105,12 +115,18 @@ export class Driver extends EventTarget {
   /** Take control, and arm the robot. */
   async arm() {
     this.#pilot.letGo();
-    if (await this.take()) this.armForHolder();
+    if (await this.take()) this.#arm();
   }
 
   /** Arm the robot for the client in control. */
   armForHolder() {
+    this.#pilot.letGo();
+    this.#arm();
+  }
+
+  #arm() {
     if (!this.seen) return;
+    this.#armMs = performance.now();
     this.#link.send("arm", { answers: this.seen.seq, emergency: this.seen.emergencies });
   }
 
@@ -129,15 +145,16 @@ export class Driver extends EventTarget {
     while (performance.now() < untilMs) {
       const observation = await nextMessage(this.#link, "observation", TAKEN_WITHIN_MS);
       if (observation?.holder_role === "program") {
-        this.armForHolder();
-        this.#note(`${observation.holder} drives from now on. Space stops it, E takes it back.`);
+        this.#arm();
+        const back = letterAt("KeyE");
+        this.#note(`${observation.holder} drives from now on. Space stops it, ${back} takes it back.`);
         return;
       }
     }
     this.#note("No program waits for control: start one, and try again while its reset waits.");
   }
 
-  /** Handle a loss of the focus, without which the person cannot steer. */
+  /** Release everything that is held; it must be let go, and used again. */
   letGo() {
     this.#pilot.letGo();
     if (this.isDriving) this.#command();
@@ -161,6 +178,10 @@ export class Driver extends EventTarget {
   #note(text) {
     this.dispatchEvent(new CustomEvent("note", { detail: text }));
   }
+}
+
+function isArmed(seen) {
+  return Boolean(seen?.armed && !seen.emergency);
 }
 
 /** Resolve to the next message of a type, or null after the time limit. */

@@ -13,19 +13,22 @@ function withDeadZone(value) {
 export class Gamepads {
   #changed;
   #pressed;
+  #note;
+  #pads = null; // The connected pads, as a text to compare.
   #mustRest = true;
-  #buttons = [];
+  #buttons = null; // Null before the first look at a pad.
   #timer = 0;
 
   /** Steering and throttle, -1 to 1 each. */
   value = { steering: 0, throttle: 0 };
 
-  /** `pressed` is called with "arm" or "stop". */
-  constructor(changed, pressed) {
+  /** `pressed` is called with "arm" or "stop", and `note` with a sentence about an ignored pad. */
+  constructor(changed, pressed, note) {
     this.#changed = changed;
     this.#pressed = pressed;
-    addEventListener("gamepadconnected", () => this.#begin());
-    if (this.#pad()) this.#begin();
+    this.#note = note;
+    for (const name of ["gamepadconnected", "gamepaddisconnected"]) addEventListener(name, () => this.#begin());
+    this.#begin();
   }
 
   /** Ignore the sticks until they have been at rest. */
@@ -34,40 +37,55 @@ export class Gamepads {
     this.value = { steering: 0, throttle: 0 };
   }
 
-  #pad() {
-    // The function does not exist in an insecure context.
-    return navigator.getGamepads?.().find((pad) => pad?.connected) ?? null;
-  }
-
   #begin() {
     clearInterval(this.#timer);
-    this.letGo();
+    this.#pads = null;
     this.#timer = setInterval(() => this.#poll(), POLL_MS);
+    this.#poll();
   }
 
   #poll() {
-    const pad = this.#pad();
     const before = this.value;
-    if (!pad) {
-      clearInterval(this.#timer);
-      this.letGo();
-    } else {
-      this.#read(pad);
-    }
+    // The function does not exist in an insecure context.
+    const pads = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
+    const pad = pads.find(({ mapping }) => mapping === "standard");
+    this.#compare(pads, pad);
+    if (pad) this.#read(pad);
+    if (!pads.length) clearInterval(this.#timer);
     const { steering, throttle } = this.value;
     if (steering !== before.steering || throttle !== before.throttle) this.#changed();
   }
 
+  /** Require rest whenever a pad comes, goes, or changes its place: another one may be read from now on. */
+  #compare(pads, used) {
+    const now = pads.map(({ index, id, mapping }) => `${index} ${mapping} ${id}`).join("\n");
+    if (now === this.#pads) return;
+    this.#pads = now;
+    this.#buttons = null;
+    this.letGo();
+    if (used) return;
+    for (const { id } of pads) {
+      this.#note(`The gamepad "${id}" is ignored: the browser does not know which stick is which ("standard" mapping).`);
+    }
+  }
+
   #read(pad) {
-    const triggers = (pad.buttons[7]?.value ?? 0) - (pad.buttons[6]?.value ?? 0);
-    const ways = [triggers, -(pad.axes[3] ?? 0), -(pad.axes[1] ?? 0)].map(withDeadZone);
-    const throttle = ways.reduce((most, way) => (Math.abs(way) > Math.abs(most) ? way : most), 0);
-    const value = { steering: withDeadZone(pad.axes[0] ?? 0), throttle };
-    if (this.#mustRest) this.#mustRest = value.steering !== 0 || value.throttle !== 0;
-    if (!this.#mustRest) this.value = value;
+    const [across, left, right] = [0, 1, 3].map((axis) => pad.axes[axis] ?? 0);
+    const [backward, forward] = [6, 7].map((button) => pad.buttons[button]?.value ?? 0);
+    const inputs = [across, left, right, backward, forward];
+    // Each input by itself: two triggers that rest half-way would cancel each other.
+    if (this.#mustRest) this.#mustRest = !inputs.every((input) => Math.abs(input) < DEAD);
+    // Another window may be played with the pad.
+    if (!document.hasFocus() || !inputs.every(Number.isFinite)) this.letGo();
+    if (!this.#mustRest) {
+      const ways = [forward - backward, -right, -left].map(withDeadZone);
+      const throttle = ways.reduce((most, way) => (Math.abs(way) > Math.abs(most) ? way : most), 0);
+      this.value = { steering: withDeadZone(across), throttle };
+    }
+    // A new pad's A does not count until it is pressed again: browsers show a pad at its first press.
     const now = pad.buttons.map((button) => button.pressed);
-    if (now[STOP] && !this.#buttons[STOP]) this.#pressed("stop");
-    if (now[ARM] && !this.#buttons[ARM]) this.#pressed("arm");
+    if (now[STOP] && !this.#buttons?.[STOP]) this.#pressed("stop");
+    if (now[ARM] && this.#buttons?.[ARM] === false && document.hasFocus()) this.#pressed("arm");
     this.#buttons = now;
   }
 }

@@ -8,6 +8,7 @@ import { Gamepads } from "./gamepad.js";
 import { defaultName, keepKey, KeyForm, keyFromAddress, keptKey } from "./key_form.js";
 import { Keys } from "./keys.js";
 import { features, formatNumber } from "./layout.js";
+import { learnLetters } from "./letters.js";
 import { describeRobot, Link } from "./link.js";
 import { Log } from "./log.js";
 import { ageOnArrivalMs, Picture } from "./picture.js";
@@ -15,7 +16,6 @@ import { Pilot } from "./pilot.js";
 import { Policies } from "./policies.js";
 import { Readings } from "./readings.js";
 import { Recorder } from "./recorder.js";
-import { listen } from "./shortcuts.js";
 import { Status } from "./status.js";
 import { Stick } from "./stick.js";
 import { Tilt } from "./tilt.js";
@@ -23,6 +23,12 @@ import { Tilt } from "./tilt.js";
 const CAP_STEP = 10; // %
 const PRESS_MS = 1_000; // The click after a press is the same press.
 const OLD_MS = 500; // An older picture is marked as old.
+
+let driver = null; // Depends on the robot's actions, so it is made for each connection.
+let actions = null;
+let readings = null;
+let key = "";
+let wasConnected = false;
 
 const link = new Link();
 const log = new Log(find("log"));
@@ -33,19 +39,23 @@ const policies = new Policies(link, log);
 const keyForm = new KeyForm(connect);
 
 const changed = () => driver?.changed();
-const keys = new Keys(changed);
-const pads = new Gamepads(changed, (what) => (what === "stop" ? stop("A gamepad's B was pressed.") : arm()));
+const keys = new Keys(() => driver !== null, changed, letGo, {
+  stop,
+  arm,
+  disarm,
+  handOver,
+  record: () => recorder.toggle(),
+  mark: () => recorder.mark(),
+  undo: () => recorder.undo(),
+  raiseCap: () => setCap(find("cap").valueAsNumber + CAP_STEP),
+  lowerCap: () => setCap(find("cap").valueAsNumber - CAP_STEP),
+});
+const pads = new Gamepads(changed, pressed, (text) => log.add(text, "refused"));
 const stick = new Stick(find("pad"), changed);
 const tilt = new Tilt(changed);
 const episodes = new Episodes(link, () => {
   if (driver?.mine) driver.disarm(); // The dialog covers the live picture.
 });
-
-let driver = null; // Depends on the robot's actions, so it is made for each connection.
-let actions = null;
-let readings = null;
-let key = "";
-let wasConnected = false;
 
 function view(name) {
   if (document.body.dataset.view !== name) scrollTo(0, 0);
@@ -122,6 +132,7 @@ link.addEventListener("observation", ({ detail: seen }) => {
   if (!driver) return;
   const nowMs = performance.now();
   driver.observe(seen);
+  showTilt(); // Arming, disarming and stopping switch it off.
   // A hidden page draws nothing.
   if (document.hidden) return;
   if (seen.frame) picture.show(seen.frame, ageOnArrivalMs(seen, link.roundTripMs), nowMs);
@@ -149,6 +160,18 @@ function stop(reason) {
 
 function arm() {
   driver?.arm();
+}
+
+/** Handle a press of a gamepad's button. */
+function pressed(what) {
+  if (what === "stop") stop("A gamepad's B was pressed.");
+  else if (!document.querySelector("dialog[open]")) arm(); // A dialog covers the picture.
+}
+
+/** Release everything that is held. */
+function letGo() {
+  driver?.letGo();
+  showTilt();
 }
 
 function disarm() {
@@ -191,8 +214,12 @@ find("arm").addEventListener("click", () => {
   else arm();
 });
 find("hand").addEventListener("click", () => {
-  if (driver && !driver.mine && driver.seen?.holder) driver.take();
-  else handOver();
+  if (driver && !driver.mine && driver.seen?.holder) {
+    letGo(); // Only what is used from now on drives.
+    driver.take();
+  } else {
+    handOver();
+  }
 });
 find("cap").addEventListener("input", () => setCap(find("cap").valueAsNumber));
 find("tilt").addEventListener("click", async () => {
@@ -221,24 +248,19 @@ find("leave").addEventListener("click", () => {
   keyForm.show();
 });
 
-listen(stop, () => driver !== null, {
-  e: arm,
-  x: disarm,
-  p: handOver,
-  r: () => recorder.toggle(),
-  m: () => recorder.mark(),
-  u: () => recorder.undo(),
-  Backspace: () => recorder.undo(),
-  "+": () => setCap(find("cap").valueAsNumber + CAP_STEP),
-  "=": () => setCap(find("cap").valueAsNumber + CAP_STEP),
-  "-": () => setCap(find("cap").valueAsNumber - CAP_STEP),
-});
-
 // Stops without a press of a button.
 
-addEventListener("blur", () => {
-  driver?.letGo();
-  showTilt();
+// The end of a press may go to where the focus is now, to a menu or to a drag.
+for (const name of ["blur", "dragstart", "compositionstart"]) addEventListener(name, letGo);
+for (const name of ["focusin", "focusout"]) {
+  addEventListener(name, () => {
+    for (const device of [keys, pads, stick]) device.letGo(); // Tilt is on until it is switched off.
+    changed();
+  });
+}
+for (const name of ["fullscreenchange", "pointerlockchange"]) document.addEventListener(name, letGo);
+addEventListener("contextmenu", (event) => {
+  if (!event.defaultPrevented) letGo(); // The stick opens no menu.
 });
 document.addEventListener("visibilitychange", () => {
   driver?.hide(document.hidden);
@@ -249,6 +271,9 @@ addEventListener("pagehide", () => {
   driver?.hide(true);
   link.close();
 });
+document.addEventListener("freeze", () => driver?.hide(true));
+document.addEventListener("resume", () => driver?.hide(document.hidden));
+addEventListener("focus", learnLetters); // The layout may have changed meanwhile.
 addEventListener("pageshow", ({ persisted }) => {
   if (persisted && wasConnected) link.open(key, find("name").value.trim() || defaultName());
 });
@@ -276,6 +301,7 @@ async function begin() {
   view("login");
   setCap(find("cap").valueAsNumber);
   requestAnimationFrame(refresh);
+  learnLetters();
   key = keyFromAddress();
   let known;
   try {

@@ -1,6 +1,7 @@
 // State of the robot and its driver in a sentence, and the buttons that can change it.
 
 import { find, label, setText } from "./dom.js";
+import { showKeys } from "./letters.js";
 
 const STOPPED_MS = 400; // A shorter reason would only flicker.
 
@@ -27,11 +28,10 @@ export class Status {
     const isByProgram = !mine && seen.holder_role === "program";
     const arm = seen.emergency ? "End the stop, arm" : isByProgram ? `Arm for ${seen.holder}` : "Arm";
     label(find("arm"), seen.armed ? "Disarm" : arm);
-    setText(find("arm").lastElementChild, seen.armed ? "X" : isByProgram ? "P" : "E");
-    find("arm").setAttribute("aria-keyshortcuts", seen.armed ? "X" : isByProgram ? "P" : "E");
+    showKeys(find("arm"), seen.armed ? "KeyX" : isByProgram ? "KeyP" : "KeyE");
     const isOthers = !mine && seen.holder !== "";
     label(find("hand"), isOthers ? "Take over" : "Let a program drive");
-    find("hand").setAttribute("aria-keyshortcuts", isOthers ? "E" : "P");
+    showKeys(find("hand"), isOthers ? "KeyE" : "KeyP");
   }
 
   /** Show a lost connection. */

@@ -40,7 +40,10 @@ export class Stick {
   }
 
   #move(event) {
-    if (event.pointerId === this.#pointer) this.#follow(event);
+    if (event.pointerId !== this.#pointer) return;
+    // The end of a press may be lost; of two mouse buttons, only the last one has a pointerup.
+    if (event.buttons & 1) this.#follow(event);
+    else this.#release();
   }
 
   #release() {
