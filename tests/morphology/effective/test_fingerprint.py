@@ -90,7 +90,6 @@ _PHYSICAL: list[tuple[str, int, float, float]] = [
     ("geom_friction", 0, 1.1, 0.0),
     ("geom_solref", 0, 1.1, 0.0),
     ("geom_solimp", 0, 1.01, 0.0),
-    ("geom_solmix", 0, 0.5, 0.0),
     ("geom_condim", 0, 2.0, 0.0),
     ("geom_margin", 0, 1.0, 0.1),
     ("geom_gap", 0, 1.0, 0.1),
@@ -163,6 +162,39 @@ def test_every_physical_number_is_in_the_fingerprint(
     values[row] = factor * values[row] + offset
     assert fingerprint(model) != nominal
 
+
+def test_the_mix_counts_where_there_is_something_to_mix() -> None:
+    """The weight of a geom's solver parameters is nothing between equal ones."""
+    alike, apart = everything(), everything()
+    apart.geom_solref[0, 0] *= 2.0
+    for model, counts in ((alike, False), (apart, True)):
+        nominal = fingerprint(model)
+        model.geom_solmix[0] *= 0.5
+        assert (fingerprint(model) != nominal) is counts
+
+
+@pytest.mark.parametrize("name", ["ant", "humanoid", "everything"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_last_bits_do_not_count(name: str, seed: int) -> None:
+    """Another processor rounds every number in its own way, and a computed zero is not zero."""
+    model = everything() if name == "everything" else asset(name)
+    nominal, random = fingerprint(model), np.random.default_rng(seed)
+    for array in (each for each in dir(model) if each.startswith(_ROUNDED)):
+        values = getattr(model, array)
+        if not isinstance(values, np.ndarray) or not values.size:
+            continue
+        if values.dtype == np.float32:  # Computed in double precision, so few are another number.
+            values.flat[random.integers(values.size)] *= 1.0 + np.finfo(np.float32).eps
+        elif values.dtype == np.float64:
+            noise = random.uniform(-4e-16, 4e-16, values.shape)
+            computed = array in ("body_pos", "body_ipos", "geom_pos", "site_pos", "jnt_axis")
+            values[:] = values * (1.0 + noise) + (0.1 * noise if computed else 0.0)
+    assert fingerprint(model) == nominal
+    model.body_mass[-1] *= 1.0 + 1e-6
+    assert fingerprint(model) != nominal
+
+
+_ROUNDED = ("body_", "geom_", "site_", "jnt_", "dof_", "qpos", "actuator_", "tendon_", "mesh_vert")
 
 _OPTIONS = {
     "timestep": 0.004,

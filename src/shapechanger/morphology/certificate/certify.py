@@ -13,7 +13,12 @@ import msgspec
 import mujoco
 
 from shapechanger.errors import EmptyShift, MorphologyError
-from shapechanger.morphology.certificate.changes import Change, compare, grouped
+from shapechanger.morphology.certificate.changes import (
+    Change,
+    compare,
+    differ_in_names,
+    grouped,
+)
 from shapechanger.morphology.certificate.consistency import inconsistencies, lone_masses
 from shapechanger.morphology.certificate.rollout import (
     Certifiable,
@@ -50,38 +55,39 @@ class Certificate(msgspec.Struct, frozen=True):
 
     @property
     def same_model(self) -> bool:
-        """Return whether the two models move equally, up to rounding."""
-        return self.source_fingerprint == self.target_fingerprint or not self.changes
+        """Return whether the two models move equally, up to rounding and names."""
+        return not self.changes
 
     @property
     def is_empty(self) -> bool:
-        """Return whether nothing differs, neither the models nor the rollouts.
+        """Return whether models and rollouts differ by no more than rounding and names.
 
-        Rollouts of models that differ by rounding need to agree in their first steps only.
+        One rule for all models: even equal ones may round differently, because MuJoCo computes
+        relative to the centre of mass of the whole, with the masses of what cannot move.
         """
-        if self.source_fingerprint == self.target_fingerprint:
-            return self.rollout.identical
         return self.same_model and self.rollout.differs_by_rounding
 
     @property
     def verdict(self) -> str:
         """Verdict in one sentence."""
-        if self.is_empty and self.source_fingerprint != self.target_fingerprint:
-            return (
-                f"{self.source} and {self.target} behave alike: their models and their first steps "
-                "differ by rounding only."
-            )
-        if self.is_empty:
+        alike = self.source_fingerprint == self.target_fingerprint
+        if self.is_empty and alike and self.rollout.identical:
             return (
                 f"{self.source} and {self.target} behave alike: both models have the fingerprint "
                 f"{self.source_fingerprint}, and {self.rollout.steps} steps gave the same numbers."
+            )
+        if self.is_empty:
+            return (
+                f"{self.source} and {self.target} behave alike: their models and "
+                f"{self.rollout.steps} steps differ by rounding only"
+                f"{'' if alike else ', or in names'}."
             )
         if self.same_model:
             return (
                 f"The models of {self.source} and {self.target} are the same "
                 f"({self.source_fingerprint}); only what is sensed, done or rewarded differs."
             )
-        if self.rollout.identical:
+        if self.rollout.differs_by_rounding:
             return (
                 f"The models of {self.source} and {self.target} differ, but "
                 f"{self.rollout.steps} steps did not show it."
@@ -152,14 +158,16 @@ def certify(
         if not hasattr(getattr(env, "unwrapped", env), "model"):
             raise MorphologyError(f"{_label(env)} has no model to compare.")
     one, two = cast("list[mujoco.MjModel]", [attribute(env, "model") for env in (source, target)])
-    rollout = compare_rollouts(source, target, steps=steps, seed=seed)
+    changes = compare(one, two, standing_height=(_height(source), _height(target)))
+    renamed = not changes and differ_in_names(one, two)
+    rollout = compare_rollouts(source, target, steps=steps, seed=seed, renamed=renamed)
     names = labels or (_label(source), _label(target))
     certificate = Certificate(
         source=names[0],
         target=names[1],
         source_fingerprint=fingerprint(one),
         target_fingerprint=fingerprint(two),
-        changes=compare(one, two, standing_height=(_height(source), _height(target))),
+        changes=changes,
         rollout=rollout,
         source_inconsistencies=inconsistencies(one),
         target_inconsistencies=(*inconsistencies(two), *lone_masses(one, two)),

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import msgspec
 import mujoco
 
-from shapechanger.morphology.effective.elements import names_of, words
+from shapechanger.morphology.effective.elements import (
+    ROUNDING,
+    margin,
+    names_of,
+    scales,
+    words,
+)
 from shapechanger.morphology.effective.model import EffectiveModel, effective_model
 
 if TYPE_CHECKING:
@@ -192,11 +198,6 @@ _JOINT_UNITS: Final = {
 }
 _ROUND: Final = frozenset(("capsule", "cylinder"))
 
-# Numbers that agree to this part of the largest of their field are equal: writing out a total mass,
-# or summing in another order, changes the last bits. Constants that MuJoCo derives lose more.
-_ROUNDING: Final = 1e-12
-_DERIVED_ROUNDING: Final = 1e-9
-
 
 def compare(
     source: mujoco.MjModel,
@@ -212,45 +213,73 @@ def compare(
         standing_height: Height at which the source and the target stand, m, if known.
 
     Returns:
-        The changes, empty for models that move equally: standing height, dimensions and total mass
-        first, then element by element.
+        The changes, empty for models that move equally, whatever their elements are called:
+        standing height, dimensions and total mass first, then element by element.
     """
     one, two = effective_model(source), effective_model(target)
     changes: list[Change] = []
     before, after = standing_height
-    if before is not None and after is not None and not _equal((before,), (after,)):
+    if before is not None and after is not None and not _equal((before,), (after,), 0.0):
         changes.append(change("standing height", "robot", (before,), (after,), "m"))
-    if one == two:
+    unnamed = (effective_model(model, anonymous=True) for model in (source, target))
+    if _alike(one, two) or _alike(*unnamed):
         return tuple(changes)
     changes += _totals(source, target)
     changes += _lengths(source, target, one, two)
+    return (*changes, *compare_effective(one, two, derived=not changes))
+
+
+def compare_effective(
+    one: EffectiveModel, two: EffectiveModel, *, derived: bool = True
+) -> tuple[Change, ...]:
+    """Return the differences between two effective models, element by element.
+
+    Args:
+        one: The source's.
+        two: The target's.
+        derived: Whether derived constants count if nothing else differs.
+    """
+    found: list[Change] = []
     for section, _ in one.sections:
         if section != "derived":
-            changes += _section(section, one[section], two[section])
-    if not changes:
+            found += _section(section, one, two)
+    if derived and not found:
         old, new = one["derived"], two["derived"]
-        changes = [
+        found = [
             change("derived constant", name, old[name]["values"], new[name]["values"])
             for name in old
-            if not _equal(old[name]["values"], new[name]["values"], _DERIVED_ROUNDING)
+            if not _equal(old[name]["values"], new[name]["values"], 0.0)
         ]
-    return tuple(changes)
+    return tuple(found)
 
 
-def _equal(
-    before: tuple[Value, ...] | None, after: tuple[Value, ...] | None, tolerance: float = _ROUNDING
-) -> bool:
-    """Return whether the values of a field agree up to rounding."""
+def differ_in_names(source: mujoco.MjModel, target: mujoco.MjModel) -> bool:
+    """Return whether two models that move equally call something that decides it differently."""
+    return not _alike(effective_model(source), effective_model(target))
+
+
+def _alike(one: EffectiveModel, two: EffectiveModel) -> bool:
+    """Return whether two effective models agree up to rounding."""
+    return not compare_effective(one, two)
+
+
+def _equal(before: tuple[Value, ...] | None, after: tuple[Value, ...] | None, scale: float) -> bool:
+    """Return whether the values of a field agree up to rounding.
+
+    Args:
+        before: Values before.
+        after: Values after.
+        scale: Largest number of this field in both models; 0 if it has no other elements.
+    """
     if before is None or after is None or len(before) != len(after):
         return before == after
-    numbers = [abs(v) for v in (*before, *after) if not isinstance(v, str) and math.isfinite(v)]
-    margin = tolerance * max(numbers, default=0.0)
+    limit = margin((*before, *after), scale)
     return all(
         old == new
         or (
             not isinstance(old, str)
             and not isinstance(new, str)
-            and (abs(old - new) <= margin or (math.isnan(old) and math.isnan(new)))
+            and (abs(old - new) <= limit or (math.isnan(old) and math.isnan(new)))
         )
         for old, new in zip(before, after, strict=True)
     )
@@ -266,30 +295,32 @@ def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
         math.fsum(model.body_mass[model.body_treeid >= 0].tolist()) for model in (source, target)
     )
     # The order of the bodies may change the last digit of the sum.
-    if not math.isclose(before, after, rel_tol=1e-12):
+    if not math.isclose(before, after, rel_tol=ROUNDING):
         found.append(change("total mass", "robot", (before,), (after,), "kg"))
     return found
 
 
-def _section(section: str, before: dict[str, _Fields], after: dict[str, _Fields]) -> list[Change]:
+def _section(section: str, one: EffectiveModel, two: EffectiveModel) -> list[Change]:
     """Return the differences within one section."""
     found: list[Change] = []
+    before, after = one[section], two[section]
+    scale = scales((*dict(one.sections)[section], *dict(two.sections)[section]))
     for element in dict.fromkeys((*before, *after)):
         old, new = before.get(element), after.get(element)
         if old is None or new is None:
             field = _DESCRIBED_BY.get(section, "type")
-            one, two = (
+            there, then = (
                 None if fields is None else fields.get(field, ("there",)) for fields in (old, new)
             )
             unit = _UNITS[field] if section == "bodies" else ""
-            found.append(change(_ONE_OF[section], element, one, two, unit))
+            found.append(change(_ONE_OF[section], element, there, then, unit))
             continue
         kinds = {*old.get("type", ()), *new.get("type", ())}
         has_length = section == "geoms" and len(kinds) == 1 and kinds <= _ROUND
         found += [
             _difference(section, element, field, old, new)
             for field in dict.fromkeys((*old, *new))
-            if not _equal(old.get(field), new.get(field))
+            if not _equal(old.get(field), new.get(field), scale[field])
             and not (has_length and field == "size")  # `_lengths` reports it.
         ]
     shared_before = [name for name in before if name in after]
@@ -356,7 +387,7 @@ def _lengths(
             continue
         for quantity in ("length", "radius"):
             old, new = getattr(before, quantity), getattr(after, quantity)
-            if old != new:
+            if not _equal((old,), (new,), 0.0):
                 found.append(change(quantity, before.label, (old,), (new,), "m"))
     return found
 

@@ -8,6 +8,7 @@ nothing but those.
 from __future__ import annotations
 
 import hashlib
+import math
 from typing import TYPE_CHECKING, Final, Literal
 
 import mujoco
@@ -216,10 +217,25 @@ def in_fluid(model: mujoco.MjModel) -> _Bools:
     return (model.geom_fluid[:, 0] > 0.0) & medium
 
 
+# Coordinates of a mesh are in single precision, and every machine rounds them in its own way. No
+# round number lies half-way between two multiples of this part of the largest.
+_GRAIN: Final = 1e-5 / 1.0471975511965976
+_ONE: Final = 1.0 - 1e-5  # A number just below a power of ten counts as that power.
+
+
 def digest(*arrays: NDArray[np.generic]) -> str:
-    """Return 16 hex digits that are equal for equal types, shapes and contents of arrays."""
+    """Return 16 hex digits that are equal for equal types, shapes and contents of arrays.
+
+    Numbers count up to a hundred-thousandth of the largest of their array.
+    """
     total = hashlib.sha256()
     for array in arrays:
+        if np.issubdtype(array.dtype, np.floating) and array.size:
+            largest = float(np.abs(array).max())
+            exponent = math.floor(math.log10(largest / _ONE)) if largest > 0.0 else 0
+            total.update(f"{exponent} ".encode())
+            grains = array.astype(np.float64) / (_GRAIN * 10.0**exponent)
+            array = np.rint(grains).astype(np.int64)
         little_endian = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
         total.update(f"{little_endian.dtype.str}{little_endian.shape}".encode())
         total.update(little_endian.tobytes())

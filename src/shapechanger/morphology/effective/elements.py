@@ -6,6 +6,7 @@ model equals a copy whose elements were named by that rule.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, SupportsInt
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapechanger.morphology.spec.elements import unique_namer
 
 _OBJ: Final = mujoco.mjtObj
+_Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,24 @@ def names_of(model: mujoco.MjModel) -> Names:
     _fill(tendons, lambda _: "tendon")
     _fill(equalities, lambda _: "equality")
     _fill(flexes, lambda _: "flex")
+    targets = _driven(model, bodies, joints, sites, tendons)
+    _fill(actuators, targets.__getitem__)
+    return Names(
+        *map(
+            tuple,
+            (bodies, joints, geoms, sites, tendons, equalities, flexes, actuators, targets),
+        )
+    )
+
+
+def _driven(
+    model: mujoco.MjModel,
+    bodies: Sequence[str],
+    joints: Sequence[str],
+    sites: Sequence[str],
+    tendons: Sequence[str],
+) -> list[str]:
+    """Return for each actuator the name of the element that it drives."""
     driven = {
         "joint": joints,
         "jointinparent": joints,
@@ -82,19 +102,43 @@ def names_of(model: mujoco.MjModel) -> Names:
         "site": sites,
         "body": bodies,
     }
-    targets = [
+    return [
         # `so3` drives a ball joint, or a site with its reference site.
         driven.get(transmission, joints if second < 0 else sites)[int(first)]
         for transmission, (first, second) in zip(
             words(mujoco.mjtTrn, model.actuator_trntype), model.actuator_trnid.tolist(), strict=True
         )
     ]
-    _fill(actuators, targets.__getitem__)
+
+
+def numbered(model: mujoco.MjModel, bodies: _Bools, geoms: _Bools, sites: _Bools) -> Names:
+    """Return numbers in place of names, in the order of the model.
+
+    Args:
+        model: The model.
+        bodies: Which bodies are numbered first, shape (nbody,), so that others between them change
+            no number.
+        geoms: The same of geoms, shape (ngeom,).
+        sites: The same of sites, shape (nsite,).
+    """
+
+    def numbers(kind: str, first: _Bools | int) -> tuple[str, ...]:
+        chosen = np.ones(first, np.bool_) if isinstance(first, int) else first
+        places = np.argsort(np.argsort(~chosen, kind="stable"))
+        return tuple(f"{kind} {place:06}" for place in places.tolist())
+
+    named_bodies, named_sites = numbers("body", bodies), numbers("site", sites)
+    joints, tendons = numbers("joint", model.njnt), numbers("tendon", model.ntendon)
     return Names(
-        *map(
-            tuple,
-            (bodies, joints, geoms, sites, tendons, equalities, flexes, actuators, targets),
-        )
+        bodies=named_bodies,
+        joints=joints,
+        geoms=numbers("geom", geoms),
+        sites=named_sites,
+        tendons=tendons,
+        equalities=numbers("equality", model.neq),
+        flexes=numbers("flex", model.nflex),
+        actuators=numbers("actuator", model.nactuator),
+        targets=tuple(_driven(model, named_bodies, joints, named_sites, tendons)),
     )
 
 
@@ -145,12 +189,19 @@ def word(member: Any) -> str:
     return member.name.partition("_")[2].lower()
 
 
+ROUNDING: Final = 1e-9
+"""Part of a field's largest number up to which two numbers are equal. Writing out a total mass,
+another order of a sum and another processor change the last bits, and constants that MuJoCo derives
+lose more."""
+NOISE: Final = 1e-14
+"""The same, as a part of the largest number of this field in the whole model: a zero that was
+computed, as by turning a frame, is not zero."""
+_DIGITS: Final = 10  # Of the largest number of a field: a half of `ROUNDING` at most.
+
 Value = float | str
 Fields = tuple[tuple[str, tuple[Value, ...]], ...]
 Element = tuple[str, Fields]
 Section = tuple[Element, ...]
-
-_Bools = NDArray[np.bool_]
 
 
 class Rows:
@@ -232,3 +283,46 @@ class Rows:
             if wanted
         ]
         return tuple(elements if in_order else sorted(elements))
+
+
+def scales(section: Section) -> dict[str, float]:
+    """Return the largest finite number of each field over the elements of a section."""
+    found: dict[str, float] = {}
+    for _, fields in section:
+        for field, values in fields:
+            found[field] = max(found.get(field, 0.0), _largest(values))
+    return found
+
+
+def margin(values: Iterable[Value], scale: float) -> float:
+    """Return by how much two numbers of a field may differ by rounding.
+
+    Args:
+        values: The numbers of the field, of both models.
+        scale: The largest number of this field in the models.
+    """
+    return max(ROUNDING * _largest(values), NOISE * scale)
+
+
+def rounded(values: Sequence[Value], scale: float) -> tuple[Value, ...]:
+    """Round the numbers of a field to as many digits as all machines agree on.
+
+    Args:
+        values: The numbers; words stay as they are.
+        scale: The largest number of this field in the model.
+    """
+    # Slightly more, so that a number just below a power of ten counts as that power.
+    largest = max(_largest(values), NOISE / 10.0 ** (1 - _DIGITS) * scale) * (1.0 + ROUNDING)
+    places = _DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
+    return tuple(
+        value if isinstance(value, str) or not math.isfinite(value) else round(value, places) + 0.0
+        for value in values
+    )
+
+
+def _largest(values: Iterable[Value]) -> float:
+    """Return the largest magnitude of the finite numbers; 0 without any."""
+    return max(
+        (abs(value) for value in values if not isinstance(value, str) and math.isfinite(value)),
+        default=0.0,
+    )

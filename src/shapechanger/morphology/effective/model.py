@@ -29,6 +29,9 @@ from shapechanger.morphology.effective.elements import (
     Value,
     is_any,
     names_of,
+    numbered,
+    rounded,
+    scales,
     word,
 )
 
@@ -140,21 +143,27 @@ class EffectiveModel(msgspec.Struct, frozen=True):
         return {element: dict(fields) for element, fields in dict(self.sections)[section]}
 
 
-def effective_model(model: mujoco.MjModel) -> EffectiveModel:
+def effective_model(model: mujoco.MjModel, *, anonymous: bool = False) -> EffectiveModel:
     """Extract everything that decides the motion of a compiled model.
 
     The sections are `options`, `sizes`, `bodies`, `joints`, `geoms`, `sites`, `contacts`,
     `actuators`, `tendons`, `equalities`, `flexes`, `plugins` and `derived`. The last holds what
     MuJoCo computes from the rest; it differs alone only where a compiled model was written to
     without `mujoco.mj_setConst`.
+
+    Args:
+        model: The compiled model.
+        anonymous: Whether elements are numbered in the order of the model in place of their names.
     """
-    names = names_of(model)
     geoms, sites = _relevant_geoms(model), _relevant_sites(model)
     carrying = np.zeros(model.nbody, np.bool_)
     carrying[model.geom_bodyid[geoms]] = True
     carrying[model.site_bodyid[sites]] = True
     carrying[_bound_bodies(model)] = True
     kept = bodies.bodies_that_matter(model, carrying)
+    # The world comes first, whatever else matters.
+    first = kept | (np.arange(model.nbody) == 0)
+    names = numbered(model, first, geoms, sites) if anonymous else names_of(model)
     return EffectiveModel(
         (
             ("options", _options(model)),
@@ -308,16 +317,28 @@ _HEX_DIGITS: Final = 16
 def fingerprint(model: mujoco.MjModel) -> str:
     """Return the first 16 hex digits of the SHA-256 of the effective model of a compiled model.
 
-    It is the same in every process and on every machine on which the model compiles to the same
-    numbers, and does not change with colours, cameras, lights, or anything else without effect.
+    It is the same in every process and on every machine, whose compilers and processors may round
+    differently: numbers count up to rounding. It does not change with colours, cameras, lights, or
+    anything else without effect.
+    """
+    return digest_of(effective_model(model).sections)
+
+
+def digest_of(sections: tuple[tuple[str, Section], ...]) -> str:
+    """Return the first 16 hex digits of the SHA-256 of sections, with their numbers rounded.
+
+    Args:
+        sections: As of an `EffectiveModel`.
     """
     total = hashlib.sha256()
-    for section, elements in effective_model(model).sections:
+    for section, elements in sections:
         total.update(_text(section) + _count(elements))
+        scale = scales(elements)
         for element, fields in elements:
             total.update(_text(element) + _count(fields))
             for field, values in fields:
-                total.update(_text(field) + _count(values) + b"".join(map(_value, values)))
+                total.update(_text(field) + _count(values))
+                total.update(b"".join(map(_value, rounded(values, scale[field]))))
     return total.hexdigest()[:_HEX_DIGITS]
 
 
