@@ -45,11 +45,14 @@ _RULES = {
     "layout": _Rule(_names("errors link"), _names("numpy msgspec")),
     "link": _Rule(_names("errors layout"), _names("numpy msgspec")),
     "files": _Rule(_names("errors"), _names("msgspec")),
+    # Versions of the user's own files and robots; models are looked into only where there are some.
+    "own_modules": _Rule(frozenset(), frozenset()),
+    "identity": _Rule(_names("own_modules morphology"), _names("gymnasium msgspec")),
     "tensor_file": _Rule(_names("errors"), _names("numpy msgspec safetensors")),
     # Selection of the OpenGL library.
     "rendering": _Rule(_names("errors")),
     # Models and edits: no environment, no reward, no robot.
-    "morphology": _Rule(_names("errors layout"), _names("numpy msgspec mujoco")),
+    "morphology": _Rule(_names("errors layout own_modules"), _names("numpy msgspec mujoco")),
     "bodies": _Rule(_names("errors layout morphology"), never=_HARDWARE | {"torch"}),
     # Courses, their scenes, and the expert that drives them with a vehicle.
     "worlds": _Rule(_names("errors rendering bodies"), never=_HARDWARE | {"torch", "gymnasium"}),
@@ -66,7 +69,7 @@ _RULES = {
     "envs.warp": _Rule(_names("errors layout morphology bodies tasks envs"), never=_HARDWARE),
     # Transfer does not distinguish simulators from robots. Cloning is one of its learners.
     "transfer": _Rule(
-        _names("errors files layout tasks demos shapechanger tensor_file"),
+        _names("errors files identity layout tasks demos shapechanger tensor_file"),
         never=_HARDWARE | _SIMULATORS,
     ),
     "reports": _Rule(
@@ -81,14 +84,15 @@ _RULES = {
     # Observations and actions, not sockets or pins.
     "teleop": _Rule(_names("errors layout demos"), never=_HARDWARE | _HEAVY | {"socket"}),
     "demos": _Rule(
-        _names("errors files layout tensor_file"), never=_HARDWARE | _SIMULATORS | {"socket"}
+        _names("errors files identity layout tensor_file"),
+        never=_HARDWARE | _SIMULATORS | {"socket"},
     ),
     # Files in a repository of the Hugging Face Hub; what they hold is others' business.
     "hub": _Rule(_names("errors"), _names("huggingface_hub")),
     # The command line composes everything, and nothing imports it.
     "cli": _Rule(
         _names("errors files layout link morphology bodies tasks envs transfer robot remote twin")
-        | _names("teleop demos reports testing shapechanger rendering worlds identify hub")
+        | _names("teleop demos reports testing shapechanger rendering worlds identify identity hub")
     ),
     "identify": _Rule(
         _names("errors layout morphology bodies tasks"),

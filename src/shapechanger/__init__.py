@@ -72,7 +72,8 @@ if TYPE_CHECKING:
     from shapechanger.remote.client import RobotClient
     from shapechanger.testing import examine
     from shapechanger.transfer import BodyMap, TransferTask
-    from shapechanger.transfer.learners.policy_file import load_policy, save_policy
+    from shapechanger.transfer.learners.policy_file import save_policy
+    from shapechanger.transfer.policies import load_policy
     from shapechanger.transfer.study import make_plan, run_study
     from shapechanger.transfer.transplant import transplant
 
@@ -144,7 +145,8 @@ _MODULES: Final = {
     "remote.client": ("RobotClient",),
     "testing": ("examine",),
     "transfer": ("BodyMap", "TransferTask"),
-    "transfer.learners.policy_file": ("load_policy", "save_policy"),
+    "transfer.learners.policy_file": ("save_policy",),
+    "transfer.policies": ("load_policy",),
     "transfer.study": ("make_plan", "run_study"),
     "transfer.transplant": ("transplant",),
 }

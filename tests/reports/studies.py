@@ -129,6 +129,7 @@ def make_study(
         seed=7,
         source_policy="ab" * 32 if given else "",
         versions={"shapechanger": "0.1.0", "numpy": "2.4.0"},
+        identity={},
     )
     return Study(
         plan=plan,

@@ -38,17 +38,19 @@ class Watching:
     """Longest episode to show."""
     learner: OwnLearner = ""
 
-    def show(self, ref: EnvRef, policy: Path | None) -> None:
+    def show(self, ref: EnvRef, policy: Path | None, *, trained_in: bool = False) -> None:
         """Show episodes in a window or write them as a film, and print the returns.
 
         Args:
             ref: The env.
             policy: File of the policy; None for random actions.
+            trained_in: Whether the env is meant to be that of the policy's training.
 
         Raises:
             StudyError: If there is nothing to play.
             OutputError: If the film cannot be written.
             MapError: If the policy's layouts do not fit the env.
+            ForeignStudy: If the env has changed since the policy's training.
         """
         from shapechanger.cli.policies import acting_in
         from shapechanger.transfer.learners.evaluation import random_actions
@@ -66,7 +68,7 @@ class Watching:
             if policy is None:
                 acting, act = env, random_actions(env.action_space, self.seed)
             else:
-                acting, act = acting_in(env, policy, self.learner)
+                acting, act = acting_in(env, policy, self.learner, ref if trained_in else None)
             for episode in range(self.episodes):
                 observation, _ = acting.reset(seed=self.seed + episode)
                 worth, steps, over, why = 0.0, 0, False, ""

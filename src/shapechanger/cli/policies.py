@@ -26,6 +26,7 @@ from shapechanger.cli.hub import PullPolicy, PushPolicy
 from shapechanger.cli.play import Watching
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError, no_policy_file
+from shapechanger.identity import identify_env, texts_in
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
@@ -35,13 +36,16 @@ from shapechanger.transfer.learners.settings import (
     PpoSettings,
     Sb3Settings,
 )
+from shapechanger.transfer.policies import load_policy
 from shapechanger.transfer.references import load_references
+from shapechanger.transfer.versions import ENV, known, require_same_env, single_body
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
     from shapechanger.transfer.learners.evaluation import Act
     from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
-    from shapechanger.transfer.onnx_policy import OnnxCard, OnnxPolicy
+    from shapechanger.transfer.onnx_policy import OnnxCard
+    from shapechanger.transfer.policies import AnyPolicy
 
 _FILE_WIDTH: Final = 160
 
@@ -56,40 +60,43 @@ class Show:
 
     def run(self) -> None:
         """Print the card."""
-        from shapechanger.demos.cloning.policy import CameraPolicy
-        from shapechanger.transfer.learners.cloning import is_clone
-        from shapechanger.transfer.learners.policy_file import load_policy
+        from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
-        allow_own_modules(self.learner)
-        if is_clone(self.file):
-            card = CameraPolicy.load(self.file).card
-            lines = _clone_lines(card)
-        else:
-            policy = load_policy(self.file, self.learner)
-            card = policy.card
-            lines = {
-                **_card_lines(card),
-                "version": card.version,
-                "command": card.command or "not in this file",
-                "normalised": "no" if policy.normalisation is None else "yes",
-                "observation": ", ".join(card.observation.names),
-                "action": ", ".join(card.action.names),
-            }
+        policy: Any = load_any_policy(self.file, self.learner)
+        card = policy.card
+        lines = _lines(card)
+        if hasattr(card, "observation"):
+            lines |= {"version": card.version}
+            if isinstance(policy, TrainedPolicy):
+                lines["command"] = card.command or "not in this file"
+                lines["normalised"] = "no" if policy.normalisation is None else "yes"
+            lines["observation"] = ", ".join(card.observation.names)
+            lines["action"] = ", ".join(card.action.names)
+        for part, identity in card.identity.items():
+            made_of = {"model": identity.model, **identity.files}
+            shown = ", ".join(f"{name} {digest}" for name, digest in made_of.items() if digest)
+            lines[f"{part} is of"] = shown
         for name, text in lines.items():
             say(f"{name:12} {text}")
-        if card.settings is not None:
-            for name, value in msgspec.structs.asdict(card.settings).items():
+        if (settings := getattr(card, "settings", None)) is not None:
+            for name, value in msgspec.structs.asdict(settings).items():
                 say(f"  {name:16} {value}")
 
 
-def _card_lines(card: PolicyCard) -> dict[str, str]:
+def _lines(card: Any) -> dict[str, str]:
+    """Return what a card says of a policy's origin, by name."""
+    return _card_lines(card) if hasattr(card, "observation") else _clone_lines(card)
+
+
+def _card_lines(card: PolicyCard | OnnxCard) -> dict[str, str]:
     """Return the origin of a policy, by name."""
+    explored: tuple[float, ...] | None = getattr(card, "start_log_std", None)
     return {
         "env": str(card.env),
         "learner": card.learner,
         "steps": f"{card.steps:,}",
         "seed": str(card.seed),
-        **({} if card.start_log_std is None else {"explored": _deviations(card.start_log_std)}),
+        **({} if explored is None else {"explored": _deviations(explored)}),
     }
 
 
@@ -126,10 +133,6 @@ class ListPolicies:
 
     def run(self) -> None:
         """Print a line for each policy; a file that is none gets its reason."""
-        from shapechanger.demos.cloning.policy import CameraPolicy
-        from shapechanger.transfer.learners.cloning import is_clone
-        from shapechanger.transfer.learners.policy_file import load_policy
-
         if self.references:
             self._print_references()
             return
@@ -138,10 +141,7 @@ class ListPolicies:
         for path in sorted(self.folder.rglob("*.safetensors")):
             name = str(path.relative_to(self.folder))
             try:
-                if is_clone(path):
-                    lines = _clone_lines(CameraPolicy.load(path).card)
-                else:
-                    lines = _card_lines(load_policy(path).card)
+                lines = _lines(load_any_policy(path).card)
             except ShapechangerError as error:
                 table.add_row(name, str(error))
                 continue
@@ -185,8 +185,11 @@ class EvaluatePolicy:
 
         if self.episodes < 1:
             raise StudyError("An evaluation takes at least one episode.")
-        with opened(_env_of(self.file, self.env, self.body, self.learner)) as env:
-            acting, act = acting_in(env, self.file, self.learner)
+        ref = _env_of(self.file, self.env, self.body, self.learner)
+        with opened(ref) as env:
+            acting, act = acting_in(
+                env, self.file, self.learner, None if self.env or self.body else ref
+            )
             if isinstance(env.unwrapped, HasHeldOutStarts):
                 env.unwrapped.hold_out()
             found = evaluate(act, [acting], EVALUATION_SEED, episodes=self.episodes)
@@ -209,33 +212,38 @@ class PlayPolicy(Watching):
 
     def run(self) -> None:
         """Play and print the returns."""
-        self.show(_env_of(self.file, self.env, self.body, self.learner), self.file)
+        ref = _env_of(self.file, self.env, self.body, self.learner)
+        self.show(ref, self.file, trained_in=not (self.env or self.body))
 
 
 def _env_of(file: Path, env: str, body: str, learner: str = "") -> EnvRef:
     """Return the env that is named, else the one in which a policy was trained."""
-    trained_in = _trained_in(file, learner)
+    if env:
+        return driven(env_ref(env, body))
     # A policy of many bodies is seen in the family's own.
-    if env or body or "bodies" in trained_in.kwargs:
-        return driven(env_ref(env or trained_in.id, body))
+    trained_in = single_body(_trained_in(file, learner))
+    # The env of a policy may be of the user's own, or have a task that is.
+    allow_own_modules(trained_in.id, *texts_in(trained_in.kwargs))
+    if body:
+        if "path" not in trained_in.kwargs:
+            return driven(env_ref(trained_in.id, body))
+        return driven(trained_in.having({"body": body}))
     return driven(trained_in)
 
 
 def _trained_in(file: Path, learner: str) -> EnvRef:
     """Return the env of a policy's card."""
-    from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.transfer.learners.cloning import is_clone
-
-    if file.suffix == ".onnx" or not is_clone(file):
-        return load_any_policy(file, learner).card.env
-    env = CameraPolicy.load(file).card.data.get("env")
+    card: Any = load_any_policy(file, learner).card
+    if hasattr(card, "env"):
+        return card.env
+    env = card.data.get("env")
     if env is None:
         raise StudyError(f"{file} learned from recordings of no env: name one with --env.")
     return env_ref(str(env))
 
 
 def acting_in(
-    env: gym.Env[Any, Any], file: Path, learner: str = ""
+    env: gym.Env[Any, Any], file: Path, learner: str = "", trained_in: EnvRef | None = None
 ) -> tuple[gym.Env[Any, Any], Act]:
     """Return an env as a policy senses it, and the policy.
 
@@ -243,27 +251,32 @@ def acting_in(
         env: The env.
         file: A policy, a clone, or a policy that was exported as ONNX.
         learner: An algorithm of the user's own that the file may name, as `module:name`.
+        trained_in: The env of the policy's training, if this is meant to be that env.
 
     Raises:
         CorruptStudy: If the file cannot be read.
+        ForeignStudy: If the env has changed since the training, and is meant to be the same.
         MapError: If there is no body map of same names between the layouts.
         PolicyError: If the clone's layouts are not those of the env.
     """
-    if file.suffix != ".onnx":  # ONNX needs no PyTorch.
-        from shapechanger.demos.cloning.policy import CameraPolicy
-        from shapechanger.transfer.learners.cloning import is_clone
-
-        if is_clone(file):
-            clone = CameraPolicy.load(file)
-            if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
-                clone.card.require_layouts(layout, clone.card.state_layout)
-            return env, clone.predict_many
     policy = load_any_policy(file, learner)
-    return _fitting(env, policy.card), policy.act
+    card: Any = policy.card
+    if trained_in is not None and ENV in card.identity:
+        remedy = (
+            "Train it again, or give the present one with --env, as another env that the policy "
+            "is tried in."
+        )
+        now = identify_env(env, trained_in.id).identity
+        require_same_env(card.identity, trained_in, now, file, remedy)
+    if hasattr(card, "observation"):
+        return _fitting(env, card), policy.act
+    if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
+        card.require_layouts(layout, card.state_layout)
+    return env, policy.act
 
 
-def load_any_policy(file: Path, learner: str = "") -> TrainedPolicy | OnnxPolicy:
-    """Load a policy, or one that was exported as ONNX, without PyTorch.
+def load_any_policy(file: Path, learner: str = "") -> AnyPolicy:
+    """Load a policy of any kind, which may name a learner of the user's own.
 
     Args:
         file: The file.
@@ -272,12 +285,6 @@ def load_any_policy(file: Path, learner: str = "") -> TrainedPolicy | OnnxPolicy
     Raises:
         CorruptStudy: If it cannot be read.
     """
-    if file.suffix == ".onnx":
-        from shapechanger.transfer.onnx_policy import OnnxPolicy
-
-        return OnnxPolicy(file)
-    from shapechanger.transfer.learners.policy_file import load_policy
-
     allow_own_modules(learner)
     return load_policy(file, learner)
 
@@ -319,16 +326,16 @@ class ExportPolicy:
         """Write the file."""
         from shapechanger.demos.cloning.onnx_policy import export_clone
         from shapechanger.demos.cloning.policy import CameraPolicy
-        from shapechanger.transfer.learners.cloning import is_clone
-        from shapechanger.transfer.learners.policy_file import load_policy
+        from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
-        allow_own_modules(self.learner)
-        if is_clone(self.file):
-            clone = CameraPolicy.load(self.file)
-            body, control_hz = _learned_with(clone.card)
-            export_clone(clone, self.out, body=body, control_hz=control_hz)
+        policy = load_any_policy(self.file, self.learner)
+        if isinstance(policy, CameraPolicy):
+            body, control_hz = _learned_with(policy.card)
+            export_clone(policy, self.out, body=body, control_hz=control_hz)
+        elif isinstance(policy, TrainedPolicy):
+            self._export(policy)
         else:
-            self._export(load_policy(self.file, self.learner))
+            raise StudyError(f"{self.file} has been exported already.")
         say(f"wrote {self.out}")
 
     def _export(self, policy: TrainedPolicy) -> None:
@@ -396,6 +403,7 @@ class Convert:
         env = env_ref(self.env, self.body)
         with opened(env) as made:
             observation, action = layouts_of(made)
+            identity = known({ENV: identify_env(made, env.id).identity})
         check_size("observation of the policy", model.observation_space, observation)
         check_size("action of the policy", model.action_space, action)
         card = PolicyCard(
@@ -407,6 +415,7 @@ class Convert:
             int(model.num_timesteps),
             int(model.seed or 0),
             shapechanger.__version__,
+            identity,
             command_line(),
         )
         save_policy(TrainedPolicy(model, None, card), self.out)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.errors import LayoutError, ShapechangerError, StudyError, UnknownName
+from shapechanger.identity import IdentifiedEnv, identify_env
 from shapechanger.layout import Layout
 from shapechanger.tasks.measure import RETURN, Measure
 
@@ -293,6 +294,7 @@ class EnvTraits:
         adapts_source: Whether it can adapt its source.
         family: Name of the continuous family that its body belongs to; may be empty.
         measures: What a policy is measured by, the default first.
+        identified: The version of its robot and of the user's own files.
     """
 
     observation_layout: Layout
@@ -305,6 +307,7 @@ class EnvTraits:
     adapts_source: bool
     family: str
     measures: tuple[Measure, ...]
+    identified: IdentifiedEnv
 
     def same_layouts(self, other: EnvTraits) -> bool:
         """Return whether observations and actions mean the same in another env."""
@@ -314,8 +317,12 @@ class EnvTraits:
         )
 
 
-def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
+def env_traits(env: gym.Env[Any, Any], env_id: str = "") -> EnvTraits:
     """Read the traits of an env.
+
+    Args:
+        env: The env.
+        env_id: Its id, which may name a module.
 
     Raises:
         LayoutError: If it publishes no layouts.
@@ -333,6 +340,7 @@ def env_traits(env: gym.Env[Any, Any]) -> EnvTraits:
         adapts_source=isinstance(inner, SourceAdaptation),
         family=inner.family_name if isinstance(inner, HasBodyFamily) else "",
         measures=measures_of(env),
+        identified=identify_env(env, env_id),
     )
 
 

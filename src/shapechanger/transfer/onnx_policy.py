@@ -23,6 +23,7 @@ from shapechanger.errors import (
     no_policy_file,
 )
 from shapechanger.files import write_atomic
+from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import EnvRef
 
@@ -46,6 +47,7 @@ class OnnxCard(msgspec.Struct, frozen=True):
         steps: Env steps of training.
         seed: Seed of the training.
         version: Version of Shapechanger.
+        identity: Version of the env and of the learner.
     """
 
     env: EnvRef
@@ -55,6 +57,7 @@ class OnnxCard(msgspec.Struct, frozen=True):
     steps: int
     seed: int
     version: str
+    identity: dict[str, Identity]
 
 
 class OnnxGraph:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Set
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,6 +11,7 @@ import msgspec
 import numpy as np
 
 from shapechanger.errors import StudyError, check_seed
+from shapechanger.identity import Identity
 from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef
@@ -68,6 +70,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
             seed; empty if there is only one target.
         versions: Version of each package that the numbers depend on; a study cannot be resumed
             with others.
+        identity: Version of source, target, learner and methods, see
+            `shapechanger.transfer.versions`; a study cannot be resumed with others.
 
     Raises:
         StudyError: If there are fewer than two seeds, or nothing to compare, or the seed is not a
@@ -92,6 +96,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     exclusive: bool = False
     individual: str = ""
     versions: dict[str, str]
+    identity: dict[str, Identity]
 
     def __post_init__(self) -> None:
         check_seed(self.seed, StudyError)
@@ -159,9 +164,19 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
         The runs of the other study then count here, because no run depends on another arm.
         """
-        grown = msgspec.structs.replace(other, seeds=self.seeds, arms=self.arms)
+        grown = msgspec.structs.replace(
+            other,
+            seeds=self.seeds,
+            arms=self.arms,
+            identity=other.identity | self._identities_of({*self.arms} - {*other.arms}),
+        )
         more = self.seeds >= other.seeds and set(self.arms) >= set(other.arms)
         return more and grown == self != other
+
+    def _identities_of(self, arms: Set[str]) -> dict[str, Identity]:
+        """Return the identities of some methods."""
+        parts = {f"method {arm}" for arm in arms}
+        return {part: each for part, each in self.identity.items() if part in parts}
 
     def difference(self, other: Plan) -> str:
         """Names of the fields in which two plans differ; empty if they are equal."""

@@ -12,8 +12,9 @@ from typing import Final
 
 import msgspec
 
-from shapechanger.errors import CorruptStudy, StudyError
+from shapechanger.errors import CorruptStudy, ForeignStudy, StudyError
 from shapechanger.files import append_line, make_folder, read_json, write_json
+from shapechanger.identity import Identity
 from shapechanger.transfer.executor import ReportSteps
 from shapechanger.transfer.learners import Learner
 from shapechanger.transfer.learners.cloning import CloneLearner
@@ -28,6 +29,7 @@ from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import RslSettings, Sb3Settings, Settings
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
+from shapechanger.transfer.versions import differences, parts_of, require_planned
 
 _RESULT: Final = "run.json"
 _CURVE: Final = "curve.jsonl"
@@ -42,6 +44,7 @@ class RunResult(msgspec.Struct, frozen=True):
         curve: Its evaluations, by steps.
         wall_s: Duration, s; the only number here that another machine would not reproduce.
         device: Where it learned: "CPU", or the name of a GPU; empty if it did not learn.
+        identity: Version of all that it depends on, as of its plan.
     """
 
     run: Run
@@ -49,6 +52,7 @@ class RunResult(msgspec.Struct, frozen=True):
     curve: tuple[Evaluation, ...]
     wall_s: float
     device: str = ""
+    identity: dict[str, Identity] = {}
 
 
 def learner_of(name: str, settings: Settings) -> Learner:
@@ -91,6 +95,7 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
 
     Raises:
         CorruptStudy: If its file cannot be read or belongs to another run.
+        ForeignStudy: If it was made with other versions than the plan's.
     """
     path = run.folder(study) / _RESULT
     if not path.exists() or (plan.trains(run.kind) and not run.policy_file(study).exists()):
@@ -101,6 +106,11 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
     complete = bool(steps) and steps[0] == 0 and steps[-1] == plan.last_step_of(run.kind)
     if result.run != run or result.seed != plan.seed_of(run) or not complete:
         raise CorruptStudy(f"{path} does not hold the result of {run.name}: {remedy}.")
+    if words := differences(plan, result.identity, parts_of(plan, run)):
+        raise ForeignStudy(
+            f"{path} is the result of another version than the one planned. {words}. Give another "
+            f"--out, or {remedy}."
+        )
     return result
 
 
@@ -135,8 +145,11 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
     Raises:
         OutputError: If its files cannot be written.
         StudyError: If the training diverges.
+        ForeignStudy: If the robot, the task, the method or the learner is not the planned one, or
+            has become another one during the run.
     """
     use_one_thread()
+    require_planned(plan, run)
     folder = run.folder(Path(study))
     make_folder(folder)
     for stale in (_CURVE, _RESULT):
@@ -173,7 +186,9 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
             context.save(policy)
     device = "" if policy is None else device_of(plan.settings)
     wall_s = time.monotonic() - began
-    result = RunResult(run, plan.seed_of(run), tuple(curve), wall_s, device)
+    require_planned(plan, run)
+    parts = parts_of(plan, run)
+    result = RunResult(run, plan.seed_of(run), tuple(curve), wall_s, device, parts)
     write_json(folder / _RESULT, result)
 
 

@@ -11,6 +11,7 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
 
+import gymnasium as gym
 import msgspec
 import numpy as np
 
@@ -39,6 +40,16 @@ from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, su
 from shapechanger.transfer.plan import ARMS, NO_SKILL, SOURCE, Plan, Run, TransferTask
 from shapechanger.transfer.references import reference_of
 from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
+from shapechanger.transfer.versions import (
+    Identities,
+    changes_between,
+    identities_of_code,
+    keep_models,
+    known,
+    require_same_env,
+    require_versions,
+    steady,
+)
 
 PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
@@ -132,11 +143,17 @@ def inspect_task(task: TransferTask) -> TaskTraits:
         StudyError: If an env does not take its arguments.
     """
     with closing(task.source.make()) as source, closing(task.target.make()) as target:
-        traits = env_traits(source), env_traits(target)
+        traits = _traits(task.source, source), _traits(task.target, target)
         try:
             return TaskTraits(*traits, certify_shift(source, target))
         except ShapechangerError as error:
             return TaskTraits(*traits, error)
+
+
+def _traits(ref: EnvRef, made: gym.Env[Any, Any]) -> EnvTraits:
+    """Return the traits of an env, with an identity that can be compared."""
+    traits = env_traits(made, ref.id)
+    return replace(traits, identified=steady(ref, traits.identified))
 
 
 def default_arms(traits: TaskTraits) -> tuple[str, ...]:
@@ -215,6 +232,13 @@ def make_plan(
                 f"The given policy was trained in {origin.env}, and the source is {task.source}: "
                 "name the env and the body that it was trained in."
             )
+        require_same_env(
+            origin.identity,
+            task.source,
+            traits.source.identified.identity,
+            source_policy,
+            "Train it again, or leave out the given policy to train one for each seed.",
+        )
         if own_steps:
             methods = [load_method(arm) for arm in arms]
             if all(one.uses_source_policy or not one.uses_source for one in methods):
@@ -257,7 +281,15 @@ def make_plan(
             "python": platform.python_version(),
             **{name: version_of(name) for name in packages},
         },
+        identity=_identities(traits, settings, arms),
     )
+
+
+def _identities(traits: TaskTraits, settings: Settings, arms: Sequence[str]) -> Identities:
+    """Return the versions of the two envs, the learner and the methods."""
+    envs = {"source": traits.source.identified, "target": traits.target.identified}
+    found = known({part: each.identity for part, each in envs.items()})
+    return found | identities_of_code(settings, arms)
 
 
 def _measure(env: EnvRef, target: EnvTraits, name: str) -> Measure:
@@ -320,8 +352,13 @@ def run_study(
     """
     if (_digest(source_policy) if source_policy else "") != plan.source_policy:
         raise StudyError("The source policy is not the one that this study was planned with.")
-    shift = (inspect_task(plan.task) if traits is None else traits).shift
+    traits = inspect_task(plan.task) if traits is None else traits
+    shift = traits.shift
+    remedy = "Restore it, or start again with another --out; nothing was changed."
+    present = _identities(traits, plan.settings, plan.arms)
+    require_versions(plan, plan.identity, present, remedy)
     claim_folder(plan, out)
+    keep_models(out, traits.source.identified, traits.target.identified)
     jobs = [
         Job(run.name, perform_run, (plan, run, str(out), source_policy), after=_after(plan, run))
         for run in unfinished_runs(plan, out)
@@ -420,6 +457,12 @@ def claim_folder(plan: Plan, out: Path) -> None:
         found = _plan_in(out)
         if plan.extends(found):
             write_json(path, plan)
+        elif words := changes_between(found, plan, out):
+            raise ForeignStudy(
+                f"{out} holds runs with other versions of what this study names. {words}. Runs of "
+                "both would be averaged: give another --out, or delete that folder to start again; "
+                "nothing was changed."
+            )
         elif found != plan:
             raise ForeignStudy(
                 f"{out} holds another study, which differs in {plan.difference(found)}: give "

@@ -22,6 +22,7 @@ from shapechanger.transfer.metrics import Estimate, LearningCurves, steps_to_rea
 from shapechanger.transfer.plan import SOURCE, Plan
 from shapechanger.transfer.runs import load_result
 from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder
+from shapechanger.transfer.versions import changes_between
 
 _OF_TARGET: Final = ("random", "zero-action", "scratch")
 _GAINS: Final = ("jumpstart", "total_reward_gain", "asymptotic_gain")
@@ -74,7 +75,8 @@ def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
         The folder of the study.
 
     Raises:
-        ForeignStudy: If its folder holds another study.
+        ForeignStudy: If its folder holds another study, or a study there was run with another
+            version of what both name.
         CorruptStudy: If a file in one cannot be read.
         OutputError: If `out` cannot be written.
     """
@@ -105,8 +107,14 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
     plans = [read_json(one / PLAN_FILE, Plan, f"leave out {one}") for one in folders]
     arms = tuple(dict.fromkeys(arm for plan in plans for arm in plan.arms))
     seeds = max(plan.seeds for plan in plans)
-    whole = msgspec.structs.replace(plans[0], arms=arms, seeds=seeds)
+    identity = {part: each for plan in reversed(plans) for part, each in plan.identity.items()}
+    whole = msgspec.structs.replace(plans[0], arms=arms, seeds=seeds, identity=identity)
     for plan, folder in zip(plans, folders, strict=True):
+        if words := changes_between(whole, plan, folders[0], folder):
+            raise ForeignStudy(
+                f"{folders[0]} and {folder} hold runs with other versions of what they name. "
+                f"{words}. Merge only folders of one version; nothing was changed."
+            )
         if whole != plan and not whole.extends(plan):
             raise ForeignStudy(
                 f"{folders[0]} and {folder} hold different studies, which differ in "
@@ -134,8 +142,18 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
     """Copy the runs of another study that are the same here."""
     remedy = f"delete {sibling} to repeat that study"
     other = read_json(sibling / PLAN_FILE, Plan, remedy)
+    if words := changes_between(other, plan, sibling, folder):
+        raise ForeignStudy(
+            f"{sibling} was run with another version of what this study names. {words}. A suite "
+            f"has one version of each: give another --out, or delete {sibling} to repeat it."
+        )
     same = msgspec.structs.replace(
-        other, task=plan.task, body_map=plan.body_map, seeds=plan.seeds, arms=plan.arms
+        other,
+        task=plan.task,
+        body_map=plan.body_map,
+        seeds=plan.seeds,
+        arms=plan.arms,
+        identity=plan.identity,
     )
     if same != plan:
         return

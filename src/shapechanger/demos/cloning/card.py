@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, cast
 
 import msgspec
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError
 from shapechanger.demos.cloning.settings import CloneSettings
+from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 
 Head = Literal["regression", "class"]
@@ -46,6 +48,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         unseen: Names of state values that the policy ignores.
         low: Action for an output of -1; () for -1 each.
         high: Action for an output of 1; () for 1 each.
+        identity: Version of the env whose demonstrator was cloned; {} for recordings.
     """
 
     framing: Framing
@@ -68,6 +71,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
     unseen: tuple[str, ...] = ()
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
+    identity: dict[str, Identity] = {}
 
     def __post_init__(self) -> None:
         """Validate the architecture.
@@ -134,6 +138,19 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
             return outputs
         low, high = np.asarray(self.low, np.float32), np.asarray(self.high, np.float32)
         return (low + 0.5 * (outputs + 1.0) * (high - low)).astype(np.float32)
+
+    def inputs_of(self, observations: Any) -> tuple[NDArray[Any] | None, NDArray[Any] | None]:
+        """Return pictures and states of observations of an env.
+
+        Args:
+            observations: Pictures, shape (n, H, W, 3); states, shape (n, k), for a policy without
+                pictures; a mapping with `image` and `state` for one with both.
+        """
+        if isinstance(observations, Mapping):
+            named = cast("Mapping[str, NDArray[Any]]", observations)
+            return named.get("image"), named.get("state")
+        values: NDArray[Any] = np.asarray(observations)
+        return (None, values) if self.eyes == "none" else (values, None)
 
     def require_picture(self, picture: object) -> None:
         """Refuse a missing picture.

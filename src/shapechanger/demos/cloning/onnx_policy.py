@@ -148,6 +148,11 @@ def export_clone(
     write_atomic(path, model.SerializeToString())
 
 
+def is_onnx_clone(path: Path) -> bool:
+    """Return whether a file has the card of a cloned policy, rather than another or none."""
+    return path.is_file() and _CARD.encode() in path.read_bytes()
+
+
 class OnnxClone:
     """A cloned policy from a file of `export_clone`.
 
@@ -222,6 +227,22 @@ class OnnxClone:
         if known is not None:
             given[_STATE] = known
         return self.card.actions(self._session.run([_OUTPUT], given)[0])[0]
+
+    def act(self, observations: Any) -> NDArray[np.float32]:
+        """Return an action for each observation, as `CameraPolicy.act` does."""
+        pictures, states = self.card.inputs_of(observations)
+        n = len(states if pictures is None else pictures)  # pyright: ignore[reportArgumentType]
+        each = [None] * n
+        return np.stack(
+            [
+                self.predict(picture, state)
+                for picture, state in zip(
+                    each if pictures is None else pictures,
+                    each if states is None else states,
+                    strict=True,
+                )
+            ]
+        )
 
     def _require_shapes(self, card: CloneCard) -> None:
         """Require that inputs and output have the shapes that the card gives."""

@@ -19,6 +19,7 @@ from shapechanger.demos.cloning.pictures import CloningError, PolicyError, prepa
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra, no_policy_file
 from shapechanger.files import cannot_write, write_atomic
+from shapechanger.identity import Identity
 from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 
 try:
@@ -115,6 +116,17 @@ class CameraPolicy:
         """
         return self.card.actions(self.outputs(pictures, states))
 
+    def act(self, observations: Any) -> NDArray[np.float32]:
+        """Return an action for each observation of an env, shape (n, m).
+
+        Args:
+            observations: As of `CloneCard.inputs_of`.
+
+        Raises:
+            CloningError: If an input is missing or has another shape.
+        """
+        return self.predict_many(*self.card.inputs_of(observations))
+
     def outputs(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> NDArray[np.float32]:
@@ -165,15 +177,21 @@ class CameraPolicy:
         known = self.card.known_states(states)
         return None if known is None else torch.as_tensor(known)
 
-    def described(self, *, command: str = "", **data: Any) -> CameraPolicy:
+    def described(
+        self, *, command: str = "", identity: Mapping[str, Identity] | None = None, **data: Any
+    ) -> CameraPolicy:
         """Return the same policy with more information on its card.
 
         Args:
             command: Command that trained it; "" keeps the present one.
+            identity: Version of its env; None keeps the present one.
             **data: Origin of the demonstrations; values that JSON can hold.
         """
         card = msgspec.structs.replace(
-            self.card, command=command or self.card.command, data={**self.card.data, **data}
+            self.card,
+            command=command or self.card.command,
+            data={**self.card.data, **data},
+            identity=self.card.identity if identity is None else dict(identity),
         )
         return CameraPolicy(self.network, card)
 

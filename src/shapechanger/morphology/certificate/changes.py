@@ -36,6 +36,14 @@ _ONE_OF: Final = {
     "equalities": "equality constraint",
     "flexes": "flex",
     "plugins": "plugin",
+    # Of what decides no motion.
+    "places": "geom",
+    "marks": "site",
+    "sensors": "sensor",
+    "keyframes": "keyframe",
+    "custom": "custom number",
+    "cameras": "camera",
+    "drawing": "drawing",
 }
 # Quantities whose ratios mean nothing.
 _WITHOUT_RATIO: Final = frozenset(("orientation", "inertia axes", "axis", "dimensions"))
@@ -226,11 +234,11 @@ def compare(
         return tuple(changes)
     changes += _totals(source, target)
     changes += _lengths(source, target, one, two)
-    return (*changes, *compare_effective(one, two, derived=not changes))
+    return (*changes, *compare_effective(one, two, derived=not changes, sizes=False))
 
 
 def compare_effective(
-    one: EffectiveModel, two: EffectiveModel, *, derived: bool = True
+    one: EffectiveModel, two: EffectiveModel, *, derived: bool = True, sizes: bool = True
 ) -> tuple[Change, ...]:
     """Return the differences between two effective models, element by element.
 
@@ -238,11 +246,13 @@ def compare_effective(
         one: The source's.
         two: The target's.
         derived: Whether derived constants count if nothing else differs.
+        sizes: Whether the sizes of capsules and cylinders count, which `compare` reports as lengths
+            and radii.
     """
     found: list[Change] = []
     for section, _ in one.sections:
         if section != "derived":
-            found += _section(section, one, two)
+            found += _section(section, one, two, sizes)
     if derived and not found:
         old, new = one["derived"], two["derived"]
         found = [
@@ -300,7 +310,7 @@ def _totals(source: mujoco.MjModel, target: mujoco.MjModel) -> list[Change]:
     return found
 
 
-def _section(section: str, one: EffectiveModel, two: EffectiveModel) -> list[Change]:
+def _section(section: str, one: EffectiveModel, two: EffectiveModel, sizes: bool) -> list[Change]:
     """Return the differences within one section."""
     found: list[Change] = []
     before, after = one[section], two[section]
@@ -316,7 +326,7 @@ def _section(section: str, one: EffectiveModel, two: EffectiveModel) -> list[Cha
             found.append(change(_ONE_OF[section], element, there, then, unit))
             continue
         kinds = {*old.get("type", ()), *new.get("type", ())}
-        has_length = section == "geoms" and len(kinds) == 1 and kinds <= _ROUND
+        has_length = not sizes and section == "geoms" and len(kinds) == 1 and kinds <= _ROUND
         found += [
             _difference(section, element, field, old, new)
             for field in dict.fromkeys((*old, *new))

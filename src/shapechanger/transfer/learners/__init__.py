@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from shapechanger.identity import Identity
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits
 
 if TYPE_CHECKING:
@@ -38,10 +39,12 @@ class PolicyOrigin(NamedTuple):
     Attributes:
         env: The env that it was trained in.
         steps: Training steps; demonstrated steps for a clone.
+        identity: Version of the env and of the learner, as in the policy's card.
     """
 
     env: EnvRef
     steps: int
+    identity: dict[str, Identity]
 
 
 class Learner(Protocol):

@@ -30,6 +30,7 @@ from shapechanger.transfer.learners.evaluation import (
 )
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.learners.settings import CloningSettings
+from shapechanger.transfer.versions import ENV, identify, known
 
 
 class Demonstrations(NamedTuple):
@@ -219,9 +220,7 @@ class CloneLearner:
             )
             on_evaluation(msgspec.structs.replace(self.evaluate(env, policy), steps=budget))
             on_steps(budget)
-        return state_actions(policy, env).described(
-            env=env.id, arguments=env.kwargs, demonstrated_steps=steps, seed=seed
-        )
+        return stated(policy, env, demonstrated_steps=steps, seed=seed)
 
     def evaluate(
         self, env: EnvRef, policy: CameraPolicy, body_map: BodyMap | None = None
@@ -271,7 +270,21 @@ class CloneLearner:
                 f"The card of {path} lacks the demonstrations that it was cloned from ({error}): "
                 "give a clone that `shapechanger train` or a study has written."
             ) from error
-        return PolicyOrigin(EnvRef(data.env, data.arguments), data.demonstrated_steps)
+        env = EnvRef(data.env, data.arguments)
+        return PolicyOrigin(env, data.demonstrated_steps, card.identity)
+
+
+def stated(policy: CameraPolicy, env: EnvRef, **data: Any) -> CameraPolicy:
+    """State in a clone's card its env, and what its actions mean.
+
+    Args:
+        policy: A clone of the env's demonstrator.
+        env: The env.
+        **data: Origin of the demonstrations besides the env.
+    """
+    identity = known({ENV: identify(env).identity})
+    policy = state_actions(policy, env)
+    return policy.described(identity=identity, env=env.id, arguments=env.kwargs, **data)
 
 
 def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:

@@ -11,6 +11,7 @@ import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import CorruptStudy, MissingExtra, no_policy_file
 from shapechanger.files import write_atomic
+from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 from shapechanger.transfer.env_ref import EnvRef
@@ -63,6 +65,7 @@ class PolicyCard(msgspec.Struct, frozen=True):
         steps: Env steps of training.
         seed: Seed of the training.
         version: Version of Shapechanger.
+        identity: Version of the env and of the learner, see `shapechanger.transfer.versions`.
         command: The command that wrote it; empty in a study, where `study.json` holds it.
         start_log_std: Logarithm of the standard deviation of each action where its training started
             from another policy; None if it did not, or if the deviation is no parameter.
@@ -76,6 +79,7 @@ class PolicyCard(msgspec.Struct, frozen=True):
     steps: int
     seed: int
     version: str
+    identity: dict[str, Identity]
     command: str = ""
     start_log_std: tuple[float, ...] | None = None
 
@@ -113,9 +117,21 @@ class TrainedPolicy:
         """The policy's mean actions for observations of shape (n, ...)."""
         return actor(self.model, self.normalisation)
 
-    def described(self, *, command: str) -> TrainedPolicy:
-        """Return the policy with the command that made it."""
-        return replace(self, card=msgspec.structs.replace(self.card, command=command))
+    def described(
+        self, *, command: str = "", identity: Mapping[str, Identity] | None = None
+    ) -> TrainedPolicy:
+        """Return the same policy with more information on its card.
+
+        Args:
+            command: The command that made it; "" keeps the present one.
+            identity: Version of what it was made of; None keeps the present one.
+        """
+        card = msgspec.structs.replace(
+            self.card,
+            command=command or self.card.command,
+            identity=self.card.identity if identity is None else dict(identity),
+        )
+        return replace(self, card=card)
 
 
 def actor(
@@ -172,7 +188,7 @@ def _normalised(observations: NDArray[Any], statistics: RunningMeanStd) -> NDArr
     return np.clip(scaled, -CLIP, CLIP).astype(np.float32)
 
 
-def save_policy(policy: TrainedPolicy, path: Path) -> None:
+def save_policy(policy: TrainedPolicy, path: str | PathLike[str]) -> None:
     """Write a policy to one file of safetensors.
 
     Args:
@@ -194,11 +210,11 @@ def save_policy(policy: TrainedPolicy, path: Path) -> None:
             statistics = getattr(policy.normalisation, side)
             for name in ("mean", "var", "count"):
                 tensors[f"{_STATISTICS}{side}.{name}"] = np.asarray(getattr(statistics, name))
-    write_atomic(path, tensor_bytes(tensors, msgspec.json.encode(policy.card)))
+    write_atomic(Path(path), tensor_bytes(tensors, msgspec.json.encode(policy.card)))
 
 
-def load_policy(path: Path, algorithm: str = "") -> TrainedPolicy:
-    """Read what `save_policy` wrote.
+def load_policy(path: str | PathLike[str], algorithm: str = "") -> TrainedPolicy:
+    """Read what `save_policy` wrote; `shapechanger.load_policy` reads every kind of policy.
 
     Args:
         path: The file.
@@ -209,6 +225,7 @@ def load_policy(path: Path, algorithm: str = "") -> TrainedPolicy:
     Raises:
         CorruptStudy: If the file is missing, is not such a policy, or has been changed.
     """
+    path = Path(path)
     try:
         content, tensors = read_tensors(path)
         card = msgspec.json.decode(content, type=PolicyCard)

@@ -37,6 +37,7 @@ from shapechanger.transfer.limbs.device import DeviceRows
 from shapechanger.transfer.limbs.envs import bodies_in_turn, together
 from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns
+from shapechanger.transfer.versions import identities_in
 
 try:
     import torch
@@ -196,6 +197,7 @@ class RslLearner(Sb3Learner):
         eval_envs = evaluation_envs(env, settings)
         try:
             one: Any = eval_envs[0]
+            identity = identities_in(env, one, settings)
             spaces = SpacesOnly(one.observation_space, one.action_space)
             envs: Any = _sb3._with_statistics(DummyVecEnv([lambda: spaces]), settings)
             single = settings.for_one_env()
@@ -232,6 +234,7 @@ class RslLearner(Sb3Learner):
                 done,
                 seed,
                 shapechanger.__version__,
+                identity,
                 start_log_std=explores,
             )
             return TrainedPolicy(model, _sb3._statistics(envs), card)

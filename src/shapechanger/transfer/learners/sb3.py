@@ -48,6 +48,7 @@ from shapechanger.transfer.learners.vec_env import training_vec_env
 from shapechanger.transfer.limbs.envs import LimbVecEnv, rows_of_each
 from shapechanger.transfer.limbs.rows import require_same_columns
 from shapechanger.transfer.transplant import transplant
+from shapechanger.transfer.versions import identities_in
 
 try:
     import torch
@@ -135,6 +136,7 @@ class Sb3Learner:
         require_budget(steps, settings)
         # These import the module of the id, if it names one.
         eval_envs = evaluation_envs(env, settings)
+        identity = identities_in(env, eval_envs[0], settings)
         if single := is_single_instance(eval_envs[0]):
             # It is trained in the env that it is evaluated in.
             settings = settings.for_one_env()
@@ -171,6 +173,7 @@ class Sb3Learner:
                 int(cast("Any", model).num_timesteps),
                 seed,
                 shapechanger.__version__,
+                identity,
                 start_log_std=explores,
             )
             return TrainedPolicy(model, _statistics(envs), card)
@@ -219,7 +222,7 @@ class Sb3Learner:
                 f"{path} was trained with {card.settings.algorithm}, and {self._name} is "
                 f"{self._settings.algorithm}: give --learner {card.learner}."
             )
-        return PolicyOrigin(card.env, card.steps)
+        return PolicyOrigin(card.env, card.steps, card.identity)
 
 
 def _training_envs(env: EnvRef, settings: Sb3Settings, threads: int | None) -> VecEnv:

@@ -24,7 +24,9 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError
 from shapechanger.transfer.env_ref import CanBeTaught, EnvRef, TaskDemonstrator
+from shapechanger.transfer.learners.cloning import stated
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
+from shapechanger.transfer.versions import ENV, identify, require_same_env
 
 STUDENT_STEPS: Final = 7200
 """Default steps of a student: six minutes, a third of which the teacher drives."""
@@ -84,15 +86,17 @@ def train_student(
                 f"A teacher for {env.id} is a policy of {wanted}, and this one is of {taught}: "
                 f"train one by `shapechanger train {name}`."
             )
+        if ENV in teacher.card.identity:
+            now = identify(teacher.card.env).identity
+            remedy = "Train the teacher again."
+            require_same_env(teacher.card.identity, teacher.card.env, now, "the teacher", remedy)
         lessons = _Lessons(made, inner.taught_by(teacher.act, seed), settings, seed, on_steps)
         each = steps // (1 + _ROUNDS)
         lessons.drive(steps - _ROUNDS * each)
         for _ in range(_ROUNDS):
             lessons.drive(each, lessons.learned(most_steps=_BETWEEN))
         policy = lessons.learned()
-    return policy.described(
-        env=env.id, arguments=env.kwargs, demonstrated_steps=steps, teacher=taught
-    )
+    return stated(policy, env, demonstrated_steps=steps, teacher=taught)
 
 
 class _Lessons:

@@ -16,6 +16,7 @@ from shapechanger.transfer.limbs.envs import fitted
 from shapechanger.transfer.limbs.policy import LimbNetwork
 from shapechanger.transfer.limbs.rows import DESCRIBED
 from shapechanger.transfer.onnx_policy import OnnxCard, OnnxGraph
+from shapechanger.transfer.versions import identities_in
 
 
 def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, path: Path) -> None:
@@ -53,8 +54,12 @@ def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, pat
     graph.apply("Add", last, rows.low.astype(np.float32), to="action")
     observation, action = layouts_of(env)
     card = msgspec.convert(policy.card, OnnxCard, from_attributes=True)
+    identity = identities_in(ref, env, settings)
     graph.write(
-        path, msgspec.structs.replace(card, env=ref, observation=observation, action=action)
+        path,
+        msgspec.structs.replace(
+            card, env=ref, observation=observation, action=action, identity=identity
+        ),
     )
 
 

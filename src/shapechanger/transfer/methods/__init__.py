@@ -163,6 +163,10 @@ class MethodRun:
         Args:
             policy: The policy.
         """
+        part = f"method {self._run.kind}"
+        if part in self._plan.identity:  # The method is the user's own.
+            own = {part: self._plan.identity[part]}
+            policy = policy.described(identity={**policy.card.identity, **own})
         self.learner.save(policy, self._run.policy_file(self._study))
 
     def source_demonstrations(self) -> DemonstrationFile:

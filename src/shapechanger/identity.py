@@ -1,0 +1,222 @@
+"""What an env, a method or a learner is made of: the model of its robot, and the user's own files.
+
+A study, a policy and a robot are known by names: an id, a path, `module:Name`. Those stay the same
+when a file is edited. Identities tell such versions apart, so that runs of two of them are never
+averaged and a policy is never taken for one of another robot.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+
+import msgspec
+
+from shapechanger.own_modules import HASH_DIGITS, modules_of, own_modules
+
+if TYPE_CHECKING:
+    import gymnasium as gym
+
+# Files that a compiled model holds the meaning of, comments left out.
+_MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
+_OF_A_NAME: Final = ("", ".toml")  # `my-car` stands for my-car.toml.
+_IMPORTED: Final = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*):[A-Za-z_]\S*")
+_MOST_CHANGES: Final = 4  # Named in a message.
+
+
+class Identity(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Version of an env, a method or a learner.
+
+    Attributes:
+        model: Fingerprint of its compiled model, see `shapechanger.morphology.effective`; empty
+            without one.
+        sensed: The same of what decides no motion and may be observed: sensors, keyframes, sites
+            and, where frames are observed, all that is drawn.
+        files: The first 16 hex digits of the SHA-256 of each own file that it needs, by its place
+            below the folder that it is imported from, or its name.
+    """
+
+    model: str = ""
+    sensed: str = ""
+    files: dict[str, str] = {}
+
+    def changes_to(self, other: Identity, numbers: Iterable[str] = ()) -> str:
+        """Return in words how another version differs; empty if it is the same.
+
+        Models are compared where both are known.
+
+        Args:
+            other: The other version, which is the newer one.
+            numbers: The differences of the models, if they are known.
+        """
+        found: list[str] = []
+        known = list(numbers)
+        listed = "; ".join(known[:_MOST_CHANGES]) + ("; ..." if known[_MOST_CHANGES:] else "")
+        if not (self.model and other.model):
+            pass
+        elif self.model != other.model:
+            found.append(f"its model {_from_to(self.model, other.model)}")
+        elif self.sensed != other.sensed:
+            found.append(
+                f"what is sensed of its model {_from_to(self.sensed, other.sensed)}, and its "
+                "motion is the same"
+            )
+        if found and listed:
+            found[0] += f" ({listed})"
+        found += [
+            f"{name} {_from_to(self.files.get(name, ''), other.files.get(name, ''))}"
+            for name in sorted(self.files.keys() | other.files.keys())
+            if self.files.get(name) != other.files.get(name)
+        ]
+        return ", and ".join(found)
+
+
+def _from_to(old: str, new: str) -> str:
+    if not (old and new):
+        return f"is gone (was {old})" if old else f"is new ({new})"
+    return f"has changed from {old} to {new}"
+
+
+class IdentifiedEnv(NamedTuple):
+    """The identity of an env, with the numbers that its fingerprints are made of.
+
+    Attributes:
+        identity: The identity.
+        numbers: The numbers of its model as MessagePack, for `model_changes`; empty without one.
+    """
+
+    identity: Identity
+    numbers: bytes
+
+
+def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> IdentifiedEnv:
+    """Return the identity of an env that has been made.
+
+    Args:
+        env: The env, with its wrappers.
+        env_id: Its id, which may name a module, as `module:id`.
+    """
+    arguments: dict[str, Any] = {} if env.spec is None else dict(env.spec.kwargs)
+    names = modules_of(*_layers(env), *_parts(env), *_objects(arguments))
+    names |= set(_named([env_id, *texts_in(arguments)]))
+    entry: Any = None if env.spec is None else env.spec.entry_point
+    names |= set(_named([entry])) if isinstance(entry, str) else modules_of(entry)
+    model = getattr(env.unwrapped, "model", None)
+    # No import of MuJoCo for an env that does without.
+    if type(model).__module__.partition(".")[0] != "mujoco" or type(model).__name__ != "MjModel":
+        files = own_modules(names) | dict(_files(arguments, ()))
+        return IdentifiedEnv(Identity(files=files), b"")
+    from shapechanger.morphology.effective.model import digest_of, effective_model
+    from shapechanger.morphology.effective.sensed import sensed_model
+
+    moved = effective_model(cast("Any", model)).sections
+    sensed = sensed_model(cast("Any", model), drawn=_sees(env.observation_space)).sections
+    files = own_modules(names) | dict(_files(arguments, _MODEL_FILES))
+    return IdentifiedEnv(
+        Identity(digest_of(moved), digest_of(sensed), files),
+        msgspec.msgpack.encode({"moved": moved, "sensed": sensed}),
+    )
+
+
+def identify_code(names: Iterable[str], *objects: Any) -> Identity:
+    """Return the identity of what has no model, such as a method.
+
+    Args:
+        names: Names such as `my_methods:warm-start`, and texts that are none.
+        *objects: Objects whose modules count, too.
+    """
+    return Identity(files=own_modules({*_named(names), *modules_of(*objects)}))
+
+
+def model_changes(old: bytes, new: bytes) -> tuple[str, ...]:
+    """Return the differences of two models in words.
+
+    Args:
+        old: Numbers of the old model, see `IdentifiedEnv`.
+        new: Numbers of the new one.
+
+    Raises:
+        msgspec.MsgspecError: If they are not such numbers.
+    """
+    from shapechanger.morphology.certificate.changes import compare_effective, grouped
+    from shapechanger.morphology.effective.model import EffectiveModel
+
+    kind: Any = dict[str, tuple[tuple[str, Any], ...]]
+    both = [
+        {name: EffectiveModel(_tuples(sections)) for name, sections in decoded.items()}
+        for decoded in (msgspec.msgpack.decode(each, type=kind) for each in (old, new))
+    ]
+    moved = compare_effective(both[0]["moved"], both[1]["moved"])
+    # A geom that moves differently also lies differently.
+    found = moved or compare_effective(both[0]["sensed"], both[1]["sensed"], derived=False)
+    return tuple(change.sentence for change in grouped(found))
+
+
+def _tuples(value: Any) -> Any:
+    """Return decoded sections with tuples in place of lists, as an effective model has them."""
+    return tuple(map(_tuples, cast("list[Any]", value))) if isinstance(value, list) else value
+
+
+def _layers(env: Any) -> Iterator[Any]:
+    """Yield an env and what it wraps, from the outermost."""
+    yield env
+    while env is not env.unwrapped:
+        env = env.env
+        yield env
+
+
+def _parts(env: gym.Env[Any, Any]) -> list[Any]:
+    """Return what an env is told to do and to be: its task, and the edits of its body."""
+    inner: Any = env.unwrapped
+    family = getattr(inner, "family", None)
+    edits = [*getattr(inner, "body", ()), *getattr(family, "rig", ())]
+    return [getattr(inner, "task", None), *getattr(inner, "measures", ()), *edits]
+
+
+def texts_in(value: Any) -> Iterator[str]:
+    """Yield all texts in arguments, at any depth."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for each in cast("Mapping[str, Any]", value).values():
+            yield from texts_in(each)
+    elif isinstance(value, list | tuple):
+        for each in cast("list[Any]", value):
+            yield from texts_in(each)
+
+
+def _objects(arguments: Mapping[str, Any]) -> list[Any]:
+    """Return the arguments that no JSON can hold, such as a task that is an object."""
+    plain = (str, int, float, bool, list, tuple, dict, type(None))
+    return [value for value in arguments.values() if not isinstance(value, plain)]
+
+
+def _named(texts: Iterable[str]) -> Iterator[str]:
+    """Yield the modules that texts such as `module:Name` name."""
+    for text in texts:
+        if found := _IMPORTED.fullmatch(text):
+            yield found[1]
+
+
+def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    """Yield name and hash of each file that an argument names, such as a robot's profile."""
+    for text in texts_in(arguments):
+        for suffix in _OF_A_NAME:
+            # JSON of a body is no path, and may be too long to be asked for.
+            path = (
+                Path(f"{text}{suffix}") if text and len(text) < 1000 and "\n" not in text else None
+            )
+            if path is not None and path.is_file() and not path.name.endswith(without or ("\0",)):
+                content = b"\n".join(path.read_bytes().splitlines())
+                yield path.name, hashlib.sha256(content).hexdigest()[:HASH_DIGITS]
+
+
+def _sees(space: gym.Space[Any]) -> bool:
+    """Return whether an observation has frames: whole numbers in rows and columns."""
+    inner: Any = getattr(space, "spaces", None)
+    if inner is not None:
+        return any(map(_sees, getattr(inner, "values", lambda: inner)()))
+    return len(space.shape or ()) >= 2 and str(space.dtype) == "uint8"
