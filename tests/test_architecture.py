@@ -69,7 +69,7 @@ _RULES = {
     "envs.warp": _Rule(_names("errors layout morphology bodies tasks envs"), never=_HARDWARE),
     # Transfer does not distinguish simulators from robots. Cloning is one of its learners.
     "transfer": _Rule(
-        _names("errors files identity layout tasks demos shapechanger tensor_file"),
+        _names("errors files identity layout own_modules tasks demos shapechanger tensor_file"),
         never=_HARDWARE | _SIMULATORS,
     ),
     "reports": _Rule(
@@ -93,6 +93,7 @@ _RULES = {
     "cli": _Rule(
         _names("errors files layout link morphology bodies tasks envs transfer robot remote twin")
         | _names("teleop demos reports testing shapechanger rendering worlds identify identity hub")
+        | _names("own_modules")
     ),
     "identify": _Rule(
         _names("errors layout morphology bodies tasks"),

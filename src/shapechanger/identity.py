@@ -8,14 +8,20 @@ averaged and a policy is never taken for one of another robot.
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import msgspec
 
-from shapechanger.own_modules import HASH_DIGITS, modules_of, own_modules
+from shapechanger.own_modules import (
+    HASH_DIGITS,
+    modules_of,
+    modules_of_env,
+    named_modules,
+    own_modules,
+    texts_in,
+)
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -23,7 +29,6 @@ if TYPE_CHECKING:
 # Files that a compiled model holds the meaning of, comments left out.
 _MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
 _OF_A_NAME: Final = ("", ".toml")  # `my-car` stands for my-car.toml.
-_IMPORTED: Final = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*):[A-Za-z_]\S*")
 _MOST_CHANGES: Final = 4  # Named in a message.
 
 
@@ -100,10 +105,7 @@ def identify_env(env: gym.Env[Any, Any], env_id: str = "") -> IdentifiedEnv:
         env_id: Its id, which may name a module, as `module:id`.
     """
     arguments: dict[str, Any] = {} if env.spec is None else dict(env.spec.kwargs)
-    names = modules_of(*_layers(env), *_parts(env), *_objects(arguments))
-    names |= set(_named([env_id, *texts_in(arguments)]))
-    entry: Any = None if env.spec is None else env.spec.entry_point
-    names |= set(_named([entry])) if isinstance(entry, str) else modules_of(entry)
+    names = modules_of_env(env, env_id)
     model = getattr(env.unwrapped, "model", None)
     # No import of MuJoCo for an env that does without.
     if type(model).__module__.partition(".")[0] != "mujoco" or type(model).__name__ != "MjModel":
@@ -128,7 +130,7 @@ def identify_code(names: Iterable[str], *objects: Any) -> Identity:
         names: Names such as `my_methods:warm-start`, and texts that are none.
         *objects: Objects whose modules count, too.
     """
-    return Identity(files=own_modules({*_named(names), *modules_of(*objects)}))
+    return Identity(files=own_modules({*named_modules(names), *modules_of(*objects)}))
 
 
 def model_changes(old: bytes, new: bytes) -> tuple[str, ...]:
@@ -158,47 +160,6 @@ def model_changes(old: bytes, new: bytes) -> tuple[str, ...]:
 def _tuples(value: Any) -> Any:
     """Return decoded sections with tuples in place of lists, as an effective model has them."""
     return tuple(map(_tuples, cast("list[Any]", value))) if isinstance(value, list) else value
-
-
-def _layers(env: Any) -> Iterator[Any]:
-    """Yield an env and what it wraps, from the outermost."""
-    yield env
-    while env is not env.unwrapped:
-        env = env.env
-        yield env
-
-
-def _parts(env: gym.Env[Any, Any]) -> list[Any]:
-    """Return what an env is told to do and to be: its task, and the edits of its body."""
-    inner: Any = env.unwrapped
-    family = getattr(inner, "family", None)
-    edits = [*getattr(inner, "body", ()), *getattr(family, "rig", ())]
-    return [getattr(inner, "task", None), *getattr(inner, "measures", ()), *edits]
-
-
-def texts_in(value: Any) -> Iterator[str]:
-    """Yield all texts in arguments, at any depth."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping):
-        for each in cast("Mapping[str, Any]", value).values():
-            yield from texts_in(each)
-    elif isinstance(value, list | tuple):
-        for each in cast("list[Any]", value):
-            yield from texts_in(each)
-
-
-def _objects(arguments: Mapping[str, Any]) -> list[Any]:
-    """Return the arguments that no JSON can hold, such as a task that is an object."""
-    plain = (str, int, float, bool, list, tuple, dict, type(None))
-    return [value for value in arguments.values() if not isinstance(value, plain)]
-
-
-def _named(texts: Iterable[str]) -> Iterator[str]:
-    """Yield the modules that texts such as `module:Name` name."""
-    for text in texts:
-        if found := _IMPORTED.fullmatch(text):
-            yield found[1]
 
 
 def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[tuple[str, str]]:

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import re
 import sys
 import sysconfig
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Final
+from typing import Any, Final, cast
 
 HASH_DIGITS: Final = 16
 """Length of a hash, in hexadecimal digits of the SHA-256."""
 
+_NAMED: Final = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*):[A-Za-z_]\S*")
 _INSTALLED: Final = frozenset(("site-packages", "dist-packages"))
 _LIBRARY: Final = tuple(
     Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib")
@@ -73,6 +75,22 @@ def modules_of(*objects: Any) -> set[str]:
         named = (each, *kind.__mro__)
         modules = [getattr(one, "__module__", None) for one in named]
         found.update(module for module in modules if isinstance(module, str))
+    return found
+
+
+def modules_of_env(env: Any, env_id: str = "") -> set[str]:
+    """Return the names of the modules that define an env: wrappers, body, task and measures.
+
+    Args:
+        env: The env.
+        env_id: Its id, which may name a module, as `module:id`.
+    """
+    spec: Any = getattr(env, "spec", None)
+    arguments: dict[str, Any] = {} if spec is None else dict(spec.kwargs)
+    found = modules_of(*_layers(env), *_parts(env), *_objects(arguments))
+    found.update(named_modules([env_id, *texts_in(arguments)]))
+    entry: Any = None if spec is None else spec.entry_point
+    found.update(named_modules([entry]) if isinstance(entry, str) else modules_of(entry))
     return found
 
 
@@ -170,3 +188,44 @@ def _used_by(module: ModuleType | None) -> set[str]:
     values = () if module is None else tuple(vars(module).values())
     named = [each for each in values if isinstance(each, ModuleType | type) or callable(each)]
     return modules_of(*named) - {*_SCRIPTS}
+
+
+def _layers(env: Any) -> Iterator[Any]:
+    """Yield an env and what it wraps, from the outermost."""
+    yield env
+    while env is not getattr(env, "unwrapped", env):
+        env = env.env
+        yield env
+
+
+def _parts(env: Any) -> list[Any]:
+    """Return what an env is told to do and to be: its task, and the edits of its body."""
+    inner: Any = getattr(env, "unwrapped", env)
+    family = getattr(inner, "family", None)
+    edits = [*getattr(inner, "body", ()), *getattr(family, "rig", ())]
+    return [getattr(inner, "task", None), *getattr(inner, "measures", ()), *edits]
+
+
+def texts_in(value: Any) -> Iterator[str]:
+    """Yield all texts in arguments, at any depth."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for each in cast("Mapping[str, Any]", value).values():
+            yield from texts_in(each)
+    elif isinstance(value, list | tuple):
+        for each in cast("list[Any]", value):
+            yield from texts_in(each)
+
+
+def _objects(arguments: Mapping[str, Any]) -> list[Any]:
+    """Return the arguments that no JSON can hold, such as a task that is an object."""
+    plain = (str, int, float, bool, list, tuple, dict, type(None))
+    return [value for value in arguments.values() if not isinstance(value, plain)]
+
+
+def named_modules(texts: Iterable[str]) -> Iterator[str]:
+    """Yield the modules that texts such as `module:Name` name."""
+    for text in texts:
+        if found := _NAMED.fullmatch(text):
+            yield found[1]

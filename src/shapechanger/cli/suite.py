@@ -420,12 +420,14 @@ class Suite:
 def _progress_table(out: Path) -> tuple[Table, bool]:
     """A row for each study in a suite's folder, and whether all are complete."""
     from shapechanger.transfer.runs import last_evaluation, load_result
-    from shapechanger.transfer.study import PLAN_FILE
+    from shapechanger.transfer.study import PLAN_FILE, planned_arms, read_plan
 
     table = Table("study", "runs", "steps", "at work", box=None)
     complete = True
     for path in sorted(out.glob(f"*/{PLAN_FILE}")):
-        plan = read_json(path, Plan, f"delete {path.parent}")
+        # The methods may be modules of the current folder, as where the suite runs.
+        allow_own_modules(*planned_arms(path.parent))
+        plan = read_plan(path.parent, f"{path.parent} is kept as it is")
         ended, done, total = 0, 0, 0
         at_work: list[str] = []
         for run in plan.runs():

@@ -476,7 +476,46 @@ def claim_folder(plan: Plan, out: Path) -> None:
 
 def _plan_in(out: Path) -> Plan:
     remedy = "give another --out, or delete that folder to start again; nothing was changed"
-    return read_json(out / PLAN_FILE, Plan, remedy)
+    return read_plan(out, remedy)
+
+
+def read_plan(out: Path, remedy: str) -> Plan:
+    """Read the plan of the study in a folder.
+
+    Args:
+        out: The folder.
+        remedy: What the user can do if the file is damaged, as the end of a sentence.
+
+    Raises:
+        StudyError: If a method of the study is not found from here.
+        CorruptStudy: If the file cannot be read.
+    """
+    path = out / PLAN_FILE
+    for arm in read_json(path, _PlannedArms, remedy).arms:
+        try:
+            load_method(arm)
+        except UnknownName as error:
+            raise StudyError(
+                f"{out} compares the method {arm}, whose module is not found from {Path.cwd()}: go "
+                "to the folder that the study was started in, or install the method; nothing was "
+                f"changed. {error}"
+            ) from error
+    return read_json(path, Plan, remedy)
+
+
+def planned_arms(out: Path) -> tuple[str, ...]:
+    """Return the names of the methods of the study in a folder, without importing them.
+
+    Raises:
+        CorruptStudy: If the plan cannot be read.
+    """
+    return read_json(out / PLAN_FILE, _PlannedArms, f"{out} is kept as it is").arms
+
+
+class _PlannedArms(msgspec.Struct):
+    """The arms of a plan, read before their methods are imported."""
+
+    arms: tuple[str, ...] = ()
 
 
 def _digest(policy: Path) -> str:

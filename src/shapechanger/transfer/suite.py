@@ -16,12 +16,12 @@ from typing import Final
 import msgspec
 
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
-from shapechanger.files import make_folder, read_json
+from shapechanger.files import make_folder
 from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.metrics import Estimate, LearningCurves, steps_to_reach
 from shapechanger.transfer.plan import SOURCE, Plan
 from shapechanger.transfer.runs import load_result
-from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder
+from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder, read_plan
 from shapechanger.transfer.versions import changes_between
 
 _OF_TARGET: Final = ("random", "zero-action", "scratch")
@@ -104,7 +104,7 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
         CorruptStudy: If one cannot be read, or two of them disagree on the result of a run.
         OutputError: If `out` cannot be written.
     """
-    plans = [read_json(one / PLAN_FILE, Plan, f"leave out {one}") for one in folders]
+    plans = [read_plan(one, f"leave out {one}") for one in folders]
     arms = tuple(dict.fromkeys(arm for plan in plans for arm in plan.arms))
     seeds = max(plan.seeds for plan in plans)
     identity = {part: each for plan in reversed(plans) for part, each in plan.identity.items()}
@@ -141,7 +141,7 @@ def merge_study(folders: Sequence[Path], out: Path) -> Plan:
 def _share(plan: Plan, folder: Path, sibling: Path) -> None:
     """Copy the runs of another study that are the same here."""
     remedy = f"delete {sibling} to repeat that study"
-    other = read_json(sibling / PLAN_FILE, Plan, remedy)
+    other = read_plan(sibling, remedy)
     if words := changes_between(other, plan, sibling, folder):
         raise ForeignStudy(
             f"{sibling} was run with another version of what this study names. {words}. A suite "

@@ -23,8 +23,8 @@ from shapechanger.identity import (
     identify_code,
     identify_env,
     model_changes,
-    texts_in,
 )
+from shapechanger.own_modules import texts_in
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.methods import load_method
 

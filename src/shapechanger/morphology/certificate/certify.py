@@ -28,6 +28,7 @@ from shapechanger.morphology.certificate.rollout import (
     compare_rollouts,
 )
 from shapechanger.morphology.effective import fingerprint
+from shapechanger.own_modules import modules_of_env, own_modules
 
 
 class Certificate(msgspec.Struct, frozen=True):
@@ -42,6 +43,8 @@ class Certificate(msgspec.Struct, frozen=True):
         rollout: Responses of both to the same commands.
         source_inconsistencies: Inconsistencies of the source's model.
         target_inconsistencies: Inconsistencies of the target's model, or between the two.
+        source_files: Hashes of the user's own modules that the source needs, by file.
+        target_files: The same of the target.
     """
 
     source: str
@@ -52,6 +55,8 @@ class Certificate(msgspec.Struct, frozen=True):
     rollout: Rollout
     source_inconsistencies: tuple[str, ...] = ()
     target_inconsistencies: tuple[str, ...] = ()
+    source_files: dict[str, str] = {}
+    target_files: dict[str, str] = {}
 
     @property
     def same_model(self) -> bool:
@@ -106,6 +111,8 @@ class Certificate(msgspec.Struct, frozen=True):
             ("Rollout", [str(self.rollout)]),
             (f"Does not fit together in {self.source}", self.source_inconsistencies),
             (f"Does not fit together in {self.target}", self.target_inconsistencies),
+            (f"Own files of {self.source}", _listed(self.source_files)),
+            (f"Own files of {self.target}", _listed(self.target_files)),
         ):
             if sentences:
                 lines += [f"{title}:", *(f"  {sentence}" for sentence in sentences)]
@@ -171,6 +178,8 @@ def certify(
         rollout=rollout,
         source_inconsistencies=inconsistencies(one),
         target_inconsistencies=(*inconsistencies(two), *lone_masses(one, two)),
+        source_files=own_modules(modules_of_env(source)),
+        target_files=own_modules(modules_of_env(target)),
     )
     if certificate.is_empty and not allow_empty:
         raise EmptyShift(
@@ -178,6 +187,11 @@ def certify(
             "effect, such as the friction of a foot below that of the floor, or may never be read."
         )
     return certificate
+
+
+def _listed(files: dict[str, str]) -> list[str]:
+    """Return files with their hashes."""
+    return [f"{name} [{digest}]" for name, digest in files.items()]
 
 
 def _height(env: Certifiable | Wrapped) -> float | None:
