@@ -158,11 +158,14 @@ def _read(source: bytes, package: str) -> tuple[bytes, list[str]]:
         tree = ast.parse(b"\n".join(lines))
     except (SyntaxError, ValueError):
         return b"\n".join(lines), []
+    run = [True] * len(lines)
     for node in tree.body:
         if isinstance(node, ast.If) and not node.orelse and _is_guard(node.test):
-            for line in range(node.lineno - 1, node.end_lineno or node.lineno):
-                lines[line] = b""
-    return b"\n".join(lines), list(_imported(tree, package))
+            run[node.lineno - 1 : node.end_lineno] = [False] * (
+                (node.end_lineno or node.lineno) - node.lineno + 1
+            )
+    kept = [line for line, runs in zip(lines, run, strict=True) if runs]
+    return b"\n".join(kept), list(_imported(tree, package))
 
 
 def _is_guard(test: ast.expr) -> bool:

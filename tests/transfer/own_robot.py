@@ -1,0 +1,102 @@
+"""A small robot, a task and a method of a user's own, in a folder that tests edit."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.envs.catalogue import OWN_ROBOT
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.learners.settings import PpoSettings
+from shapechanger.transfer.plan import Plan, TransferTask
+from shapechanger.transfer.study import Study, make_plan, run_study
+
+XML = """
+<mujoco><worldbody><body name="load">
+  <joint name="lift" type="slide" axis="0 0 1" range="0 1" damping="5"/>
+  <geom type="box" size=".1 .1 .1" mass="{}"/>
+</body></worldbody>
+<actuator><motor joint="lift" gear="30" ctrlrange="-1 1"/></actuator></mujoco>
+"""
+TASK = """
+import {name}_goal
+
+class Hold:
+    def reward(self, robot):
+        return {{"near": -abs(robot["lift/position"] - {name}_goal.HEIGHT)}}
+"""
+METHOD = """
+from shapechanger.transfer.methods import register
+from shapechanger.transfer.methods.basic import FineTune
+
+@register
+class Warm(FineTune):
+    name = "{name}-warm"
+"""
+TINY = PpoSettings(
+    n_envs=1,
+    n_steps=8,
+    batch_size=8,
+    n_epochs=1,
+    learning_rate=1e-3,
+    net_arch=(4,),
+    steps=8,
+    eval_every=8,
+    eval_episodes=1,
+)
+
+
+def write_project(folder: Path, name: str) -> None:
+    """Write two robots, a task with a module that it imports, and a method.
+
+    Args:
+        folder: The folder.
+        name: Beginning of the names of the modules, so that no two tests share one.
+    """
+    (folder / "a.xml").write_text(XML.format(1.5))
+    (folder / "b.xml").write_text(XML.format(2.5))
+    (folder / f"{name}_task.py").write_text(TASK.format(name=name))
+    (folder / f"{name}_goal.py").write_text("HEIGHT = 0.5\n")
+    (folder / f"{name}_method.py").write_text(METHOD.format(name=name))
+
+
+def forget(name: str) -> None:
+    """Forget the modules of a project, as a new process would."""
+    for module in [each for each in sys.modules if each.startswith(name)]:
+        del sys.modules[module]
+
+
+def task_of(name: str) -> TransferTask:
+    """Return the task from the one robot to the other, with paths relative to the folder."""
+    one, other = (
+        EnvRef(OWN_ROBOT, {"path": path, "task": f"{name}_task:Hold"})
+        for path in ("a.xml", "b.xml")
+    )
+    return TransferTask(one, other)
+
+
+def plan_of(name: str, seeds: int = 2, **more: Any) -> Plan:
+    """Return the plan of a study of two arms, one of them of the user's own."""
+    arms = ("scratch", f"{name}_method:{name}-warm")
+    given = {"seeds": seeds, "steps": 8, "source_steps": 8, "arms": arms, **more}
+    return make_plan(given.pop("task", task_of(name)), "tiny", TINY, **given)
+
+
+def study_of(plan: Plan, out: Path) -> Study:
+    """Perform a study in this process."""
+    return run_study(plan, out, executor=Serial())
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: Any) -> str:
+    """The name of a project in the current folder."""
+    name = f"p{abs(hash(request.node.nodeid)) % 10**9}"
+    write_project(tmp_path, name)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    return name

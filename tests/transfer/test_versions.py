@@ -1,0 +1,202 @@
+"""Versions of robots, tasks, methods and learners are never mixed."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from shapechanger.errors import ForeignStudy
+from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.transfer.plan import Run
+from shapechanger.transfer.runs import load_result, perform_run
+from shapechanger.transfer.suite import merge_study, open_study_folder
+from shapechanger.transfer.versions import require_planned
+from tests.transfer.own_robot import (
+    METHOD,
+    TASK,
+    XML,
+    forget,
+    plan_of,
+    project,
+    study_of,
+    task_of,
+)
+from tests.transfer.studies import files_of
+
+__all__ = ["project"]
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a project called `shared` and a finished study of it."""
+    from tests.transfer.own_robot import write_project
+
+    folder = tmp_path_factory.mktemp("project")
+    write_project(folder, "shared")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.syspath_prepend(str(folder))
+        patch.setattr("shapechanger.transfer.methods._registered", {})
+        study_of(plan_of("shared"), Path("study"))
+        forget("shared")
+    return folder
+
+
+@pytest.fixture
+def copied(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of that folder, which is the current one."""
+    folder = tmp_path / "copy"
+    shutil.copytree(done, folder)
+    monkeypatch.chdir(folder)
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    forget("shared")
+    return folder
+
+
+_EDITS = {
+    "target's mass": ("b.xml", XML.format(0.5), r"mass 2\.5 kg -> 0\.5 kg"),
+    "source's damping": (
+        "a.xml",
+        XML.format(1.5).replace('damping="5"', 'damping="6"'),
+        r"lift: damping 5 .* -> 6",
+    ),
+    "what is sensed": (
+        "b.xml",
+        XML.format(2.5).replace("</body>", '<site name="tip" pos="0 0 1"/></body>'),
+        "what is sensed of its model has changed .* its motion is the same .*tip: site added",
+    ),
+    "the task": (
+        "shared_task.py",
+        TASK.format(name="shared").replace("abs", "2 * abs"),
+        r"shared_task\.py has changed from \w+ to \w+",
+    ),
+    "a module that the task imports": (
+        "shared_goal.py",
+        "HEIGHT = 0.6\n",
+        r"shared_goal\.py has changed from \w+ to \w+",
+    ),
+    "the method": (
+        "shared_method.py",
+        METHOD.format(name="shared") + "    paper = 'mine'\n",
+        r"the method .*: shared_method\.py has changed from \w+ to \w+",
+    ),
+}
+
+
+@pytest.mark.parametrize("edit", _EDITS)
+@pytest.mark.parametrize("seeds", [2, 3])
+def test_an_edited_file_does_not_join_older_runs(edit: str, seeds: int, copied: Path) -> None:
+    """Resuming and growing are refused, name the change and the way out, and change nothing."""
+    file, content, words = _EDITS[edit]
+    (copied / file).write_text(content)
+    before = files_of(copied / "study")
+    plan = plan_of("shared", seeds)
+    with pytest.raises(ForeignStudy, match=f"(?s){words}.*give another --out, or delete"):
+        study_of(plan, Path("study"))
+    assert files_of(copied / "study") == before
+
+
+_LOOKS = {
+    "a colour": ("b.xml", XML.format(2.5).replace("<geom ", '<geom rgba="1 0 0 1" ')),
+    "a comment in a robot": ("b.xml", XML.format(2.5).replace("<geom ", "<!-- box --><geom ")),
+    "line ends": ("shared_goal.py", "HEIGHT = 0.5\r\n"),
+    "what only a script runs": (
+        "shared_goal.py",
+        "HEIGHT = 0.5\nif __name__ == '__main__':\n    print(HEIGHT)\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("look", _LOOKS)
+def test_an_edit_without_effect_resumes(look: str, copied: Path) -> None:
+    """What neither moves nor is sensed or run does not count."""
+    file, content = _LOOKS[look]
+    (copied / file).write_text(content, newline="")
+    before = (copied / "study" / "study.json").read_bytes()
+    study_of(plan_of("shared"), Path("study"))
+    assert (copied / "study" / "study.json").read_bytes() == before
+
+
+def test_growing_an_unchanged_study_gives_the_same_numbers(copied: Path) -> None:
+    """Two seeds and then a third equal three seeds at once, bit for bit."""
+    grown = study_of(plan_of("shared", 3), Path("study"))
+    at_once = study_of(plan_of("shared", 3), Path("other"))
+    assert [run.curve for run in grown.runs] == [run.curve for run in at_once.runs]
+    assert all(run.identity for run in grown.runs)
+
+
+def test_versions_stand_in_plan_run_and_card(copied: Path) -> None:
+    """Each has the fingerprint of the robot and the hashes of task, helper and method."""
+    plan = plan_of("shared")
+    method = f"method {plan.arms[1]}"
+    assert set(plan.identity) == {"source", "target", method}
+    assert set(plan.identity["target"].files) == {"shared_goal.py", "shared_task.py"}
+    assert plan.identity["source"].model != plan.identity["target"].model
+    run = Run(plan.arms[1], 0)
+    result = load_result(plan, Path("study"), run)
+    assert result is not None
+    assert result.identity == plan.identity
+    card = load_policy(run.policy_file(Path("study"))).card
+    assert card.identity == {"env": plan.identity["target"], method: plan.identity[method]}
+    scratch = load_result(plan, Path("study"), Run("scratch", 0))
+    assert scratch is not None
+    assert set(scratch.identity) == {"target"}
+
+
+def test_a_file_that_changes_during_a_study_ends_its_runs(copied: Path) -> None:
+    """So does another version on another node: each run compares before and after."""
+    plan = plan_of("shared")
+    (copied / "b.xml").write_text(XML.format(0.5))
+    run = Run("scratch", 0)
+    before = files_of(copied / "study")
+    with pytest.raises(ForeignStudy, match=r"b\.xml.*: its model has changed from \w+ to \w+"):
+        perform_run(plan, run, "study", None, lambda steps: None)
+    assert files_of(copied / "study") == before
+    require_planned(plan, Run("source", 0))  # That of the source is as it was.
+    with pytest.raises(ForeignStudy, match="What this study was planned with has changed"):
+        study_of(plan, Path("new"))
+
+
+def test_a_run_of_another_version_is_refused(copied: Path) -> None:
+    """Even where somebody has copied its folder into a study."""
+    plan = plan_of("shared")
+    path = copied / "study" / "runs" / "scratch-0" / "run.json"
+    result = msgspec.json.decode(path.read_bytes())
+    result["identity"]["target"]["model"] = "0" * 16
+    path.write_bytes(msgspec.json.encode(result))
+    with pytest.raises(ForeignStudy, match="result of another version than the one planned"):
+        load_result(plan, Path("study"), Run("scratch", 0))
+
+
+def test_folders_of_two_versions_are_not_merged(copied: Path) -> None:
+    """The message names what differs, in numbers."""
+    (copied / "b.xml").write_text(XML.format(0.5))
+    study_of(plan_of("shared", arms=("scratch", "zero-shot")), Path("other"))
+    with pytest.raises(ForeignStudy, match=r"(?s)mass 2\.5 kg -> 0\.5 kg.*Merge only folders"):
+        merge_study([Path("study"), Path("other")], Path("whole"))
+    assert not Path("whole").exists()
+
+
+def test_a_suite_has_one_version_of_each_robot(copied: Path) -> None:
+    """Another study of the suite does not share runs with an edited robot, nor its table."""
+    Path("suite").mkdir()
+    Path("study").rename("suite/a-to-b")
+    (copied / "b.xml").write_text(XML.format(0.5))
+    task = task_of("shared")
+    back = msgspec.structs.replace(task, source=task.target, target=task.source)
+    with pytest.raises(ForeignStudy, match=r"(?s)mass 2\.5 kg.*has one version of each"):
+        open_study_folder(plan_of("shared", task=back), Path("suite"), "b-to-a")
+
+
+def test_a_given_policy_of_an_edited_robot_is_refused(copied: Path) -> None:
+    """A zero-shot transfer would be that of another robot."""
+    policy = Run("source", 0).policy_file(Path("study"))
+    arms = ("scratch", "zero-shot")
+    plan_of("shared", source_policy=policy, source_steps=None, arms=arms)
+    (copied / "a.xml").write_text(XML.format(0.1))
+    with pytest.raises(ForeignStudy, match=r"a\.xml.* has changed since .* was trained in it"):
+        plan_of("shared", source_policy=policy, source_steps=None, arms=arms)
