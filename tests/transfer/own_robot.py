@@ -6,8 +6,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
@@ -73,7 +71,7 @@ def forget(name: str) -> None:
 def task_of(name: str) -> TransferTask:
     """Return the task from the one robot to the other, with paths relative to the folder."""
     one, other = (
-        EnvRef(OWN_ROBOT, {"path": path, "task": f"{name}_task:Hold"})
+        EnvRef(OWN_ROBOT, {"path": path, "task": f"{name}_task:Hold", "max_episode_steps": 5})
         for path in ("a.xml", "b.xml")
     )
     return TransferTask(one, other)
@@ -89,14 +87,3 @@ def plan_of(name: str, seeds: int = 2, **more: Any) -> Plan:
 def study_of(plan: Plan, out: Path) -> Study:
     """Perform a study in this process."""
     return run_study(plan, out, executor=Serial())
-
-
-@pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: Any) -> str:
-    """The name of a project in the current folder."""
-    name = f"p{abs(hash(request.node.nodeid)) % 10**9}"
-    write_project(tmp_path, name)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
-    return name

@@ -20,20 +20,16 @@ from tests.transfer.own_robot import (
     XML,
     forget,
     plan_of,
-    project,
     study_of,
     task_of,
+    write_project,
 )
 from tests.transfer.studies import files_of
-
-__all__ = ["project"]
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a project called `shared` and a finished study of it."""
-    from tests.transfer.own_robot import write_project
-
     folder = tmp_path_factory.mktemp("project")
     write_project(folder, "shared")
     with pytest.MonkeyPatch.context() as patch:

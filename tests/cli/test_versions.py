@@ -1,0 +1,138 @@
+"""The commands refuse to mix versions of a user's files, and find the user's modules."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+from tests.transfer.own_robot import (
+    METHOD,
+    TASK,
+    XML,
+    forget,
+    plan_of,
+    study_of,
+    task_of,
+    write_project,
+)
+from tests.transfer.studies import files_of
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a project called `cliown` and a suite with one finished study of it."""
+    folder = tmp_path_factory.mktemp("project")
+    write_project(folder, "cliown")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.syspath_prepend(str(folder))
+        patch.setattr("shapechanger.transfer.methods._registered", {})
+        study_of(plan_of("cliown", task=task_of("cliown")), Path("suite", "a-to-b"))
+        forget("cliown")
+    return folder
+
+
+@pytest.fixture
+def folder(done: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """That folder, as an installed program sees it: modules are not looked for there."""
+    monkeypatch.chdir(done)
+    monkeypatch.setattr(sys, "path", [each for each in sys.path if each not in ("", str(done))])
+    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    forget("cliown")
+    return done
+
+
+_POLICY = "suite/a-to-b/runs/scratch-0/policy.safetensors"
+
+
+@pytest.mark.filterwarnings("ignore:.*possible render_modes")
+def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The task is found as `train` finds it; an edited robot or task is refused by name."""
+    main(["policies", "evaluate", _POLICY, "--episodes", "1"])
+    assert "return" in capsys.readouterr().out
+    main(["policies", "show", _POLICY])
+    assert "cliown_task.py" in capsys.readouterr().out
+    for file, content, words in (
+        ("b.xml", XML.format(0.5), "its model has changed from"),
+        ("cliown_goal.py", "HEIGHT = 0.7\n", "cliown_goal.py has changed from"),
+    ):
+        was = (folder / file).read_text()
+        (folder / file).write_text(content)
+        for command in (["evaluate"], ["play", "--out", "film.mp4"]):
+            with pytest.raises(SystemExit) as ended:
+                main(["policies", command[0], _POLICY, *command[1:]])
+            assert ended.value.code != 0
+            told = " ".join(capsys.readouterr().err.split())
+            assert words in told
+            assert "give the present one with --env" in told
+        main(["policies", "evaluate", _POLICY, "--env", "b.xml@cliown_task:Hold"])
+        (folder / file).write_text(was)
+    main(["policies", "evaluate", _POLICY, "--episodes", "1"])
+
+
+def test_a_suite_is_watched_with_own_methods(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """From elsewhere the message says where to go, and to delete nothing."""
+    main(["suite", "watch", "suite"])
+    assert "a-to-b" in capsys.readouterr().out
+    monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(folder)])
+    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    forget("cliown")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit):
+        main(["suite", "watch", str(folder / "suite")])
+    told = " ".join(capsys.readouterr().err.split())
+    assert "go to the folder that the study was started in" in told
+    assert "delete" not in told
+
+
+@pytest.mark.system
+def test_a_study_of_edited_files_is_refused_end_to_end(tmp_path: Path) -> None:
+    """Robot, task and method are edited between two runs; an unchanged study grows bit for bit."""
+    write_project(tmp_path, "ended")
+    settings = ["n_envs=1", "n_steps=8", "batch_size=8", "n_epochs=1", "net_arch=[4]"]
+    settings += ["eval_every=8", "eval_episodes=1"]
+    given = '{"max_episode_steps": 5}'
+
+    def run(seeds: int, out: str) -> subprocess.CompletedProcess[str]:
+        command = [str(Path(sys.executable).with_name("shapechanger")), "transfer"]
+        command += ["a.xml@ended_task:Hold", "b.xml@ended_task:Hold", "--learner", "ppo-balance"]
+        command += ["--set", *settings, "--steps", "8", "--source-steps", "8", "--out", out]
+        command += ["--source-options", given, "--target-options", given, "--workers", "1"]
+        command += ["--arms", "scratch", "ended_method:ended-warm", "--seeds", str(seeds)]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    first = run(2, "study")
+    assert first.returncode == 0, first.stderr
+    before = files_of(tmp_path / "study")
+    for file, content, words in (
+        ("b.xml", XML.format(0.5), "mass 2.5 kg -> 0.5 kg"),
+        ("ended_task.py", TASK.format(name="ended") + "\nMORE = 1\n", "ended_task.py has changed"),
+        ("ended_method.py", METHOD.format(name="ended") + "\nMORE = 1\n", "ended_method.py has"),
+    ):
+        was = (tmp_path / file).read_text()
+        (tmp_path / file).write_text(content)
+        refused = run(3, "study")
+        assert refused.returncode != 0
+        told = " ".join(refused.stderr.split())
+        assert words in told
+        assert "give another --out" in told
+        assert files_of(tmp_path / "study") == before
+        (tmp_path / file).write_text(was)
+    assert run(3, "study").returncode == 0
+    assert run(3, "other").returncode == 0
+    grown, at_once = (
+        json.loads((tmp_path / out / "study.json").read_text()) for out in ("study", "other")
+    )
+    assert [each["curve"] for each in grown["runs"]] == [each["curve"] for each in at_once["runs"]]

@@ -1,0 +1,84 @@
+"""One call loads a policy of any kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shapechanger
+from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.envs.vehicle.drivers import CLONES
+from shapechanger.errors import CorruptStudy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.onnx_policy import OnnxPolicy, export_onnx
+from shapechanger.transfer.references import reference_policy
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_trained_policies_and_clones_load_from_text_and_path(
+    kind: type[str] | type[Path], tmp_path: Path
+) -> None:
+    """Each has a card and acts on observations of its env."""
+    trained = shapechanger.load_policy(kind(reference_policy("shapechanger/Ant-v1")))
+    assert isinstance(trained, TrainedPolicy)
+    seen = np.zeros((2, trained.card.observation.size))
+    assert trained.act(seen).shape == (2, 8)
+    shapechanger.save_policy(trained, kind(tmp_path / "again.safetensors"))
+    assert load_policy(kind(tmp_path / "again.safetensors")).card == trained.card
+
+    clone = shapechanger.load_policy(kind(CLONES["car"]))
+    assert isinstance(clone, CameraPolicy)
+    frames = np.zeros((2, 120, 160, 3), np.uint8)
+    np.testing.assert_array_equal(clone.act(frames), clone.predict_many(frames))
+
+
+def test_exported_policies_load_too(tmp_path: Path) -> None:
+    """A policy as ONNX acts as what it was exported from, and has its identity."""
+    pytest.importorskip("onnxruntime")
+    trained = load_policy(reference_policy("shapechanger/InvertedPendulum-v1"))
+    export_onnx(trained, tmp_path / "trained.onnx")
+    loaded = shapechanger.load_policy(str(tmp_path / "trained.onnx"))
+    assert isinstance(loaded, OnnxPolicy)
+    assert loaded.card.identity == trained.card.identity != {}
+    seen = np.full((3, 4), 0.1)
+    np.testing.assert_allclose(loaded.act(seen), trained.act(seen), atol=1e-5)
+
+
+@pytest.mark.slow
+def test_exported_clones_load_too(tmp_path: Path) -> None:
+    """A clone as ONNX acts as the clone."""
+    pytest.importorskip("onnxruntime")
+    pytest.importorskip("onnxscript")
+    clone = CameraPolicy.load(CLONES["car"])
+    export_clone(clone, tmp_path / "clone.onnx")
+    onboard = shapechanger.load_policy(tmp_path / "clone.onnx")
+    assert isinstance(onboard, OnnxClone)
+    frames = np.full((2, 120, 160, 3), 90, np.uint8)
+    np.testing.assert_allclose(onboard.act(frames), clone.act(frames), atol=1e-3)
+
+
+def test_a_policy_on_a_state_acts_on_states(tmp_path: Path) -> None:
+    """Without pictures an observation is the state; with both it is a mapping."""
+    card = CameraPolicy.load(CLONES["car"]).card
+    frames, state = np.zeros((1, 120, 160, 3), np.uint8), np.zeros((1, 2))
+    assert card.inputs_of({"image": frames, "state": state}) == (frames, state)
+    assert card.inputs_of(frames)[1] is None
+    assert save_policy is shapechanger.save_policy
+
+
+@pytest.mark.parametrize("name", ["no.safetensors", "no.onnx"])
+def test_a_missing_file_is_named(name: str) -> None:
+    """As for every kind."""
+    with pytest.raises(CorruptStudy, match=r"no\."):
+        shapechanger.load_policy(name)
+
+
+@pytest.mark.parametrize("name", ["x.safetensors", "x.onnx"])
+def test_something_else_is_refused(name: str, tmp_path: Path) -> None:
+    """With the reason."""
+    (tmp_path / name).write_bytes(b"nothing")
+    with pytest.raises(CorruptStudy, match="is not a policy"):
+        shapechanger.load_policy(str(tmp_path / name))
