@@ -56,6 +56,7 @@ from tests.morphology.models import (
     pendulum,
     posed,
     tip,
+    uncoupled_gantry,
 )
 
 # A fixed number of examples.
@@ -206,8 +207,8 @@ def test_locking_at_rest_moves_nothing(load: Callable[[], mujoco.MjSpec], joint:
 )
 def test_a_locked_joint_keeps_its_position(lock: str, positions: dict[str, float]) -> None:
     """Hinges and slides, alone or with other joints of the body."""
-    free = built(gantry())
-    locked = built(gantry(), Lock(lock, positions[lock]))
+    free = built(uncoupled_gantry())
+    locked = built(uncoupled_gantry(), Lock(lock, positions[lock]))
     others = {joint: at for joint, at in positions.items() if joint != lock}
     a, b = posed(free, positions), posed(locked, others)
     np.testing.assert_allclose(b.geom_xpos, a.geom_xpos, atol=1e-12)
@@ -266,7 +267,7 @@ def test_a_copied_limb_is_rotated(angle: float, hip: float, knee: float) -> None
         (leg, AddLimb("shin", "_2", 1.0, size=2.0), "shin_2"),
         (leg, AddSegment("shin", "foot", (0.1, 0.0, 0.0), gear=1.0), "foot"),
         (ant, AddLimb("right_back_leg", "_5", 0.7), "right_back_leg_5"),
-        (gantry, AddLimb("boom", "_2", 0.7), "boom_2"),
+        (uncoupled_gantry, AddLimb("boom", "_2", 0.7), "boom_2"),
     ],
 )
 def test_adding_and_removing_restores_the_model(

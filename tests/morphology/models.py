@@ -92,6 +92,14 @@ def gantry() -> mujoco.MjSpec:
     return spec_of(GANTRY)
 
 
+def uncoupled_gantry() -> mujoco.MjSpec:
+    """Return a new body with several joints that move independently."""
+    spec = gantry()
+    for equality in list(spec.equalities):
+        spec.delete(equality)
+    return spec
+
+
 def ant() -> mujoco.MjSpec:
     """Return Gymnasium's ant, with all elements named."""
     return ANT.load(os.path.join(ASSETS, "ant.xml"))

@@ -21,6 +21,7 @@ from shapechanger.morphology.edits.joints import JointRange, Lock
 from shapechanger.morphology.edits.limbs import AddLimb, AddSegment, Cut, Remove, Split
 from shapechanger.morphology.edits.places import PlaceBody, PlaceGeom, TotalMass
 from shapechanger.morphology.edits.rigging import AddFloor, AddFreeJoint, AddMotor
+from shapechanger.morphology.edits.switches import require_effect
 from shapechanger.morphology.edits.values import (
     Damping,
     Density,
@@ -33,6 +34,7 @@ from shapechanger.morphology.edits.values import (
     Stiffness,
     Stretch,
 )
+from shapechanger.morphology.spec.carried import Carried
 from shapechanger.morphology.spec.explicit import make_explicit
 
 Body = tuple[Edit, ...]
@@ -209,10 +211,15 @@ def reshape(spec: mujoco.MjSpec, edits: Iterable[Edit]) -> mujoco.MjSpec:
     """
     result = spec.copy()
     effective = [edit for edit in edits if edit.amount > 0.0]
-    if effective:
-        make_explicit(result)
+    if not effective:
+        return result
+    make_explicit(result)
+    carried = Carried(result)
     for edit in effective:
+        require_effect(result, edit)
         edit.apply(result)
+        edit.follow_in_keyframes(result, carried.keyframes)
+    carried.put_back(result)
     return result
 
 

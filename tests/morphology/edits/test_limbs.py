@@ -205,7 +205,7 @@ def test_rounded_ends_grow_with_the_amount() -> None:
 def test_a_split_divides_an_explicit_mass() -> None:
     """An explicit mass is divided like one from a density."""
     for content in ('mass="3"', 'density="3"'):
-        geom = f'<geom name="g" type="capsule" size=".1 .5" {content}/>'
+        geom = f'<geom name="g" type="capsule" size=".1" fromto="0 0 0 0 0 1" {content}/>'
         first = built(limb(geom), Split("link", "far", at=0.3).partly(1e-9))
         assert mass(first, "link", "far") == pytest.approx(mass(built(limb(geom)), "link"))
         assert mass(first, "far") > mass(first, "link")
@@ -236,11 +236,18 @@ def test_splits_of_gymnasiums_limbs(model: str, body: str, child: str) -> None:
     )
     name = before.geom(int(before.body(body).geomadr[0])).name
     whole, near, far = _ends(before, name), _ends(after, name), _ends(after, f"{name}_of_half")
-    along = whole[1] - whole[0]
-    for part, share in ((near, 0.4), (far, 0.6)):
-        np.testing.assert_allclose(part[1] - part[0], share * along, atol=1e-12)
-    distances = [min(np.linalg.norm(end - other) for other in far) for end in whole]
-    assert min(distances) == pytest.approx(0.0, abs=1e-12)
+    held = posed(before).xanchor[before.body(body).jntadr[0]]
+    end = max(whole, key=lambda point: float(np.linalg.norm(point - held)))
+    for parts, place in (
+        (far, end),
+        (near, min(whole, key=lambda point: -np.linalg.norm(point - end))),
+    ):
+        assert min(np.linalg.norm(point - place) for point in parts) < 1e-12
+    # Both parts end where the axis crosses the plane of the split.
+    meeting = [point for point in near if min(np.linalg.norm(point - f) for f in far) < 1e-12]
+    assert (meeting[0] - held) @ (end - held) == pytest.approx(
+        0.4 * float((end - held) @ (end - held))
+    )
 
 
 def _ends(model: mujoco.MjModel, geom: str) -> tuple[np.ndarray, np.ndarray]:

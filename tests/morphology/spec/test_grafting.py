@@ -8,7 +8,7 @@ import pytest
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import AddLimb, Split
-from shapechanger.morphology.spec.grafting import copy_geom, graft_copy, move_limb, move_point
+from shapechanger.morphology.spec.grafting import copy_geom, copy_limb, move_limb, move_point
 from tests.morphology.models import built, leg, posed, spec_of
 from tests.morphology.scenes import EVERYTHING
 
@@ -112,7 +112,7 @@ def test_a_copied_limb_shares_the_assets() -> None:
     spec = spec_of(_REFERRED_TO)
     before = built(spec)
     for suffix, angle in (("_2", 2.0), ("_3", 4.0)):
-        copy = graft_copy(spec, spec.body("thigh"), suffix, angle)
+        copy = copy_limb(spec, spec.body("thigh"), suffix, angle)
         assert copy.name == f"thigh{suffix}"
     after = built(spec)
     assert (after.nmesh, after.nmat, after.ntex) == (before.nmesh, before.nmat, before.ntex)
@@ -124,21 +124,39 @@ def test_a_copied_limb_shares_the_assets() -> None:
     assert after.light("lamp_2").bodyid == after.body("shin_2").id
 
 
-def test_only_motors_are_copied_with_a_limb() -> None:
-    """Sensors, tendons and equalities stay with the original."""
+def test_all_that_names_a_limb_is_copied_with_it() -> None:
+    """Couplings, pins, exclusions, pairs, tendons, motors and sensors; nothing else is new."""
     spec = spec_of(_REFERRED_TO)
     before = _referring(built(spec))
-    graft_copy(spec, spec.body("thigh"), "_2", 2.0)
-    after = _referring(built(spec))
-    assert after["motors"] == [*before["motors"], "knee_2", "hip_2", "jet_2"]
-    for kind in ("sensed", "tendons", "coupled", "welded", "pairs", "excluded"):
-        assert after[kind] == before[kind]
+    copy_limb(spec, spec.body("thigh"), "_2", 2.0)
+    model = built(spec)
+    after = _referring(model)
+    assert after["motors"] == [*before["motors"], "knee_2", "hip_2", "tie_2", "jet_2"]
+    assert after["sensed"] == [
+        *before["sensed"],
+        *("knee_2", "tip_2", "shin_2", "knee_2", "rope_2"),
+    ]
+    assert after["tendons"] == [2, 2, 2, 2]
+    assert after["excluded"] == [2]
+    assert after["pairs"] == ["shin", "shin_2"]
+    names = mujoco.mj_id2name
+    assert names(model, mujoco.mjtObj.mjOBJ_JOINT, model.equality("couple_2").obj1id[0]) == "knee_2"
+    assert names(model, mujoco.mjtObj.mjOBJ_JOINT, model.equality("couple_2").obj2id[0]) == "flap"
+    assert names(model, mujoco.mjtObj.mjOBJ_BODY, model.equality("weld_2").obj1id[0]) == "shin_2"
+    assert "graft" not in spec.to_xml()
+    assert "~" not in spec.to_xml()
 
 
 def test_limbs_of_a_complex_model_can_be_copied() -> None:
     """Height fields, skyboxes, mocap bodies, ball joints and muscles are supported."""
-    before = built(spec_of(EVERYTHING))
-    model = built(spec_of(EVERYTHING), AddLimb("arm", "_2", 2.0), Split("hand", "finger"))
+    before, spec = built(spec_of(EVERYTHING)), spec_of(EVERYTHING)
+    with pytest.raises(MorphologyError, match="'knee' follows 'wrist', and cannot follow a copy"):
+        built(spec, AddLimb("arm", "_2", 2.0))
+    spec.delete(spec.equality("mirror"))
+    with pytest.raises(MorphologyError, match="'hand' cannot be split: the actuator 'suction'"):
+        built(spec, Split("hand", "finger"))
+    spec.delete(spec.actuator("suction"))
+    model = built(spec, AddLimb("arm", "_2", 2.0), Split("hand", "finger"))
     assert (model.nbody, model.nmesh, model.nhfield) == (
         before.nbody + 3,
         before.nmesh,

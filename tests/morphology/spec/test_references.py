@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from shapechanger.errors import MorphologyError
@@ -27,16 +28,17 @@ _TIED = """
 """
 
 
-def test_references_to_the_joint_are_removed() -> None:
-    """Its motor, the sensors of both, its equality, and all keyframes are removed."""
+def test_references_to_a_locked_joint() -> None:
+    """Its motor and the sensors of both go; its follower is held; a keyframe loses its number."""
     model = built(gantry(), Lock("yaw"))
-    assert (model.nu, model.nkey) == (0, 0)
+    assert (model.nu, model.nkey) == (0, 1)
     assert [model.sensor(i).name for i in range(model.nsensor)] == ["swing_angle", "hook"]
-    assert model.neq == 1
-    assert {int(model.eq_obj1id[0]), int(model.eq_obj2id[0])} == {
-        model.joint("y").id,
-        model.joint("swing").id,
-    }
+    assert [int(i) for i in model.eq_obj1id] == [model.joint(j).id for j in ("pitch", "y")]
+    assert [int(i) for i in model.eq_obj2id] == [-1, model.joint("swing").id]
+    # `yaw` is 0.45 rad from its reference, and `pitch` follows it by the same angle.
+    pitch = model.joint("pitch").qposadr[0]
+    assert model.qpos0[pitch] == pytest.approx(-0.45)
+    np.testing.assert_allclose(model.key_qpos[0], [0.4, 0.0, 0.0, 0.1])
 
 
 def test_a_tendon_without_effect_is_removed() -> None:

@@ -19,6 +19,8 @@ from shapechanger.errors import MorphologyError
 if TYPE_CHECKING:
     import mujoco
 
+    from shapechanger.morphology.spec.keyframes import Keyframes
+
 Vector = tuple[float, float, float]
 
 # A limb a hundred times longer or shorter is a typing mistake, and the softness of MuJoCo's
@@ -76,6 +78,14 @@ class Edit(
             MorphologyError: If the element cannot be changed this way.
         """
         raise NotImplementedError
+
+    def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
+        """Make the change in the keyframes too, after `apply`; most edits change none.
+
+        Args:
+            spec: The changed specification; its keyframes are elsewhere meanwhile.
+            keyframes: Its keyframes.
+        """
 
     def partly(self, alpha: float) -> Edit:
         """Return the edit with its amount scaled by `alpha`, 0 to 1."""

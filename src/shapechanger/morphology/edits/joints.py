@@ -6,16 +6,13 @@ import math
 from typing import Final
 
 import mujoco
-import numpy as np
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits.edit import Edit, part_of_the_way
-from shapechanger.morphology.spec.elements import delete_joint, select
-from shapechanger.morphology.spec.geometry import orientation, rotation
+from shapechanger.morphology.spec.elements import select
+from shapechanger.morphology.spec.positions import displace, limits, reference_of, set_limits
+from shapechanger.morphology.spec.references import remove_joint
 
-_J = mujoco.mjtJoint
-# A joint without limits turns all the way round; a slide without limits has no such number.
-_FULL_TURN: Final = (-math.pi, math.pi)
 # MuJoCo needs a range above zero; that of a partly locked joint is at least this.
 _NARROWEST_RAD: Final = 1e-3
 
@@ -74,8 +71,9 @@ class JointRange(Edit, frozen=True):
 class Lock(Edit, frozen=True):
     """Lock hinges or slides at a position: remove the joints and their motors, keep the limbs.
 
-    Both spaces shrink, so a policy needs a body map to be transferred; the rule `hold` of the map
-    presents the locked position to the policy.
+    A joint that is coupled to a locked one is held where the coupling puts it. Both spaces shrink,
+    so a policy needs a body map to be transferred; the rule `hold` of the map presents the locked
+    position to the policy.
 
     Attributes:
         joint: Name or glob of the joints.
@@ -92,21 +90,19 @@ class Lock(Edit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Lock every joint that fits."""
-        for joint in select("joint", self.joint, spec.joints):
-            old = limits(joint)
-            position = self.position
-            if position is None:
-                if old is None:
-                    raise MorphologyError(
-                        f"{joint.name!r} slides without limits, so it has no middle: "
-                        "give a position."
-                    )
-                position = 0.5 * (old[0] + old[1])
-            if self.amount == 1.0:
-                _weld(spec, joint, position)
-                continue
-            far = 1.0 / self.amount
-            lower, upper = old or (position - far, position + far)
+        joints = select("joint", self.joint, spec.joints)
+        positions = {joint.name: self._position_of(joint) for joint in joints}
+        if self.amount == 1.0:
+            displacements = {
+                joint.name: positions[joint.name] - reference_of(joint) for joint in joints
+            }
+            for joint in joints:
+                displace(spec, joint, displacements[joint.name])
+                remove_joint(spec, joint, displacements)
+            return
+        for joint in joints:
+            position, far = positions[joint.name], 1.0 / self.amount
+            lower, upper = limits(joint) or (position - far, position + far)
             narrow = max(1.0 - self.amount, _NARROWEST_RAD / (upper - lower))
             set_limits(
                 joint,
@@ -114,77 +110,13 @@ class Lock(Edit, frozen=True):
                 position + narrow * (upper - position),
             )
 
-
-def limits(joint: mujoco.MjsJoint) -> tuple[float, float] | None:
-    """The range of a hinge or slide, rad or m.
-
-    Returns:
-        A full turn for a hinge without limits, None for a slide without.
-
-    Raises:
-        MorphologyError: For other joints.
-    """
-    if joint.type not in (_J.mjJNT_HINGE, _J.mjJNT_SLIDE):
-        raise MorphologyError(f"{joint.name!r} is neither a hinge nor a slide, so it has no range.")
-    lower, upper = (float(x) for x in joint.range)
-    automatic = joint.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
-    if joint.limited != mujoco.mjtLimited.mjLIMITED_TRUE and not automatic:
-        return None if joint.type == _J.mjJNT_SLIDE else _FULL_TURN
-    if _in_degrees(joint):
-        return math.radians(lower), math.radians(upper)
-    return lower, upper
-
-
-def set_limits(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
-    """Limit the range of a hinge or slide.
-
-    Args:
-        joint: The joint.
-        lower: Lower limit, rad or m.
-        upper: Upper limit, rad or m.
-    """
-    joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-    in_degrees = _in_degrees(joint)
-    joint.range = [_degrees(x) if in_degrees else x for x in (lower, upper)]
-
-
-def _in_degrees(joint: mujoco.MjsJoint) -> bool:
-    """Return whether the model writes this joint's angles in degrees."""
-    return bool(joint.compiler.degree) and joint.type == _J.mjJNT_HINGE
-
-
-def _degrees(angle: float) -> float:
-    """Return degrees that MuJoCo converts to exactly `angle`, rad, if possible.
-
-    It is for every angle that was written in degrees: 30° is not 29.999999999999996°.
-    """
-    near = math.degrees(angle)
-    candidates = (round(near, 9), near, math.nextafter(near, 0.0), math.nextafter(near, 2.0 * near))
-    return next((degrees for degrees in candidates if math.radians(degrees) == angle), near)
-
-
-def _weld(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, position: float) -> None:
-    """Add the joint's displacement at `position` to its body's pose, and delete the joint."""
-    body = joint.parent
-    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-    reference = math.radians(joint.ref) if _in_degrees(joint) else float(joint.ref)
-    displacement = position - reference
-    turn, shift = np.eye(3), np.zeros(3)
-    quaternion = np.array([1.0, 0.0, 0.0, 0.0])
-    if joint.type == _J.mjJNT_HINGE:
-        mujoco.mju_axisAngle2Quat(quaternion, axis, displacement)
-        turn = rotation(quaternion)
-        shift = joint.pos - turn @ joint.pos
-    else:
-        shift = axis * displacement
-    # The body's joints act in order; those before this one are now seen from the turned frame.
-    for earlier in body.joints[: [j.name for j in body.joints].index(joint.name)]:
-        earlier.axis = turn.T @ earlier.axis
-        earlier.pos = turn.T @ (earlier.pos - shift)
-    parent = orientation(spec, body)
-    turned = np.empty(4)
-    mujoco.mju_mulQuat(turned, parent, quaternion)
-    body.pos = body.pos + rotation(parent) @ shift
-    body.quat = turned
-    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-    delete_joint(spec, joint)
+    def _position_of(self, joint: mujoco.MjsJoint) -> float:
+        """Return the position at which a joint is locked, rad or m."""
+        old = limits(joint)
+        if self.position is not None:
+            return self.position
+        if old is None:
+            raise MorphologyError(
+                f"{joint.name!r} slides without limits, so it has no middle: give a position."
+            )
+        return 0.5 * (old[0] + old[1])

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import mujoco
 import numpy as np
@@ -17,39 +16,61 @@ from shapechanger.morphology.edits.edit import (
     require_factor,
     require_vector,
 )
-from shapechanger.morphology.edits.joints import set_limits
+from shapechanger.morphology.spec.cutting import Piece, Plane, shorten
 from shapechanger.morphology.spec.elements import (
     limbs_and_trunks,
     require_free_name,
     require_limb,
     select,
-    subtree,
 )
+from shapechanger.morphology.spec.explicit import LEAST_MASS
 from shapechanger.morphology.spec.geometry import (
+    Point,
     anchor,
     far_end,
     held_at,
     move_by,
     place_of,
     require_geometry,
+    resize_geom,
     resize_limb,
     scale_geom_mass,
-    stretch_geom,
-    stretch_segment,
+    stretched,
     volume,
 )
-from shapechanger.morphology.spec.grafting import copy_geom, graft_copy, move_limb, move_point
+from shapechanger.morphology.spec.grafting import (
+    Point,
+    copy_geom,
+    copy_limb,
+    move_limb,
+    move_point,
+    share_contacts,
+)
+from shapechanger.morphology.spec.positions import set_limits
+from shapechanger.morphology.spec.references import (
+    elements_of,
+    release_drawings,
+    remove_limb,
+    require_divisible,
+    require_removable,
+    require_unnamed,
+)
 
-_SPHERE: Final = mujoco.mjtGeom.mjGEOM_SPHERE
+if TYPE_CHECKING:
+    from shapechanger.morphology.spec.keyframes import Keyframes
+
 # MuJoCo refuses bodies of almost no mass, so a limb that exists in part is never smaller than this
 # share of its full size, which is a millionth of its mass.
 _SMALLEST_PART: Final = 0.01
-# In kg and in kg·m²: ten times what MuJoCo refuses.
-_LEAST: Final = 1e-14
+# A geom that is divided this far from the axis of its segment lies on it, m.
+_ON_THE_AXIS_M: Final = 1e-12
 
 
 class Cut(Edit, frozen=True):
     """Cut a limb: shorten a segment, and remove what is attached to it beyond the cut.
+
+    What lies nearer stays as it is, and the geoms that the cut crosses become shorter. Sites, pins
+    of loops, cameras and lights at the far end or past it mark the end, and move to the new one.
 
     Attributes:
         body: Name or glob of the segments; not a trunk.
@@ -73,10 +94,51 @@ class Cut(Edit, frozen=True):
                 continue  # It was part of a limb that has been cut off.
             require_limb(body, "cut")
             require_geometry(spec, body)
-            beyond = _children_beyond(spec, body, self.keep)
-            stretch_segment(spec, body, part_of_the_way(1.0, self.keep, self.amount))
-            for child in beyond:
-                _take_away(spec, child, self.amount)
+            plane = Plane(spec, body, self.keep)
+            if self.keep < 1.0:
+                release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, name)})
+                self._cut_geoms(spec, body, plane)
+                for child in plane.children_beyond():
+                    self._take_child(spec, body, child)
+                for point in plane.points_beyond():
+                    self._cut_point(spec, plane, point)
+
+    def _cut_geoms(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, plane: Plane) -> None:
+        """Shorten the geoms that the plane cuts, and remove those that lie beyond it."""
+        pieces = [(geom, plane.piece_of(geom)) for geom in body.geoms]
+        if not any(piece.share for _, piece in pieces):
+            raise MorphologyError(
+                f"No geom of {body.name!r} lies nearer than {self.keep:g} of its length, so "
+                "nothing would be left of it: keep more."
+            )
+        for geom, piece in pieces:
+            if not piece.share:
+                _require_unnamed_beyond(spec, geom)
+                if self.amount == 1.0:
+                    spec.delete(geom)
+                else:
+                    part = max(1.0 - self.amount, _SMALLEST_PART)
+                    resize_geom(spec, geom, place_of(geom), part)
+            elif piece.share < 1.0:
+                share = part_of_the_way(1.0, piece.share, self.amount)
+                shorten(spec, geom, piece.near, share, piece.axis)
+
+    def _cut_point(self, spec: mujoco.MjSpec, plane: Plane, point: Point) -> None:
+        """Pull a point at the far end to the new end, and remove any other one."""
+        if plane.is_at_end(point):
+            move_by(point, part_of_the_way(1.0, self.keep, self.amount) * plane.along - plane.along)
+            return
+        _require_unnamed_beyond(spec, point)
+        if self.amount == 1.0:
+            spec.delete(point)
+
+    def _take_child(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, child: mujoco.MjsBody) -> None:
+        """Remove a limb beyond the cut; at an amount below 1, pull it in and make it smaller."""
+        if self.amount < 1.0:
+            share = part_of_the_way(1.0, self.keep, self.amount)
+            there = held_at(spec, child)
+            child.pos = child.pos + (stretched(there, anchor(body), share) - there)
+        _take_away(spec, child, self.amount)
 
 
 class Remove(Edit, frozen=True):
@@ -100,9 +162,10 @@ class Remove(Edit, frozen=True):
 class Split(Edit, frozen=True):
     """Split a segment in two, with a hinge where it was split.
 
-    The nearer part keeps the body's name and joint; what is attached to the farther part moves with
-    it, and so do its sites and spheres. The new hinge has the armature, damping and stiffness of
-    the body's own joint.
+    The nearer part keeps the body's name and joint. What lies wholly on one side of the plane of
+    the split stays whole and goes to that part, spheres and ellipsoids by their middle; geoms that
+    the plane cuts are divided. The new hinge has the armature, damping and stiffness of the body's
+    own joint.
 
     Attributes:
         body: Name of the segment; not a trunk.
@@ -133,34 +196,55 @@ class Split(Edit, frozen=True):
         (body,) = select("body", self.body, limbs_and_trunks(spec))[:1]
         require_limb(body, "split")
         require_geometry(spec, body)
-        place = anchor(body) + self.at * (far_end(spec, body) - anchor(body))
-        is_beyond = _beyond(spec, body, self.at)
-        children = _children_beyond(spec, body, self.at)
-        part = _new_segment(spec, body, self.name, place)
-        points = [*body.sites, *(geom for geom in body.geoms if geom.type == _SPHERE)]
-        for point in [point for point in points if is_beyond(place_of(point))]:
-            move_by(move_point(spec, point, part), -place)
-        self._share(spec, body, part)
+        plane = Plane(spec, body, self.at)
+        pieces = {geom.name: plane.piece_of(geom) for geom in body.geoms}
+        cut = [name for name, piece in pieces.items() if 0.0 < piece.share < 1.0]
+        require_divisible(spec, body, cut)
+        release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, body.name)})
+        points, children = plane.points_beyond(), plane.children_beyond()
+        part = _new_segment(spec, body, self.name, plane.place)
+        for name, piece in pieces.items():
+            if not piece.share:
+                move_by(move_point(spec, spec.geom(name), part), -plane.place)
+        for point in points:
+            move_by(move_point(spec, point, part), -plane.place)
+        for name in cut:
+            self._divide(spec, spec.geom(name), pieces[name], part, plane.place)
         for child in children:
-            offset = child.pos - place
+            offset = child.pos - plane.place
             move_limb(spec, child, part).pos = offset
+        share_contacts(spec, body, part, {name: self._far_half(name) for name in cut})
         _add_hinge(spec, body, part, self, self.amount)
 
-    def _share(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, part: mujoco.MjsBody) -> None:
-        """Split every geom that has a length between both parts."""
-        held = anchor(body)
-        for geom in [geom for geom in body.geoms if geom.type != _SPHERE]:
-            whole = volume(spec, geom)
-            copy = copy_geom(spec, geom, part, f"{geom.name}_of_{self.name}")
-            move_by(copy, -held)
-            stretch_geom(spec, copy, np.zeros(3), 1.0 - self.at)
-            stretch_geom(spec, geom, held, self.at)
-            # The rounded ends at the split overlap. Their mass grows with the amount of the split.
-            volumes = [volume(spec, half) for half in (geom, copy)]
-            rounded_end = 0.5 * (sum(volumes) - whole)
-            for half, own in zip((geom, copy), volumes, strict=True):
-                without = 1.0 - rounded_end / own
-                scale_geom_mass(half, part_of_the_way(without, 1.0, self.amount))
+    def _far_half(self, geom: str) -> str:
+        """Return the name of the farther half of a geom that is cut in two."""
+        return f"{geom}_of_{self.name}"
+
+    def _divide(
+        self,
+        spec: mujoco.MjSpec,
+        geom: mujoco.MjsGeom,
+        piece: Piece,
+        part: mujoco.MjsBody,
+        place: np.ndarray,
+    ) -> None:
+        """Divide a geom between both parts."""
+        whole = volume(spec, geom)
+        copy = copy_geom(spec, geom, part, self._far_half(geom.name))
+        # About its near end, which then goes to where the geom is cut.
+        move_by(copy, -piece.near)
+        shorten(spec, copy, np.zeros(3), 1.0 - piece.share, piece.axis)
+        end = piece.near + 2.0 * (place_of(geom) - piece.near)
+        offset = piece.near + piece.share * (end - piece.near) - place
+        if float(np.linalg.norm(offset)) > _ON_THE_AXIS_M:
+            move_by(copy, offset)
+        shorten(spec, geom, piece.near, piece.share, piece.axis)
+        # The rounded ends at the split overlap. Their mass grows with the amount of the split.
+        volumes = [volume(spec, half) for half in (geom, copy)]
+        rounded_end = 0.5 * (sum(volumes) - whole)
+        for half, own in zip((geom, copy), volumes, strict=True):
+            without = 1.0 - rounded_end / own
+            scale_geom_mass(half, part_of_the_way(without, 1.0, self.amount))
 
 
 class AddSegment(Edit, frozen=True):
@@ -243,16 +327,18 @@ class AddLimb(Edit, frozen=True):
         """Add the limb."""
         (limb,) = select("body", self.like, limbs_and_trunks(spec))[:1]
         require_limb(limb, "copied")
-        for body in subtree(limb):
-            require_free_name(spec, "body", body.name + self.suffix)
-            for kind, elements in (("joint", body.joints), ("geom", body.geoms)):
-                for element in elements:
-                    require_free_name(spec, kind, element.name + self.suffix)
-        copy = graft_copy(spec, limb, self.suffix, self.angle)
+        for kind, name in elements_of(limb):
+            require_free_name(spec, kind.name.removeprefix("mjOBJ_").lower(), name + self.suffix)
+        copy = copy_limb(spec, limb, self.suffix, self.angle)
         if self.size != 1.0:
             resize_limb(spec, copy, self.size)
         if self.amount != 1.0:
             _shrink(spec, copy, self.amount)
+
+    def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
+        """Pose the copy like the limb that it was copied from."""
+        named = [element.name for element in (*spec.joints, *spec.actuators, *spec.bodies)]
+        keyframes.copy({n: n.removesuffix(self.suffix) for n in named if n.endswith(self.suffix)})
 
 
 def _check_hinge(lower: float, upper: float, gear: float | None, axis: Vector | None) -> None:
@@ -267,28 +353,20 @@ def _check_hinge(lower: float, upper: float, gear: float | None, axis: Vector | 
         require_vector("The axis of a hinge", axis)
 
 
-def _beyond(spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float) -> Callable[[np.ndarray], bool]:
-    """Return a test whether a point lies farther out on the segment than `part` of its length."""
-    held = anchor(body)
-    along = far_end(spec, body) - held
-    # A point exactly at the cut counts as within; rounding must not decide it.
-    reach = (part + 1e-9) * float(along @ along)
-    return lambda point: float((point - held) @ along) > reach
-
-
-def _children_beyond(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, part: float
-) -> list[mujoco.MjsBody]:
-    """Return the children attached farther out along the segment than `part` of its length."""
-    is_beyond = _beyond(spec, body, part)
-    return [child for child in body.bodies if is_beyond(held_at(spec, child))]
+def _require_unnamed_beyond(spec: mujoco.MjSpec, element: Point) -> None:
+    """Refuse a cut that would remove an element that something names."""
+    kind = type(element).__name__.removeprefix("Mjs").upper()
+    require_unnamed(
+        spec, (getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), element.name), "lies beyond the cut"
+    )
 
 
 def _take_away(spec: mujoco.MjSpec, limb: mujoco.MjsBody, amount: float) -> None:
     """Remove a limb; at an amount below 1, make it smaller and weaker instead."""
     if amount == 1.0:
-        spec.delete(limb)
+        remove_limb(spec, limb)
     else:
+        require_removable(spec, limb)
         _shrink(spec, limb, 1.0 - amount)
 
 
@@ -296,8 +374,8 @@ def _shrink(spec: mujoco.MjSpec, limb: mujoco.MjsBody, part: float) -> None:
     """Scale a limb that exists only in part, in size and strength."""
     resize_limb(spec, limb, max(part, _SMALLEST_PART))
     # Of a limb that is scaled by two edits, masses can fall below what MuJoCo accepts.
-    spec.compiler.boundmass = max(spec.compiler.boundmass, _LEAST)
-    spec.compiler.boundinertia = max(spec.compiler.boundinertia, _LEAST)
+    spec.compiler.boundmass = max(spec.compiler.boundmass, LEAST_MASS)
+    spec.compiler.boundinertia = max(spec.compiler.boundinertia, LEAST_MASS)
 
 
 def _new_segment(

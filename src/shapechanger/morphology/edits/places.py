@@ -7,13 +7,14 @@ variant of a model that is written as a file can be written as edits.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits.edit import Edit, Vector, part_of_the_way, require_vector
-from shapechanger.morphology.spec.elements import limbs_and_trunks, select
+from shapechanger.morphology.spec.elements import compiled, limbs_and_trunks, select
 from shapechanger.morphology.spec.geometry import (
     axis_ends,
     has_ends,
@@ -24,6 +25,9 @@ from shapechanger.morphology.spec.geometry import (
     scale_mass,
     volume,
 )
+
+if TYPE_CHECKING:
+    from shapechanger.morphology.spec.keyframes import Keyframes
 
 # A robot of a million kilograms is a typing mistake.
 _LARGEST_MASS_KG = 1e6
@@ -48,6 +52,16 @@ class PlaceBody(Edit, frozen=True):
         """Move every body that fits."""
         for body in select("body", self.body, limbs_and_trunks(spec)):
             body.pos = _between(body.pos, self.to, self.amount)
+
+    def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
+        """Place the bodies that float in every keyframe too."""
+        for body in select("body", self.body, limbs_and_trunks(spec)):
+            for joint in (j for j in body.joints if j.type == mujoco.mjtJoint.mjJNT_FREE):
+                keyframes.change(joint.name, self._placed)
+
+    def _placed(self, pose: np.ndarray) -> np.ndarray:
+        """Return the position of a free joint, shape (7,), at the new place."""
+        return np.concatenate([_between(pose[:3], self.to, self.amount), pose[3:]])
 
 
 class PlaceGeom(Edit, frozen=True):
@@ -149,7 +163,7 @@ class TotalMass(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Scale the mass of every body."""
         # Only the compiler knows the volume of every shape.
-        old = float(spec.copy().compile().body_mass.sum())
+        old = float(compiled(spec).body_mass.sum())
         for body in limbs_and_trunks(spec):
             scale_mass(body, part_of_the_way(old, self.to, self.amount) / old)
 

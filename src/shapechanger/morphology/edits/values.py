@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, Literal
 
+import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
@@ -19,18 +20,25 @@ from shapechanger.morphology.edits.edit import (
     require_factor,
     require_vector,
 )
-from shapechanger.morphology.spec.elements import limbs_and_trunks, select
+from shapechanger.morphology.spec.elements import compiled, limbs_and_trunks, select
 from shapechanger.morphology.spec.geometry import (
     inertia_is_written_out,
+    orientation,
     require_geometry,
+    rotation,
     scale_mass,
     stretch_segment,
     thicken_geom,
 )
+from shapechanger.morphology.spec.positions import reference_of
+from shapechanger.morphology.spec.strength import is_motor, scale_clamps, scale_strength
 
 if TYPE_CHECKING:
-    import mujoco
+    from shapechanger.morphology.spec.keyframes import Keyframes
 
+_J: Final = mujoco.mjtJoint
+# Share of an axis that is vertical from which a slide raises its body.
+_VERTICAL: Final = 1.0 - 1e-6
 # A larger value, in any unit here, is a typing mistake, and MuJoCo's numbers overflow.
 _LARGEST_VALUE: Final = 1e6
 
@@ -86,10 +94,10 @@ class Mass(ValueEdit, frozen=True):
         """Change every body that fits."""
         bodies = select("body", self.element, limbs_and_trunks(spec))
         # Only the compiler knows the volume of every shape.
-        compiled = spec.copy().compile() if self.to is not None else None
+        whole = compiled(spec) if self.to is not None else None
         for body in bodies:
             # By name: an earlier edit may have changed the indices of the bodies.
-            old = 1.0 if compiled is None else float(compiled.body(body.name).mass[0])
+            old = 1.0 if whole is None else float(whole.body(body.name).mass[0])
             if old <= 0.0:
                 raise MorphologyError(f"{body.name!r} has no mass, so none can be set.")
             scale_mass(body, self.changed(old) / old)
@@ -117,9 +125,11 @@ class Density(ValueEdit, frozen=True):
 
 
 class Gear(ValueEdit, frozen=True):
-    """Change the gear of actuators: N·m of torque, or N of force, for a control of 1.
+    """Change the strength of actuators: N·m of torque, or N of force, for a control of 1.
 
-    `to` sets the strongest axis of the gear and keeps its direction.
+    `to` sets the strongest axis of a motor's gear and keeps its direction. A servo keeps its
+    targets: its gains, its bias and its force range scale, and it takes a scale alone. A largest
+    force of the joint or tendon scales along where all of its actuators are changed.
     """
 
     @staticmethod
@@ -128,13 +138,29 @@ class Gear(ValueEdit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every actuator that fits."""
+        factors: dict[str, float] = {}
         for actuator in select("actuator", self.element, spec.actuators):
-            gear = np.array(actuator.gear)
-            strongest = gear[np.argmax(np.abs(gear))]
-            if not strongest:
-                raise MorphologyError(f"{actuator.name!r} has a gear of zero, so none can be set.")
-            new = self.changed(float(strongest))
-            actuator.gear = np.where(gear == strongest, new, gear * (new / strongest))
+            if is_motor(actuator):
+                factors[actuator.name] = self._change_gear(actuator)
+            elif self.scale is None:
+                raise MorphologyError(
+                    f"{actuator.name!r} is no motor, so its gear is not its strength: give a scale "
+                    "in place of a value."
+                )
+            else:
+                factors[actuator.name] = factor = self.changed(1.0)
+                scale_strength(actuator, factor)
+        scale_clamps(spec, factors)
+
+    def _change_gear(self, actuator: mujoco.MjsActuator) -> float:
+        """Change the gear of a motor, and return its new strength over the old one."""
+        gear = np.array(actuator.gear)
+        strongest = float(gear[np.argmax(np.abs(gear))])
+        if not strongest:
+            raise MorphologyError(f"{actuator.name!r} has a gear of zero, so none can be set.")
+        new = self.changed(strongest)
+        actuator.gear = np.where(gear == strongest, new, gear * (new / strongest))
+        return new / strongest
 
 
 class Damping(ValueEdit, frozen=True):
@@ -143,6 +169,7 @@ class Damping(ValueEdit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every joint that fits."""
         for joint in select("joint", self.element, spec.joints):
+            _require_own_values(joint, "damping")
             joint.damping = _first_changed(self, joint.damping)
 
 
@@ -152,6 +179,7 @@ class Stiffness(ValueEdit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Change every joint that fits."""
         for joint in select("joint", self.element, spec.joints):
+            _require_own_values(joint, "stiffness")
             joint.stiffness = _first_changed(self, joint.stiffness)
 
 
@@ -175,6 +203,15 @@ class Friction(ValueEdit, frozen=True):
             friction = np.array(geom.friction)
             friction[place] = self.changed(float(friction[place]))
             geom.friction = friction
+
+
+def _require_own_values(joint: mujoco.MjsJoint, what: str) -> None:
+    """Refuse a joint whose resistance the compiler derives from its inertia."""
+    if all(number > 0.0 for number in joint.springdamper):
+        raise MorphologyError(
+            f"{joint.name!r} takes its {what} from its springdamper, which would swallow the "
+            "change: write stiffness and damping out in the model."
+        )
 
 
 def _first_changed(edit: ValueEdit, polynomial: np.ndarray) -> np.ndarray:
@@ -292,8 +329,30 @@ class StartHeight(Edit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Raise or lower every trunk that fits."""
-        trunks = [body for body in limbs_and_trunks(spec) if body.parent.parent is None]
-        for body in select("trunk", self.body, trunks):
+        for body in self._trunks(spec):
             position = body.pos.copy()
             position[2] = part_of_the_way(float(position[2]), self.to, self.amount)
             body.pos = position
+
+    def follow_in_keyframes(self, spec: mujoco.MjSpec, keyframes: Keyframes) -> None:
+        """Raise or lower the trunks in every keyframe too, because robots start in one."""
+        for joint in (joint for body in self._trunks(spec) for joint in body.joints):
+            axis = rotation(orientation(spec, joint.parent)) @ joint.axis
+            vertical = joint.type == _J.mjJNT_SLIDE and abs(axis[2]) > _VERTICAL * math.hypot(*axis)
+            if joint.type == _J.mjJNT_FREE:
+                keyframes.change(joint.name, self._raised)
+            elif vertical:
+                # At its reference the body is where the model puts it.
+                own = np.array([reference_of(joint)])
+                keyframes.change(joint.name, lambda old, own=own: old + self.amount * (own - old))
+
+    def _raised(self, pose: np.ndarray) -> np.ndarray:
+        """Return the position of a free joint, shape (7,), at the new height."""
+        pose = pose.copy()
+        pose[2] = part_of_the_way(float(pose[2]), self.to, self.amount)
+        return pose
+
+    def _trunks(self, spec: mujoco.MjSpec) -> list[mujoco.MjsBody]:
+        """Return the trunks that fit."""
+        trunks = [body for body in limbs_and_trunks(spec) if body.parent.parent is None]
+        return select("trunk", self.body, trunks)

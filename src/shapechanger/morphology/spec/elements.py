@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import mujoco
-import numpy as np
 
 from shapechanger.errors import MorphologyError, UnknownName
 
@@ -74,7 +73,7 @@ def require_free_name(spec: mujoco.MjSpec, kind: str, name: str) -> None:
     Raises:
         MorphologyError: If `name` is empty or taken.
     """
-    elements = getattr(spec, "bodies" if kind == "body" else f"{kind}s")
+    elements = getattr(spec, {"body": "bodies", "equality": "equalities"}.get(kind, f"{kind}s"))
     if not name or any(element.name == name for element in elements):
         raise MorphologyError(f"A new {kind} needs an unused name, got {name!r}.")
 
@@ -87,7 +86,7 @@ def subtree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
 
 
 def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None = None) -> None:
-    """Name every body, joint, geom, site, camera and actuator that has no name, in place.
+    """Name every body, joint, geom, site, camera, light and actuator without a name, in place.
 
     A body is named after `bodies_by_joint`, or its joint, or its parent; an actuator after the
     element that it drives; anything else after its body. Names change no physics.
@@ -107,6 +106,7 @@ def name_elements(spec: mujoco.MjSpec, bodies_by_joint: Mapping[str, str] | None
         ("geom", spec.geoms),
         ("site", spec.sites),
         ("camera", spec.cameras),
+        ("light", spec.lights),
     ):
         free = unique_namer(element.name for element in elements)
         for element in elements:
@@ -136,66 +136,12 @@ def unique_namer(taken: Iterable[str], numbered: str = "_{}") -> Callable[[str],
     return free
 
 
-_OF_JOINTS: Final = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-
-
-def delete_joint(spec: mujoco.MjSpec, joint: mujoco.MjsJoint) -> None:
-    """Delete a joint, its motors and couplings, the sensors of these, and all keyframes.
-
-    A keyframe lists every joint, so none fits the new model.
+def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile a copy in which every body stands for itself, in its own frame.
 
     Args:
-        spec: Specification that contains it.
-        joint: The joint.
-
-    Raises:
-        MorphologyError: If a tendon ties the joint to others.
+        spec: The specification; not changed.
     """
-    name = joint.name
-    for tendon in list(spec.tendons):
-        if name in _joints_of(tendon):
-            if _does_something(spec, tendon):
-                raise MorphologyError(
-                    f"{name!r} is tied to other joints by the tendon {tendon.name!r}, so it cannot "
-                    "be removed alone."
-                )
-            spec.delete(tendon)
-    for actuator in list(spec.actuators):
-        if actuator.trntype in _OF_JOINTS and actuator.target == name:
-            _delete_sensors(spec, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator.name)
-            spec.delete(actuator)
-    for equality in list(spec.equalities):
-        if equality.type == mujoco.mjtEq.mjEQ_JOINT and name in (equality.name1, equality.name2):
-            spec.delete(equality)
-    _delete_sensors(spec, mujoco.mjtObj.mjOBJ_JOINT, name)
-    for key in list(spec.keys):
-        spec.delete(key)
-    spec.delete(joint)
-
-
-def _delete_sensors(spec: mujoco.MjSpec, kind: mujoco.mjtObj, name: str) -> None:
-    """Delete the sensors of one element."""
-    for sensor in list(spec.sensors):
-        if sensor.objtype == kind and sensor.objname == name:
-            spec.delete(sensor)
-
-
-def _joints_of(tendon: mujoco.MjsTendon) -> set[str]:
-    """Return the names of the joints of a fixed tendon; none for a spatial one."""
-    wraps = (tendon.path[i] for i in range(len(tendon.path)))
-    return {wrap.target.name for wrap in wraps if wrap.type == mujoco.mjtWrap.mjWRAP_JOINT}
-
-
-def _does_something(spec: mujoco.MjSpec, tendon: mujoco.MjsTendon) -> bool:
-    """Return whether a tendon acts on its joints or is used; the humanoid's do neither."""
-    lower, upper = tendon.range
-    automatic = tendon.limited == mujoco.mjtLimited.mjLIMITED_AUTO and lower < upper
-    acts = np.any(tendon.stiffness) or np.any(tendon.damping) or tendon.frictionloss
-    if tendon.limited == mujoco.mjtLimited.mjLIMITED_TRUE or automatic or acts or tendon.armature:
-        return True
-    used = {a.target for a in spec.actuators if a.trntype == mujoco.mjtTrn.mjTRN_TENDON}
-    used |= {s.objname for s in spec.sensors if s.objtype == mujoco.mjtObj.mjOBJ_TENDON}
-    for equality in spec.equalities:
-        if equality.type == mujoco.mjtEq.mjEQ_TENDON:
-            used |= {equality.name1, equality.name2}
-    return bool(tendon.name) and tendon.name in used
+    copy = spec.copy()
+    copy.compiler.fusestatic = copy.compiler.alignfree = copy.compiler.discardvisual = False
+    return copy.compile()

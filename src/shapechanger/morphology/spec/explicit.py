@@ -1,7 +1,8 @@
-"""Make implicit parts of a model explicit: names, frames and a total mass.
+"""Make implicit parts of a model explicit: names, frames, fitted shapes and bounds of mass.
 
 Edits change numbers in place. An element without a name cannot be selected, a pose relative to a
-frame has other axes than its body, and a total mass that the compiler restores undoes any change.
+frame has other axes than its body, and a size, mass or inertia that the compiler sets undoes any
+change.
 """
 
 from __future__ import annotations
@@ -12,19 +13,23 @@ import mujoco
 import numpy as np
 
 from shapechanger.errors import MorphologyError
-from shapechanger.morphology.spec.elements import limbs_and_trunks, name_elements
+from shapechanger.morphology.spec.elements import compiled, limbs_and_trunks, name_elements
 from shapechanger.morphology.spec.geometry import Array, has_ends, orientation, rotation, scale_mass
+
+LEAST_MASS: Final = 1e-14
+"""Ten times the mass and the inertia of a body that MuJoCo refuses, kg and kg·m²."""
 
 _UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)
 
 
 def make_explicit(spec: mujoco.MjSpec) -> None:
-    """Name every element, and write out frames and a total mass, in place.
+    """Name every element, and write out whatever the compiler would derive anew, in place.
 
-    The physics does not change.
+    These are frames, a total mass, least masses and inertias, and primitives that are fitted to
+    meshes. The physics does not change.
 
     Raises:
-        MorphologyError: If a frame scales its elements.
+        MorphologyError: If a frame scales its elements, or a least mass cannot be written out.
     """
     name_elements(spec)
     resolve_frames(spec)
@@ -34,6 +39,48 @@ def make_explicit(spec: mujoco.MjSpec) -> None:
         factor = total / float(spec.copy().compile().body_mass.sum())
         for body in limbs_and_trunks(spec):
             scale_mass(body, factor)
+    _write_out_bounds(spec)
+    _write_out_fits(spec)
+
+
+def _write_out_bounds(spec: mujoco.MjSpec) -> None:
+    """Give the bodies that the compiler makes heavier their final inertia, and drop the bounds."""
+    compiler = spec.compiler
+    if max(compiler.boundmass, compiler.boundinertia) <= LEAST_MASS:
+        return
+    bounded = compiled(spec)
+    compiler.boundmass = min(compiler.boundmass, LEAST_MASS)
+    compiler.boundinertia = min(compiler.boundinertia, LEAST_MASS)
+    free = compiled(spec)
+    for body in limbs_and_trunks(spec):
+        final, own = bounded.body(body.name), free.body(body.name)
+        if final.mass == own.mass and np.array_equal(final.inertia, own.inertia):
+            continue
+        if compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+            raise MorphologyError(
+                f"The least mass or inertia of the compiler raises that of {body.name!r}, which "
+                "would undo an edit: give the body a denser geom, or drop boundmass and "
+                "boundinertia."
+            )
+        body.explicitinertial = True
+        body.mass, body.ipos, body.iquat = final.mass[0], final.ipos, final.iquat
+        body.inertia, body.fullinertia = final.inertia, np.full(6, np.nan)
+        body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+
+
+def _write_out_fits(spec: mujoco.MjSpec) -> None:
+    """Write out the size and place of primitives that are fitted to a mesh."""
+    meshes = (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF)
+    fitted = [e for e in (*spec.geoms, *spec.sites) if e.meshname and e.type not in meshes]
+    if not fitted:
+        return
+    model = compiled(spec)
+    for element in fitted:
+        kind = model.geom if isinstance(element, mujoco.MjsGeom) else model.site
+        final = kind(element.name)
+        element.meshname = ""
+        element.size, element.pos, element.quat = final.size, final.pos, final.quat
+        element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
 
 
 def resolve_frames(spec: mujoco.MjSpec) -> None:

@@ -11,15 +11,24 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.spec.elements import subtree
+from shapechanger.morphology.spec.references import (
+    elements_of,
+    moves_only,
+    path_elements,
+    references,
+    release_drawings,
+)
+from shapechanger.morphology.spec.strength import scale_strength
 
 Array = NDArray[np.float64]
 _Oriented = mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera | mujoco.MjsFrame
+Point = mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera | mujoco.MjsLight
 _G = mujoco.mjtGeom
 _LONG: Final = (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER)
 _AXES: Final = {"x": 0, "y": 1, "z": 2}
 # Cosine above which a geom lies along an axis; the pole of the inverted pendulum leans by 1 mm on
 # 600.
-_ALONG: Final = 0.999
+ALONG: Final = 0.999
 
 
 def rotation(quaternion: Array) -> Array:
@@ -29,28 +38,37 @@ def rotation(quaternion: Array) -> Array:
     return matrix.reshape(3, 3)
 
 
-def orientation(spec: mujoco.MjSpec, element: _Oriented) -> Array:
+def orientation(
+    spec: mujoco.MjSpec,
+    element: _Oriented,
+    alternative: mujoco.MjsOrientation | None = None,
+    quaternion: Array | None = None,
+) -> Array:
     """Return an element's quaternion (w, x, y, z), however its orientation was written.
 
     Args:
         spec: Specification that contains it, which says how angles are written.
-        element: A body, geom or site.
+        element: A body, geom, site, camera or frame.
+        alternative: Another orientation of the element, such as that of its inertia.
+        quaternion: The quaternion of that.
     """
-    if element.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
-        quaternion = np.array(element.quat, dtype=np.float64)
-        return quaternion / np.linalg.norm(quaternion)
+    alternative = element.alt if alternative is None else alternative
+    if alternative.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
+        given = np.array(element.quat if quaternion is None else quaternion, dtype=np.float64)
+        return given / np.linalg.norm(given)
     return np.array(
         spec.resolve_orientation(
             degree=bool(element.compiler.degree),
             sequence=element.compiler.eulerseq,
-            orientation=element.alt,
+            orientation=alternative,
         )
     )
 
 
-def has_ends(element: mujoco.MjsGeom | mujoco.MjsSite) -> bool:
+def has_ends(element: Point) -> bool:
     """Return whether an element is given by the ends of its axis; even a box can be."""
-    return not math.isnan(element.fromto[0])
+    lines = mujoco.MjsGeom | mujoco.MjsSite
+    return isinstance(element, lines) and not math.isnan(element.fromto[0])
 
 
 def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
@@ -68,16 +86,16 @@ def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] 
     return geom.pos - half, geom.pos + half
 
 
-def place_of(element: mujoco.MjsGeom | mujoco.MjsSite) -> Array:
+def place_of(element: Point) -> Array:
     """Return the middle of an element in the body's frame, m."""
     return np.array(element.fromto.reshape(2, 3).mean(axis=0) if has_ends(element) else element.pos)
 
 
-def move_by(element: mujoco.MjsGeom | mujoco.MjsSite, shift: Array) -> None:
+def move_by(element: Point, shift: Array) -> None:
     """Move an element within its body.
 
     Args:
-        element: The geom or site.
+        element: The geom, site, camera or light.
         shift: Shift in the body's frame, shape (3,), m.
     """
     if has_ends(element):
@@ -203,9 +221,9 @@ def _lengthen(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, factor: float, axis: st
         along = np.abs(rotation(orientation(spec, geom))[_AXES[axis]])
         if geom.type not in _LONG:
             place = direction = int(np.argmax(along))
-        if along[direction] < 1.0 - _ALONG:
+        if along[direction] < 1.0 - ALONG:
             return  # It lies across the axis.
-        if along[direction] < _ALONG:
+        if along[direction] < ALONG:
             raise MorphologyError(
                 f"{geom.name!r} lies oblique to the axis {axis!r}: stretch it along all axes "
                 "instead."
@@ -222,7 +240,7 @@ def keep_density(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, volume_before: float
         geom: The geom, changed.
         volume_before: Its volume before the change, m³.
     """
-    if not math.isnan(geom.mass):
+    if not math.isnan(geom.mass) and volume_before > 0.0:
         geom.mass *= volume(spec, geom) / volume_before
 
 
@@ -332,14 +350,23 @@ def stretch_segment(
 def _carry_outwards(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, held: Array, factor: float, axis: str | None = None
 ) -> None:
-    """Move what is attached to a stretched segment: joints, sites and bodies."""
+    """Move what is attached to a stretched segment: joints, sites, cameras, lights and bodies."""
     for joint in body.joints:
         joint.pos = stretched(joint.pos, held, factor, axis)
     for site in body.sites:
         _move_outwards(site, held, factor, axis)
+    for seen in (*body.cameras, *body.lights):
+        if is_mounted(seen):
+            seen.pos = stretched(seen.pos, held, factor, axis)
     for child in body.bodies:
         held_there = held_at(spec, child)
         child.pos = child.pos + (stretched(held_there, held, factor, axis) - held_there)
+
+
+def is_mounted(seen: mujoco.MjsCamera | mujoco.MjsLight) -> bool:
+    """Return whether a camera or light is fixed to its body; others follow at a distance."""
+    modes = mujoco.mjtCamLight
+    return seen.mode not in (modes.mjCAMLIGHT_TRACK, modes.mjCAMLIGHT_TRACKCOM)
 
 
 def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> None:
@@ -351,9 +378,8 @@ def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> Non
         factor: New size over the old one.
 
     Raises:
-        MorphologyError: If a body of it cannot be reshaped.
+        MorphologyError: If a body of it cannot be reshaped, or an actuator cannot be scaled.
     """
-    joints: set[str] = set()
     for body in subtree(limb):
         require_geometry(spec, body)
         held = anchor(body)
@@ -361,14 +387,32 @@ def resize_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody, factor: float) -> Non
             resize_geom(spec, geom, held, factor)
         _carry_outwards(spec, body, held, factor)
         for joint in body.joints:
-            joints.add(joint.name)
             joint.armature *= factor
             joint.damping = joint.damping * factor
             joint.stiffness = joint.stiffness * factor
             joint.frictionloss *= factor
-    for actuator in spec.actuators:
-        if actuator.target in joints:
-            actuator.gear = actuator.gear * factor
+    elements = elements_of(limb)
+    release_drawings(spec, elements)
+    for tendon in spec.tendons:
+        path = path_elements(spec, tendon)
+        if path.isdisjoint(elements) or not moves_only(spec, tendon, elements):
+            continue
+        elements.add((mujoco.mjtObj.mjOBJ_TENDON, tendon.name))
+        tendon.armature *= factor
+        tendon.damping = tendon.damping * factor
+        tendon.stiffness = tendon.stiffness * factor
+        tendon.frictionloss *= factor
+        if path <= elements and mujoco.mjtObj.mjOBJ_JOINT not in {kind for kind, _ in path}:
+            tendon.range = tendon.range * factor
+            # A negative length stands for the length in the reference pose.
+            lengths = np.array(tendon.springlength)
+            tendon.springlength = np.where(lengths > 0.0, lengths * factor, lengths)
+    strong = (mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_TENDON)
+    for reference in references(spec):
+        target = (reference.target, reference.name)
+        of_limb = target in elements and reference.target in strong
+        if reference.kind == "actuator" and of_limb:
+            scale_strength(reference.holder, factor)
 
 
 def scale_mass(body: mujoco.MjsBody, factor: float) -> None:
