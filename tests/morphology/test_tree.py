@@ -125,3 +125,72 @@ def test_without_a_floor() -> None:
     tree = tree_of(model, model.qpos0)
     assert tree.limbs == ()
     assert tree.numbers[TRUNK_NUMBERS.index("friction")] == 1.0
+
+
+_TENDONS = """
+<mujoco>
+  <worldbody>
+    <site name="wall" pos="0.1 0 0.15"/><site name="floor"/>
+    <body name="upper"><joint name="shoulder" axis="0 1 0"/>
+      <geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/>
+      <site name="upper" pos=".03 0 .25"/>
+      <body name="lower" pos="0 0 .3"><joint name="elbow" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/>
+        <site name="lower" pos=".03 0 .1"/>
+        <body name="hand" pos="0 0 .3"><joint name="wrist" axis="0 1 0"/><geom size=".02"/></body>
+      </body>
+    </body>
+  </worldbody>
+  <tendon>
+    <fixed name="flex_elbow"><joint joint="elbow" coef="1"/></fixed>
+    <fixed name="both"><joint joint="shoulder" coef="-.5"/><joint joint="elbow" coef=".5"/></fixed>
+    <fixed name="wrist_most"><joint joint="elbow" coef="1"/><joint joint="wrist" coef="2"/></fixed>
+    <spatial name="biceps"><site site="upper"/><site site="lower"/></spatial>
+    <spatial name="slack"><site site="wall"/><site site="floor"/></spatial>
+  </tendon>
+  <actuator>{}</actuator>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize(
+    ("actuators", "movers"),
+    [
+        ('<motor name="e" tendon="flex_elbow"/>', {"elbow": "e"}),
+        # Of equal moments, the joint nearer to the trunk.
+        ('<motor name="b" tendon="both"/>', {"shoulder": "b"}),
+        # A joint with a motor is left to it, wherever the motor stands in the file.
+        (
+            '<motor name="b" tendon="both"/><motor name="s" joint="shoulder"/>',
+            {"shoulder": "s", "elbow": "b"},
+        ),
+        ('<motor name="w" tendon="wrist_most" gear="3"/>', {"wrist": "w"}),
+        ('<muscle name="m" tendon="biceps" lengthrange=".01 .5"/>', {"elbow": "m"}),
+        ('<muscle name="m" tendon="biceps" lengthrange=".01 .5" force="7"/>', {"elbow": "m"}),
+        ('<motor name="jet" site="lower" gear="1 0 0 0 0 0"/>', {"shoulder": "jet"}),
+        ('<adhesion name="grip" body="hand" ctrlrange="0 1"/>', {"wrist": "grip"}),
+        ('<motor name="nothing" tendon="slack"/>', {}),
+    ],
+)
+def test_an_actuator_goes_to_the_joint_that_it_turns_most(
+    actuators: str, movers: dict[str, str]
+) -> None:
+    """Ids of tendons, sites and bodies are not taken for those of joints."""
+    model = mujoco.MjModel.from_xml_string(_TENDONS.format(actuators))
+    tree = tree_of(model, np.zeros(model.nq))
+    assert {limb.joint: limb.actuator for limb in tree.limbs if limb.actuator} == movers
+
+
+@pytest.mark.parametrize(
+    ("actuators", "torque"),
+    [
+        ('<motor name="w" tendon="wrist_most" gear="3"/>', 6.0),
+        ('<position name="w" tendon="wrist_most" kp="4"/>', 8.0),
+        ('<muscle name="w" tendon="wrist_most" lengthrange="-1 1" force="7"/>', 14.0),
+    ],
+)
+def test_the_strength_of_a_tendon_is_a_torque(actuators: str, torque: float) -> None:
+    """Its force counts with its moment about the joint."""
+    model = mujoco.MjModel.from_xml_string(_TENDONS.format(actuators))
+    strength = _number(tree_of(model, np.zeros(model.nq)), "wrist", "strength")
+    assert strength == pytest.approx(math.log10(1.0 + torque) / 2.0)

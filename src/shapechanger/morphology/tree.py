@@ -21,6 +21,12 @@ _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HF
 _LONG: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 _MOVES_ONE_WAY: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
+_TO_JOINT: Final = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+# A smaller moment, m or 1, is rounding.
+_NO_MOMENT: Final = 1e-9
+# Moments that differ by a smaller share are equal.
+_EQUAL: Final = 1e-6
+
 LIMB_NUMBERS: Final = (
     *("joint x", "joint y", "joint z", "distance"),  # From the trunk's origin: direction, and m.
     *("axis x", "axis y", "axis z"),
@@ -47,7 +53,9 @@ class Limb(msgspec.Struct, frozen=True):
         joint: Name of its hinge or slide.
         bodies: Names of its body and of those fixed to it; none if another joint of the same body
             has them.
-        actuator: Name of the actuator that moves the joint; empty if there is none.
+        actuator: Name of the actuator that moves the joint; empty if there is none. One of a
+            tendon, site or body counts for the joint that it turns most in the start pose, of those
+            without an actuator yet; of equal ones, for the nearest to the trunk.
         numbers: What describes it, see `LIMB_NUMBERS`.
     """
 
@@ -87,6 +95,8 @@ def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)  # Masses of subtrees.
+    mujoco.mj_tendon(model, data)
+    mujoco.mj_transmission(model, data)
     trunk = travelling_body(model) or 0
     joints = [
         j
@@ -98,7 +108,7 @@ def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
     owner: dict[int, int | None] = {0: None}
     for body in range(1, model.nbody):
         owner[body] = mover.get(body, owner[int(model.body_parentid[body])])
-    moved_by = {int(model.actuator_trnid[a, 0]): a for a in range(model.nu)}
+    moved_by = _actuators_by_joint(model, data, joints, owner)
     limbs: list[Limb] = []
     for j in joints:
         own = [body for body, mover_of in owner.items() if mover_of == j]
@@ -140,7 +150,7 @@ def _limb_numbers(
     lower, upper = model.jnt_range[joint] if limited else (0.0, 0.0)
     strength = 0.0
     if actuator is not None:
-        strength = abs(model.actuator_gear[actuator, 0] * model.actuator_gainprm[actuator, 0])
+        strength = _moment(model, data, actuator, dof) * _gain(model, actuator)
     depth = sum(
         1 for above in _ancestors(model, body) if model.body_jntnum[above] and above != trunk
     )
@@ -156,6 +166,58 @@ def _limb_numbers(
         *(limited, model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE, depth),
     )
     return tuple(float(number) for number in numbers)
+
+
+def _actuators_by_joint(
+    model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], owner: dict[int, int | None]
+) -> dict[int, int]:
+    """Return the actuator that moves each joint; see `Limb.actuator`."""
+    found: dict[int, int] = {}
+    others: list[int] = []
+    for actuator in range(model.nactuator):
+        if model.actuator_trntype[actuator] in _TO_JOINT:
+            found[int(model.actuator_trnid[actuator, 0])] = actuator
+        else:
+            others.append(actuator)
+    for actuator in others:
+        moments = {
+            j: _moment(model, data, actuator, int(model.jnt_dofadr[j]))
+            for j in joints
+            if j not in found
+        }
+        most = max(moments.values(), default=0.0)
+        if most > _NO_MOMENT:
+            joint = next(j for j, moment in moments.items() if moment > (1.0 - _EQUAL) * most)
+        else:  # Adhesion moves its body only in contact.
+            body = int(model.actuator_trnid[actuator, 0])
+            adheres = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_BODY
+            joint = owner[body] if adheres else None
+        if joint is not None:
+            found.setdefault(joint, actuator)
+    return found
+
+
+def _moment(model: mujoco.MjModel, data: mujoco.MjData, actuator: int, dof: int) -> float:
+    """Return the torque or force on a degree of freedom for a force of 1 of an actuator."""
+    first = int(model.actuator_outadr[actuator])
+    found = 0.0
+    for row in range(first, first + int(model.actuator_outnum[actuator])):
+        start = int(data.moment_rowadr[row])
+        entries = slice(start, start + int(data.moment_rownnz[row]))
+        on_dof = data.actuator_moment[entries][data.moment_colind[entries] == dof]
+        found = max(found, float(np.abs(on_dof).max(initial=0.0)))
+    return found
+
+
+def _gain(model: mujoco.MjModel, actuator: int) -> float:
+    """Return the force of an actuator for a control of 1, N or N·m."""
+    gain = model.actuator_gainprm[actuator]
+    if model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE:
+        # Its peak force; a negative one is derived from a scale and the inertia that it moves.
+        return float(
+            gain[2] if gain[2] >= 0.0 else gain[3] / max(model.actuator_acc0[actuator], _NO_MOMENT)
+        )
+    return float(abs(gain[0]))
 
 
 def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:

@@ -39,7 +39,6 @@ from shapechanger.morphology.spec.geometry import (
     volume,
 )
 from shapechanger.morphology.spec.grafting import (
-    Point,
     copy_geom,
     copy_limb,
     move_limb,

@@ -25,6 +25,7 @@ from shapechanger.morphology.spec.geometry import (
     scale_mass,
     volume,
 )
+from shapechanger.morphology.spec.references import release_drawings
 
 if TYPE_CHECKING:
     from shapechanger.morphology.spec.keyframes import Keyframes
@@ -105,6 +106,7 @@ class PlaceGeom(Edit, frozen=True):
         for geom in select("geom", self.geom, spec.geoms):
             if geom.parent.parent is not None:
                 require_geometry(spec, geom.parent)
+                release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, geom.parent.name)})
             before = volume(spec, geom)
             if self.start is not None and self.end is not None:
                 self._place_ends(spec, geom, np.array(self.start), np.array(self.end))

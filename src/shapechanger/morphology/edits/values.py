@@ -31,6 +31,7 @@ from shapechanger.morphology.spec.geometry import (
     thicken_geom,
 )
 from shapechanger.morphology.spec.positions import reference_of
+from shapechanger.morphology.spec.references import release_drawings
 from shapechanger.morphology.spec.strength import is_motor, scale_clamps, scale_strength
 
 if TYPE_CHECKING:
@@ -274,6 +275,7 @@ class Radius(Edit, frozen=True):
         factor = part_of_the_way(1.0, self.factor, self.amount)
         for body in select("body", self.body, limbs_and_trunks(spec)):
             require_geometry(spec, body)
+            release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, body.name)})
             for geom in body.geoms:
                 thicken_geom(spec, geom, factor)
 

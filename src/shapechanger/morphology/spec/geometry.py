@@ -23,6 +23,7 @@ from shapechanger.morphology.spec.strength import scale_strength
 Array = NDArray[np.float64]
 _Oriented = mujoco.MjsBody | mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera | mujoco.MjsFrame
 Point = mujoco.MjsGeom | mujoco.MjsSite | mujoco.MjsCamera | mujoco.MjsLight
+_Extended = mujoco.MjsGeom | mujoco.MjsSite
 _G = mujoco.mjtGeom
 _LONG: Final = (_G.mjGEOM_CAPSULE, _G.mjGEOM_CYLINDER)
 _AXES: Final = {"x": 0, "y": 1, "z": 2}
@@ -65,10 +66,9 @@ def orientation(
     )
 
 
-def has_ends(element: Point) -> bool:
+def has_ends(element: mujoco.MjsGeom | mujoco.MjsSite) -> bool:
     """Return whether an element is given by the ends of its axis; even a box can be."""
-    lines = mujoco.MjsGeom | mujoco.MjsSite
-    return isinstance(element, lines) and not math.isnan(element.fromto[0])
+    return not math.isnan(element.fromto[0])
 
 
 def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] | None:
@@ -88,7 +88,9 @@ def axis_ends(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> tuple[Array, Array] 
 
 def place_of(element: Point) -> Array:
     """Return the middle of an element in the body's frame, m."""
-    return np.array(element.fromto.reshape(2, 3).mean(axis=0) if has_ends(element) else element.pos)
+    if isinstance(element, _Extended) and has_ends(element):
+        return np.array(element.fromto.reshape(2, 3).mean(axis=0))
+    return np.array(element.pos)
 
 
 def move_by(element: Point, shift: Array) -> None:
@@ -98,7 +100,7 @@ def move_by(element: Point, shift: Array) -> None:
         element: The geom, site, camera or light.
         shift: Shift in the body's frame, shape (3,), m.
     """
-    if has_ends(element):
+    if isinstance(element, _Extended) and has_ends(element):
         element.fromto = element.fromto + np.tile(shift, 2)
     else:
         element.pos = element.pos + shift
@@ -341,6 +343,7 @@ def stretch_segment(
     """
     if factor == 1.0:
         return  # Moving a point by nothing may still round it.
+    release_drawings(spec, {(mujoco.mjtObj.mjOBJ_BODY, body.name)})
     held = anchor(body)
     for geom in body.geoms:
         stretch_geom(spec, geom, held, factor, axis)

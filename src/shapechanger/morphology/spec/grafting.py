@@ -157,7 +157,7 @@ def _copy_fields(spec: mujoco.MjSpec, old: Any, new: Any) -> None:
     """
     if hasattr(old, "plugin") and old.plugin.active:
         raise MorphologyError(f"{old.name!r} is driven by a plugin, so it cannot be copied.")
-    for field in _fields_of(type(old)):
+    for field in _fields_of(old.__class__):
         setattr(new, field, getattr(old, field))
     if hasattr(old, "quat"):
         new.quat = orientation(spec, old)
@@ -202,6 +202,8 @@ class _Copies:
     ) -> None:
         self._spec, self._suffix, self._turn = spec, suffix, turn
         self._parent, self._inside = limb.parent, inside
+        # Points of the parent that have been copied and turned.
+        self._turned: set[Element] = set()
         # Before there is a copy, whose cameras name elements too.
         self._references = references(spec)
 
@@ -295,24 +297,24 @@ class _Copies:
         A site or geom of the body that carries the limb is copied when it is first asked for.
         """
         new = name + self._suffix
-        if (kind, name) in self._inside:
+        if (kind, name) in self._inside or (kind, name) in self._turned:
             return new
         finders = {_O.mjOBJ_SITE: self._spec.site, _O.mjOBJ_GEOM: self._spec.geom}
         point = finders[kind](name) if kind in finders else None
         if point is None or point.parent != self._parent or self._parent.parent is None:
             return name
-        if finders[kind](new) is None:
-            copy = _copy_point(self._spec, point, self._parent, new)
-            matrix = rotation(self._turn)
-            if has_ends(copy):
-                copy.fromto = (copy.fromto.reshape(2, 3) @ matrix.T).ravel()
-            copy.pos = matrix @ copy.pos
-            turned = np.empty(4)
-            mujoco.mju_mulQuat(turned, self._turn, copy.quat)
-            copy.quat = turned
-            if kind == _O.mjOBJ_GEOM:  # A tendon bends around it; that needs no second mass.
-                copy.mass, copy.contype, copy.conaffinity = 0.0, 0, 0
-        self._inside.add((kind, name))
+        require_free_name(self._spec, "site" if kind == _O.mjOBJ_SITE else "geom", new)
+        copy = _copy_point(self._spec, point, self._parent, new)
+        matrix = rotation(self._turn)
+        if has_ends(copy):
+            copy.fromto = (copy.fromto.reshape(2, 3) @ matrix.T).ravel()
+        copy.pos = matrix @ copy.pos
+        turned = np.empty(4)
+        mujoco.mju_mulQuat(turned, self._turn, copy.quat)
+        copy.quat = turned
+        if isinstance(copy, mujoco.MjsGeom):  # A tendon bends around it; that needs no second mass.
+            copy.mass, copy.contype, copy.conaffinity = 0.0, 0, 0
+        self._turned.add((kind, name))
         return new
 
 

@@ -22,10 +22,13 @@ from shapechanger.morphology.spec.references import COUPLINGS, MARK, Element
 _E: Final = mujoco.mjtEq
 _J: Final = mujoco.mjtJoint
 _O: Final = mujoco.mjtObj
+_ONE_NUMBER: Final = (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE))
 _EQUALITY_ROWS: Final = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
 _PINS: Final = (_E.mjEQ_CONNECT, _E.mjEQ_WELD)
 # Residual of an equality that is closed, m or rad; above the rounding of a compiled model.
 _CLOSED: Final = 1e-9
+# Points of a closed loop coincide within this, m.
+_TOGETHER: Final = 1e-8
 # A joint that moves less has not moved, rad or m.
 _STILL: Final = 1e-12
 _MOST_STEPS: Final = 200
@@ -144,13 +147,14 @@ def unmark_pins(spec: mujoco.MjSpec, data: mujoco.MjData) -> None:
         if equality.type not in _PINS or not equality.name1.startswith(MARK):
             continue
         first, second = spec.site(equality.name1), spec.site(equality.name2)
-        closed, own = _coincide(data, first.name, second.name), np.array(equality.data)
+        a, b, own = data.site(first.name), data.site(second.name), np.array(equality.data)
+        together = np.allclose(a.xpos, b.xpos, 0.0, _TOGETHER)
         if equality.type == _E.mjEQ_WELD:
             own[:3] = second.pos
-            if own[6:10].any() or not closed:
+            if own[6:10].any() or not (together and np.allclose(a.xmat, b.xmat, 0.0, _TOGETHER)):
                 own[3:6] = first.pos
                 own[6:10] = _relative(orientation(spec, second), orientation(spec, first))
-        elif closed:
+        elif together:
             own[:3] = first.pos
         else:  # One that is switched off, and open: only sites can state both places.
             for end, site in enumerate((first, second), 1):
@@ -184,7 +188,7 @@ def _residuals(spec: mujoco.MjSpec, data: mujoco.MjData) -> dict[Element, float]
     found: dict[Element, float] = {}
     keys = _keys(spec)
     for row in np.flatnonzero(data.efc_type == _EQUALITY_ROWS).tolist():
-        key = keys[data.efc_id[row]]
+        key = keys[int(data.efc_id[row])]
         found[key] = max(found.get(key, 0.0), float(abs(data.efc_pos[row])))
     return found
 
@@ -218,7 +222,7 @@ def _solve(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
         clipped = np.clip(pose, low, high)
         # A joint at its limit is left out of the next step, which the others must make.
         at_limit[:] = False
-        for i in np.flatnonzero(np.isin(model.jnt_type, (_J.mjJNT_HINGE, _J.mjJNT_SLIDE))):
+        for i in np.flatnonzero(np.isin(model.jnt_type, _ONE_NUMBER)):
             place = model.jnt_qposadr[i]
             at_limit[model.jnt_dofadr[i]] = clipped[place] != pose[place]
         data.qpos[:] = clipped
@@ -273,12 +277,6 @@ def _shift_coupling(equality: mujoco.MjsEquality, changes: dict[Element, float])
         shifted[0] -= by_follower
         data[:5] = shifted
         equality.data = data
-
-
-def _coincide(data: mujoco.MjData, first: str, second: str) -> bool:
-    """Return whether two sites have the same pose."""
-    a, b = data.site(first), data.site(second)
-    return np.allclose(a.xpos, b.xpos, 0.0, 10.0 * _CLOSED)
 
 
 def _relative(around: Array, turn: Array) -> Array:

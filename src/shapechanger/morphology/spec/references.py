@@ -211,7 +211,7 @@ def require_unnamed(
         named = (reference.target, reference.name) == element
         if named and (kinds is None or reference.kind in kinds):
             raise MorphologyError(
-                f"{name_of(element)!r} {why}, but {reference} names it: change or remove it first."
+                f"{name_of(element)} {why}, but {reference} names it: change or remove it first."
             )
 
 
@@ -220,8 +220,8 @@ MARK: Final = "pin~"
 
 
 def name_of(element: Element) -> str:
-    """Return the name of an element for a message; the place of a loop has none of its own."""
-    return "the pin of a loop" if element[1].startswith(MARK) else element[1]
+    """Return what a message calls an element; the place of a pin has no name of its own."""
+    return "A pin" if element[1].startswith(MARK) else repr(element[1])
 
 
 def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
@@ -243,11 +243,13 @@ def remove_limb(spec: mujoco.MjSpec, limb: mujoco.MjsBody) -> None:
     for aimed in (*spec.cameras, *spec.lights):
         if (_O.mjOBJ_BODY, aimed.targetbody) in gone:
             aimed.targetbody = limb.parent.name
-    for group in spec.tuples:
+    for group in list(spec.tuples):
         members = zip(group.objtype, group.objname, group.objprm, strict=True)
         kept = [member for member in members if (_plain(_O(member[0])), member[1]) not in gone]
-        if len(kept) < len(group.objname):
-            kinds, names, values = zip(*kept, strict=True) if kept else ((), (), ())
+        if not kept:
+            spec.delete(group)
+        elif len(kept) < len(group.objname):
+            kinds, names, values = zip(*kept, strict=True)
             group.objtype, group.objname, group.objprm = list(kinds), list(names), list(values)
     spec.delete(limb)
 
