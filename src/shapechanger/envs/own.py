@@ -149,7 +149,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         self.family = self._file = own_family(path, as_body(rig))
         self._begin(body, arguments)
         spec = self.family.load(self._file.path)
-        self._home = _home_of(spec, self._file.path)
+        self._home = _joints_at_home(spec, self._file.path)
         if frame_skip is None:
             frame_skip = max(1, round(_CONTROL_STEP_S / spec.option.timestep))
         if frame_skip < 1:
@@ -183,9 +183,13 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     def _start_and_height(self, model: mujoco.MjModel) -> tuple[_Floats, float | None]:
         pose = start_pose(model)
         if self._home:
+            # Edits carry the keyframe along, so `StartHeight` and the poses of copied limbs are in
+            # it; joints that are new to it are left inside their limits.
+            home = model.key(_HOME).qpos
             for joint, place, size in _places_of_joints(model):
-                if joint in self._home:
-                    pose[place : place + size] = self._home[joint]
+                at = slice(place, place + size)
+                if joint in self._home or np.any(home[at] != model.qpos0[at]):
+                    pose[at] = home[at]
             # Lifted to the floor if the robot has grown since.
             pose = StartRules(model).feasible(pose, mujoco.MjData(model))
         # In the middle of their ranges many legs are folded.
@@ -282,8 +286,8 @@ def _places_of_joints(model: mujoco.MjModel) -> Iterator[tuple[str, int, int]]:
         yield model.joint(j).name, int(model.jnt_qposadr[j]), _SIZES[_J(model.jnt_type[j])]
 
 
-def _home_of(spec: mujoco.MjSpec, path: Path) -> dict[str, _Floats]:
-    """Return the pose of the keyframe `home` by joint, because edits add and remove joints.
+def _joints_at_home(spec: mujoco.MjSpec, path: Path) -> set[str]:
+    """Return the joints that the keyframe `home` poses, if there is one.
 
     Args:
         spec: The unedited robot.
@@ -296,11 +300,9 @@ def _home_of(spec: mujoco.MjSpec, path: Path) -> dict[str, _Floats]:
         model = spec.copy().compile()
     except (ValueError, mujoco.FatalError) as error:
         raise BrokenModel(f"MuJoCo does not compile {path.name}: {reason_of(error)}.") from error
-    home = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, _HOME)
-    if home < 0:
-        return {}
-    pose = model.key_qpos[home]
-    return {name: pose[at : at + size].copy() for name, at, size in _places_of_joints(model)}
+    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, _HOME) < 0:
+        return set()
+    return {joint for joint, _, _ in _places_of_joints(model)}
 
 
 def _place_on_floor(model: mujoco.MjModel) -> set[int]:

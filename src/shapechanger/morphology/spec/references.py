@@ -29,6 +29,9 @@ OF_JOINTS: Final = (_T.mjTRN_JOINT, _T.mjTRN_JOINTINPARENT)
 COUPLINGS: Final = {_E.mjEQ_JOINT: _O.mjOBJ_JOINT, _E.mjEQ_TENDON: _O.mjOBJ_TENDON}
 """Equalities y - y0 = p(x - x0) of a follower y and a leader x, and the kind of both."""
 
+MARK: Final = "pin~"
+"""Prefix of the sites that stand for the ends of loops while edits are applied."""
+
 _TARGETS: Final = {
     _T.mjTRN_JOINT: _O.mjOBJ_JOINT,
     _T.mjTRN_JOINTINPARENT: _O.mjOBJ_JOINT,
@@ -68,7 +71,10 @@ class Reference(NamedTuple):
     name: str
 
     def __str__(self) -> str:
-        return f"the {self.kind} {self.holder.name!r}" if self.holder.name else f"a {self.kind}"
+        if not self.holder.name and self.name.startswith(MARK):
+            return f"the {self.kind}"
+        named = f"{self.holder.name!r}" if self.holder.name else f"of {self.name!r}"
+        return f"the {self.kind} {named}"
 
 
 def references(spec: mujoco.MjSpec) -> list[Reference]:
@@ -213,10 +219,6 @@ def require_unnamed(
             raise MorphologyError(
                 f"{name_of(element)} {why}, but {reference} names it: change or remove it first."
             )
-
-
-MARK: Final = "pin~"
-"""Prefix of the sites that stand for the ends of loops while edits are applied."""
 
 
 def name_of(element: Element) -> str:
