@@ -16,7 +16,7 @@ from shapechanger.morphology.edits.edit import (
     require_factor,
     require_vector,
 )
-from shapechanger.morphology.spec.cutting import Piece, Plane, shorten
+from shapechanger.morphology.spec.cutting import NearPart, Plane, shorten
 from shapechanger.morphology.spec.elements import (
     limbs_and_trunks,
     require_free_name,
@@ -223,7 +223,7 @@ class Split(Edit, frozen=True):
         self,
         spec: mujoco.MjSpec,
         geom: mujoco.MjsGeom,
-        piece: Piece,
+        piece: NearPart,
         part: mujoco.MjsBody,
         place: np.ndarray,
     ) -> None:

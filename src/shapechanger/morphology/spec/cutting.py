@@ -30,7 +30,7 @@ _G: Final = mujoco.mjtGeom
 _SAME: Final = 1e-9
 
 
-class Piece(NamedTuple):
+class NearPart(NamedTuple):
     """The part of a geom that lies on the near side of a plane.
 
     Attributes:
@@ -84,7 +84,7 @@ class Plane:
         points = (*self._body.sites, *self._body.cameras, *self._body.lights)
         return [point for point in points if self.is_beyond(place_of(point))]
 
-    def piece_of(self, geom: mujoco.MjsGeom) -> Piece:
+    def piece_of(self, geom: mujoco.MjsGeom) -> NearPart:
         """Return the part of a geom of the segment on the near side.
 
         A shape without a length goes to the side of its middle.
@@ -99,17 +99,17 @@ class Plane:
                 ends, shares = ends[::-1], shares[::-1]
             inner, outer = shares
             if outer <= self._part + _SAME:
-                return Piece(ends[0], 1.0, axis)
+                return NearPart(ends[0], 1.0, axis)
             if inner >= self._part - _SAME:
-                return Piece(ends[0], 0.0, axis)
+                return NearPart(ends[0], 0.0, axis)
             # Exact for a geom that spans the segment.
             near = self._held if np.allclose(ends[0], self._held, 0.0, _SAME) else ends[0]
             inner = 0.0 if near is self._held else inner
             outer = 1.0 if abs(outer - 1.0) < _SAME else outer
-            return Piece(near, (self._part - inner) / (outer - inner), axis)
+            return NearPart(near, (self._part - inner) / (outer - inner), axis)
         if geom.type == _G.mjGEOM_BOX:
             self._require_one_side(geom)
-        return Piece(place_of(geom), 0.0 if self.is_beyond(place_of(geom)) else 1.0, axis)
+        return NearPart(place_of(geom), 0.0 if self.is_beyond(place_of(geom)) else 1.0, axis)
 
     def _share(self, point: Array) -> float:
         """Return the position of a point along the segment as a share of its length."""

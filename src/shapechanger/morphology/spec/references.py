@@ -53,7 +53,7 @@ _OF_ALL_GEOMS: Final = (
 )
 
 
-class Reference(NamedTuple):
+class Mention(NamedTuple):
     """One element of a model that names another.
 
     Attributes:
@@ -77,7 +77,7 @@ class Reference(NamedTuple):
         return f"the {self.kind} {named}"
 
 
-def references(spec: mujoco.MjSpec) -> list[Reference]:
+def references(spec: mujoco.MjSpec) -> list[Mention]:
     """Return every reference to an element of a body, a tendon or an actuator.
 
     Keyframes refer to joints and actuators by their order; see `keyframes`.
@@ -85,48 +85,48 @@ def references(spec: mujoco.MjSpec) -> list[Reference]:
     return [reference for reference in _all_references(spec) if reference.name]
 
 
-def _all_references(spec: mujoco.MjSpec) -> Iterator[Reference]:
+def _all_references(spec: mujoco.MjSpec) -> Iterator[Mention]:
     """Yield every reference, those to nothing included."""
     for tendon in spec.tendons:
         for wrap in path_of(tendon):
             if wrap.type in _WRAPS:
-                yield Reference(tendon, "tendon", "path", _WRAPS[wrap.type], wrap.target.name)
+                yield Mention(tendon, "tendon", "path", _WRAPS[wrap.type], wrap.target.name)
             if side := wrap.sidesite:
-                yield Reference(tendon, "tendon", "path", _O.mjOBJ_SITE, side.name)
+                yield Mention(tendon, "tendon", "path", _O.mjOBJ_SITE, side.name)
     for equality in spec.equalities:
         target = COUPLINGS.get(equality.type, equality.objtype)
         if equality.type not in (*COUPLINGS, _E.mjEQ_CONNECT, _E.mjEQ_WELD):
             target = _O.mjOBJ_FLEX
         for field in ("name1", "name2"):
-            yield Reference(equality, "equality", field, target, getattr(equality, field))
+            yield Mention(equality, "equality", field, target, getattr(equality, field))
     for exclude in spec.excludes:
         for field in ("bodyname1", "bodyname2"):
             name = getattr(exclude, field)
-            yield Reference(exclude, "exclusion", field, _O.mjOBJ_BODY, name)
+            yield Mention(exclude, "exclusion", field, _O.mjOBJ_BODY, name)
     for pair in spec.pairs:
         for field in ("geomname1", "geomname2"):
-            yield Reference(pair, "contact pair", field, _O.mjOBJ_GEOM, getattr(pair, field))
+            yield Mention(pair, "contact pair", field, _O.mjOBJ_GEOM, getattr(pair, field))
     for actuator in spec.actuators:
         target = _TARGETS.get(actuator.trntype, _O.mjOBJ_UNKNOWN)
-        yield Reference(actuator, "actuator", "target", target, actuator.target)
+        yield Mention(actuator, "actuator", "target", target, actuator.target)
         for field in ("refsite", "slidersite"):
-            yield Reference(actuator, "actuator", field, _O.mjOBJ_SITE, getattr(actuator, field))
+            yield Mention(actuator, "actuator", field, _O.mjOBJ_SITE, getattr(actuator, field))
     for sensor in spec.sensors:
-        yield Reference(sensor, "sensor", "objname", _plain(sensor.objtype), sensor.objname)
-        yield Reference(sensor, "sensor", "refname", _plain(sensor.reftype), sensor.refname)
+        yield Mention(sensor, "sensor", "objname", _plain(sensor.objtype), sensor.objname)
+        yield Mention(sensor, "sensor", "refname", _plain(sensor.reftype), sensor.refname)
     for camera in spec.cameras:
-        yield Reference(camera, "camera", "targetbody", _O.mjOBJ_BODY, camera.targetbody)
+        yield Mention(camera, "camera", "targetbody", _O.mjOBJ_BODY, camera.targetbody)
     for light in spec.lights:
-        yield Reference(light, "light", "targetbody", _O.mjOBJ_BODY, light.targetbody)
+        yield Mention(light, "light", "targetbody", _O.mjOBJ_BODY, light.targetbody)
     for skin in spec.skins:
         for name in skin.bodyname:
-            yield Reference(skin, "skin", "bodyname", _O.mjOBJ_BODY, name)
+            yield Mention(skin, "skin", "bodyname", _O.mjOBJ_BODY, name)
     for flex in spec.flexes:
         for name in {*flex.vertbody, *flex.nodebody}:
-            yield Reference(flex, "flex", "vertbody", _O.mjOBJ_BODY, name)
+            yield Mention(flex, "flex", "vertbody", _O.mjOBJ_BODY, name)
     for group in spec.tuples:
         for kind, name in zip(group.objtype, group.objname, strict=True):
-            yield Reference(group, "tuple", "objname", _plain(_O(kind)), name)
+            yield Mention(group, "tuple", "objname", _plain(_O(kind)), name)
 
 
 def _plain(kind: mujoco.mjtObj) -> mujoco.mjtObj:
