@@ -73,12 +73,11 @@ class Board:
         plan, camera, seed = GuardPlan.from_json(settings.plan), settings.camera, settings.seed
         is_real = settings.clock == "real"
         parts = {output.part for output in plan.outputs if output.part}
-        size = None if camera is None else camera.size
-        self.world = open_world(settings.place, parts, size, seed)
+        self.world = open_world(settings.place, parts, camera, seed)
         # Let the world prepare what takes a while, before a guard in real time waits for it.
         self.world.put_back()
         self.world.place(seed)
-        if size is not None:
+        if camera is not None:
             self.world.picture()
         if is_real:
             run_early()  # Hardware is never late because the machine is busy.

@@ -27,6 +27,7 @@ HALF_WIDTH_RAD: Final = math.atan(0.5 * CANONICAL_SIZE[0] / _FOCAL)
 """Bearing of the left and right edge of a rectified picture, rad."""
 
 _SAMPLES: Final = 3  # In each direction of a pixel.
+_NEAREST: Final = 1e-3  # Depth of a ray below which it points beside or behind the camera.
 _MOST_MISSING: Final = 0.15  # Share of the pixels.
 
 # Vertical fields of view from which the search for the camera's own begins, degrees.
@@ -80,7 +81,8 @@ class Rectifier:
                 f"A camera that looks {geometry.pitch_deg:g} degrees down with a vertical field "
                 f"of view of {geometry.fovy_deg:g} degrees misses {100 * missing:.0f} % of what "
                 "policies for all vehicles look at, which is 18 degrees above the horizon to 21 "
-                "below, and 31 to each side."
+                f"below, and 31 to each side, in frames of {wide} x {high} pixels: turn it level, "
+                "or take wider frames, of its whole sensor, or a wider lens."
             )
         places = np.clip(row, 0, high - 1) * wide + np.clip(column, 0, wide - 1)
         shape = (rows, _SAMPLES, columns, _SAMPLES)
@@ -241,6 +243,8 @@ def _seen_at(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return columns and rows of a camera's pixels at places of the virtual camera's picture.
 
+    What is behind the camera is at (-1, -1).
+
     Args:
         geometry: The camera.
         size: Width and height of its pictures, pixels.
@@ -252,8 +256,11 @@ def _seen_at(
     down = math.radians(geometry.pitch_deg)
     right, below = (x - 0.5 * CANONICAL_SIZE[0]) / _FOCAL, (y - _HORIZON) / _FOCAL  # At depth 1.
     depth = below * math.sin(down) + math.cos(down)
-    column = focal * right / depth + 0.5 * wide
-    row = focal * (below * math.cos(down) - math.sin(down)) / depth + 0.5 * high
+    ahead = np.maximum(depth, _NEAREST)
+    column = focal * right / ahead + 0.5 * wide
+    row = focal * (below * math.cos(down) - math.sin(down)) / ahead + 0.5 * high
+    behind = depth < _NEAREST
+    column[behind] = row[behind] = -1.0
     return np.floor(column).astype(np.intp), np.floor(row).astype(np.intp)
 
 

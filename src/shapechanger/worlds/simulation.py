@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.bodies.vehicles import SIM_DT, Motion, add_vehicle, vehicle_model
+from shapechanger.bodies.vehicles.parts import CameraMount, aim_camera
 from shapechanger.errors import WorldError
 from shapechanger.worlds.camera import CameraJitter, OnboardCamera, OutsideCamera, move_camera
 from shapechanger.worlds.course import HOME, Course, require_element
@@ -63,6 +64,8 @@ class MujocoWorld:
         world: Kind of course, such as "corridor"; None for the vehicle's own (`HOME`).
         seed: Seed of the course and of the first start.
         size: Width and height of the camera's pictures in pixels; None for no camera.
+        pitch_deg: Angle of the camera's axis below the horizon, degrees; None for the vehicle's.
+        fovy_deg: Vertical field of view of the camera, degrees; None for the vehicle's.
         look: Light and colours; None for the usual look of the world.
         lenses: Names of camera faults; see `shapechanger.worlds.lens`.
         coarse: Whether to take twice as long steps, but for a vehicle that turns on the spot, and
@@ -70,6 +73,7 @@ class MujocoWorld:
 
     Attributes:
         vehicle: Model of the vehicle.
+        mount: Pose and field of view of the camera.
         course: The course.
         look: Light and colours.
         lenses: Names of camera faults.
@@ -90,11 +94,14 @@ class MujocoWorld:
         seed: int = 0,
         *,
         size: tuple[int, int] | None = (160, 120),
+        pitch_deg: float | None = None,
+        fovy_deg: float | None = None,
         look: Look | None = None,
         lenses: Sequence[str] = (),
         coarse: bool = False,
     ) -> None:
         self.vehicle = vehicle_model(vehicle)
+        self.mount = self.vehicle.camera.aimed(pitch_deg, fovy_deg)
         self._coarse = coarse
         # With the longer step a tank, which skids when it turns, would turn a fifth less.
         self._step_s = _COARSE_DT if coarse and self.vehicle.turning_radius_m > 0.0 else SIM_DT
@@ -156,7 +163,7 @@ class MujocoWorld:
         look = self.look if look is None else look
         require_element(self.vehicle.name, floats=self.vehicle.floats, world=self._world)
         course, model = _compiled(
-            self.vehicle.name, self._world, seed, look, self._coarse, self._step_s
+            self.vehicle.name, self._world, seed, look, self._coarse, self._step_s, self.mount
         )
         if camera is not None:
             model = copy.copy(model)
@@ -443,13 +450,20 @@ class MujocoWorld:
 
 @lru_cache(maxsize=_KEPT_COURSES)
 def _compiled(
-    vehicle: str, world: str, seed: int, look: Look, coarse: bool, step_s: float
+    vehicle: str,
+    world: str,
+    seed: int,
+    look: Look,
+    coarse: bool,
+    step_s: float,
+    mount: CameraMount,
 ) -> tuple[Course, mujoco.MjModel]:
     """Return a course, and the compiled model of a vehicle on it; neither may be changed."""
     course = lay_out(world, seed)
     spec = mujoco.MjSpec()
     add_course(spec, course, look)
     add_vehicle(spec, vehicle, look.tone())
+    aim_camera(spec.camera(_CAMERA), mount)
     spec.option.timestep = step_s
     if coarse:
         _let_wheels_meet_only_the_ground(spec)

@@ -158,6 +158,19 @@ class CameraMount:
     pitch_rad: float
     fovy_deg: float = PI_CAMERA_FOVY_DEG
 
+    def aimed(self, pitch_deg: float | None, fovy_deg: float | None) -> CameraMount:
+        """Return the mount with the pitch and the field of view that a profile states.
+
+        Args:
+            pitch_deg: Angle of the optical axis below the horizon; None to keep the mount's.
+            fovy_deg: Vertical field of view; None to keep the mount's.
+        """
+        return replace(
+            self,
+            pitch_rad=self.pitch_rad if pitch_deg is None else math.radians(pitch_deg),
+            fovy_deg=self.fovy_deg if fovy_deg is None else fovy_deg,
+        )
+
 
 def add_camera(body: mujoco.MjsBody, mount: CameraMount) -> None:
     """Add the camera "vehicle/camera", which looks ahead.
@@ -166,13 +179,22 @@ def add_camera(body: mujoco.MjsBody, mount: CameraMount) -> None:
         body: Body to extend.
         mount: Its pose and field of view.
     """
+    aim_camera(body.add_camera(name="vehicle/camera"), mount)
+
+
+def aim_camera(camera: mujoco.MjsCamera, mount: CameraMount) -> None:
+    """Change the pose and the field of view of a camera.
+
+    Args:
+        camera: Camera to change.
+        mount: Its new pose and field of view.
+    """
     s, c = math.sin(mount.pitch_rad), math.cos(mount.pitch_rad)
     # The columns are its axes: x to the right, y up, and z backwards, against its view.
     axes = np.array([[0.0, s, -c], [-1.0, 0.0, 0.0], [0.0, c, s]])
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, axes.ravel())
-    place = [mount.x, mount.y, mount.z]
-    body.add_camera(name="vehicle/camera", pos=place, quat=quat, fovy=mount.fovy_deg)
+    camera.pos, camera.quat, camera.fovy = [mount.x, mount.y, mount.z], quat, mount.fovy_deg
 
 
 def _three(size: ArrayLike) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from shapechanger.envs.waypoints import (
     measure_response,
     observation_space,
 )
-from shapechanger.errors import RobotRefused
+from shapechanger.errors import RobotRefused, WorldError
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Welcome
 from shapechanger.worlds.rectify import CameraGeometry, Rectifier
@@ -55,8 +55,9 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
         response: How the vehicle turns; None before the first reset.
 
     Raises:
-        RobotRefused: If the robot is not a vehicle, the geometry of its camera is unknown, or it
-            does not measure its speed or, without a given response, its rate of turn.
+        RobotRefused: If the robot is not a vehicle, the geometry of its camera is unknown, its
+            camera does not see what policies for all vehicles look at, or it does not measure its
+            speed or, without a given response, its rate of turn.
         StudyError: If the vehicle does not turn as it steers.
     """
 
@@ -71,8 +72,7 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
             welcome = self._env.welcome
             if self.response is None and welcome.turning is not None:
                 self.response = SteeringResponse(*welcome.turning)
-            size, geometry = _camera_of(welcome)
-            self._rectifier = Rectifier(geometry, size)
+            self._rectifier = _rectifier_of(welcome)
             self._state_at = _state_places(welcome, self.response is None)
         except BaseException:
             self._env.close()
@@ -141,11 +141,12 @@ class _Numbers(gym.ObservationWrapper[Any, Any, Any]):
         return observation["state"]
 
 
-def _camera_of(welcome: Welcome) -> tuple[tuple[int, int], CameraGeometry]:
-    """Return the size of the frames, and how the camera looks at the world.
+def _rectifier_of(welcome: Welcome) -> Rectifier:
+    """Return what warps the frames of a robot.
 
     Raises:
-        RobotRefused: If the robot has no camera, or does not state how it looks.
+        RobotRefused: If the robot has no camera, does not state how it looks, or has one that sees
+            too little.
     """
     size, pitch, fovy = welcome.image_size, welcome.camera_pitch_deg, welcome.camera_fovy_deg
     if size is None:
@@ -155,7 +156,10 @@ def _camera_of(welcome: Welcome) -> tuple[tuple[int, int], CameraGeometry]:
             f"{welcome.robot} does not state pitch_deg and fovy_deg of its camera: measure them "
             "with `shapechanger robot camera`, and serve the profile that it writes."
         )
-    return size, CameraGeometry(pitch, fovy)
+    try:
+        return Rectifier(CameraGeometry(pitch, fovy), size)
+    except WorldError as error:
+        raise RobotRefused(f"{welcome.robot}: {error}") from error
 
 
 def _state_places(welcome: Welcome, measures: bool) -> tuple[int, int]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from shapechanger.bodies.vehicles import require_fit, vehicle_model
 from shapechanger.envs.vehicle.drivers import Demonstrator, ExpertDriver, VehicleDemonstrator
 from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError, check_seed
+from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.worlds.camera import CameraJitter
@@ -58,20 +59,25 @@ def _seed_of(what: str, seed: Any) -> int:
 def resolve_profile(
     vehicle: str,
     robot: str | os.PathLike[str] | None,
-    size: tuple[int, int],
+    size: Sequence[int] | None = None,
     steering: Steering | None = None,
-) -> Profile:
+) -> tuple[Profile, CameraPlan]:
     """Load the profile of a vehicle, and set its steering and its camera's frame size.
 
     Args:
         vehicle: Name of the vehicle.
         robot: Path or name of the profile; None for `lab-` followed by the vehicle.
-        size: Width and height of frames, pixels.
+        size: Replaces the width and height of its frames, pixels; None to keep them.
         steering: Replaces the profile's steering; None to keep it.
+
+    Returns:
+        The profile, and its camera, which simulations show as it is stated there. It is upright,
+        because drivers turn the frames of a camera that is mounted upside down.
 
     Raises:
         UnknownName: If there is no such vehicle, profile or steering.
         ProfileError: If it is not the profile of this vehicle with a camera.
+        SpaceMismatch: If the size is out of range.
     """
     vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
     profile = load_profile(find_profile(f"lab-{vehicle}" if robot is None else robot))
@@ -88,8 +94,9 @@ def resolve_profile(
             raise UnknownName("steering", steering, _LEVELS)
         actions = (dataclasses.replace(actions[0], levels=_LEVELS[steering]), *actions[1:])
     require_fit(vehicle, {output.part for output in profile.outputs})
-    camera = dataclasses.replace(profile.camera, size=size, flip=False)
-    return dataclasses.replace(profile, actions=actions, camera=camera)
+    wide, high = profile.camera.size if size is None else check_frame_size(size)
+    camera = dataclasses.replace(profile.camera, size=(wide, high), flip=False)
+    return dataclasses.replace(profile, actions=actions, camera=camera), camera
 
 
 Courses = Literal["training", "held-out"] | Sequence[int]

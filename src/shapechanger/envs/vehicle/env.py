@@ -18,7 +18,6 @@ from shapechanger.envs.vehicle.base import (
     CourseSampler,
     DrivingEnv,
     Steering,
-    check_frame_size,
     resolve_profile,
 )
 from shapechanger.envs.vehicle.drivers import TeacherDemonstrator
@@ -76,7 +75,7 @@ class VehicleEnv(DrivingEnv):
             usual place.
         robot: Path or name of a profile; None for `lab-` followed by the vehicle.
         steering: Replaces the profile's steering; None to keep it.
-        size: Width and height of frames in pixels.
+        size: Width and height of frames in pixels; None for the profile's.
         image: Whether observations include the frame.
         state: Whether observations include the state besides the frame.
         reward: Weights by name that replace those of the profile.
@@ -110,7 +109,7 @@ class VehicleEnv(DrivingEnv):
         world: str | None = None,
         robot: str | os.PathLike[str] | None = None,
         steering: Steering | None = None,
-        size: Sequence[int] = (160, 120),
+        size: Sequence[int] | None = None,
         image: bool = True,
         state: bool = False,
         reward: Mapping[str, float] | None = None,
@@ -127,20 +126,21 @@ class VehicleEnv(DrivingEnv):
         if render_mode is not None and render_mode not in _MODES:
             raise UnknownName("render mode", render_mode, _MODES)
         self.render_mode = render_mode
-        wide, high = check_frame_size(size)
-        profile = resolve_profile(vehicle, robot, (wide, high), steering)
+        profile, camera = resolve_profile(vehicle, robot, size, steering)
         self._draw = CourseSampler(courses, randomise)
         self._world = MujocoWorld(
             vehicle,
             world,
             self._draw.first,
-            size=(wide, high) if image or render_mode else None,
+            size=camera.size if image or render_mode else None,
+            pitch_deg=camera.pitch_deg,
+            fovy_deg=camera.fovy_deg,
             lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )
         self.parts = frozenset(output.part for output in profile.outputs)
         self._robot = InProcessRobot(profile, self._world, pictures=image)
         welcome = self._robot.welcome
-        self._senses = RobotSpaces(welcome, (wide, high), image, state)
+        self._senses = RobotSpaces(welcome, camera.size, image, state)
         self._puts_back = put_back
         ends = {"collision_ends_episode": 0.0} if put_back else {}
         weights = DriveReward.from_weights({**welcome.reward, **(reward or {}), **ends})

@@ -136,8 +136,7 @@ class RangesEnv(DrivingEnv):
         randomise: Whether `reset` samples light, textures and the camera's pose too.
         put_back: Whether to put the vehicle back on the lane after a collision, where its bumper's
             reflex keeps it from going forward for 0.75 s.
-        camera: Width and height of the camera's pictures in pixels, for `world.picture()`; None
-            for no camera.
+        camera: Whether `world.picture()` shows the pictures of the profile's camera.
         render_mode: "rgb_array" for `render` to return the camera's picture.
 
     Raises:
@@ -156,17 +155,24 @@ class RangesEnv(DrivingEnv):
         courses: Courses = _COURSES,
         randomise: bool = False,
         put_back: bool = False,
-        camera: tuple[int, int] | None = None,
+        camera: bool = False,
         render_mode: str | None = None,
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
-        profile = resolve_profile(vehicle, robot, (160, 120))
+        profile, seen = resolve_profile(vehicle, robot)
         self.parts = frozenset(output.part for output in profile.outputs)
         self._draw = CourseSampler(courses, randomise)
         self.render_mode = render_mode
-        size = (160, 120) if camera is None and render_mode else camera
-        self._world = MujocoWorld(vehicle, world, self._draw.first, size=size, coarse=True)
+        self._world = MujocoWorld(
+            vehicle,
+            world,
+            self._draw.first,
+            size=seen.size if camera or render_mode else None,
+            pitch_deg=seen.pitch_deg,
+            fovy_deg=seen.fovy_deg,
+            coarse=True,
+        )
         self._shaper = OutputShaper(profile.guard_plan())
         self._ticks = round(1.0 / (profile.control_hz * self._shaper.tick_s))
         self._period_s = 1.0 / profile.control_hz

@@ -167,7 +167,7 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
     """Return the properties of a vehicle by name."""
     inner: Any = env.unwrapped
     world: MujocoWorld = inner.world
-    model = world.vehicle
+    model, camera = world.vehicle, world.mount
     turning = model.turning_radius_m
     response: SteeringResponse | None = getattr(inner, "response", None)
     mapped = (
@@ -187,9 +187,9 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
         "width": f"{model.width_m:g} m",
         "top speed": f"{model.top_speed_mps:g} m/s",
         "smallest turning radius": f"{turning:.2f} m" if turning else "0, it turns on the spot",
-        "camera above the ground": f"{model.camera.z:g} m",
-        "camera's angle below the horizon": f"{math.degrees(model.camera.pitch_rad):.3g} degrees",
-        "camera's angle of view": f"{model.camera.fovy_deg:g} degrees",
+        "camera above the ground": f"{camera.z:g} m",
+        "camera's angle below the horizon": f"{math.degrees(camera.pitch_rad):.3g} degrees",
+        "camera's angle of view": f"{camera.fovy_deg:g} degrees",
         "place": world.course.world,
         "lenses": " and ".join(world.lenses) or "none",
     }

@@ -33,25 +33,24 @@ from shapechanger.envs.waypoints import (
     measure_response,
     observation_space,
 )
-from shapechanger.errors import ProfileError
+from shapechanger.errors import ProfileError, WorldError
+from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.worlds.course import FLOODED
 from shapechanger.worlds.rectify import CameraGeometry, Rectifier
 from shapechanger.worlds.simulation import MujocoWorld
 
-_SIZE: Final = (160, 120)
 # Standard deviation of the bearing's disturbance: the effect of steering by 0.25 in the car.
 _SWAY: Final = 0.18
 
 
-def _geometry(profile: Profile) -> CameraGeometry:
-    """Return how the camera of a profile looks at the world.
+def _rectifier_of(profile: Profile, camera: CameraPlan) -> Rectifier:
+    """Return what warps the frames of a profile's camera.
 
     Raises:
-        ProfileError: If the profile does not say it.
+        ProfileError: If the profile does not state how the camera looks, or it sees too little.
     """
-    camera = profile.camera
-    pitch, fovy = (None, None) if camera is None else (camera.pitch_deg, camera.fovy_deg)
+    pitch, fovy = camera.pitch_deg, camera.fovy_deg
     if pitch is None or fovy is None:
         missing = " and ".join(
             name for name, value in (("pitch_deg", pitch), ("fovy_deg", fovy)) if value is None
@@ -60,7 +59,10 @@ def _geometry(profile: Profile) -> CameraGeometry:
             f"{profile.path}: [camera] needs {missing} for waypoints: `shapechanger robot camera` "
             "measures them from one picture of a checkerboard."
         )
-    return CameraGeometry(pitch, fovy)
+    try:
+        return Rectifier(CameraGeometry(pitch, fovy), camera.size)
+    except WorldError as error:
+        raise ProfileError(f"{profile.path}: {error}") from error
 
 
 @lru_cache(maxsize=32)
@@ -125,7 +127,8 @@ class WaypointEnv(DrivingEnv):
 
     Raises:
         UnknownName: If there is no such vehicle, world, profile or kind of courses.
-        ProfileError: If the profile moves other parts than the vehicle has, or has no camera.
+        ProfileError: If the profile moves other parts than the vehicle has, or has no camera that
+            sees what policies for all vehicles look at.
         WorldError: If the vehicle cannot drive in the world.
     """
 
@@ -146,6 +149,7 @@ class WaypointEnv(DrivingEnv):
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
         body = vehicle_model(vehicle)
+        self._rectifier = _rectifier_of(*resolve_profile(vehicle, robot))
         world = world or (FLOODED if body.floats else "corridor")
         common: dict[str, Any] = {
             "world": world, "robot": robot, "courses": courses, "randomise": randomise,
@@ -153,14 +157,13 @@ class WaypointEnv(DrivingEnv):
         }  # fmt: skip
         self.response = _response_of(vehicle, world, robot, full_robot)
         self._env: VehicleEnv | RangesEnv = (
-            VehicleEnv(vehicle, size=_SIZE, state=True, **common)
+            VehicleEnv(vehicle, state=True, **common)
             if full_robot
-            else RangesEnv(vehicle, camera=_SIZE, **common)
+            else RangesEnv(vehicle, camera=True, **common)
         )
         self.parts, self._world, self._draw = self._env.parts, self._env.world, self._env._draw
         self.render_mode = render_mode
         self._turns_on_the_spot = body.turning_radius_m == 0.0
-        self._rectifier = Rectifier(_geometry(resolve_profile(vehicle, robot, _SIZE)), _SIZE)
         self.observation_space, self.action_space = observation_space(), action_space()
         self.observation_layout, self.action_layout = OBSERVATION_LAYOUT, ACTION_LAYOUT
         self.metadata = {**self.metadata, "render_fps": self._env.metadata["render_fps"]}

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from shapechanger.errors import MissingExtra
+from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.twin.world.vehicle import DrivingWorld
 from shapechanger.worlds.world import World
 
@@ -31,15 +32,13 @@ class Place:
     finger: str = ""
 
 
-def open_world(
-    place: Place, parts: Collection[str], size: tuple[int, int] | None, seed: int
-) -> World:
+def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, seed: int) -> World:
     """Open the world of a place.
 
     Args:
         place: The place.
         parts: Parts that the robot's outputs move.
-        size: Width and height of the pictures in pixels; None without a camera.
+        camera: Camera of the profile, as which the world is shown; None without one.
         seed: Seed of the surroundings and of the start.
 
     Raises:
@@ -56,8 +55,13 @@ def open_world(
         except ModuleNotFoundError as error:
             raise MissingExtra(error.name or "mujoco", "sim") from error
         return FingerWorld(FingerParameters.from_json(place.finger), seed)
+    size, pitch_deg, fovy_deg = (
+        (None, None, None) if camera is None else (camera.size, camera.pitch_deg, camera.fovy_deg)
+    )
     if not place.world:
-        return DrivingWorld(frozenset(parts), size or _ROOM, seed)
+        return DrivingWorld(
+            frozenset(parts), size or _ROOM, seed, pitch_deg=pitch_deg, fovy_deg=fovy_deg
+        )
     try:
         from shapechanger.bodies.vehicles import require_fit
         from shapechanger.worlds.simulation import MujocoWorld
@@ -65,4 +69,12 @@ def open_world(
         raise MissingExtra(error.name or "mujoco", "sim") from error
 
     require_fit(place.vehicle, parts)
-    return MujocoWorld(place.vehicle, place.world, seed, size=size, lenses=place.lenses)
+    return MujocoWorld(
+        place.vehicle,
+        place.world,
+        seed,
+        size=size,
+        pitch_deg=pitch_deg,
+        fovy_deg=fovy_deg,
+        lenses=place.lenses,
+    )

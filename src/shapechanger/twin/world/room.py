@@ -181,11 +181,14 @@ def find_start(room: Room, seed: int) -> Pose:
     return best_pose
 
 
-FIELD_OF_VIEW: Final = math.radians(90.0)  # From the left edge of the picture to the right one.
+FIELD_OF_VIEW: Final = math.radians(90.0)  # From left to right, where no profile states another.
 CAMERA_HEIGHT: Final = 0.12  # m above the floor
 WALL_HEIGHT: Final = 0.4  # m
 STRIPE: Final = 0.25  # m: width of the stripes on walls
 FADE: Final = 4.0  # m at which a wall has lost 63 % of its light
+_STEEP: Final = 0.75  # Slope of a line of sight at which floor and ceiling are lightest.
+_RAYS: Final = 2  # For each column of a picture.
+_ROUNDING: Final = 1e-9
 
 _CEILING: Final = np.array((205.0, 210.0, 215.0), np.float32)
 _FLOOR: Final = np.array((120.0, 95.0, 70.0), np.float32)
@@ -209,26 +212,41 @@ class FrontCamera:
 
     Args:
         size: Width and height of the pictures in pixels.
+        pitch_deg: Angle of the optical axis below the horizon, degrees; None for level.
+        fovy_deg: Vertical field of view, degrees; None for `FIELD_OF_VIEW` from left to right.
     """
 
-    def __init__(self, size: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        size: tuple[int, int],
+        pitch_deg: float | None = None,
+        fovy_deg: float | None = None,
+    ) -> None:
         width, height = size
-        self._focal = (width / 2) / math.tan(FIELD_OF_VIEW / 2)  # In pixels.
-        columns = (np.arange(width) + 0.5 - width / 2) / self._focal
-        self._angles = -np.arctan(columns)  # The first column is to the left.
-        self._lengths = np.hypot(1.0, columns)  # Of a ray whose share along the heading is 1.
-        self._rows = (np.arange(height) + 0.5 - height / 2)[:, np.newaxis].astype(np.float32)
+        if fovy_deg is None:
+            focal = (width / 2) / math.tan(FIELD_OF_VIEW / 2)  # In pixels.
+        else:
+            focal = (height / 2) / math.tan(math.radians(fovy_deg) / 2)
+        pitch = math.radians(pitch_deg or 0.0)
+        right = (np.arange(width) + 0.5 - width / 2) / focal
+        below = ((np.arange(height) + 0.5 - height / 2) / focal)[:, np.newaxis]
+        ahead = math.cos(pitch) - math.sin(pitch) * below
+        down = math.sin(pitch) + math.cos(pitch) * below
+        # One ray along the floor serves all pixels of a bearing.
+        bearings = -np.arctan2(right, ahead)
+        first, last = float(bearings.min()), float(bearings.max())
+        self._angles = np.linspace(first, last, _RAYS * width)
+        step = max(last - first, _ROUNDING) / (_RAYS * width - 1)
+        self._rays = np.rint((bearings - first) / step).astype(np.intp)
+        # How far a pixel looks down for each metre along the floor.
+        self._slopes = (down / np.hypot(right, ahead)).astype(np.float32)
         # Light falls off towards the horizon, on the floor and on the ceiling.
-        near = np.abs(self._rows) / (height / 2)
-        below = self._rows > 0
-        background = np.where(
-            below[..., np.newaxis],
-            _FLOOR * (0.55 + 0.45 * near[..., np.newaxis]),
-            _CEILING * (0.8 + 0.2 * near[..., np.newaxis]),
-        )
-        self._background = np.ascontiguousarray(
-            np.broadcast_to(background, (height, width, 3)).astype(np.uint8)
-        )
+        near = np.minimum(np.abs(self._slopes) / _STEEP, 1.0)[..., np.newaxis]
+        self._background = np.where(
+            self._slopes[..., np.newaxis] > 0.0,
+            _FLOOR * (0.55 + 0.45 * near),
+            _CEILING * (0.8 + 0.2 * near),
+        ).astype(np.uint8)
 
     def picture(self, room: Room, x: float, y: float, heading: float) -> NDArray[np.uint8]:
         """Draw a picture, RGB, shape (height, width, 3).
@@ -241,13 +259,13 @@ class FrontCamera:
         """
         angles = heading + self._angles
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
-        directions *= self._lengths[:, np.newaxis]  # So that distances are along the heading.
         distance, segment, along = room.cast(x, y, directions)
         distance = np.maximum(distance, 0.02).astype(np.float32)
-        top = -self._focal * (WALL_HEIGHT - CAMERA_HEIGHT) / distance
-        bottom = self._focal * CAMERA_HEIGHT / distance
         light = 0.25 + 0.75 * np.exp(-distance / np.float32(FADE))
         light *= np.where((along // STRIPE) % 2 == 0, 1.0, 0.72).astype(np.float32)
         colours = (_WALLS[segment % len(_WALLS)] * light[:, np.newaxis]).astype(np.uint8)
-        wall = (self._rows >= top) & (self._rows < bottom)  # (height, width)
-        return np.where(wall[..., np.newaxis], colours, self._background)
+        rise = self._slopes * distance[self._rays]  # Below the camera where it meets the wall, m.
+        wall = (rise >= CAMERA_HEIGHT - WALL_HEIGHT) & (rise < CAMERA_HEIGHT)
+        picture = self._background.copy()
+        picture[wall] = colours[self._rays[wall]]
+        return picture

@@ -197,15 +197,25 @@ class DrivingWorld:
         parts: Parts that the vehicle's outputs move, such as "wheels".
         size: Width and height of the pictures in pixels.
         seed: Seed of the boxes and of the first start.
+        pitch_deg: Angle of the camera's axis below the horizon, degrees; None for level.
+        fovy_deg: Vertical field of view of the camera, degrees; None for 90 degrees across.
 
     Attributes:
         resting_v: Voltage of the battery without load, V.
     """
 
-    def __init__(self, parts: Collection[str], size: tuple[int, int], seed: int) -> None:
+    def __init__(
+        self,
+        parts: Collection[str],
+        size: tuple[int, int],
+        seed: int,
+        *,
+        pitch_deg: float | None = None,
+        fovy_deg: float | None = None,
+    ) -> None:
         self._parts = frozenset(parts)
         self._vehicle = _vehicle_for(self._parts)
-        self._camera = FrontCamera(size)
+        self._camera = FrontCamera(size, pitch_deg, fovy_deg)
         self.resting_v = RESTING_V
         self._travelled = 0.0
         self.lay_out(seed)
