@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from shapechanger.demos.drivers import Gate, GateRule
 from shapechanger.errors import DemosError
@@ -45,6 +47,30 @@ def test_the_gate_gives_reasons() -> None:
     assert reasons == ["", "", "the expert takes over: the policy is off by 0.8", ""]
     reasons = [gate.watch(RIGHT, RIGHT, "") for _ in range(4)]
     assert [text for text in reasons if text] == ["the policy drives on"]
+
+
+@given(
+    right=st.floats(-1.0, 1.0, width=32),
+    rest=st.sampled_from([0.0, -1.0]),
+    share=st.floats(0.0, 1.0, width=32),
+)
+def test_slower_than_the_expert_is_no_difference(right: float, rest: float, share: float) -> None:
+    """Every value from rest to the expert's counts as agreement, and hands control back."""
+    expert = np.array([0.0, right], np.float32)
+    slow = np.array([0.1, rest + share * (right - rest)], np.float32)
+    gate = Gate(RULE, 0.1, (None, rest))
+    assert not any(gate.watch(slow, expert, "") for _ in range(10))
+    gate.watch(slow, expert, "danger")
+    assert [gate.watch(slow, expert, "") for _ in range(3)][-1] == "the policy drives on"
+
+
+@pytest.mark.parametrize("wanted", [(0.9, 0.5), (0.0, 1.0), (0.0, -0.6)])
+def test_faster_backward_and_aside_are_corrected(wanted: tuple[float, float]) -> None:
+    """What is not on the way from rest to the expert's action differs from it."""
+    gate = Gate(RULE, 0.1, (None, 0.0))
+    right = np.array([0.0, 0.4], np.float32)
+    reasons = [gate.watch(np.array(wanted, np.float32), right, "") for _ in range(3)]
+    assert reasons[-1].startswith("the expert takes over: the policy is off by")
 
 
 def test_a_rule_that_contradicts_itself_is_refused() -> None:

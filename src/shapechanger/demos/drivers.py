@@ -8,7 +8,7 @@ when to intervene; here a rule with fixed thresholds does.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
@@ -26,12 +26,17 @@ _ROUNDING: Final = 1e-9
 class GateRule:
     """When the expert takes over, and when it hands back.
 
+    A policy is corrected where it is dangerous, not where it is slow: of a value such as the
+    throttle, everything from rest to the expert's value counts as agreement.
+
     Attributes:
         apart: Take over when any value of the two actions, such as the steering, has differed by
             more than this,
         apart_s: for this long without interruption, s; at least one step.
         near_s: Take over at once when an obstacle ahead would be reached within this time at the
             present speed, s, and the policy does not brake.
+        still_s: Take over when the vehicle has stood still for this long, s, because nothing is
+            learned from that.
         agree: Hand back when no value has differed by more than this,
         agree_s: for this long without interruption, s, with no obstacle near; at least one step.
     """
@@ -39,6 +44,7 @@ class GateRule:
     apart: float = 0.6
     apart_s: float = 0.3
     near_s: float = 0.4
+    still_s: float = 2.0
     agree: float = 0.3
     agree_s: float = 1.0
 
@@ -48,8 +54,8 @@ class GateRule:
             raise DemosError(
                 f"agree must be positive and at most apart, got {self.agree} and {self.apart}."
             )
-        if min(self.apart_s, self.near_s, self.agree_s) < 0.0:
-            raise DemosError("apart_s, near_s and agree_s must not be negative.")
+        if min(self.apart_s, self.near_s, self.still_s, self.agree_s) < 0.0:
+            raise DemosError("apart_s, near_s, still_s and agree_s must not be negative.")
 
 
 class Gate:
@@ -58,13 +64,16 @@ class Gate:
     Args:
         rule: The thresholds.
         period_s: Time between steps, s.
+        rests: For each value of an action, the value at which it is slowest; None for those, such
+            as the steering, that are not slow. Empty for none.
 
     Attributes:
         corrects: Whether the expert drives.
     """
 
-    def __init__(self, rule: GateRule, period_s: float) -> None:
+    def __init__(self, rule: GateRule, period_s: float, rests: Sequence[float | None] = ()) -> None:
         self._rule = rule
+        self._rests = tuple(rests)
         self._steps_apart = _steps(rule.apart_s, period_s)
         self._steps_agreed = _steps(rule.agree_s, period_s)
         self.begin()
@@ -85,7 +94,7 @@ class Gate:
         Returns:
             Why the driver changes at this step, in words; "" if it does not change.
         """
-        rule, gap = self._rule, float(np.abs(wanted - right).max())
+        rule, gap = self._rule, self._gap(wanted, right)
         if self.corrects:
             fine = gap <= rule.agree and not danger
             self._lasted = self._lasted + 1 if fine else 0
@@ -101,6 +110,14 @@ class Gate:
             return ""
         self.corrects, self._lasted = True, 0
         return f"the expert takes over: {why}"
+
+    def _gap(self, wanted: NDArray[np.float32], right: NDArray[np.float32]) -> float:
+        """Return the largest difference of two actions that is not slowness."""
+        slowest = right.copy()
+        for i, rest in enumerate(self._rests):
+            slowest[i] = right[i] if rest is None else rest
+        agreed = np.clip(wanted, np.minimum(slowest, right), np.maximum(slowest, right))
+        return float(np.abs(wanted - agreed).max())
 
 
 def _steps(seconds: float, period_s: float) -> int:
@@ -187,6 +204,11 @@ class CorrectedPilot:
         expert: The expert; its intended actions, without mistakes, are carried out.
         gate: Decides who drives.
         danger: Returns the imminent danger of an action, in words; "" for none.
+
+    Attributes:
+        steps: Number of decisions.
+        corrected: Number of those that were the expert's.
+        takeovers: How often the expert took over.
     """
 
     def __init__(
@@ -197,6 +219,7 @@ class CorrectedPilot:
         danger: Callable[[NDArray[np.float32]], str] = lambda action: "",
     ) -> None:
         self._act, self._expert, self._gate, self._danger = act, expert, gate, danger
+        self.steps = self.corrected = self.takeovers = 0
 
     def begin(self) -> None:
         """Start an episode: the policy drives."""
@@ -206,8 +229,12 @@ class CorrectedPilot:
     def decide(self, observation: Any) -> DriverDecision:
         """Return the decision for an observation."""
         wanted, right = self._act(observation), self._expert.act()[0]
+        drove = self._gate.corrects
         remark = self._gate.watch(wanted, right, self._danger(wanted))
+        self.steps += 1
         if self._gate.corrects:
+            self.corrected += 1
+            self.takeovers += not drove
             return DriverDecision(right, right, "expert", wanted, remark)
         return DriverDecision(wanted, wanted, "policy", None, remark)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.cli.demos.record import pilot_of
+from shapechanger.cli.demos.record import corrected_pilot, pilot_of
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.drivers import CorrectedPilot
+from shapechanger.demos.drivers import Act, CorrectedPilot
+from shapechanger.envs.vehicle import RangesEnv
+from shapechanger.envs.vehicle.base import DrivingEnv
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 from tests.demos.corridor_env import CorridorEnv, Shows
@@ -57,6 +60,40 @@ def test_a_corrected_policy_uses_the_expert_of_the_env(tmp_path: Path) -> None:
     assert isinstance(pilot, CorrectedPilot)
     pilot.begin()
     assert pilot.decide(env.reset(seed=0)[0]).driver == "policy"
+
+
+def _corrected(env: DrivingEnv, change: Act, steps: int) -> tuple[CorrectedPilot, set[str]]:
+    """Let the expert drive with changed actions, corrected by itself; return marks too."""
+    expert, remarks = env.expert(), set[str]()
+    pilot = corrected_pilot(env, lambda seen: change(expert(seen)), env.demonstrator(0))
+    env.reset(options={"course": 3, "start": 3})
+    pilot.begin()
+    for _ in range(steps):
+        decision = pilot.decide(None)
+        env.step(decision.carried_out)
+        remarks.add(decision.remark)
+    return pilot, remarks
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_a_slow_driver_is_not_corrected(share: float) -> None:
+    """The car drives where the expert would, with a share of the throttle."""
+    with closing(RangesEnv("car", put_back=True)) as env:
+        pilot, _ = _corrected(env, lambda right: right * np.float32([1.0, share]), 300)
+        assert env.world.progress_m > 4.0
+    assert pilot.corrected <= 0.05 * pilot.steps
+
+
+def test_danger_and_standing_are_corrected() -> None:
+    """A driver that never steers is corrected, and so is one that never moves."""
+    with closing(RangesEnv("car", put_back=True)) as env:
+        pilot, remarks = _corrected(env, lambda right: right * np.float32([0.0, 1.0]), 300)
+        assert 0.05 * pilot.steps < pilot.corrected < pilot.steps
+        assert pilot.takeovers > 0
+        assert any("what is ahead" in remark or "is off by" in remark for remark in remarks)
+        pilot, remarks = _corrected(env, lambda right: right * np.float32([1.0, 0.0]), 100)
+        assert "the expert takes over: it stands still" in remarks
+        assert env.world.progress_m > 0.2
 
 
 def test_a_policy_with_other_inputs_is_refused(tmp_path: Path) -> None:

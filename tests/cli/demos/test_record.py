@@ -49,7 +49,7 @@ def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str
     """Only the expert's steps are loaded for learning."""
     data = tmp_path / "data"
     policy = ("--driver", str(CLONES["boat"]), "--corrected-by", "expert")
-    output_of(capsys, "record", "Car", "--out", data, "--minutes", "0.1", *policy)
+    printed = output_of(capsys, "record", "Car", "--out", data, "--minutes", "0.1", *policy)
     (path,) = episodes_of(data)
     episode = read_episode(path)
     drivers = [step.driver for step in episode.steps]
@@ -59,6 +59,7 @@ def test_a_policy_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert all(step.wanted is None for step in episode.steps if step.driver == "policy")
     assert "the expert takes over" in episode.marks[0].text
     assert len(load_dataset(data)) == len(corrected)
+    assert f" of the steps, {len(corrected)} of 120, and took over " in printed
     assert episode.header.notes["corrected_by"] == "expert"
 
 

@@ -25,16 +25,23 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.errors import DemosError
+from shapechanger.layout import Layout
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 
 if TYPE_CHECKING:
-    from shapechanger.demos.drivers import Act, EpisodeDriver, TaskExpert
+    from shapechanger.demos.drivers import (
+        Act,
+        CorrectedPilot,
+        EpisodeDriver,
+        GateRule,
+        TaskExpert,
+    )
 
 _EXPERT: Final = "expert"
 
-# Below this throttle a vehicle does not collide.
-_CRAWLS_MPS: Final = 0.05
-_BRAKES: Final = 0.0
+# Values of the actions of vehicles at which they are slowest.
+_RESTS: Final = {"throttle": 0.0, "waypoint/speed": -1.0}
+_CRAWLS_MPS: Final = 0.05  # Below this speed a vehicle does not collide.
 
 
 def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) -> EpisodeDriver:
@@ -50,7 +57,7 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
         DemosError: If the driver is unknown, or the env has no expert.
         PolicyError: If the file is not a policy.
     """
-    from shapechanger.demos.drivers import CorrectedPilot, ExpertPilot, Gate, GateRule, PolicyPilot
+    from shapechanger.demos.drivers import ExpertPilot, PolicyPilot
 
     if corrected_by not in ("", _EXPERT):
         raise DemosError(f"A policy is corrected by {_EXPERT}, and not by {corrected_by!r}.")
@@ -68,14 +75,25 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
     act = _policy(Path(driver), env)
     if not corrected_by:
         return PolicyPilot(act)
+    return corrected_pilot(env, act, _expert(env, seed))
+
+
+def corrected_pilot(env: gym.Env[Any, Any], act: Act, expert: TaskExpert) -> CorrectedPilot:
+    """Return a policy that an expert corrects where it is dangerous.
+
+    Args:
+        env: The env.
+        act: The policy.
+        expert: The expert of the env.
+    """
+    from shapechanger.demos.drivers import CorrectedPilot, Gate, GateRule
+
     rule = GateRule()
     period_s = 1.0 / float(env.metadata.get("render_fps") or 20.0)
-    return CorrectedPilot(
-        act,
-        _expert(env, seed),
-        Gate(rule, period_s),
-        lambda action: _danger(env, action, rule.near_s),
-    )
+    layout: Layout | None = getattr(env.unwrapped, "action_layout", None)
+    rests = [] if layout is None else [_RESTS.get(name) for name in layout.names]
+    dangers = _Dangers(env, rests[-1] if rests else None, rule, period_s)
+    return CorrectedPilot(act, expert, Gate(rule, period_s, rests), dangers)
 
 
 def _expert(env: gym.Env[Any, Any], seed: int) -> TaskExpert:
@@ -110,16 +128,38 @@ def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     return lambda seen: fitting(policy.act(np.asarray(seen)[np.newaxis]))
 
 
-def _danger(env: gym.Env[Any, Any], action: NDArray[np.float32], near_s: float) -> str:
-    """Describe the danger in the env's world, such as a collision within `near_s`; else empty."""
-    world = getattr(env.unwrapped, "world", None)
-    if world is None:
-        return ""
-    if world.touches:
-        return "it touches something"
-    speed, ahead_m = world.inputs().speed, world.distance_m()
-    drives_on = speed > _CRAWLS_MPS and action[-1] > _BRAKES
-    return f"{ahead_m:.1f} m to what is ahead" if drives_on and ahead_m < speed * near_s else ""
+class _Dangers:
+    """Describes the danger in the env's world, if it has one.
+
+    Args:
+        env: The env.
+        rest: Value of the last action at which a vehicle brakes or rolls to rest; None for 0.
+        rule: Thresholds of the gate.
+        period_s: Time between steps, s.
+    """
+
+    def __init__(
+        self, env: gym.Env[Any, Any], rest: float | None, rule: GateRule, period_s: float
+    ) -> None:
+        self._world = getattr(env.unwrapped, "world", None)
+        self._rest, self._rule, self._period_s = rest or 0.0, rule, period_s
+        self._placed, self._still_s = -1, 0.0
+
+    def __call__(self, action: NDArray[np.float32]) -> str:
+        """Return the danger of an action, in words; "" for none. Call it once per step."""
+        world = self._world
+        if world is None:
+            return ""
+        speed, ahead_m = world.inputs().speed, world.distance_m()
+        if world.placed != self._placed or abs(speed) > _CRAWLS_MPS:
+            self._placed, self._still_s = world.placed, 0.0
+        self._still_s += self._period_s
+        if world.touches:
+            return "it touches something"
+        drives_on = speed > _CRAWLS_MPS and action[-1] > self._rest
+        if drives_on and ahead_m < speed * self._rule.near_s:
+            return f"{ahead_m:.1f} m to what is ahead"
+        return "it stands still" if self._still_s > self._rule.still_s else ""
 
 
 def _clone(path: Path, env: gym.Env[Any, Any]) -> Callable[[Any], NDArray[Any]]:
@@ -170,7 +210,7 @@ class RecordDemonstrations:
 
     def run(self) -> None:
         """Record and print a summary."""
-        from shapechanger.demos.drivers import record_steps
+        from shapechanger.demos.drivers import CorrectedPilot, record_steps
         from shapechanger.demos.recording import RecordEpisodes
 
         require_seed(self.seed)
@@ -201,6 +241,12 @@ class RecordDemonstrations:
             ) from None
         finally:
             made.close()
+        if isinstance(pilot, CorrectedPilot):
+            say(
+                f"the expert corrected {pilot.corrected / max(pilot.steps, 1):.0%} of the steps, "
+                f"{pilot.corrected} of {pilot.steps}, and took over "
+                f"{counted(pilot.takeovers, 'time')}"
+            )
         say(
             f"wrote {env.steps} steps, {env.steps / env.control_hz / 60.0:.1f} minutes, in "
             f"{counted(env.episodes, 'episode')} to {self.out}\n"
