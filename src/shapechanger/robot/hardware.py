@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 import select
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from shapechanger.errors import RobotError
@@ -42,6 +42,17 @@ class Clock(Protocol):
         Returns:
             False if only the limit was reached. A twin's time moves in grants: the result is True
             at each grant, and only then.
+        """
+        ...
+
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Let a call to the hardware send heartbeats while a twin's board is held up.
+
+        A busy machine, or a world that is laid out, holds up a board as no hardware is. On a robot
+        this does nothing: a guard that hangs in a bus is silent, and must be replaced.
+
+        Args:
+            beat: Sends a heartbeat if one is due.
         """
         ...
 
@@ -149,6 +160,9 @@ class RealClock:
             poll.register(fd, select.POLLIN)
         ready = poll.poll(max(0.0, left_s * 1e3))
         return bool(ready) or time.monotonic_ns() >= until_ns
+
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Do nothing; see `Clock.keep_alive`."""
 
     async def sleep(self, seconds: float) -> None:
         """Sleep for `seconds` of real time."""

@@ -8,7 +8,7 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import msgspec
 
@@ -32,6 +32,9 @@ from shapechanger.twin.messages import (
 
 Result = TypeVar("Result")
 
+_HELD_UP_MS: Final = 10  # Between two calls while the board does not reply.
+_HELD_UP_S: Final = 10.0  # A board that does not reply for longer is broken.
+
 
 class BoardClient:
     """A connection to the board, to be used by one thread; see `BoardPins` for the pins.
@@ -46,6 +49,8 @@ class BoardClient:
             connection.
         levels: Level of each pin that is claimed as an input.
         on_edge: Called by `dispatch` with pin, level and time of each edge.
+        while_held_up: Called every 10 ms while the board is held up and neither takes a request nor
+            replies to it, for 10 s at most.
 
     Raises:
         RobotError: If no board listens there.
@@ -58,12 +63,16 @@ class BoardClient:
         except OSError as error:
             self._socket.close()
             raise RobotError(f"No twin's board answers at {path}: {error.strerror}.") from error
+        self._readable, self._writable = select.poll(), select.poll()
+        self._readable.register(self._socket, select.POLLIN)
+        self._writable.register(self._socket, select.POLLOUT)
         self._last_id = 0
         self._edges: deque[tuple[int, int, int]] = deque()
         self._grants: deque[int] = deque()
         self._replies: dict[int, BoardReply] = {}
         self.levels: dict[int, int] = {}
         self.on_edge: Callable[[int, int, int], None] | None = None
+        self.while_held_up: Callable[[], object] = lambda: None
         greeting = self.ask(ConnectClient(role=role, pid=os.getpid()), BoardGreeting)
         self.clock: Literal["real", "twin"] = greeting.clock
         self.now_ns = greeting.t
@@ -83,10 +92,16 @@ class BoardClient:
         Raises:
             RobotError: If the board is gone.
         """
-        try:
-            self._socket.send(encode(request))
-        except OSError as error:
-            raise RobotError("The twin's board is gone.") from error
+        data, until_s = encode(request), time.monotonic() + _HELD_UP_S
+        while True:
+            try:
+                self._socket.send(data, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                self._await(self._writable, until_s)
+            except OSError as error:
+                raise RobotError("The twin's board is gone.") from error
+            else:
+                return
 
     def ask(self, request: Request, kind: type[Result] | Any = None) -> Any:
         """Send a request and wait for its reply.
@@ -102,8 +117,10 @@ class BoardClient:
         self._last_id += 1
         request.id = self._last_id
         self.post(request)
+        until_s = time.monotonic() + _HELD_UP_S
         while request.id not in self._replies:
-            self._receive(0)
+            self._await(self._readable, until_s)
+            self._receive(socket.MSG_DONTWAIT)
         reply = self._replies.pop(request.id)
         if reply.error:
             raise RobotError(reply.error)
@@ -125,10 +142,8 @@ class BoardClient:
 
     def await_grant(self, at_most_s: float) -> bool:
         """Wait for a grant, which sets `now_ns`, and dispatch the edges before it."""
-        poll = select.poll()
-        poll.register(self._socket, select.POLLIN)
         while not self._grants:
-            if not poll.poll(max(0.0, at_most_s * 1e3)):
+            if not self._readable.poll(max(0.0, at_most_s * 1e3)):
                 self.dispatch()
                 return False
             self.drain()
@@ -145,6 +160,12 @@ class BoardClient:
                 pass  # The board ended first.
             finally:
                 self._socket.close()
+
+    def _await(self, ready: select.poll, until_s: float) -> None:
+        """Wait for the board, which a busy machine or a new world may hold up."""
+        while not ready.poll(_HELD_UP_MS):
+            if time.monotonic() < until_s:
+                self.while_held_up()
 
     def _receive(self, flags: int) -> bool:
         """Receive one message; False if there is none."""
@@ -199,6 +220,10 @@ class SteadyClock:
             if ready - {board} or now_ns >= latest_ns:
                 return bool(ready - {board}) or now_ns >= until_ns
 
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Call `beat` while the board does not reply; see `Clock.keep_alive`."""
+        self._client.while_held_up = beat
+
     async def sleep(self, seconds: float) -> None:
         """Sleep in real time."""
         import asyncio  # Only the daemon sleeps; the guard stays light.
@@ -238,6 +263,10 @@ class GrantedClock:
             return False
         self._waiting = False
         return True
+
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Call `beat` while the board does not reply; see `Clock.keep_alive`."""
+        self._client.while_held_up = beat
 
     async def sleep(self, seconds: float) -> int | None:
         """Let twin time advance, and return when the newest picture was taken."""

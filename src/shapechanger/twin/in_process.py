@@ -98,6 +98,9 @@ class LocalBoard:
         """Refuse: the caller is the one who would have to advance the board."""
         raise RobotError("The time of a board in this process advances only by `advance`.")
 
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Do nothing: a guard in this process has no supervisor."""
+
     async def sleep(self, seconds: float) -> int | None:
         """Refuse; see `wait`."""
         raise RobotError("The time of a board in this process advances only by `advance`.")

@@ -66,8 +66,7 @@ class Operator:
         """Replace the surroundings, and place the vehicle at a start in them.
 
         On a course in MuJoCo the board stands still for some tenths of a second meanwhile, and also
-        for the first `put_back` on it. On a busy machine a guard in real time may then be taken for
-        dead; a twin that is started with another seed has no such wait.
+        for the first `put_back` on it. A twin that is started with another seed has no such wait.
         """
         self._act("lay_out", seed)
 

@@ -144,6 +144,9 @@ class SteppedClock:
         """Raise, since the daemon does not use it."""
         raise NotImplementedError
 
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Do nothing, since the daemon does not use it."""
+
     async def sleep(self, seconds: float) -> int | None:
         """Advance the time, and let the guard tick."""
         await asyncio.sleep(0)

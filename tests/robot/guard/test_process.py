@@ -37,6 +37,9 @@ class _Clock:
     def now_ns(self) -> int:
         return self.time_ns
 
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        pass
+
     def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
         if self.events and self.events[0][0] <= until_ns:
             self.time_ns, event = self.events.pop(0)

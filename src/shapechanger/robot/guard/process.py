@@ -95,6 +95,7 @@ class Guard:
     def run(self, heartbeat: Heartbeat) -> None:
         """Run until asked to end, with a heartbeat to the supervisor."""
         self._heartbeat = heartbeat
+        self._clock.keep_alive(heartbeat.beat)
         until_ns = self._clock.now_ns()
         while not self.ended:
             fds = [heartbeat.fileno()]

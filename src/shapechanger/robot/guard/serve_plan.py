@@ -34,8 +34,9 @@ class ServePlan:
             `shapechanger.robot.hardware.connect`.
         python: The interpreter that runs the processes.
         patience_ms: Lower bound on the silence after which guard and daemon are killed, ms; their
-            own limits apply if those are longer. 0 on a robot. A twin's clock waits for a busy
-            machine, and is paused while a world is drawn; a guard that waits for it is alive.
+            own limits apply if those are longer. 0 on a robot, and on a twin in real time, whose
+            guard beats while its board is held up. A twin's clock waits for a busy machine, and is
+            paused while a world is drawn; a guard that waits for it is alive.
     """
 
     guard: GuardPlan
