@@ -87,6 +87,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "vehicles-waypoints-labels": _suite("waypoints", "labels"),
     "vehicles-waypoints-worlds": _suite("waypoints", "worlds"),
     "vehicles-waypoints-robot": _suite("waypoints", "whole_robot"),
+    "vehicles-waypoints-cameras": _suite("waypoints", "cameras"),
     "vehicles-waypoints-remote": _suite("waypoints", "remote"),
     "vehicles-waypoint-studies": _suite("vehicles_studies", "waypoints"),
 }

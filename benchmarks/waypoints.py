@@ -20,6 +20,7 @@ from typing import Any, Final, Literal, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
+import tomlkit
 from numpy.typing import NDArray
 
 from benchmarks.remote_drive import drive_remote
@@ -87,6 +88,11 @@ ACROSS: Final = tuple(list(SOURCES)[4:])
 BY_STEERING: Final = {
     "car-by-its-steering": Source("car", labels="steering"),
     "car-by-the-path": Source("car", labels="path beside it"),
+}
+# Keys of a profile's camera. The car's own looks level and sees 48.8 degrees, in 160 x 120 pixels.
+CAMERAS: Final[dict[str, dict[str, Any]]] = {
+    "70 degrees, 8 down": {"pitch_deg": 8.0, "fovy_deg": 70.0},
+    "module 3, 2 down": {"pitch_deg": 2.0, "fovy_deg": 41.0, "size": [160, 90]},
 }
 # Both clones were trained in the corridor.
 STEERED: Final = (("car", "tank"), ("tank", "car"))
@@ -235,6 +241,56 @@ def whole_robot() -> list[Row]:
             )
         )
     return rows
+
+
+def cameras() -> list[Row]:
+    """Compare drives of the car's clone behind other cameras with those behind its training's.
+
+    The pictures are rectified by the profile of each camera, along the same courses from the same
+    starts. `SEEDS` are one by default.
+    """
+    OUT.mkdir(parents=True, exist_ok=True)
+    seeds = range(int(os.environ.get("SEEDS", "1")))
+    jobs = [(camera, seed) for camera in ("training", *CAMERAS) for seed in seeds]
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        for _ in pool.map(_train, [("car", seed) for seed in seeds]):
+            pass
+        drives = list(pool.map(_seen, jobs))
+    scores = {
+        camera: _score(drives[i * len(seeds) : (i + 1) * len(seeds)])
+        for i, camera in enumerate(("training", *CAMERAS))
+    }
+    known = scores["training"]
+    return [
+        Row(
+            f"waypoints, car behind the camera of {camera}: collisions per 100 m",
+            f"{score.per_100_m:.1f}",
+            f"{counted(score)}; {score.speed:.2f} m/s",
+            f"in the interval of the training's, {known.low:.2f} to {known.high:.2f}",
+            known.low <= score.per_100_m <= known.high,
+        )
+        for camera, score in scores.items()
+    ]
+
+
+def _seen(job: tuple[str, int]) -> list[DriveResult]:
+    """Drive the car's clone behind a camera; cache it."""
+    camera, seed = job
+    use_one_thread()
+    kept = OUT / f"car-{camera.replace(',', '').replace(' ', '-')}-{seed}.json"
+    if kept.exists():
+        return [DriveResult(**one) for one in json.loads(kept.read_bytes())]
+    robot = find_profile("lab-car")
+    if camera in CAMERAS:
+        stated = tomlkit.parse(robot.read_text(encoding="utf-8"))
+        cast("Any", stated["camera"]).update(CAMERAS[camera])
+        robot = kept.with_suffix(".toml")
+        robot.write_text(tomlkit.dumps(stated), encoding="utf-8")
+    policy = taught_source("car", seed)
+    with closing(WaypointEnv("car", robot=robot, courses="held-out", put_back=True)) as env:
+        drives = [drive(env, policy.predict, course=course) for course in COURSES]
+    kept.write_text(json.dumps([asdict(one) for one in drives]), encoding="utf-8")
+    return drives
 
 
 def remote() -> list[Row]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import Any
 
 import gymnasium as gym
@@ -138,3 +139,15 @@ def test_reward_terms_of_an_evaluation_add_up_to_its_return(name: str) -> None:
     result = evaluate(random_actions(env.action_space, 0), [env], 0)
     assert sum(result.terms.values()) == pytest.approx(result.mean_return, rel=1e-5)
     env.close()
+
+
+def test_the_standing_share_of_a_vehicle_is_reported() -> None:
+    """A car that never moves stands in all steps, and one at full throttle in few."""
+    with closing(gym.make("shapechanger/CarRanges-v1", max_episode_steps=40)) as car:
+        still = evaluate(lambda seen: np.zeros((len(seen), 2), np.float32), [car], 5)
+        fast = evaluate(lambda seen: np.tile(np.float32([0.0, 1.0]), (len(seen), 1)), [car], 5)
+    assert still.standing == 1.0
+    assert fast.standing is not None
+    assert 0.0 < fast.standing < 0.2
+    countdown = evaluate(lambda seen: np.zeros((len(seen), 1)), [Countdown()], 5)
+    assert countdown.standing is None

@@ -197,6 +197,8 @@ class EvaluatePolicy:
             for measure in measures_of(env):
                 unit = "" if measure.unit == "1" else f" {measure.unit}"
                 say(f"{measure.name:14} {found.value(measure.name):.4g}{unit}")
+            if found.standing is not None:
+                say(f"{'standing':14} {found.standing:.1%} of the steps")
             say(f"{'length':14} {found.mean_length:.4g} steps")
 
 

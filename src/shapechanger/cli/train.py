@@ -186,6 +186,8 @@ class Train:
 
 def _print_evaluation(result: Evaluation) -> None:
     terms = ", ".join(f"{name} {value:.4g}" for name, value in result.terms.items())
+    if result.standing is not None:
+        terms += f"; it stood in {result.standing:.1%} of the steps"
     say(
         f"{result.steps:>9} steps: return {result.mean_return:.1f} "
         f"over {result.mean_length:.0f} steps an episode ({terms})"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import SpaceMismatch, StudyError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.worlds.rectify import CANONICAL_SIZE
+from shapechanger.worlds.world import STANDING_MPS, STANDING_RADPS
 
 AHEAD_M: Final = 0.8
 """Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
@@ -22,8 +23,6 @@ WIDEST_RAD: Final = 1.0
 
 _SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
 _LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
-_STANDING_MPS: Final = 0.1
-_STANDING_RADPS: Final = 0.1
 _AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
 # Of a fit to a drive: largest change of the steering within the lag of the turn, the jitter of the
 # steps' times, and the least share of the turning that the steering must explain.
@@ -268,8 +267,8 @@ def waypoints_of(
     sine = 0.5 * AHEAD_M * turn / fast
     widest = math.sin(WIDEST_RAD)
     bearing = np.arcsin(np.clip(sine, -widest, widest)) / WIDEST_RAD
-    moves = np.abs(speed) >= _STANDING_MPS
-    turns = np.abs(steering) * response.per_second >= _STANDING_RADPS
+    moves = np.abs(speed) >= STANDING_MPS
+    turns = np.abs(steering) * response.per_second >= STANDING_RADPS
     # Backwards it cannot point ahead; at rest only a throttle, or tracks that turn, say something.
     usable = np.where(
         moves, speed > 0.0, (throttle >= _LEAST_THROTTLE) | ((throttle >= 0.0) & turns)

@@ -13,6 +13,13 @@ RESTING_V: Final = 8.0
 """Voltage without load of two nearly full lithium cells."""
 
 
+STANDING_MPS: Final = 0.1
+"""Speed, m/s, below which a vehicle stands, unless it turns."""
+
+STANDING_RADPS: Final = 0.1
+"""Rate of turn, rad/s, below which it does not turn."""
+
+
 @dataclass(frozen=True, slots=True)
 class Pose:
     """Pose of a vehicle seen from above.
@@ -53,6 +60,11 @@ class Readings:
     bumped: bool = False
     battery_v: float = 0.0
     current_a: float = 0.0
+
+    @property
+    def stands(self) -> bool:
+        """Return whether the vehicle neither moves nor turns."""
+        return abs(self.speed) < STANDING_MPS and abs(self.yaw_rate) < STANDING_RADPS
 
 
 class World(Protocol):

@@ -53,8 +53,9 @@ def test_the_interval_grows_with_the_confidence() -> None:
 def test_scores_are_ratios_of_sums() -> None:
     """Scores are ratios of sums."""
     score = DriveScore.of(
-        [DriveResult(1, 30.0, 20.0, 0, True), DriveResult(2, 10.0, 60.0, 2, False)]
+        [DriveResult(1, 30.0, 20.0, 0, True, 0.1), DriveResult(2, 10.0, 60.0, 2, False, 0.5)]
     )
+    assert score.standing == pytest.approx((2.0 + 30.0) / 80.0)
     assert score.speed == pytest.approx(0.5)
     assert (score.slowest, score.fastest) == pytest.approx((1.0 / 6.0, 1.5))
     assert score.collisions == 2
@@ -86,6 +87,7 @@ def test_the_expert_reaches_the_distance(car: VehicleEnv) -> None:
     assert done.collisions == 0
     assert 5.0 / 2.0 < done.seconds < 5.0
     assert done.speed == pytest.approx(done.metres / done.seconds)
+    assert done.standing < 0.1
     assert done.course == HELD_OUT[0]
 
 
@@ -107,6 +109,7 @@ def test_a_drive_ends_at_the_time_limit(car: VehicleEnv) -> None:
     assert done.seconds == pytest.approx(2.0)
     assert not done.reached
     assert abs(done.metres) < 0.01
+    assert done.standing == 1.0
 
 
 def test_the_start_can_be_given(car: VehicleEnv) -> None:

@@ -65,9 +65,9 @@ class VehicleEnv(DrivingEnv):
     ## Info
     `progress`, metres along the course since the start; `collisions` since the start, of any part
     of the vehicle, also where no bumper detects them; `pose`, (x, y, heading) in m and rad;
-    `course`, the seed of the course; and as `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
-    `refused`, `armed`, `emergency`, `absent`, `reward_terms`, `reward_sources`, `captured_ns`,
-    `decided_ns`.
+    `course`, the seed of the course; `standing`, whether it neither moves nor turns; and as
+    `RemoteVehicleEnv`: `action_applied`, `stop_reason`, `refused`, `armed`, `emergency`, `absent`,
+    `reward_terms`, `reward_sources`, `captured_ns`, `decided_ns`.
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
@@ -268,6 +268,7 @@ class VehicleEnv(DrivingEnv):
             "collisions": self._world.collisions,
             "pose": (pose.x, pose.y, pose.heading),
             "course": self._world.seed,
+            "standing": self._world.inputs().stands,
             "captured_ns": seen.captured_ns,
             "decided_ns": seen.command_ns,
         }

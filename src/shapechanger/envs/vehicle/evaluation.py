@@ -35,6 +35,7 @@ class DriveResult:
         seconds: Duration in the vehicle's time, s.
         collisions: Number of collisions.
         reached: Whether it reached the required distance.
+        standing: Share of the time in which it stood still.
     """
 
     course: int
@@ -42,6 +43,7 @@ class DriveResult:
     seconds: float
     collisions: int
     reached: bool
+    standing: float = 0.0
 
     @property
     def speed(self) -> float:
@@ -75,17 +77,25 @@ def drive(
     """
     seen, info = env.reset(options={"course": course, "start": course if start is None else start})
     period_s = 1.0 / env.metadata["render_fps"]
-    steps = 0
+    steps = stood = 0
     while info["progress"] < metres and steps * period_s < limit_s:
         seen, _, terminated, _, info = env.step(act(seen))
         steps += 1
+        stood += bool(info.get("standing", False))
         if terminated:
             raise WorldError(
                 f"The drive along course {course} ended at its first collision: make the env with "
                 "put_back=True."
             )
     came = float(info["progress"])
-    return DriveResult(course, came, steps * period_s, int(info["collisions"]), came >= metres)
+    return DriveResult(
+        course,
+        came,
+        steps * period_s,
+        int(info["collisions"]),
+        came >= metres,
+        stood / max(steps, 1),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +113,7 @@ class DriveScore:
         low: Lower bound of the collisions per 100 m, with 95 % confidence.
         high: Upper bound of the same.
         reached: Share of drives that reached the required distance.
+        standing: Share of the time in which it stood still.
     """
 
     drives: int
@@ -115,6 +126,7 @@ class DriveScore:
     low: float
     high: float
     reached: float
+    standing: float
 
     @classmethod
     def of(cls, drives: Sequence[DriveResult]) -> DriveScore:
@@ -127,6 +139,7 @@ class DriveScore:
             raise WorldError("There is no drive to score: give at least one.")
         metres = sum(drive.metres for drive in drives)
         collisions = sum(drive.collisions for drive in drives)
+        seconds = sum(drive.seconds for drive in drives)
         speeds = [drive.speed for drive in drives]
         # Without progress, the rate of collisions is infinite.
         scale = _PER_M / metres if metres > 0.0 else float("inf")
@@ -134,7 +147,7 @@ class DriveScore:
         return cls(
             drives=len(drives),
             metres=metres,
-            speed=metres / sum(drive.seconds for drive in drives),
+            speed=metres / seconds,
             slowest=min(speeds),
             fastest=max(speeds),
             collisions=collisions,
@@ -142,6 +155,7 @@ class DriveScore:
             low=scale * low if low else 0.0,
             high=scale * high,
             reached=sum(drive.reached for drive in drives) / len(drives),
+            standing=sum(drive.standing * drive.seconds for drive in drives) / seconds,
         )
 
 

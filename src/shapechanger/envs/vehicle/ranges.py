@@ -19,13 +19,11 @@ from shapechanger.robot.guard.plan import GuardPlan, output_values
 from shapechanger.robot.guard.rules import aimed, slewed
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.worlds.simulation import MujocoWorld
+from shapechanger.worlds.world import STANDING_MPS
 
 COLLISION_REWARD: Final = -3.0
 """Reward of a collision: it costs three metres."""
 
-# Slower than this it stands. Without a price for it, two of four teachers learned to stop in front
-# of a wall and stay there.
-_STANDING_MPS: Final = 0.1
 # Nearer to something than this costs, up to the second number for each second. Teachers keep this
 # distance without a price for it, but once nearer they squeezed through where a camera that sees 31
 # degrees to each side must guess; with it they brake and back out, and a student learns that too.
@@ -123,7 +121,7 @@ class RangesEnv(DrivingEnv):
     Terminated by a collision, unless `put_back`. Truncated after 400 steps.
 
     ## Info
-    As `VehicleEnv`: `progress`, `collisions`, `pose`, `course`, `reward_terms`.
+    As `VehicleEnv`: `progress`, `collisions`, `pose`, `course`, `standing`, `reward_terms`.
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
@@ -247,7 +245,8 @@ class RangesEnv(DrivingEnv):
         self._bumped = world.bumped  # Before it is put back: a robot's reflex outlasts the contact.
         self._progress_m = world.progress_m
         speed = (self._progress_m - progress) / self._period_s
-        stands = abs(speed) < _STANDING_MPS
+        stands = abs(speed) < STANDING_MPS
+        # Without a price of standing, two of four teachers learned to stop in front of a wall.
         terms = self._reward.terms(speed, collided, stands, self._period_s)
         if collided and self._puts_back:
             world.put_back()
@@ -271,4 +270,5 @@ class RangesEnv(DrivingEnv):
             "collisions": world.collisions,
             "pose": (pose.x, pose.y, pose.heading),
             "course": world.seed,
+            "standing": world.inputs().stands,
         }

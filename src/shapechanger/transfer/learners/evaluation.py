@@ -40,6 +40,8 @@ class Evaluation(msgspec.Struct, frozen=True):
         success: Share of the episodes whose last `info["is_success"]` is true; None if the env does
             not report success.
         measures: Mean of each measure that the env declares besides the return, by its name.
+        standing: Share of the steps whose `info["standing"]` is true; None if the env, as all but
+            those of vehicles, does not report it.
     """
 
     steps: int
@@ -48,6 +50,7 @@ class Evaluation(msgspec.Struct, frozen=True):
     terms: dict[str, float] = {}
     success: float | None = None
     measures: dict[str, float] = {}
+    standing: float | None = None
 
     def value(self, measure: str) -> float:
         """Return the value of a measure, or the sum of a reward term, by name.
@@ -113,7 +116,14 @@ def evaluate(
         _means([episode.terms for episode in played]),
         float(np.mean(reached)) if reached else None,
         _means([episode.measures for episode in played]),
+        _standing(played),
     )
+
+
+def _standing(played: Sequence[_Episode]) -> float | None:
+    """Return the share of all steps at which a vehicle stood; None where that is not reported."""
+    stood = [episode.stood for episode in played if episode.stood is not None]
+    return sum(stood) / sum(episode.length for episode in played) if stood else None
 
 
 def _means(episodes: Sequence[dict[str, float]]) -> dict[str, float]:
@@ -130,6 +140,7 @@ class _Episode:
     length: int = 0
     terms: dict[str, float] = field(default_factory=dict[str, float])
     success: bool | None = None
+    stood: int | None = None
     measures: dict[str, float] = field(default_factory=dict[str, float])
 
     def add(self, reward: float, info: Mapping[str, Any], measures: Sequence[Measure]) -> None:
@@ -142,6 +153,8 @@ class _Episode:
                 self.terms[name] = self.terms.get(name, 0.0) + float(cast("float", value))
         if "is_success" in info:
             self.success = bool(info["is_success"])
+        if "standing" in info:
+            self.stood = (self.stood or 0) + bool(info["standing"])
         for measure in measures:
             if measure.key not in info:
                 continue

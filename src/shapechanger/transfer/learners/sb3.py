@@ -429,6 +429,8 @@ class _PeriodicEvaluation(BaseCallback):
         result = self.evaluate(self.model, self.training_env, self.num_timesteps)
         self.logger.record("eval/mean_return", result.mean_return)
         self.logger.record("eval/mean_length", result.mean_length)
+        if result.standing is not None:
+            self.logger.record("eval/standing", result.standing)
         for name, value in result.terms.items():
             self.logger.record(f"eval/{name}", value)
         self._on_evaluation(result)
