@@ -77,6 +77,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "vehicles-frames": _suite("vehicles", "frames"),
     "vehicles-fast": _suite("vehicles", "fast"),
     "vehicles-students": _suite("vehicles", "students"),
+    "vehicles-teachers": _suite("standing", "teachers"),
     "vehicles-expert": _suite("vehicles", "expert"),
     "vehicles-clone": _suite("vehicles", "clone"),
     "vehicles-on-board": _suite("vehicles_twin", "on_board"),
