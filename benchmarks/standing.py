@@ -1,6 +1,7 @@
 """How often a car's teacher stands for good at starts beside the lane.
 
-`SEEDS` teachers are trained with the preset of `CarRanges` and kept in `results/standing`. All starts are on held-out courses.
+`SEEDS` teachers are trained with the preset of `CarRanges` and kept in `results/standing`.
+All starts are on held-out courses.
 """
 
 from __future__ import annotations
