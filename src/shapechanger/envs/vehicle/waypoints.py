@@ -81,7 +81,7 @@ def _response_of(
         missing = [name for name in ("speed", "yaw_rate") if name not in places]
         if missing:
             raise ProfileError(
-                f"{resolve_profile(vehicle, robot, _SIZE).path} has no sensor of "
+                f"{resolve_profile(vehicle, robot)[0].path} has no sensor of "
                 f"{' and '.join(missing)}, which waypoints need on the full robot: add it to the "
                 "profile, or leave out full_robot."
             )
