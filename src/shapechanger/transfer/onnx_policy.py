@@ -25,6 +25,7 @@ from shapechanger.errors import (
 from shapechanger.files import write_atomic
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
+from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
@@ -183,8 +184,11 @@ def export_onnx(policy: TrainedPolicy, path: Path) -> None:
         last = graph.apply("Tanh", last)
         last = graph.apply("Mul", last, 0.5 * (high - low))
         last = graph.apply("Add", last, 0.5 * (high + low))
-    last = graph.apply("Max", last, low)
-    graph.apply("Min", last, high, to="action")
+    last = graph.apply("Min", graph.apply("Max", last, low), high)
+    scale = ActionScale.between(space, policy.card.action)
+    middle, half, low, high = (each.astype(np.float32) for each in scale)
+    last = graph.apply("Add", graph.apply("Mul", last, half), middle)
+    graph.apply("Min", graph.apply("Max", last, low), high, to="action")
     graph.write(path, msgspec.convert(policy.card, OnnxCard, from_attributes=True))
 
 

@@ -1,8 +1,10 @@
 """Trained policies in files.
 
-A file holds safetensors: the weights, the normalisation statistics and the bounds of the spaces; in
-its metadata a JSON card (env, learner, settings, steps, seed, version, command, both layouts) and a
-hash of the tensors. Loading a file only reads numbers and JSON, so it cannot run code.
+A file holds safetensors: the weights, the normalisation statistics and the bounds of the model's
+own spaces; in its metadata a JSON card (env, learner, settings, steps, seed, version, command, both
+layouts) and a hash of the tensors. The model's actions are scaled from the bounds of its own space
+to those of the action layout; in files of older versions the two are equal. Loading a file only
+reads numbers and JSON, so it cannot run code.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from shapechanger.files import write_atomic
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
+from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
 from shapechanger.transfer.learners.settings import RslSettings, Sb3Settings
@@ -102,7 +105,8 @@ class TrainedPolicy:
     """A policy with its normalisation and card.
 
     Attributes:
-        model: Stable-Baselines3's model. One that was loaded has the weights and settings of the
+        model: Stable-Baselines3's model, whose own actions are from -1 to 1; see
+            `shapechanger.transfer.actions`. One that was loaded has the weights and settings of the
             trained one, and a new optimiser.
         normalisation: The statistics that it was trained with; None if it is not normalised.
         card: Its provenance.
@@ -114,8 +118,8 @@ class TrainedPolicy:
 
     @property
     def act(self) -> Act:
-        """The policy's mean actions for observations of shape (n, ...)."""
-        return actor(self.model, self.normalisation)
+        """The policy's mean actions for observations of shape (n, ...), in the env's units."""
+        return actor(self.model, self.normalisation, self.card.action)
 
     def described(
         self, *, command: str = "", identity: Mapping[str, Identity] | None = None
@@ -135,16 +139,22 @@ class TrainedPolicy:
 
 
 def actor(
-    model: BaseAlgorithm, normalisation: Normalisation | None, *, deterministic: bool = True
+    model: BaseAlgorithm,
+    normalisation: Normalisation | None,
+    action: Layout,
+    *,
+    deterministic: bool = True,
 ) -> Act:
-    """Return a function from the env's observations to the model's actions.
+    """Return a function from the env's observations to the env's actions.
 
     Args:
         model: The model.
         normalisation: Its statistics; None if it is not normalised.
+        action: Layout of the env's actions.
         deterministic: Whether actions are the mean ones, without exploration noise.
     """
     mean = _mean_action(model) if deterministic else None
+    scale = ActionScale.between(cast("Any", model).action_space, action)
     if mean is not None and isinstance(model.policy, LimbPolicy):
         return mean  # Its observations are scaled already, and of any body.
 
@@ -153,8 +163,8 @@ def actor(
         if normalisation is not None:
             inputs = _normalised(observations, normalisation.observation)
         if mean is not None:
-            return mean(inputs)
-        return model.predict(inputs, deterministic=deterministic)[0]
+            return scale.to_env(mean(inputs))
+        return scale.to_env(model.predict(inputs, deterministic=deterministic)[0])
 
     return act
 

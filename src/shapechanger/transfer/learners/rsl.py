@@ -19,6 +19,7 @@ import numpy as np
 
 import shapechanger
 from shapechanger.errors import MissingExtra, StudyError
+from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners import DemonstrationFile, ignore
@@ -68,8 +69,8 @@ class RslVecEnv(VecEnv):
     """Worlds of `shapechanger.make_vec(backend="warp")` as rsl-rl's learners take them.
 
     Observations are in the group `policy`. A world whose episode has ended starts again in the same
-    step, and `time_outs` says where only the time limit ended it. Actions outside the action space
-    are moved to its edge, as Stable-Baselines3 does.
+    step, and `time_outs` says where only the time limit ended it. Actions are from -1 to 1; those
+    outside are moved to the edge, as Stable-Baselines3 does.
 
     Args:
         envs: The worlds; they are reset.
@@ -98,12 +99,14 @@ class RslVecEnv(VecEnv):
         self._rows = None if rows is None else DeviceRows(envs, rows)
         if self._rows is not None:
             self.num_actions = self._rows.room
-            self._low, self._high = torch.tensor([-1.0, 1.0], device=self.device)
         else:
-            self.num_actions = envs.action_layout.size
-            space = envs.single_action_space
-            self._low = torch.as_tensor(space.low, device=self.device)
-            self._high = torch.as_tensor(space.high, device=self.device)
+            space, layout = envs.single_action_space, envs.action_layout
+            require_ranges("this env", space, layout)
+            self.num_actions = layout.size
+            scale = ActionScale.between(learners_space(space), layout)
+            self._middle, self._half, self._low, self._high = (
+                torch.as_tensor(each, dtype=torch.float32, device=self.device) for each in scale
+            )
         self._observations: Tensor = seen if self._rows is None else self._rows.of(seen)
 
     @property
@@ -128,9 +131,11 @@ class RslVecEnv(VecEnv):
         Returns:
             Observations, rewards, ends, and `time_outs` among the extras.
         """
-        moved: Any = actions.clamp(self._low, self._high)
+        moved: Any = actions.clamp(-1.0, 1.0)
         if self._rows is not None:
             moved = self._rows.actions(moved)
+        else:
+            moved = (self._middle + self._half * moved).clamp(self._low, self._high)
         seen, rewards, terminated, truncated, _ = self.envs.step(moved)
         self._observations = seen if self._rows is None else self._rows.of(seen)
         ends = terminated | truncated
@@ -198,7 +203,8 @@ class RslLearner(Sb3Learner):
         try:
             one: Any = eval_envs[0]
             identity = identities_in(env, one, settings)
-            spaces = SpacesOnly(one.observation_space, one.action_space)
+            layouts = layouts_of(one)
+            spaces = SpacesOnly(one.observation_space, learners_space(one.action_space))
             envs: Any = _sb3._with_statistics(DummyVecEnv([lambda: spaces]), settings)
             single = settings.for_one_env()
             # Stable-Baselines3 leaves out types.
@@ -208,7 +214,7 @@ class RslLearner(Sb3Learner):
 
             def evaluated(done: int) -> None:
                 _sb3._require_finite(model, self._name)
-                act = actor(model, _sb3._statistics(envs))
+                act = actor(model, _sb3._statistics(envs), layouts[1])
                 episodes = settings.eval_episodes
                 on_evaluation(evaluate(act, eval_envs, EVALUATION_SEED, done, episodes=episodes))
 
@@ -228,7 +234,7 @@ class RslLearner(Sb3Learner):
             model.num_timesteps = done
             card = PolicyCard(
                 env,
-                *layouts_of(one),
+                *layouts,
                 self._name,
                 settings,
                 done,

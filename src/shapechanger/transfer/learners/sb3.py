@@ -11,7 +11,9 @@ import gymnasium as gym
 import numpy as np
 
 import shapechanger
-from shapechanger.errors import MissingExtra, StudyError, TransplantError
+from shapechanger.errors import MissingExtra, SpaceMismatch, StudyError, TransplantError
+from shapechanger.layout import Layout
+from shapechanger.transfer.actions import require_ranges
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.env_ref import (
@@ -44,7 +46,7 @@ from shapechanger.transfer.learners.settings import (
     Sb3Settings,
     require_budget,
 )
-from shapechanger.transfer.learners.vec_env import training_vec_env
+from shapechanger.transfer.learners.vec_env import training_vec_env, with_scaled_actions
 from shapechanger.transfer.limbs.envs import LimbVecEnv, rows_of_each
 from shapechanger.transfer.limbs.rows import require_same_columns
 from shapechanger.transfer.transplant import transplant
@@ -64,7 +66,8 @@ OnEvaluation = Callable[[Evaluation], None]
 OnSteps = Callable[[int], None]
 
 START_LOG_STD: Final = -1.0
-"""Smallest logarithm of an action's standard deviation at the start of training from a policy.
+"""Smallest logarithm of the standard deviation of an action, in half its range, at the start of
+training from a policy.
 
 A converged policy hardly explores: with the standard deviations of 0.06 to 0.22 of the shipped
 finger's policy, fine-tuning reached no target of another finger in 30,720 steps
@@ -101,6 +104,7 @@ class Sb3Learner:
         """Refuse an env whose spaces are not flat boxes of the sizes of its layouts."""
         check_size(f"observation of {env}", traits.observation_space, traits.observation_layout)
         check_size(f"action of {env}", traits.action_space, traits.action_layout)
+        require_ranges(env.id, traits.action_space, traits.action_layout)
         if isinstance(self._settings, LimbSettings):
             rows_of_each(each_body(env), self._settings.room)
 
@@ -143,14 +147,19 @@ class Sb3Learner:
             together: VecEnv = DummyVecEnv([lambda: eval_envs[0]])
         else:
             together = _training_envs(env, settings, self._threads)
-        envs = _with_statistics(VecMonitor(together), settings)
+        layouts = layouts_of(eval_envs[0])
+        try:
+            scaled = with_scaled_actions(together, layouts[1], env.id)
+        except SpaceMismatch:
+            together.close()
+            raise
+        envs = _with_statistics(VecMonitor(scaled), settings)
         try:
             if start is not None and isinstance(settings, LimbSettings):
-                rows, _ = layouts_of(eval_envs[0])
-                require_same_columns(start.card.observation, rows, env.id)
+                require_same_columns(start.card.observation, layouts[0], env.id)
             model, explores = _first_model(envs, settings, seed, self._tensorboard, start, body_map)
             evaluations = _PeriodicEvaluation(
-                self._name, settings, eval_envs, single, on_evaluation, on_steps
+                self._name, settings, eval_envs, layouts[1], single, on_evaluation, on_steps
             )
             # Before `learn`: it starts with a reset, which already changes the running statistics.
             if on_evaluation is not ignore:
@@ -167,7 +176,7 @@ class Sb3Learner:
             evaluations.evaluate_now()
             card = PolicyCard(
                 env,
-                *layouts_of(eval_envs[0]),
+                *layouts,
                 self._name,
                 settings,
                 int(cast("Any", model).num_timesteps),
@@ -382,6 +391,7 @@ class _PeriodicEvaluation(BaseCallback):
         learner: str,
         settings: Sb3Settings,
         envs: list[gym.Env[Any, Any]],
+        action: Layout,
         single: bool,
         on_evaluation: OnEvaluation,
         on_steps: OnSteps,
@@ -390,6 +400,7 @@ class _PeriodicEvaluation(BaseCallback):
         self._learner = learner
         self._settings = settings
         self._envs = envs
+        self._action = action
         self._single = single
         self._on_evaluation = on_evaluation
         self._on_steps = on_steps
@@ -416,7 +427,7 @@ class _PeriodicEvaluation(BaseCallback):
             steps: Training steps so far.
         """
         return evaluate(
-            actor(model, _statistics(envs)),
+            actor(model, _statistics(envs), self._action),
             self._envs,
             EVALUATION_SEED,
             steps,

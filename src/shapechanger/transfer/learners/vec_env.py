@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 import shapechanger
 from shapechanger.errors import MissingExtra
+from shapechanger.layout import Layout
+from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.env_ref import EnvRef
 
 try:
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecEnvWrapper
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 
@@ -84,8 +86,55 @@ class ThreadVecEnv(DummyVecEnv):
         return self._envs.render()
 
 
+class ScaledActions(VecEnvWrapper):
+    """Envs that take actions from -1 to 1, whatever the units of their actuators.
+
+    Args:
+        envs: The envs.
+        scale: Scale of their actions.
+    """
+
+    def __init__(self, envs: VecEnv, scale: ActionScale) -> None:
+        space = learners_space(cast("Any", envs).action_space)
+        cast("Any", super()).__init__(envs, action_space=space)
+        self._scale = scale
+
+    def reset(self) -> Any:
+        """Reset each env."""
+        return self.venv.reset()
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Start a step.
+
+        Args:
+            actions: Shape (envs, n), from -1 to 1.
+        """
+        self.venv.step_async(self._scale.to_env(actions))
+
+    def step_wait(self) -> Any:
+        """End the step; return observations, rewards, dones and infos."""
+        return cast("Any", self.venv).step_wait()
+
+
+def with_scaled_actions(envs: VecEnv, layout: Layout, name: str) -> VecEnv:
+    """Return envs that take actions from -1 to 1; the envs themselves if they already do.
+
+    Args:
+        envs: The envs, with flat actions.
+        layout: Layout of an action.
+        name: Name of the env, for messages.
+
+    Raises:
+        SpaceMismatch: If an action has no finite range, or its layout states another.
+    """
+    space = cast("Any", envs).action_space
+    require_ranges(name, space, layout)
+    scale = ActionScale.between(learners_space(space), layout)
+    return envs if scale.is_identity else ScaledActions(envs, scale)
+
+
 def training_vec_env(env: EnvRef, num_envs: int, threads: int | None) -> VecEnv:
-    """Make the parallel envs of a training.
+    """Make the parallel envs of a training, with actions in the units of their actuators.
 
     Envs of the catalogue are stepped by threads. Those of others may share state, so they are
     stepped one after another; the numbers would be the same.

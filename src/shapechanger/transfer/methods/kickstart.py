@@ -11,6 +11,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 from torch.nn.utils import clip_grad_norm_
 
+from shapechanger.layout import Layout
+from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.body_map.rules import Learn
 from shapechanger.transfer.env_ref import EnvTraits
@@ -47,7 +49,7 @@ class Kickstart(Method):
         return run.train(
             run.target,
             run.steps,
-            callback=_Distillation(teacher),
+            callback=_Distillation(teacher, run.body_map.target_action),
             on_evaluation=run.report,
         )
 
@@ -77,11 +79,17 @@ class MappedTeacher:
 
 
 class _Distillation(BaseCallback):
-    """Collects the teacher's actions during a rollout, and learns from them after the update."""
+    """Collects the teacher's actions during a rollout, and learns from them after the update.
 
-    def __init__(self, teacher: MappedTeacher) -> None:
+    Args:
+        teacher: The teacher, which acts in the env's units.
+        action: Layout of the actions.
+    """
+
+    def __init__(self, teacher: MappedTeacher, action: Layout) -> None:
         super().__init__()
         self._teacher = teacher
+        self._action = action
         self._seen: list[NDArray[Any]] = []
         self._shown: list[NDArray[np.float32]] = []
         # The teacher's answer to the observations that the next step acts on.
@@ -118,7 +126,8 @@ class _Distillation(BaseCallback):
         taught = torch.from_numpy(self._teacher.taught)  # pyright: ignore[reportUnknownMemberType]
         order = torch.randperm(len(seen))
         observations = torch.from_numpy(seen)[order]  # pyright: ignore[reportUnknownMemberType]
-        actions = torch.from_numpy(shown)[order]  # pyright: ignore[reportUnknownMemberType]
+        scaled = ActionScale.between(model.action_space, self._action).to_model(shown)
+        actions = torch.from_numpy(scaled)[order]  # pyright: ignore[reportUnknownMemberType]
         losses: list[float] = []
         for start in range(0, len(seen), model.batch_size):
             batch = slice(start, start + model.batch_size)

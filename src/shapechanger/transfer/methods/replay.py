@@ -15,8 +15,10 @@ from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import Tensor, nn
 from torch.nn import functional
 
+from shapechanger.layout import Layout
+from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef, EnvTraits
+from shapechanger.transfer.env_ref import EnvRef, EnvTraits, layouts_of
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate, evaluation_envs
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, actor
 from shapechanger.transfer.learners.settings import OffPolicySettings, Settings
@@ -78,7 +80,7 @@ class PrefilledReplay(Method):
         return run.train(
             run.target,
             run.steps,
-            callback=_Prefill(_mapped(seen, run.body_map)),
+            callback=_Prefill(_mapped(seen, run.body_map), run.body_map.target_action),
             on_evaluation=run.report,
         )
 
@@ -124,7 +126,7 @@ def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transi
         steps: Number of steps.
         seed: Seed of the first start; it increases by one per episode.
     """
-    act = actor(policy.model, policy.normalisation, deterministic=False)
+    act = actor(policy.model, policy.normalisation, policy.card.action, deterministic=False)
     rows: list[tuple[Any, ...]] = []
     with closing(env.make()) as made:
         torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
@@ -156,22 +158,29 @@ def _mapped(seen: Transitions, body_map: BodyMap) -> Transitions:
 
 
 class _Prefill(BaseCallback):
-    """Fills the replay buffer before the first step."""
+    """Fills the replay buffer before the first step.
 
-    def __init__(self, transitions: Transitions) -> None:
+    Args:
+        transitions: Transitions of the target, with actions in the env's units.
+        action: Layout of the actions.
+    """
+
+    def __init__(self, transitions: Transitions, action: Layout) -> None:
         super().__init__()
         self._transitions = transitions
+        self._action = action
 
     def _on_training_start(self) -> None:
         model = cast("Any", self.model)
         space = model.action_space
+        scale = ActionScale.between(space, self._action)
         together = model.n_envs
         whole = len(self._transitions.rewards) // together * together
         for at in range(0, whole, together):
             seen, acted, rewards, then, ended = (
                 column[at : at + together] for column in self._transitions
             )
-            inside = np.clip(acted, space.low, space.high)
+            inside = np.clip(scale.to_model(acted), space.low, space.high)
             model.replay_buffer.add(
                 seen, then, model.policy.scale_action(inside), rewards, ended, [{}] * together
             )
@@ -267,6 +276,7 @@ class _Correction(BaseCallback):
         super().__init__()
         self._run = run
         self._env = run.target.make()
+        self._action = layouts_of(self._env)[1]
         self._judges = evaluation_envs(run.target, run.settings)
         self._seen, _ = self._env.reset(seed=run.seed)
         self._next = 0
@@ -310,7 +320,8 @@ class _Correction(BaseCallback):
         """Take one step on the target with the policy's exploration noise."""
         model = cast("Any", self.model)
         action, _ = model.predict(self._seen)
-        then, reward, terminated, truncated, _ = self._env.step(action)
+        scale = ActionScale.between(model.action_space, self._action)
+        then, reward, terminated, truncated, _ = self._env.step(scale.to_env(action))
         scaled = model.policy.scale_action(action)
         self._of_target.add(
             np.asarray(self._seen),
@@ -330,7 +341,7 @@ class _Correction(BaseCallback):
             return
         self._next += run.settings.eval_every
         found = evaluate(
-            actor(cast("Any", self.model), None),
+            actor(cast("Any", self.model), None, self._action),
             self._judges,
             EVALUATION_SEED,
             episodes=run.settings.eval_episodes,

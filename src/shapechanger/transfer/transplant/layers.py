@@ -16,6 +16,7 @@ from torch import nn
 
 from shapechanger.errors import TransplantError
 from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap, Copy, Learn
 
 EPSILON: Final = 1e-8
@@ -168,14 +169,26 @@ class PolicyOutputs:
     log_std: OutputMap
 
 
-def gaussian_outputs(body_map: BodyMap) -> PolicyOutputs:
-    """Outputs of a policy whose actions are in the env's units, as PPO's: a_t = N a_s + d."""
-    matrix = body_map.action_matrix
+def gaussian_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> PolicyOutputs:
+    """Outputs of a policy whose actions are not squashed, as PPO's.
+
+    The map is in the units of the layouts, a_t = N a_s + d, and the outputs are in those of the
+    models, a = middle + half y.
+
+    Args:
+        body_map: Map between the bodies.
+        source: The source model's action space.
+        target: The target model's action space.
+    """
+    ours = ActionScale.between(source, body_map.source_action)
+    theirs = ActionScale.between(target, body_map.target_action)
+    matrix = body_map.action_matrix * ours.half / theirs.half[:, np.newaxis]
+    middle = body_map.action_matrix @ ours.middle + body_map.action_offset - theirs.middle
     scale = np.abs(matrix).sum(axis=1)
     log_scale = np.log(np.where(scale > 0.0, scale, 1.0))
     fresh = _fresh(body_map)
     return PolicyOutputs(
-        mean=OutputMap(matrix, body_map.action_offset, fresh),
+        mean=OutputMap(matrix, middle / theirs.half, fresh),
         log_std=OutputMap(_spread(matrix), log_scale, fresh),
     )
 
@@ -196,8 +209,10 @@ def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
     """
     matrix = body_map.action_matrix
     signs, squashed = np.zeros_like(matrix), np.zeros(len(matrix))
-    source_middle, source_half = _middle_and_half(source)
-    target_middle, target_half = _middle_and_half(target)
+    ours = ActionScale.between(source, body_map.source_action)
+    theirs = ActionScale.between(target, body_map.target_action)
+    source_middle, source_half = ours.of_squashed(source)
+    target_middle, target_half = theirs.of_squashed(target)
     for place, (name, _) in enumerate(_names(body_map.target_action)):
         if not matrix[place].any():
             constant = body_map.action_offset[place] - target_middle[place]
@@ -243,7 +258,8 @@ def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) 
         copies = [int(place) for place in np.flatnonzero(signs[:, origin])]
         chosen = [place for place in copies if target_names[place] == name] or copies
         matrix[origin, chosen] = signs[chosen, origin] / max(1, len(chosen))
-    middle, half = _middle_and_half(source)
+    scale = ActionScale.between(source, body_map.source_action)
+    middle, half = scale.of_squashed(source)
     still = np.clip(-middle / half, -1.0, 1.0)
     return Affine(matrix, np.where(matrix.any(axis=1), 0.0, still))
 
@@ -266,12 +282,6 @@ def _spread(matrix: Array) -> Array:
     taken = matrix != 0.0
     mean = np.full_like(matrix, 1.0 / matrix.shape[1])
     return np.where(taken.any(axis=1, keepdims=True), taken.astype(np.float64), mean)
-
-
-def _middle_and_half(space: Box[Any]) -> tuple[Array, Array]:
-    """Middle and half width of a bounded space, each of shape (n,)."""
-    low, high = space.low.astype(np.float64), space.high.astype(np.float64)
-    return 0.5 * (low + high), 0.5 * (high - low)
 
 
 @dataclass(frozen=True, slots=True)

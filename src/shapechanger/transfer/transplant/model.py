@@ -158,7 +158,9 @@ def transplant(
     those of the source, see `transplant_normalisation`. Where it does not, the source's statistics
     go into the first layer, which is exact up to the clipping of `VecNormalize`.
 
-    Actions: PPO's are moved before they are clipped to the bounds. Critics stay in the units of the
+    Actions: the map is in the units of the layouts, to whose ranges the action space of each model
+    is scaled where it has another, see `shapechanger.transfer.actions`. PPO's are moved before they
+    are clipped to the bounds. Critics stay in the units of the
     rewards that they learned from, so return statistics are moved with them if
     `VecNormalize` is on both sides.
 
@@ -191,7 +193,7 @@ def transplant(
     if _is_squashed(source_model):
         outputs = squashed_outputs(body_map, source_space, target_space)
     else:
-        outputs = gaussian_outputs(body_map)
+        outputs = gaussian_outputs(body_map, source_space, target_space)
     model = _new_model(source_model, target_env, seed, device or source_model.device, settings)
     sensed = _sensed(
         body_map,

@@ -1,0 +1,129 @@
+"""Actions of learners, from -1 to 1, and those of envs, in the units of their actuators.
+
+A learner explores with the same deviation in every action, so it learns nothing where an actuator
+takes ±200 N·m, and overshoots where one takes ±0.1 rad. Every learner therefore acts from -1 to 1.
+Everything else is in the units of the env: layouts, body maps, `TrainedPolicy.act`, exported
+policies, recordings and evaluations. The border runs between a model of Stable-Baselines3 and all
+that surrounds it: `model.action_space` is the model's side, and the action layout the env's.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+
+from shapechanger.errors import SpaceMismatch
+from shapechanger.layout import Layout
+
+_Array = NDArray[np.float64]
+
+
+class ActionScale(NamedTuple):
+    """The scale of a model's actions: action of the env = middle + half * action of the model.
+
+    Attributes:
+        middle: Shape (n,), in the unit of each action.
+        half: Shape (n,), above zero; likewise.
+        low: Smallest actions of the env, shape (n,); likewise.
+        high: Largest actions of the env, shape (n,); likewise.
+    """
+
+    middle: _Array
+    half: _Array
+    low: _Array
+    high: _Array
+
+    @classmethod
+    def between(cls, space: Any, layout: Layout) -> ActionScale:
+        """Return the scale from a model's own action space to the range of a layout.
+
+        It is the identity where both are the same, as of policies that were trained without a
+        scale, and for actions without a range on one of the sides.
+
+        Args:
+            space: The model's action space, a flat box.
+            layout: Layout of the same actions in the env.
+        """
+        box = cast("Box[Any]", space)
+        # Bounds of a space are in single precision, those of a layout in double.
+        low, high = (
+            side.astype(box.dtype).astype(np.float64) for side in (layout.low, layout.high)
+        )
+        own_low, own_high = box.low.astype(np.float64), box.high.astype(np.float64)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            half = (high - low) / (own_high - own_low)
+            middle = low - half * own_low
+        plain = ~(np.isfinite(middle) & np.isfinite(half) & (half > 0.0))
+        half[plain], middle[plain] = 1.0, 0.0
+        return cls(middle, half, middle + half * own_low, middle + half * own_high)
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether the model acts in the units of the env."""
+        return not self.middle.any() and bool((self.half == 1.0).all())
+
+    def to_env(self, actions: NDArray[Any]) -> NDArray[Any]:
+        """Return a model's actions, shape (..., n), in the units of the env and in its range."""
+        if self.is_identity:
+            return actions
+        scaled = np.clip(self.middle + self.half * actions, self.low, self.high)
+        return scaled.astype(actions.dtype)
+
+    def to_model(self, actions: NDArray[Any]) -> NDArray[Any]:
+        """Return actions of the env, shape (..., n), in the units of the model."""
+        if self.is_identity:
+            return actions
+        return ((actions - self.middle) / self.half).astype(actions.dtype)
+
+    def of_squashed(self, space: Any) -> tuple[_Array, _Array]:
+        """Return the middle and half width, (n,), of the env's actions over a bounded model space.
+
+        Args:
+            space: The model's action space.
+        """
+        box = cast("Box[Any]", space)
+        low, high = box.low.astype(np.float64), box.high.astype(np.float64)
+        return (
+            self.middle + self.half * (0.5 * (low + high)),
+            self.half * (0.5 * (high - low)),
+        )
+
+
+def learners_space(space: Any) -> Box[np.float32]:
+    """Return the action space in which a learner acts: -1 to 1 for each action.
+
+    Args:
+        space: The action space of the env, a flat box.
+    """
+    return Box(-1.0, 1.0, space.shape, np.float32)
+
+
+def require_ranges(env: str, space: Any, layout: Layout) -> None:
+    """Refuse actions whose range is unknown, or is not the one that their layout states.
+
+    Args:
+        env: Name of the env, for messages.
+        space: Its action space, a flat box of the size of the layout.
+        layout: Its action layout.
+
+    Raises:
+        SpaceMismatch: If an action has no finite range, or its layout states another.
+    """
+    box = cast("Box[Any]", space)
+    names = [feature.name for feature in layout for _ in range(feature.size)]
+    for name, low, high, stated_low, stated_high in zip(
+        names, box.low, box.high, layout.low, layout.high, strict=True
+    ):
+        if not np.isfinite([low, high]).all() or not low < high:
+            raise SpaceMismatch(
+                f"The action {name!r} of {env} ranges from {low:g} to {high:g}, and a learner "
+                "explores over a finite range: give its action space and its layout one."
+            )
+        if not np.allclose((low, high), (stated_low, stated_high)):
+            raise SpaceMismatch(
+                f"The action {name!r} of {env} ranges from {low:g} to {high:g} in its action space "
+                f"and from {stated_low:g} to {stated_high:g} in its layout: make them equal."
+            )
