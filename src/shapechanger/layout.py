@@ -135,12 +135,15 @@ class Layout(msgspec.Struct, frozen=True):
                 return True
         return False
 
-    def __getitem__(self, name: str) -> Feature:
-        """Return the feature of this name.
+    def __getitem__(self, name: str | int) -> Feature:
+        """Return the feature of a name, or of a place in the order.
 
         Raises:
-            UnknownName: If there is none.
+            UnknownName: If there is none of this name.
+            IndexError: If there are fewer features.
         """
+        if not isinstance(name, str):
+            return self.features[name]
         for feature in self.features:
             if feature.name == name:
                 return feature

@@ -18,6 +18,8 @@ from shapechanger.morphology import Body, name_elements, reason_of, reshape, to_
 # Names of the package are those of its modules.
 _DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")
 _PACKAGE: Final = "robot_descriptions"
+# Paths of ROS and Gazebo.
+_IN_PACKAGE: Final = re.compile(r"(package|model)://(?P<name>[^/]+)/(?P<rest>.+)")
 
 
 @dataclass(frozen=True)
@@ -38,21 +40,44 @@ class OwnFamily(Family):
     def load(self, path: str | Path) -> mujoco.MjSpec:
         """Load a model with the rig, and name all its elements.
 
+        A file that a URDF names as `package://NAME/REST` is looked for in the folder NAME, which is
+        one of the folders that the URDF is in, or in one of these.
+
         Args:
             path: The file.
 
         Raises:
-            BrokenModel: If MuJoCo cannot read it.
+            BrokenModel: If MuJoCo cannot read it, or no folder has a file of a package.
             MorphologyError: If the rig does not fit it.
         """
         try:
             spec = mujoco.MjSpec.from_file(str(path))
         except (ValueError, mujoco.FatalError) as error:
             raise BrokenModel(f"MuJoCo cannot read {path}: {reason_of(error)}.") from error
+        _find_packages(spec, Path(path))
         # The base of a URDF would vanish in the world, and its names with it.
         spec.compiler.fusestatic = False
         name_elements(spec)
         return reshape(spec, self.rig)
+
+
+def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
+    """Replace the `package://` paths of a URDF, which only ROS resolves, by those of files."""
+    for element in (*spec.meshes, *spec.textures):
+        package = _IN_PACKAGE.fullmatch(element.file)
+        if package is None:
+            continue
+        name, rest = package["name"], package["rest"]
+        above = path.resolve().parents
+        folders = [each if each.name == name else each / name for each in above]
+        found = [folder / rest for folder in folders if (folder / rest).is_file()]
+        if not found:
+            raise BrokenModel(
+                f"{path.name} names the file {element.file}, and neither a folder {name!r} that it "
+                f"is in nor one beside these has {rest}: copy the package's folder next to "
+                f"{path.name}, or write a path relative to it."
+            )
+        element.file = str(found[0])
 
 
 def own_family(path: str | Path, rig: Body = ()) -> OwnFamily:

@@ -30,11 +30,13 @@ from shapechanger.layout import Feature
 from shapechanger.morphology import as_body, reason_of, to_json
 from shapechanger.morphology.pose import (
     StartRules,
+    floor_height,
     standing_height,
     start_pose,
     travelling_body,
     trunk_lift,
 )
+from shapechanger.morphology.robot import robot_bodies
 from shapechanger.tasks.measure import RETURN, Measure
 from shapechanger.tasks.own import RobotState, as_task, has_ended, observed, reference, reward_terms
 
@@ -74,9 +76,12 @@ class _TaskEnv(MujocoEnv, EzPickle):
     def reset_model(self) -> _Floats:
         """Draw a start state around the start pose."""
         own = cast("OwnRobotEnv", self)
-        scale = own.reset_noise_scale
-        place = self.init_qpos + self.np_random.uniform(-scale, scale, self.model.nq)
-        speed = self.init_qvel + scale * self.np_random.standard_normal(self.model.nv)
+        scale, rules = own.reset_noise_scale, own.start_rules()
+        # Nothing is drawn for objects, so that a robot starts alike with and without them.
+        place, speed = self.init_qpos.copy(), self.init_qvel.copy()
+        moved, pushed = int(rules.robot_places.sum()), int(rules.robot_dofs.sum())
+        place[rules.robot_places] += self.np_random.uniform(-scale, scale, moved)
+        speed[rules.robot_dofs] += scale * self.np_random.standard_normal(pushed)
         cast("Any", self).set_state(place, speed)
         return self._get_obs()
 
@@ -98,9 +103,12 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     - **Action**: one number per actuator, over its `ctrlrange`; `action_layout` has names, units
       and gains.
     - **Reward**: the sum of the terms that the task returns, which `info` lists as `reward_...`.
+    - **Robot**: all that the actuators move, see `shapechanger.morphology.robot`. Trunk, standing
+      height, noise and lift are the robot's alone, and objects keep the file's own start.
     - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
-      at least a tenth of its range inside its limits; the feet stand above the floor. The standing
-      height is that of this pose.
+      at least a tenth of its range inside its limits; the feet stand above the floor, and coupled
+      joints and closed loops are closed as well as in the file. The standing height is that of this
+      pose.
     - **End**: where the task ends it, and where the simulation diverges, with a reward of 0.
 
     Args:
@@ -124,6 +132,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     """
 
     measures: tuple[Measure, ...]
+    _draws_bare_floors = True
 
     def __init__(
         self,
@@ -171,6 +180,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
             "reset_noise_scale": reset_noise_scale,
         }
         self.set_state(self.init_qpos, self.init_qvel)
+        self._started = False
         check = getattr(self.task, "check", None)
         if check is not None:
             check(self.seen(np.zeros(self.model.nu), self.trunk_place()))
@@ -191,19 +201,21 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
                 if joint in self._home or np.any(home[at] != model.qpos0[at]):
                     pose[at] = home[at]
             # Lifted to the floor if the robot has grown since.
-            pose = StartRules(model).feasible(pose, mujoco.MjData(model))
+            pose = StartRules(model).feasible(pose, mujoco.MjData(model), pose)
         # In the middle of their ranges many legs are folded.
-        return pose, standing_height(model, pose)
+        height = standing_height(model, pose)
+        return pose, None if height is None else height - floor_height(model, pose)
 
     def _follow_body(self) -> None:
         model = self.model
         travelling = travelling_body(model)
         self._can_travel = travelling is not None
-        self._trunk = travelling or min(1, model.nbody - 1)
+        self._trunk = travelling or int(model.body_rootid[np.argmax(robot_bodies(model))])
         super()._follow_body()
         data = mujoco.MjData(model)
         data.qpos[:] = self.init_qpos
         mujoco.mj_kinematics(model, data)
+        self._floor = floor_height(model, self.init_qpos)
         self._up_axis = data.xmat[self._trunk].reshape(3, 3)[2].copy()
         low, high = self.action_layout.low, self.action_layout.high
         self._middle, self._half_range = 0.5 * (low + high), 0.5 * (high - low)
@@ -264,6 +276,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
             self.standing_height,
             self._can_travel,
             self._number,
+            self._floor,
         )
 
     @property

@@ -185,6 +185,8 @@ _ELEVATION_DEG: Final = -25.0
 _DISTANCE_PER_REACH: Final = 3.0
 # Brightness of the headlight for models without lights; its default is dim.
 _HEADLIGHT: Final = 0.5
+# Geoms of the groups 3 to 5 are not drawn unless a viewer asks for them.
+_HIDDEN_GROUP: Final = 3
 # Value of the depth buffer, from 0 to 1, where nothing was drawn.
 _FARTHEST: Final = 1.0
 _BACKGROUND: Final = 235
@@ -290,22 +292,31 @@ def _geoms(
     return middle, places, model.geom_rbound[of_body]
 
 
-def prepare_scene(spec: mujoco.MjSpec) -> None:
+def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:
     """Make a model's floor, lights and sky fit to look at; nothing of this moves a body.
+
+    Neither does a sensor see it: range finders see a geom by its opacity, which stays.
 
     Gymnasium's floors are black and white and mirror half of the light: they draw the eye from the
     body, and flicker towards the horizon; in frames with shadows they turn green, and the shadows
     are black. Its lights hang lower than large bodies stand, and their shadow maps, which stay
     behind a body that walks, leave dark stripes far from it. The pendulums' models have no sky,
     and most have no light: their frames would be dark shapes on black.
+
+    Args:
+        spec: The model.
+        bare_floors: Whether planes without a material are drawn. The double pendulum's has no tiles
+            and lies far below it.
     """
     for texture in spec.textures:
         if texture.builtin == mujoco.mjtBuiltin.mjBUILTIN_CHECKER:
             texture.rgb1, texture.rgb2 = _DARK_TILE, _LIGHT_TILE
     for geom in spec.geoms:
         if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
-            # The double pendulum's has no tiles and lies far below it.
-            geom.rgba = [1.0, 1.0, 1.0, 1.0 if geom.material else 0.0]
+            if geom.material:
+                geom.rgba = [1.0, 1.0, 1.0, geom.rgba[3]]
+            elif not bare_floors:
+                geom.group = _HIDDEN_GROUP
     for material in spec.materials:
         material.reflectance = 0.0
     if spec.lights:

@@ -107,6 +107,10 @@ class Reshapable(MujocoEnv):
     standing_height: float | None
     _spec: EnvSpec | None = None
     fast_model: bool = True
+    # Whether planes without a material are drawn.
+    _draws_bare_floors: bool = False
+    # Whether a state has been set since the env was made.
+    _started: bool = False
     # Whether a start state is being drawn.
     _starting: bool = False
 
@@ -194,7 +198,7 @@ class Reshapable(MujocoEnv):
     def _load_family(self) -> mujoco.MjSpec:
         """Return the family's model, with smaller textures if the env never renders."""
         spec = self.family.load(self.fullpath)
-        prepare_scene(spec)
+        prepare_scene(spec, bare_floors=self._draws_bare_floors)
         if not self._draws:
             halve_textures(spec)
         return spec
@@ -255,6 +259,7 @@ class Reshapable(MujocoEnv):
             BadAction: If the action has another shape or is not finite; nothing has moved then.
         """
         check_action(self, action)
+        self._require_reset("step")
         result = cast("Any", super()).step(action)
         if self.diverged:
             result[-1]["diverged"] = True
@@ -287,7 +292,8 @@ class Reshapable(MujocoEnv):
         """Draw a start state as Gymnasium does, and make it feasible.
 
         Joints that the noise moved beyond their limits are moved back, orientations are normalised,
-        and a trunk whose feet the noise pushed into the floor is lifted.
+        equalities such as coupled joints and closed loops are satisfied, and a trunk whose feet the
+        noise pushed into the floor is lifted.
         """
         self._starting = True
         try:
@@ -297,10 +303,23 @@ class Reshapable(MujocoEnv):
 
     def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Set the pose (nq,) and the velocities (nv,)."""
-        pose = self._start_rules().feasible(qpos, self.data) if self._starting else qpos
-        cast("Any", super()).set_state(pose, qvel)
+        if self._starting:
+            rules = self.start_rules()
+            qpos = rules.feasible(qpos, self.data, self.init_qpos)
+            if not rules.closure.is_empty:
+                qvel = rules.closure.still(qpos, qvel, self.data)
+        cast("Any", super()).set_state(qpos, qvel)
+        self._started = True
 
-    def _start_rules(self) -> StartRules:
+    def _require_reset(self, method: str) -> None:
+        """Refuse a call before the first reset, also of a copy that was made in mid-episode."""
+        if not self._started:
+            raise gym.error.ResetNeeded(
+                f"Cannot call env.{method}() before calling env.reset(): "
+                f"{type(self).__name__} has no state yet."
+            )
+
+    def start_rules(self) -> StartRules:
         """Return the rules that make a start pose feasible, for the model as it is now."""
         return StartRules(self.model)
 

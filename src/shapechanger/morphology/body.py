@@ -51,6 +51,7 @@ EDITS: Final[tuple[type[Edit], ...]] = (
 
 _TAGS: Final[dict[str, type[Edit]]] = {str(edit.__struct_config__.tag): edit for edit in EDITS}
 
+_WRONG_SPARSE: Final = "4.0.0"
 _E = TypeVar("_E", bound=type[Edit])
 
 
@@ -237,12 +238,26 @@ def compile_body(spec: mujoco.MjSpec, edits: Iterable[Edit] = ()) -> mujoco.MjMo
     """
     body = tuple(edits)
     try:
-        return reshape(spec, body).compile()
+        return solvable(reshape(spec, body).compile())
     except (ValueError, mujoco.FatalError) as error:
         if isinstance(error, ShapechangerError):
             raise
         text = f"MuJoCo does not compile the body {to_json(body)}: {reason_of(error)}."
         raise BrokenModel(text) from error
+
+
+def solvable(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return a model with dense constraint Jacobians where MuJoCo solves sparse ones wrongly.
+
+    MuJoCo takes sparse ones from 60 degrees of freedom on. Newton's solver of MuJoCo 4.0.0 then
+    factorises a wrong Hessian, which 4.0.1 mends (google-deepmind/mujoco#3767).
+
+    Args:
+        model: The model; changed in place.
+    """
+    if mujoco.__version__ == _WRONG_SPARSE and mujoco.mj_isSparse(model):
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    return model
 
 
 def reason_of(error: BaseException) -> str:

@@ -8,6 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.morphology.closure import Closure
+from shapechanger.morphology.robot import moved_trees, robot_bodies
+
 _Array = NDArray[np.float64]
 _J = mujoco.mjtJoint
 _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
@@ -53,16 +56,20 @@ class Lift(NamedTuple):
 
 
 def trunk_joint(model: mujoco.MjModel) -> int | None:
-    """Return the index of the first free joint; None for a body that is fixed to the world."""
-    free = np.flatnonzero(model.jnt_type == _J.mjJNT_FREE)
-    return int(free[0]) if free.size else None
+    """Return the index of the robot's free joint; None for a robot that is fixed to the world.
+
+    Free objects are not the robot, see `robot_bodies`. Of several free robots it is the one that
+    most actuators move.
+    """
+    free = _in_robot(model, model.jnt_type == _J.mjJNT_FREE)
+    return free[0] if free else None
 
 
 def travelling_body(model: mujoco.MjModel) -> int | None:
     """Return the index of the body that can go anywhere; None if there is none.
 
-    It is that of the first free joint or, without one, of the first slide without limits on a body
-    on the world, as of runners in a plane.
+    It is that of the robot's free joint or, without one, of its first slide without limits on a
+    body on the world, as of runners in a plane.
     """
     trunk = trunk_joint(model)
     joints = _unlimited_slides(model) if trunk is None else [trunk]
@@ -72,7 +79,7 @@ def travelling_body(model: mujoco.MjModel) -> int | None:
 def trunk_lift(model: mujoco.MjModel) -> Lift | None:
     """Return the coordinate that raises the trunk; None for a body that cannot be raised.
 
-    It is that of the first free joint or, without one, of the first vertical slide without limits
+    It is that of the robot's free joint or, without one, of its first vertical slide without limits
     on a body on the world. A slide with limits is a hoist, which does not stand.
     """
     trunk = trunk_joint(model)
@@ -89,16 +96,26 @@ def trunk_lift(model: mujoco.MjModel) -> Lift | None:
 
 
 def _unlimited_slides(model: mujoco.MjModel) -> list[int]:
-    """Return the slides without limits of bodies on the world."""
+    """Return the slides without limits of the robot's bodies on the world."""
     slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
-    return np.flatnonzero(slides & (model.body_parentid[model.jnt_bodyid] == 0)).tolist()
+    return _in_robot(model, slides & (model.body_parentid[model.jnt_bodyid] == 0))
+
+
+def _in_robot(model: mujoco.MjModel, joints: NDArray[np.bool_]) -> list[int]:
+    """Return the joints of the robot among some, those of the tree with most actuators first."""
+    of_tree = model.body_treeid[model.jnt_bodyid]
+    return [
+        int(joint)
+        for tree in moved_trees(model)
+        for joint in np.flatnonzero(joints & (of_tree == tree))
+    ]
 
 
 def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
     """Return the model's own pose, shape (nq,), made feasible.
 
-    Each joint is moved inside its limits by at least the share `inside` of its range, and a trunk
-    that can be raised stands no lower than its feet need.
+    Each joint of the robot is moved inside its limits by at least the share `inside` of its range,
+    equalities are satisfied, and a trunk that can be raised stands no lower than its feet need.
 
     Args:
         model: The model.
@@ -106,6 +123,8 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
     """
     rules = StartRules(model)
     pose = rules.keep_within_limits(model.qpos0, inside)
+    if not rules.closure.is_empty:
+        pose = rules.closure.closed(pose, model.qpos0, mujoco.MjData(model))
     if rules.lift is not None:
         rules.lift.raise_by(pose, max(0.0, -rules.floor_gap(_posed(model, pose))))
     return pose
@@ -127,7 +146,7 @@ def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
 
 
 def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float | None:
-    """Return the height of the trunk's origin when the lowest point touches the floor, m.
+    """Return the world height of the trunk's origin when the lowest point touches the floor, m.
 
     Args:
         model: The body.
@@ -146,6 +165,20 @@ def standing_height(model: mujoco.MjModel, pose: _Array | None = None) -> float 
     return None if gap >= _FAR_M else rules.lift.height(pose) - gap
 
 
+def floor_height(model: mujoco.MjModel, pose: _Array) -> float:
+    """Return the height in the world of the floor that is nearest to the robot, m; 0 for none.
+
+    Args:
+        model: The model.
+        pose: Its pose, shape (nq,).
+    """
+    data, ends, nearest = _posed(model, pose), np.zeros(6), (_FAR_M, 0.0)
+    for floor, geom in StartRules(model).floor_pairs:
+        gap = mujoco.mj_geomDistance(model, data, floor, geom, _FAR_M, ends)
+        nearest = min(nearest, (gap, float(ends[2])))
+    return nearest[1]
+
+
 def _posed(model: mujoco.MjModel, pose: _Array) -> mujoco.MjData:
     """Return data with the kinematics of a pose (nq,)."""
     data = mujoco.MjData(model)
@@ -162,30 +195,42 @@ class StartRules:
 
     Attributes:
         lift: The coordinate that raises the trunk; see `trunk_lift`.
-        limited_places: Indices in qpos of the hinges and slides with limits.
+        limited_places: Indices in qpos of the robot's hinges and slides with limits.
         lowest: Their lower limits, rad or m.
         highest: Their upper limits, rad or m.
-        floor_pairs: Each floor with each geom of the body that it can touch.
+        floor_pairs: Each floor with each geom of the robot that it can touch.
+        robot_places: Whether each number of qpos is one of the robot's, shape (nq,).
+        robot_dofs: Whether each number of qvel is, shape (nv,).
+        closure: The equalities that a start pose satisfies.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.lift = trunk_lift(model)
         self._model = model
+        robot = robot_bodies(model)
         one_number = np.isin(model.jnt_type, (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE)))
-        joints = np.flatnonzero(one_number & (model.jnt_limited != 0))
+        joints = np.flatnonzero(one_number & (model.jnt_limited != 0) & robot[model.jnt_bodyid])
         self.lowest, self.highest = model.jnt_range[joints].T
         self.limited_places = model.jnt_qposadr[joints]
+        self.robot_dofs = robot[model.dof_bodyid]
+        # Each number of qpos belongs to the last joint that begins at or before it.
+        of_place = np.searchsorted(model.jnt_qposadr, np.arange(model.nq), side="right") - 1
+        self.robot_places = robot[model.jnt_bodyid[of_place]]
+        self.closure = Closure(
+            model, self.robot_dofs, self.limited_places, self.lowest, self.highest
+        )
         self.floor_pairs: list[tuple[int, int]] = []
         of_world = model.body_weldid[model.geom_bodyid] == 0
         for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)).tolist():
             touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
                 model.geom_conaffinity & model.geom_contype[floor]
             )
-            geoms = np.flatnonzero(~of_world & (touching != 0)).tolist()
+            own = ~of_world & robot[model.geom_bodyid]
+            geoms = np.flatnonzero(own & (touching != 0)).tolist()
             self.floor_pairs += [(floor, geom) for geom in geoms]
 
     def keep_within_limits(self, pose: _Array, inside: float = 0.0) -> _Array:
-        """Return a pose, shape (nq,), with every hinge and slide moved inside its limits.
+        """Return a pose, shape (nq,), with the robot's hinges and slides moved inside their limits.
 
         Args:
             pose: Shape (nq,).
@@ -198,16 +243,16 @@ class StartRules:
         return result
 
     def middle_pose(self) -> _Array:
-        """Return the model's own pose, shape (nq,), with each joint in the middle of its range."""
+        """Return the model's own pose, (nq,), with the robot's joints in the middle of theirs."""
         pose = self._model.qpos0.copy()
         pose[self.limited_places] = 0.5 * (self.lowest + self.highest)
         return pose
 
     def floor_gap(self, data: mujoco.MjData) -> float:
-        """Return the clearance of the body's lowest point above the floor, m; negative inside it.
+        """Return the clearance of the robot's lowest point above the floor, m; negative inside it.
 
         The floor is every plane and height field that is fixed to the world and can touch the
-        body's geoms; 1000 if there is none.
+        robot's geoms; 1000 if there is none.
 
         Args:
             data: Data of the model after `mj_kinematics`.
@@ -217,18 +262,22 @@ class StartRules:
             gap = min(gap, mujoco.mj_geomDistance(self._model, data, floor, geom, _FAR_M, None))
         return gap
 
-    def feasible(self, drawn: _Array, data: mujoco.MjData) -> _Array:
+    def feasible(self, drawn: _Array, data: mujoco.MjData, start: _Array | None = None) -> _Array:
         """Return the feasible pose next to a drawn one, shape (nq,).
 
-        Joints are moved inside their limits, orientations normalised, and a trunk whose feet are in
-        the floor is lifted.
+        Joints are moved inside their limits, orientations normalised, equalities satisfied as well
+        as they are at the start, and a trunk whose feet are in the floor is lifted.
 
         Args:
             drawn: The drawn pose, shape (nq,).
-            data: Data of the model; its pose and kinematics are overwritten.
+            data: Data of the model; its pose and all that depends on it are overwritten.
+            start: The pose that it deviates from, shape (nq,); the model's own by default.
         """
         pose = self.keep_within_limits(drawn)
         mujoco.mj_normalizeQuat(self._model, pose)
+        if not self.closure.is_empty:
+            origin = self._model.qpos0 if start is None else start
+            pose = self.closure.closed(pose, origin, data)
         if self.lift is not None:
             data.qpos[:] = pose
             mujoco.mj_kinematics(self._model, data)

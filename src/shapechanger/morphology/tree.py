@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.morphology.pose import travelling_body
+from shapechanger.morphology.robot import robot_bodies
 
 _Array = NDArray[np.float64]
 _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
@@ -97,11 +98,13 @@ def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
     mujoco.mj_comPos(model, data)  # Masses of subtrees.
     mujoco.mj_tendon(model, data)
     mujoco.mj_transmission(model, data)
-    trunk = travelling_body(model) or 0
+    trunk, robot = travelling_body(model) or 0, robot_bodies(model)
     joints = [
         j
         for j in range(model.njnt)
-        if model.jnt_type[j] in _MOVES_ONE_WAY and (model.jnt_bodyid[j] != trunk or trunk == 0)
+        if model.jnt_type[j] in _MOVES_ONE_WAY
+        and robot[model.jnt_bodyid[j]]
+        and (model.jnt_bodyid[j] != trunk or trunk == 0)
     ]
     # The last joint of a body moves it.
     mover = {int(model.jnt_bodyid[j]): j for j in joints}
@@ -116,7 +119,7 @@ def tree_of(model: mujoco.MjModel, pose: _Array) -> Tree:
         names = tuple(model.body(body).name for body in own)
         actuator = model.actuator(moved_by[j]).name if j in moved_by else ""
         limbs.append(Limb(model.joint(j).name, names, actuator, numbers))
-    own = [body for body, mover_of in owner.items() if mover_of is None and body > 0]
+    own = [body for body, mover_of in owner.items() if mover_of is None and robot[body]]
     own = own if trunk else [0, *own]
     floor = np.flatnonzero(model.geom_bodyid == 0)
     return Tree(

@@ -37,16 +37,19 @@ class RobotState:
         model: MuJoCo's model.
         data: MuJoCo's data.
         dt: Duration of a step, s.
-        place: Origin of the trunk in the world, shape (3,), m. The trunk is the body that can
-            travel or, of a robot fixed to the world, its first body.
+        place: Origin of the trunk in the world, shape (3,), m. The robot is all that the actuators
+            move. Its trunk is the body that can travel or, of a robot fixed to the world, its first
+            body.
         velocity: Mean velocity of that point over the step, shape (3,), m/s.
         up: Vertical part of the axis of the trunk that points up at the start: 1 upright, 0 on its
             side, -1 upside down.
         action: The action, shape (nu,).
         scaled_action: The action from -1 to 1 over the range of each actuator, shape (nu,).
-        standing_height: Height of the trunk when it stands, m; None for a robot that does not.
+        standing_height: Height of the trunk above the floor when it stands, m; None for a robot
+            that does not.
         can_travel: Whether the trunk can go anywhere.
         numbers: All numbers that can be observed, by name.
+        floor: Height in the world of the floor below the start, m; 0 without a floor.
     """
 
     model: Any
@@ -60,11 +63,12 @@ class RobotState:
     standing_height: float | None
     can_travel: bool
     numbers: Callable[[str], float]
+    floor: float = 0.0
 
     @property
     def height(self) -> float:
-        """Height of the trunk, m."""
-        return float(self.place[2])
+        """Height of the trunk above the floor below the start, m."""
+        return float(self.place[2]) - self.floor
 
     def __getitem__(self, name: str) -> float:
         """Return a number by its name in the layout, such as `knee/angle`, observed or not.

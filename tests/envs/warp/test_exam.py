@@ -72,7 +72,7 @@ def test_starts_are_those_of_the_cpu(pair: tuple[WarpVectorEnv, list[Any]]) -> N
     for i, env in enumerate(alone):
         qpos, qvel = (x[i].double().cpu().numpy() for x in (batch.worlds.qpos, batch.worlds.qvel))
         env.reset()
-        np.testing.assert_allclose(env._start_rules().feasible(qpos, env.data), qpos, atol=2e-6)
+        np.testing.assert_allclose(env.start_rules().feasible(qpos, env.data), qpos, atol=2e-6)
         assert np.abs(qvel).max() < 6.0 * env._reset_noise_scale
         env.reset()
         env.set_state(qpos, qvel)

@@ -172,7 +172,6 @@ class TunedStep(Reshapable):
     _bound: Any = None
     _watch: ModelWatch | None = None
     _rules: StartRules | None = None
-    _started: bool = False
 
     def _follow_body(self) -> None:
         super()._follow_body()
@@ -181,18 +180,18 @@ class TunedStep(Reshapable):
         self._invalidate()
         self._bound = None
 
-    def _start_rules(self) -> StartRules:
+    def start_rules(self) -> StartRules:
+        """Return the rules that make a start pose feasible, for the model as it is now."""
         watch = self._watch
         if watch is None or watch.model is not self.model or not watch.unedited():
-            return super()._start_rules()
+            return super().start_rules()
         if self._rules is None:
-            self._rules = super()._start_rules()
+            self._rules = super().start_rules()
         return self._rules
 
     def set_state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Set the pose (nq,) and the velocities (nv,)."""
         super().set_state(qpos, qvel)
-        self._started = True
         self._invalidate()
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -335,10 +334,3 @@ class TunedStep(Reshapable):
     def _steps_as_written(self) -> bool:
         """Return whether `step` itself is not overridden."""
         return type(self).step is TunedStep.step and "step" not in vars(self)
-
-    def _require_reset(self, method: str) -> None:
-        if not self._started:
-            raise gym.error.ResetNeeded(
-                f"Cannot call env.{method}() before calling env.reset(): "
-                f"{type(self).__name__} has no state yet."
-            )

@@ -14,6 +14,7 @@ import numpy as np
 
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology.edits.edit import Edit, Vector, part_of_the_way, require_vector
+from shapechanger.morphology.robot import robot_bodies
 from shapechanger.morphology.spec.elements import compiled, limbs_and_trunks, select
 from shapechanger.morphology.spec.geometry import (
     axis_ends,
@@ -147,12 +148,13 @@ class PlaceGeom(Edit, frozen=True):
 
 
 class TotalMass(Edit, frozen=True):
-    """Scale all masses and inertias, so that the robot has this mass.
+    """Scale all masses and inertias of the robot, so that it has this mass.
 
-    It acts on the robot as the edits before it have left it.
+    It acts on the robot as the edits before it have left it. Objects, which no actuator moves, keep
+    theirs.
 
     Attributes:
-        to: Mass of all bodies together, kg.
+        to: Mass of the robot's bodies together, kg.
     """
 
     to: float
@@ -165,9 +167,13 @@ class TotalMass(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Scale the mass of every body."""
         # Only the compiler knows the volume of every shape.
-        old = float(compiled(spec).body_mass.sum())
+        model = compiled(spec)
+        robot = robot_bodies(model)
+        old = float(np.where(robot, model.body_mass, 0.0).sum())
+        names = {model.body(i).name for i in np.flatnonzero(robot)}
         for body in limbs_and_trunks(spec):
-            scale_mass(body, part_of_the_way(old, self.to, self.amount) / old)
+            if body.name in names:
+                scale_mass(body, part_of_the_way(old, self.to, self.amount) / old)
 
 
 def _between(old: np.ndarray, new: Vector | np.ndarray, amount: float) -> np.ndarray:

@@ -29,8 +29,8 @@ class AddMotor(Edit, frozen=True):
     """Add a motor to joints that have none, named after the joint, with controls from -1 to 1.
 
     Attributes:
-        joint: Name or glob of the joints; those of a glob that have a motor, or that no single
-            motor can move, are left as they are.
+        joint: Name or glob of the joints; those of a glob that have a motor, that an equality
+            makes follow another joint, or that no single motor can move, are left as they are.
         gear: Torque, N·m, or force, N, for a control of 1; None for the largest that the model
             allows the joint (`effort` in URDF, `actuatorfrcrange` in MJCF).
     """
@@ -46,6 +46,15 @@ class AddMotor(Edit, frozen=True):
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add a motor to every joint that fits and has none."""
         moved = {actuator.target for actuator in spec.actuators}
+        # Also of a model that makes two joints follow each other: one of them has a motor.
+        moved |= {
+            coupling.name1
+            for coupling in spec.equalities
+            if coupling.type == mujoco.mjtEq.mjEQ_JOINT
+            and coupling.name2
+            and coupling.active
+            and coupling.name1 != self.joint
+        }
         joints = [
             joint
             for joint in select("joint", self.joint, spec.joints)
@@ -53,7 +62,8 @@ class AddMotor(Edit, frozen=True):
         ]
         if not joints:
             raise MorphologyError(
-                f"Each hinge and slide that matches {self.joint!r} has a motor, or there is none."
+                f"Each hinge and slide that matches {self.joint!r} has a motor or follows another "
+                "joint, or there is none."
             )
         for joint in joints:
             require_free_name(spec, "actuator", joint.name)

@@ -1,0 +1,162 @@
+"""Poses and velocities that satisfy equalities: coupled joints, closed loops and welds."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+_Array = NDArray[np.float64]
+_E: Final = mujoco.mjtEq
+_SOLVED: Final = tuple(
+    int(kind) for kind in (_E.mjEQ_CONNECT, _E.mjEQ_WELD, _E.mjEQ_JOINT, _E.mjEQ_TENDON)
+)
+_MOST_STEPS: Final = 40
+_MOST_HALVINGS: Final = 6
+# Largest violation, m or rad, of a closed pose, and the one at which steps end.
+_CLOSED: Final = 1e-4
+_EXACT: Final = 1e-9
+# Singular values below this share of the largest do not move a joint.
+_SMALLEST_SHARE: Final = 1e-6
+# Shares of a drawn deviation that are tried, until one can be closed.
+_SHARES: Final = (1.0, 0.5, 0.25, 0.125)
+
+
+class Closure:
+    """The equalities of a model, solved by Gauss-Newton steps on MuJoCo's own Jacobian.
+
+    Args:
+        model: The model.
+        movable: Whether each degree of freedom may move to close them, shape (nv,).
+        places: Indices in qpos of the hinges and slides with limits.
+        lowest: Their lower limits, rad or m.
+        highest: Their upper limits, rad or m.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        movable: NDArray[np.bool_],
+        places: NDArray[np.integer[Any]],
+        lowest: _Array,
+        highest: _Array,
+    ) -> None:
+        self._model = model
+        self._movable = movable
+        self._places, self._lowest, self._highest = places, lowest, highest
+        of_place = {
+            int(place): int(dof)
+            for place, dof in zip(model.jnt_qposadr, model.jnt_dofadr, strict=True)
+        }
+        self._dofs = np.array([of_place[int(place)] for place in places], np.intp)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the model has no equality to solve."""
+        return not np.isin(self._model.eq_type, _SOLVED).any()
+
+    def closed(self, drawn: _Array, start: _Array, data: mujoco.MjData) -> _Array:
+        """Return the closed pose next to a drawn one, shape (nq,), inside the limits.
+
+        Where it cannot be closed as well as the start is, a smaller deviation from the start is
+        tried, and at last none.
+
+        Args:
+            drawn: A pose, shape (nq,).
+            start: The pose that it deviates from, shape (nq,).
+            data: Data of the model; its pose and all that depends on it are overwritten.
+        """
+        goal = max(_CLOSED, self._violation(start, data))
+        deviation = np.zeros(self._model.nv)
+        mujoco.mj_differentiatePos(self._model, deviation, 1.0, start, drawn)
+        for share in _SHARES:
+            pose = drawn.copy() if share == 1.0 else self._moved(start, share * deviation)
+            pose, violation = self._solved(pose, data)
+            if violation <= goal:
+                return pose
+        return start.copy()
+
+    def still(self, pose: _Array, velocity: _Array, data: mujoco.MjData) -> _Array:
+        """Return the velocity nearest to a drawn one, shape (nv,), that keeps a pose closed.
+
+        Args:
+            pose: A closed pose, shape (nq,).
+            velocity: Shape (nv,).
+            data: As of `closed`.
+        """
+        _, jacobian = self._rows(pose, data)
+        return velocity - _least_squares(jacobian, jacobian @ velocity)
+
+    def _solved(self, pose: _Array, data: mujoco.MjData) -> tuple[_Array, float]:
+        """Return the nearest closed pose that steps reach, and its largest violation."""
+        gaps, jacobian = self._rows(pose, data)
+        for _ in range(_MOST_STEPS):
+            if _largest(gaps) <= _EXACT:
+                break
+            step = self._step(pose, gaps, jacobian)
+            for _ in range(_MOST_HALVINGS):
+                tried = self._moved(pose, step)
+                new_gaps, new_jacobian = self._rows(tried, data)
+                if np.linalg.norm(new_gaps) < np.linalg.norm(gaps):
+                    pose, gaps, jacobian = tried, new_gaps, new_jacobian
+                    break
+                step = 0.5 * step
+            else:
+                break
+        return pose, _largest(gaps)
+
+    def _step(self, pose: _Array, gaps: _Array, jacobian: _Array) -> _Array:
+        """Return the smallest step, (nv,), that closes the gaps and presses at no limit."""
+        free = jacobian.copy()
+        step = _least_squares(free, -gaps)
+        for _ in self._dofs:
+            value, moved = pose[self._places], step[self._dofs]
+            pressed = ((value <= self._lowest) & (moved < 0.0)) | (
+                (value >= self._highest) & (moved > 0.0)
+            )
+            if not pressed.any():
+                break
+            free[:, self._dofs[pressed]] = 0.0
+            step = _least_squares(free, -gaps)
+        return step
+
+    def _moved(self, pose: _Array, step: _Array) -> _Array:
+        """Return a pose moved by a step (nv,), inside the limits."""
+        moved = pose.copy()
+        mujoco.mj_integratePos(self._model, moved, step, 1.0)
+        moved[self._places] = np.clip(moved[self._places], self._lowest, self._highest)
+        return moved
+
+    def _violation(self, pose: _Array, data: mujoco.MjData) -> float:
+        return _largest(self._rows(pose, data)[0])
+
+    def _rows(self, pose: _Array, data: mujoco.MjData) -> tuple[_Array, _Array]:
+        """Return the violation of each equality, (n,), and its Jacobian, (n, nv)."""
+        model = self._model
+        data.qpos[:] = pose
+        mujoco.mj_fwdPosition(model, data)
+        count = int(data.ne)
+        rows = np.flatnonzero(np.isin(model.eq_type[data.efc_id[:count]], _SOLVED))
+        dense = np.zeros((int(data.nefc), model.nv))
+        if mujoco.mj_isSparse(model):
+            mujoco.mju_sparse2dense(
+                dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+            )
+        else:
+            dense[:] = data.efc_J.reshape(dense.shape)
+        movable: _Array = np.where(self._movable, dense[rows], 0.0)
+        return data.efc_pos[rows].copy(), movable
+
+
+def _largest(gaps: _Array) -> float:
+    return float(np.abs(gaps).max(initial=0.0))
+
+
+def _least_squares(jacobian: _Array, wanted: _Array) -> _Array:
+    """Return the smallest step (nv,) that comes nearest to the wanted change of each row."""
+    if not len(wanted):
+        return np.zeros(jacobian.shape[1])
+    solver: Any = np.linalg.lstsq
+    return cast("_Array", solver(jacobian, wanted, rcond=_SMALLEST_SHARE)[0])
