@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -68,7 +68,7 @@ class Closure:
             start: The pose that it deviates from, shape (nq,).
             data: Data of the model; its pose and all that depends on it are overwritten.
         """
-        goal = max(_CLOSED, self._violation(start, data))
+        goal = self.goal(start, data)
         deviation = np.zeros(self._model.nv)
         mujoco.mj_differentiatePos(self._model, deviation, 1.0, start, drawn)
         for share in _SHARES:
@@ -77,6 +77,14 @@ class Closure:
             if violation <= goal:
                 return pose
         return start.copy()
+
+    def violation(self, pose: _Array, data: mujoco.MjData) -> float:
+        """Return the largest violation of an equality at a pose (nq,), m or rad."""
+        return _largest(self._rows(pose, data)[0])
+
+    def goal(self, start: _Array, data: mujoco.MjData) -> float:
+        """Return the largest violation of a pose that is as closed as a start pose, m or rad."""
+        return max(_CLOSED, self.violation(start, data))
 
     def still(self, pose: _Array, velocity: _Array, data: mujoco.MjData) -> _Array:
         """Return the velocity nearest to a drawn one, shape (nv,), that keeps a pose closed.
@@ -129,9 +137,6 @@ class Closure:
         moved[self._places] = np.clip(moved[self._places], self._lowest, self._highest)
         return moved
 
-    def _violation(self, pose: _Array, data: mujoco.MjData) -> float:
-        return _largest(self._rows(pose, data)[0])
-
     def _rows(self, pose: _Array, data: mujoco.MjData) -> tuple[_Array, _Array]:
         """Return the violation of each equality, (n,), and its Jacobian, (n, nv)."""
         model = self._model
@@ -156,7 +161,6 @@ def _largest(gaps: _Array) -> float:
 
 def _least_squares(jacobian: _Array, wanted: _Array) -> _Array:
     """Return the smallest step (nv,) that comes nearest to the wanted change of each row."""
-    if not len(wanted):
-        return np.zeros(jacobian.shape[1])
-    solver: Any = np.linalg.lstsq
-    return cast("_Array", solver(jacobian, wanted, rcond=_SMALLEST_SHARE)[0])
+    # NumPy's types leave out the kind of the numbers.
+    step: Any = np.linalg.pinv(jacobian, rcond=_SMALLEST_SHARE) @ wanted
+    return step

@@ -123,11 +123,7 @@ def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
     """
     rules = StartRules(model)
     pose = rules.keep_within_limits(model.qpos0, inside)
-    if not rules.closure.is_empty:
-        pose = rules.closure.closed(pose, model.qpos0, mujoco.MjData(model))
-    if rules.lift is not None:
-        rules.lift.raise_by(pose, max(0.0, -rules.floor_gap(_posed(model, pose))))
-    return pose
+    return rules.feasible(pose, mujoco.MjData(model))
 
 
 def standing_pose(model: mujoco.MjModel, pose: _Array) -> _Array:
@@ -273,15 +269,26 @@ class StartRules:
             data: Data of the model; its pose and all that depends on it are overwritten.
             start: The pose that it deviates from, shape (nq,); the model's own by default.
         """
-        pose = self.keep_within_limits(drawn)
-        mujoco.mj_normalizeQuat(self._model, pose)
+        pose = self._lifted(self.normalised(self.keep_within_limits(drawn)), data)
         if not self.closure.is_empty:
             origin = self._model.qpos0 if start is None else start
             pose = self.closure.closed(pose, origin, data)
+            lifted = self._lifted(pose, data)
+            # A robot that a weld or a rope holds hangs there, and does not stand.
+            if self.closure.violation(lifted, data) <= self.closure.goal(origin, data):
+                pose = lifted
+        return pose
+
+    def normalised(self, pose: _Array) -> _Array:
+        """Return a pose with its orientations normalised, in place."""
+        mujoco.mj_normalizeQuat(self._model, pose)
+        return pose
+
+    def _lifted(self, pose: _Array, data: mujoco.MjData) -> _Array:
+        """Return a pose with the trunk lifted until its feet are not in the floor."""
+        lifted = pose.copy()
         if self.lift is not None:
             data.qpos[:] = pose
             mujoco.mj_kinematics(self._model, data)
-            gap = self.floor_gap(data)
-            if gap < 0.0:
-                self.lift.raise_by(pose, -gap)
-        return pose
+            self.lift.raise_by(lifted, max(0.0, -self.floor_gap(data)))
+        return lifted

@@ -9,7 +9,6 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from typing import Any, ClassVar, Final, Literal, NamedTuple, cast
 
-import gymnasium as gym
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
