@@ -83,9 +83,6 @@ class _TaskEnv(MujocoEnv, EzPickle):
         place[rules.robot_places] += self.np_random.uniform(-scale, scale, moved)
         speed[rules.robot_dofs] += scale * self.np_random.standard_normal(pushed)
         cast("Any", self).set_state(place, speed)
-        if not np.abs(self.data.qacc).max(initial=0.0) < mujoco.mjMAXVAL:
-            # Files lock a joint with a damping that MuJoCo takes at rest only.
-            cast("Any", self).set_state(place, self.init_qvel)
         return self._get_obs()
 
     def _get_obs(self) -> _Floats:
@@ -111,7 +108,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     - **Start**: the keyframe `home` if the model has one, else the model's own pose with each joint
       at least a tenth of its range inside its limits; the feet stand above the floor, and coupled
       joints and closed loops are closed as well as in the file. The standing height is that of this
-      pose. A start whose velocities diverge at once is at rest.
+      pose.
     - **End**: where the task ends it, and where the simulation diverges, with a reward of 0.
 
     Args:

@@ -20,6 +20,8 @@ _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HF
 _INSIDE: Final = 0.1
 # Distance at which a floor is looked for; a body that is higher stands on nothing.
 _FAR_M: Final = 1000.0
+# A damping that slows a joint down by more than this factor in one step locks it.
+_LOCKED: Final = 1e5
 # Tolerance of the vertical part of an axis that counts as vertical.
 _VERTICAL: Final = 1e-6
 
@@ -196,7 +198,8 @@ class StartRules:
         highest: Their upper limits, rad or m.
         floor_pairs: Each floor with each geom of the robot that it can touch.
         robot_places: Whether each number of qpos is one of the robot's, shape (nq,).
-        robot_dofs: Whether each number of qvel is, shape (nv,).
+        robot_dofs: Whether each number of qvel is, shape (nv,); without those that their damping
+            locks.
         closure: The equalities that a start pose satisfies.
     """
 
@@ -208,7 +211,9 @@ class StartRules:
         joints = np.flatnonzero(one_number & (model.jnt_limited != 0) & robot[model.jnt_bodyid])
         self.lowest, self.highest = model.jnt_range[joints].T
         self.limited_places = model.jnt_qposadr[joints]
-        self.robot_dofs = robot[model.dof_bodyid]
+        # Files lock a joint with a damping of 1e11, and MuJoCo diverges unless it is at rest.
+        stops = model.dof_damping * model.opt.timestep > _LOCKED * model.dof_M0
+        self.robot_dofs = robot[model.dof_bodyid] & ~stops
         # Each number of qpos belongs to the last joint that begins at or before it.
         of_place = np.searchsorted(model.jnt_qposadr, np.arange(model.nq), side="right") - 1
         self.robot_places = robot[model.jnt_bodyid[of_place]]

@@ -1,0 +1,142 @@
+"""Start poses that satisfy equalities: coupled joints, closed loops and welds."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.morphology.pose import StartRules, start_pose
+
+# A leg whose foot is driven by a rod, on a free trunk, as in Cassie.
+_FOUR_BAR = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option jacobian="{jacobian}"/>
+  <worldbody>
+    <geom type="plane" size="9 9 1"/>
+    <body name="trunk" pos="0 0 1"><freejoint/><geom size=".05" mass="3"/>
+      <body name="crank"><joint name="crank" axis="0 1 0" range="-1 1"/>
+        <geom type="capsule" fromto="0 0 0 .1 0 0" size=".01"/>
+        <body name="rod" pos=".1 0 0"><joint name="rod" axis="0 1 0"/>
+          <geom type="capsule" fromto="0 0 0 0 0 -.3" size=".01"/></body></body>
+      <body name="shank" pos="0 0 -.3"><joint name="shank" axis="0 1 0" range="-1 1"/>
+        <geom type="capsule" fromto="0 0 0 .1 0 0" size=".01"/></body>
+    </body>
+  </worldbody>
+  <equality><connect body1="rod" body2="shank" anchor="0 0 -.3"/></equality>
+  <actuator><motor joint="crank" ctrlrange="-1 1"/></actuator>
+</mujoco>
+"""
+_COUPLED = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <body><joint name="lead" axis="0 1 0" range="-1 1"/><geom size=".1"/></body>
+    <body pos="1 0 0"><joint name="follow" axis="0 1 0" range="{low} {high}"/>
+      <geom size=".1"/></body>
+    <body pos="2 0 0"><joint name="last" type="slide" range="-2 2"/><geom size=".1"/></body>
+  </worldbody>
+  <equality>
+    <joint joint1="follow" joint2="lead" polycoef="{coefficients}"/>
+    <joint joint1="last" joint2="follow" polycoef="0 -.5 0 0 0"/>
+  </equality>
+  <actuator><motor joint="lead" ctrlrange="-1 1"/></actuator>
+</mujoco>
+"""
+
+
+def _gap(model: mujoco.MjModel, pose: np.ndarray) -> float:
+    """Return the largest violation of a constraint at a pose as MuJoCo computes it, m or rad."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_forward(model, data)
+    return float(np.abs(data.efc_pos[: data.ne]).max())
+
+
+@pytest.mark.parametrize("jacobian", ["dense", "sparse"])
+@given(seed=st.integers(0, 1000), scale=st.sampled_from([0.05, 0.3]))
+def test_a_drawn_start_closes_loops(jacobian: str, seed: int, scale: float) -> None:
+    """Inside the limits; velocities open no loop, and the trunk stands above the floor."""
+    model = mujoco.MjModel.from_xml_string(_FOUR_BAR.format(jacobian=jacobian))
+    data, rules = mujoco.MjData(model), StartRules(model)
+    start = start_pose(model)
+    rng = np.random.default_rng(seed)
+    drawn = start + rng.uniform(-scale, scale, model.nq)
+    pose = rules.feasible(drawn, data, start)
+    assert _gap(model, pose) < 1e-4
+    assert np.abs(pose[[7, 9]]).max() <= 1.0
+    np.testing.assert_array_equal(pose, rules.feasible(drawn, data, start))
+    velocity = rules.closure.still(pose, rng.standard_normal(model.nv), data)
+    moved = pose.copy()
+    mujoco.mj_integratePos(model, moved, velocity, 1e-6)
+    assert abs(_gap(model, moved) - _gap(model, pose)) < 1e-9
+
+
+@given(
+    coefficients=st.tuples(st.floats(-0.3, 0.3), *[st.floats(-2.0, 2.0)] * 2),
+    low=st.sampled_from([-3.0, -0.5]),
+    drawn=st.tuples(*[st.floats(-1.5, 1.5)] * 3),
+)
+def test_coupled_joints_start_coupled(
+    coefficients: tuple[float, float, float], low: float, drawn: tuple[float, float, float]
+) -> None:
+    """By their polynomial, also in a chain, and inside the limits; or as well as the file does."""
+    text = " ".join(map(str, (*coefficients, 0.0, 0.0)))
+    model = mujoco.MjModel.from_xml_string(_COUPLED.format(low=low, high=3.0, coefficients=text))
+    rules, start = StartRules(model), start_pose(model)
+    pose = rules.feasible(np.array(drawn), mujoco.MjData(model), start)
+    assert _gap(model, pose) <= max(1e-4, _gap(model, start))
+    assert _gap(model, start) <= max(1e-4, _gap(model, model.qpos0))
+    assert -1.0 <= pose[0] <= 1.0
+    assert low <= pose[1] <= 3.0
+
+
+def test_a_start_that_cannot_be_closed_is_the_files_own() -> None:
+    """A smaller deviation is tried before."""
+    model = mujoco.MjModel.from_xml_string(
+        """
+        <mujoco><compiler angle="radian"/><worldbody>
+          <body><joint name="a" axis="0 1 0" range="-1 1"/><geom size=".1"/></body>
+          <body pos="1 0 0"><joint name="b" axis="0 1 0" range="0 1"/><geom size=".1"/></body>
+        </worldbody>
+        <equality><joint joint1="b" joint2="a" polycoef="0 0 -1 0 0"/></equality>
+        <actuator><motor joint="a" ctrlrange="-1 1"/></actuator></mujoco>"""
+    )
+    # b = -a², which its limit forbids everywhere but at the start.
+    rules = StartRules(model)
+    pose = rules.feasible(np.array([0.9, 0.5]), mujoco.MjData(model), np.zeros(2))
+    assert _gap(model, pose) <= 1e-4
+
+
+def test_objects_stay_where_a_weld_holds_them() -> None:
+    """The robot moves to what it is tied to."""
+    model = mujoco.MjModel.from_xml_string(
+        """
+        <mujoco><worldbody>
+          <geom type="plane" size="9 9 1"/>
+          <body name="hand" mocap="true" pos="0 0 .05"/>
+          <body name="base"><joint name="x" type="slide" axis="1 0 0"/>
+            <joint name="z" type="slide" axis="0 0 1"/><geom size=".1" pos="0 0 .05"/></body>
+        </worldbody>
+        <equality><connect body1="base" body2="hand" anchor="0 0 .05"/></equality>
+        <actuator><motor joint="x" ctrlrange="-1 1"/></actuator></mujoco>"""
+    )
+    rules = StartRules(model)
+    # Its geom is in the floor, and the weld does not let it be lifted.
+    pose = rules.feasible(np.array([0.3, 0.2]), mujoco.MjData(model))
+    np.testing.assert_allclose(pose, 0.0, atol=1e-6)
+
+
+def test_inactive_equalities_close_nothing() -> None:
+    """A drawn pose stays as it is."""
+    text = _COUPLED.format(low=-3, high=3, coefficients="0 1 0 0 0").replace(
+        "<joint joint1", '<joint active="false" joint1'
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    rules, drawn = StartRules(model), np.array([0.5, -0.4, 0.3])
+    np.testing.assert_array_equal(rules.feasible(drawn, mujoco.MjData(model)), drawn)
+    speed = np.array([1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(rules.closure.still(drawn, speed, mujoco.MjData(model)), speed)
