@@ -57,3 +57,13 @@ class Nonsense:
     def reward(self, robot: RobotState) -> dict[str, float]:
         """Return the reward of nonsense."""
         return {"nonsense": float("nan")}
+
+
+class Hoist:
+    """Hold a mass half a metre up."""
+
+    observe = ("lift/position", "lift/velocity")
+
+    def reward(self, robot: RobotState) -> dict[str, float]:
+        """Return the distance, m, as a cost."""
+        return {"near": -abs(robot["lift/position"] - 0.5)}
