@@ -1,0 +1,225 @@
+"""Robots of a user's own in scenes of their own: objects, floors, couplings and packages."""
+
+from __future__ import annotations
+
+import copy
+import struct
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+
+import shapechanger
+from shapechanger.errors import BrokenModel
+from shapechanger.morphology import AddMotor
+from tests.envs.own_robots import DOG
+
+_BALL = '<body name="ball" pos="3 0 .1"><freejoint/><geom size=".1" mass=".1"/></body>'
+_DOOR = (
+    '<body name="door" pos="5 0 1"><joint name="door" axis="0 0 1" range="0 90"/>'
+    '<geom type="box" size=".5 .02 1"/></body>'
+)
+_FLOOR = '<geom name="floor" type="plane" size="20 20 1"/>'
+_ARM = """
+<mujoco>
+  <worldbody>
+    {scene}
+    <body name="stand"><geom size=".05"/>
+      <body name="arm" pos="0 0 .5"><joint name="arm" axis="0 1 0" range="-60 60"/>
+        <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
+        <body name="left" pos=".3 0 0">
+          <joint name="left" type="slide" axis="0 1 0" range="0 .04"/><geom size=".01" mass=".05"/></body>
+        <body name="right" pos=".3 0 0">
+          <joint name="right" type="slide" axis="0 -1 0" range="0 .04"/><geom size=".01" mass=".05"/></body>
+      </body></body>
+  </worldbody>
+  <equality><joint joint1="right" joint2="left"/></equality>
+  {actuators}
+</mujoco>
+"""
+_MOTORS = (
+    '<actuator><motor joint="arm" ctrlrange="-30 30"/>'
+    '<position joint="left" kp="10" ctrlrange="0 .04"/></actuator>'
+)
+
+
+def still(robot: Any) -> dict[str, float]:
+    """A task without a goal."""
+    del robot
+    return {"still": 0.0}
+
+
+def _env(folder: Path, text: str, task: Any = "walk", **more: Any) -> tuple[Any, Any]:
+    """Return an env of a model, and the same env without its wrappers."""
+    file = folder / "robot.xml"
+    file.write_text(text)
+    env = shapechanger.from_mjcf(file, task, **more)
+    return env, env.unwrapped
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_objects_change_nothing_of_the_robot(tmp_path: Path, first: bool) -> None:
+    """Listed before or after it: the same trunk, height, starts and rewards; they start as written.
+
+    The keyframe of the file is left out, because it names numbers of all joints.
+    """
+    dog = DOG[: DOG.index("  <keyframe>")] + "</mujoco>"
+    objects = _BALL + _DOOR
+    place = _FLOOR if first else "</worldbody>"
+    scene = dog.replace(place, place + objects if first else objects + place)
+    alone, plain = _env(tmp_path, dog)
+    among, inner = _env(tmp_path, scene)
+    assert inner.standing_height == plain.standing_height
+    for seed in range(3):
+        alone.reset(seed=seed)
+        among.reset(seed=seed)
+        for name in ("trunk", "front", "back"):
+            np.testing.assert_array_equal(plain.data.body(name).xpos, inner.data.body(name).xpos)
+            np.testing.assert_array_equal(plain.data.body(name).cvel, inner.data.body(name).cvel)
+        np.testing.assert_allclose(inner.data.body("ball").xpos, [3.0, 0.0, 0.1])
+        assert inner.data.joint("door").qpos[0] == 0.0
+    for _ in range(5):
+        results = [env.step(np.zeros(2)) for env in (alone, among)]
+        assert results[0][1] == pytest.approx(results[1][1])
+    assert "ball/x" in inner.observation_layout.names
+    assert "trunk/x" not in inner.observation_layout.names
+
+
+@pytest.mark.parametrize("height", [-1.0, 2.0])
+def test_the_floor_may_be_anywhere(tmp_path: Path, height: float) -> None:
+    """Heights are above it, and so a robot on a high floor can fall too."""
+    moved = DOG.replace(_FLOOR, _FLOOR.replace("/>", f' pos="0 0 {height}"/>'))
+    moved = moved.replace(
+        'key name="home" qpos="0 0 .47', f'key name="home" qpos="0 0 {height + 0.47}'
+    )
+    _, plain = _env(tmp_path, DOG)
+    env, inner = _env(tmp_path, moved)
+    assert inner.standing_height == pytest.approx(plain.standing_height, abs=1e-6)
+    env.reset(seed=0)
+    for share, stands in ((0.5, True), (0.3, False)):
+        inner.data.qpos[2] = height + share * inner.standing_height
+        mujoco.mj_kinematics(inner.model, inner.data)
+        robot = inner.seen(np.zeros(2), inner.trunk_place())
+        assert robot.height == pytest.approx(share * inner.standing_height)
+        assert inner.task.healthy(robot) == stands
+
+
+def test_a_scene_is_its_own(tmp_path: Path) -> None:
+    """Sensors of the env read as MuJoCo's, because no plane is made transparent."""
+    sensor = '<sensor><rangefinder site="eye"/></sensor></mujoco>'
+    eye = '<site name="eye" pos=".3 0 .3" zaxis="0 0 -1"/>'
+    for material in ("", 'rgba="1 1 1 0"', 'material="tiles"', 'material="tiles" rgba="0 1 0 0"'):
+        floor = f'<geom type="plane" size="5 5 1" {material}/>'
+        text = _ARM.format(scene=floor + eye, actuators=_MOTORS).replace("</mujoco>", sensor)
+        text = text.replace("<worldbody>", '<asset><material name="tiles"/></asset><worldbody>')
+        plain = mujoco.MjModel.from_xml_string(text)
+        data = mujoco.MjData(plain)
+        env, inner = _env(tmp_path, text, still, reset_noise_scale=0.0)
+        env.reset(seed=0)
+        data.qpos[:] = inner.data.qpos
+        mujoco.mj_forward(plain, data)
+        np.testing.assert_array_equal(inner.data.sensordata, data.sensordata, err_msg=material)
+        np.testing.assert_array_equal(inner.model.geom_rgba[:, 3], plain.geom_rgba[:, 3])
+        env.close()
+
+
+def test_coupled_fingers_start_coupled_and_stay_without_motors(tmp_path: Path) -> None:
+    """An arm on a fixed base with a box to push: it cannot travel, and the box lies still."""
+    box = '<body name="box" pos=".5 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>'
+    scene = _FLOOR + box
+    env, inner = _env(tmp_path, _ARM.format(scene=scene, actuators=_MOTORS), still)
+    widths: set[float] = set()
+    for seed in range(20):
+        env.reset(seed=seed)
+        left, right = (inner.data.joint(name).qpos[0] for name in ("left", "right"))
+        assert left == pytest.approx(right, abs=1e-8)
+        widths.add(round(float(left), 4))
+        np.testing.assert_allclose(inner.data.body("box").xpos, [0.5, 0.0, 0.1])
+    assert len(widths) > 5
+    env, inner = _env(
+        tmp_path, _ARM.format(scene=scene, actuators=""), still, rig=AddMotor("*", 2.0)
+    )
+    assert inner.action_layout.names == ("arm/motor", "left/motor")
+    # A joint that is named gets one.
+    named = AddMotor("right", 2.0)
+    _, inner = _env(tmp_path, _ARM.format(scene=scene, actuators=""), still, rig=named)
+    assert inner.action_layout.names == ("right/motor",)
+
+
+def test_a_copy_begins_an_episode_of_its_own(tmp_path: Path) -> None:
+    """One that was made in mid-episode refuses to step before its reset."""
+    env, _ = _env(tmp_path, DOG)
+    env.reset(seed=0)
+    env.step(np.zeros(2))
+    other = copy.deepcopy(env)
+    with pytest.raises(gym.error.ResetNeeded, match="OwnRobotEnv has no state yet"):
+        other.step(np.zeros(2))
+    other.reset(seed=3)
+    np.testing.assert_array_equal(other.step(np.zeros(2))[0].shape, (15,))
+
+
+def test_many_joints_are_solved_densely(tmp_path: Path) -> None:
+    """With MuJoCo 4.0.0, whose sparse solver is wrong; a rollout equals MuJoCo's own dense one."""
+    links = "".join(
+        f'<body name="l{i}" pos=".1 0 0"><joint name="j{i}" axis="0 {i % 2} {1 - i % 2}"/>'
+        '<geom type="capsule" fromto="0 0 0 .1 0 0" size=".02" mass=".1"/>'
+        for i in range(64)
+    )
+    text = (
+        f'<mujoco><worldbody>{_FLOOR}<body pos="0 0 .1"><freejoint/><geom size=".05"/>{links}'
+        f'{"</body>" * 65}</worldbody><actuator><motor joint="j0" ctrlrange="-1 1"/></actuator>'
+        "</mujoco>"
+    )
+    env, inner = _env(tmp_path, text, still)
+    assert bool(mujoco.mj_isSparse(inner.model)) == (mujoco.__version__ != "4.0.0")
+    env.reset(seed=0)
+    plain = mujoco.MjModel.from_xml_string(text)
+    plain.opt.jacobian = inner.model.opt.jacobian
+    data = mujoco.MjData(plain)
+    data.qpos[:], data.qvel[:] = inner.data.qpos, inner.data.qvel
+    env.step(np.ones(1))
+    data.ctrl[:] = 1.0
+    mujoco.mj_step(plain, data, inner.frame_skip)
+    np.testing.assert_array_equal(data.qpos, inner.data.qpos)
+
+
+def _tetrahedron() -> bytes:
+    corners = 0.1 * np.eye(4, 3)
+    faces = [(3, 1, 0), (3, 0, 2), (0, 1, 2), (3, 2, 1)]
+    return (
+        b"\0" * 80
+        + struct.pack("<I", 4)
+        + b"".join(struct.pack("<12fH", 0, 0, 0, *corners[list(face)].ravel(), 0) for face in faces)
+    )
+
+
+@pytest.mark.parametrize("scheme", ["package", "model"])
+def test_packages_are_the_folders_around_a_urdf(tmp_path: Path, scheme: str) -> None:
+    """Or the folders in these; elsewhere an error says what to do."""
+    text = f"""
+    <robot name="r"><link name="base">{_INERTIA}</link>
+      <link name="arm">{_INERTIA}<collision><geometry>
+        <mesh filename="{scheme}://my_robot/meshes/arm.stl"/></geometry></collision></link>
+      <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>
+        <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="5" velocity="1"/></joint>
+    </robot>"""
+    package = tmp_path / "ros" / "my_robot"
+    (package / "meshes").mkdir(parents=True)
+    (package / "urdf").mkdir()
+    (package / "meshes" / "arm.stl").write_bytes(_tetrahedron())
+    for file in (package / "urdf" / "r.urdf", tmp_path / "ros" / "r.urdf"):
+        file.write_text(text)
+        env = shapechanger.from_mjcf(file, still, rig=AddMotor("*"))
+        assert env.unwrapped.model.nmesh == 1  # pyright: ignore[reportAttributeAccessIssue]
+    (tmp_path / "r.urdf").write_text(text)
+    with pytest.raises(BrokenModel, match=r"neither a folder 'my_robot' .* copy the package"):
+        shapechanger.from_mjcf(tmp_path / "r.urdf", still, rig=AddMotor("*"))
+
+
+_INERTIA = (
+    '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/>'
+    "</inertial>"
+)
