@@ -31,9 +31,11 @@ _ARM = """
       <body name="arm" pos="0 0 .5"><joint name="arm" axis="0 1 0" range="-60 60"/>
         <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
         <body name="left" pos=".3 0 0">
-          <joint name="left" type="slide" axis="0 1 0" range="0 .04"/><geom size=".01" mass=".05"/></body>
+          <joint name="left" type="slide" axis="0 1 0" range="0 .04"/>
+          <geom size=".01" mass=".05"/></body>
         <body name="right" pos=".3 0 0">
-          <joint name="right" type="slide" axis="0 -1 0" range="0 .04"/><geom size=".01" mass=".05"/></body>
+          <joint name="right" type="slide" axis="0 -1 0" range="0 .04"/>
+          <geom size=".01" mass=".05"/></body>
       </body></body>
   </worldbody>
   <equality><joint joint1="right" joint2="left"/></equality>

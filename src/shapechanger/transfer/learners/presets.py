@@ -82,6 +82,7 @@ LEARNERS: Final[dict[str, Settings]] = {
         batch_size=128,
         n_epochs=10,
         learning_rate=1e-3,
+        log_std_init=-1.1,
         steps=24_576,
         eval_every=3072,
     ),
@@ -102,8 +103,9 @@ LEARNERS: Final[dict[str, Settings]] = {
     "rsl-limbs": RslLimbSettings(**msgspec.structs.asdict(_LIMBS)),
     # What limbs are compared with; an extended ant has 12 limbs.
     "padded": msgspec.structs.replace(_LIMBS, network="padded", net_arch=(256, 256), room=12),
-    # A humanoid takes actions up to 0.4, so it explores with less noise, in smaller batches: it
-    # ends at 653, and with `ppo-run` at 468. With both it falls after two seconds, before it walks.
+    # In smaller batches than `ppo-run`. With actions in the unit of its motors, which take 0.4, and
+    # the same noise (a logarithm of -2) it ended at 653, and with `ppo-run` at 468. With both it
+    # falls after two seconds, before it walks.
     "ppo-humanoid": PpoSettings(
         n_envs=16,
         n_steps=256,
@@ -111,7 +113,7 @@ LEARNERS: Final[dict[str, Settings]] = {
         n_epochs=5,
         learning_rate=1e-4,
         gae_lambda=0.9,
-        log_std_init=-2.0,
+        log_std_init=-1.1,
         net_arch=(256, 256),
         normalise=True,
         steps=524_288,
