@@ -56,8 +56,9 @@ def test_actions_are_those_of_the_model() -> None:
     for factor, clipped in ((1.0, False), (1000.0, True)):
         network.action_net.weight.data *= factor
         expected, _ = policy.model.predict(observations, deterministic=True)
-        assert (np.abs(expected) == 3.0).any() == clipped  # The bounds of the pendulum's motor.
-        np.testing.assert_array_equal(policy.act(observations), expected)
+        assert (np.abs(expected) == 1.0).any() == clipped
+        # The pendulum's motor takes -3 to 3 N.
+        np.testing.assert_array_equal(policy.act(observations), 3.0 * expected)
 
 
 def test_normalised_policies_take_plain_observations(tmp_path: Path) -> None:
