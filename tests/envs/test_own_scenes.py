@@ -151,6 +151,24 @@ def test_coupled_fingers_start_coupled_and_stay_without_motors(tmp_path: Path) -
     assert inner.action_layout.names == ("right/motor",)
 
 
+def test_a_base_that_slides_in_a_plane_can_walk(tmp_path: Path) -> None:
+    """It cannot fall, so the task needs no floor; a box before it in the file is no trunk."""
+    box = '<body name="box" pos="1 0 .1"><freejoint/><geom size=".1"/></body>'
+    text = f"""
+    <mujoco><worldbody>{box}
+      <body name="base" pos="0 0 .2"><geom type="box" size=".3 .2 .05"/>
+        <joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
+        <joint name="yaw" axis="0 0 1"/></body>
+    </worldbody><actuator><velocity joint="x" kv="500" ctrlrange="-2 2"/></actuator></mujoco>"""
+    env, inner = _env(tmp_path, text)
+    assert inner.standing_height == pytest.approx(0.2)
+    env.reset(seed=0)
+    for _ in range(50):
+        _, _, terminated, _, info = env.step(np.array([2.0]))
+        assert not terminated
+    assert info["x_velocity"] == pytest.approx(2.0, abs=0.05)
+
+
 def test_a_copy_begins_an_episode_of_its_own(tmp_path: Path) -> None:
     """One that was made in mid-episode refuses to step before its reset."""
     env, _ = _env(tmp_path, DOG)

@@ -203,7 +203,13 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
             # Lifted to the floor if the robot has grown since.
             pose = StartRules(model).feasible(pose, mujoco.MjData(model), pose)
         # In the middle of their ranges many legs are folded.
-        height = standing_height(model, pose)
+        height, trunk = standing_height(model, pose), travelling_body(model)
+        if height is None and trunk is not None and trunk_lift(model) is None:
+            # Such as a base on wheels that slides in a plane: it stays as high as it starts.
+            data = mujoco.MjData(model)
+            data.qpos[:] = pose
+            mujoco.mj_kinematics(model, data)
+            height = float(data.xpos[trunk, 2])
         return pose, None if height is None else height - floor_height(model, pose)
 
     def _follow_body(self) -> None:
