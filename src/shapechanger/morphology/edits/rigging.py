@@ -62,8 +62,8 @@ class AddMotor(Edit, frozen=True):
         ]
         if not joints:
             raise MorphologyError(
-                f"Each hinge and slide that matches {self.joint!r} has a motor, or there is none; a "
-                "joint that follows another one needs none."
+                f"Each hinge and slide that matches {self.joint!r} has a motor, or there is none; "
+                "a joint that follows another one needs none."
             )
         for joint in joints:
             require_free_name(spec, "actuator", joint.name)
