@@ -69,6 +69,7 @@ def test_a_drawn_start_closes_loops(jacobian: str, seed: int, scale: float) -> N
     assert _gap(model, pose) < 1e-4
     assert np.abs(pose[[7, 9]]).max() <= 1.0
     np.testing.assert_array_equal(pose, rules.feasible(drawn, data, start))
+    assert rules.closure is not None
     velocity = rules.closure.still(pose, rng.standard_normal(model.nv), data)
     moved = pose.copy()
     mujoco.mj_integratePos(model, moved, velocity, 1e-6)
@@ -142,4 +143,5 @@ def test_inactive_equalities_close_nothing() -> None:
     rules, drawn = StartRules(model), np.array([0.5, -0.4, 0.3])
     np.testing.assert_array_equal(rules.feasible(drawn, mujoco.MjData(model)), drawn)
     speed = np.array([1.0, 2.0, 3.0])
+    assert rules.closure is not None
     np.testing.assert_array_equal(rules.closure.still(drawn, speed, mujoco.MjData(model)), speed)

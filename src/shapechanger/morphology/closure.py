@@ -46,16 +46,9 @@ class Closure:
         self._model = model
         self._movable = movable
         self._places, self._lowest, self._highest = places, lowest, highest
-        of_place = {
-            int(place): int(dof)
-            for place, dof in zip(model.jnt_qposadr, model.jnt_dofadr, strict=True)
-        }
-        self._dofs = np.array([of_place[int(place)] for place in places], np.intp)
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether the model has no equality to solve."""
-        return not np.isin(self._model.eq_type, _SOLVED).any()
+        dofs = np.zeros(model.nq, np.intp)
+        dofs[model.jnt_qposadr] = model.jnt_dofadr
+        self._dofs = dofs[places]
 
     def closed(self, drawn: _Array, start: _Array, data: mujoco.MjData) -> _Array:
         """Return the closed pose next to a drawn one, shape (nq,), inside the limits.

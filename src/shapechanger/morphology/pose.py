@@ -105,12 +105,11 @@ def _unlimited_slides(model: mujoco.MjModel) -> list[int]:
 
 def _in_robot(model: mujoco.MjModel, joints: NDArray[np.bool_]) -> list[int]:
     """Return the joints of the robot among some, those of the tree with most actuators first."""
+    found = np.flatnonzero(joints).tolist()
+    if model.ntree < 2 or not found:
+        return found
     of_tree = model.body_treeid[model.jnt_bodyid]
-    return [
-        int(joint)
-        for tree in moved_trees(model)
-        for joint in np.flatnonzero(joints & (of_tree == tree))
-    ]
+    return [joint for tree in moved_trees(model) for joint in found if of_tree[joint] == tree]
 
 
 def start_pose(model: mujoco.MjModel, inside: float = _INSIDE) -> _Array:
@@ -197,38 +196,52 @@ class StartRules:
         lowest: Their lower limits, rad or m.
         highest: Their upper limits, rad or m.
         floor_pairs: Each floor with each geom of the robot that it can touch.
-        robot_places: Whether each number of qpos is one of the robot's, shape (nq,).
-        robot_dofs: Whether each number of qvel is, shape (nv,); without those that their damping
-            locks.
-        closure: The equalities that a start pose satisfies.
+        closure: The equalities that a start pose satisfies; None for a model without any.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.lift = trunk_lift(model)
         self._model = model
-        robot = robot_bodies(model)
         one_number = np.isin(model.jnt_type, (int(_J.mjJNT_HINGE), int(_J.mjJNT_SLIDE)))
-        joints = np.flatnonzero(one_number & (model.jnt_limited != 0) & robot[model.jnt_bodyid])
+        limited = one_number & (model.jnt_limited != 0)
+        # A single tree is the robot; runners read these rules at each reset.
+        self._robot = robot_bodies(model) if model.ntree > 1 else None
+        if self._robot is not None:
+            limited &= self._robot[model.jnt_bodyid]
+        joints = np.flatnonzero(limited)
         self.lowest, self.highest = model.jnt_range[joints].T
         self.limited_places = model.jnt_qposadr[joints]
-        # Files lock a joint with a damping of 1e11, and MuJoCo diverges unless it is at rest.
-        stops = model.dof_damping * model.opt.timestep > _LOCKED * model.dof_M0
-        self.robot_dofs = robot[model.dof_bodyid] & ~stops
-        # Each number of qpos belongs to the last joint that begins at or before it.
-        of_place = np.searchsorted(model.jnt_qposadr, np.arange(model.nq), side="right") - 1
-        self.robot_places = robot[model.jnt_bodyid[of_place]]
-        self.closure = Closure(
-            model, self.robot_dofs, self.limited_places, self.lowest, self.highest
-        )
+        self.closure: Closure | None = None
+        if model.neq:
+            limits = self.limited_places, self.lowest, self.highest
+            self.closure = Closure(model, self.robot_dofs, *limits)
         self.floor_pairs: list[tuple[int, int]] = []
         of_world = model.body_weldid[model.geom_bodyid] == 0
         for floor in np.flatnonzero(of_world & np.isin(model.geom_type, _GROUND)).tolist():
             touching = (model.geom_contype & model.geom_conaffinity[floor]) | (
                 model.geom_conaffinity & model.geom_contype[floor]
             )
-            own = ~of_world & robot[model.geom_bodyid]
+            own = ~of_world if self._robot is None else ~of_world & self._robot[model.geom_bodyid]
             geoms = np.flatnonzero(own & (touching != 0)).tolist()
             self.floor_pairs += [(floor, geom) for geom in geoms]
+
+    @property
+    def robot_places(self) -> NDArray[np.bool_]:
+        """Whether each number of qpos is one of the robot's, shape (nq,)."""
+        model = self._model
+        if self._robot is None:
+            return np.ones(model.nq, np.bool_)
+        # Each number belongs to the last joint that begins at or before it.
+        joints = np.searchsorted(model.jnt_qposadr, np.arange(model.nq), side="right") - 1
+        return self._robot[model.jnt_bodyid[joints]]
+
+    @property
+    def robot_dofs(self) -> NDArray[np.bool_]:
+        """Whether each number of qvel is one of the robot's, and not locked, shape (nv,)."""
+        model = self._model
+        # Files lock a joint with a damping of 1e11, and MuJoCo diverges unless it is at rest.
+        moves = model.dof_damping * model.opt.timestep <= _LOCKED * model.dof_M0
+        return moves if self._robot is None else moves & self._robot[model.dof_bodyid]
 
     def keep_within_limits(self, pose: _Array, inside: float = 0.0) -> _Array:
         """Return a pose, shape (nq,), with the robot's hinges and slides moved inside their limits.
@@ -274,26 +287,25 @@ class StartRules:
             data: Data of the model; its pose and all that depends on it are overwritten.
             start: The pose that it deviates from, shape (nq,); the model's own by default.
         """
-        pose = self._lifted(self.normalised(self.keep_within_limits(drawn)), data)
-        if not self.closure.is_empty:
+        pose = self.keep_within_limits(drawn)
+        mujoco.mj_normalizeQuat(self._model, pose)
+        self._lift(pose, data)
+        if self.closure is not None:
             origin = self._model.qpos0 if start is None else start
             pose = self.closure.closed(pose, origin, data)
-            lifted = self._lifted(pose, data)
+            lifted = pose.copy()
+            self._lift(lifted, data)
             # A robot that a weld or a rope holds hangs there, and does not stand.
             if self.closure.violation(lifted, data) <= self.closure.goal(origin, data):
                 pose = lifted
         return pose
 
-    def normalised(self, pose: _Array) -> _Array:
-        """Return a pose with its orientations normalised, in place."""
-        mujoco.mj_normalizeQuat(self._model, pose)
-        return pose
-
-    def _lifted(self, pose: _Array, data: mujoco.MjData) -> _Array:
-        """Return a pose with the trunk lifted until its feet are not in the floor."""
-        lifted = pose.copy()
-        if self.lift is not None:
-            data.qpos[:] = pose
-            mujoco.mj_kinematics(self._model, data)
-            self.lift.raise_by(lifted, max(0.0, -self.floor_gap(data)))
-        return lifted
+    def _lift(self, pose: _Array, data: mujoco.MjData) -> None:
+        """Lift the trunk of a pose until its feet are not in the floor, in place."""
+        if self.lift is None:
+            return
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(self._model, data)
+        gap = self.floor_gap(data)
+        if gap < 0.0:
+            self.lift.raise_by(pose, -gap)
