@@ -31,8 +31,8 @@ def main(
     )
     plan = make_plan(
         task,
-        "ppo-pendulum",
-        learner_settings("ppo-pendulum"),
+        "ppo-balance",
+        learner_settings("ppo-balance"),
         steps=steps,
         source_steps=steps,
         seeds=seeds,
