@@ -57,8 +57,8 @@ def main(steps: int = 24_576, seeds: int = 3, out: Path = Path("results/last-lay
     )
     plan = make_plan(
         task,
-        "ppo-balance",
-        learner_settings("ppo-balance"),
+        "ppo-pendulum",
+        learner_settings("ppo-pendulum"),
         steps=steps,
         source_steps=steps,
         seeds=seeds,

@@ -31,8 +31,8 @@ def main(
     )
     plan = make_plan(
         task,
-        "ppo-balance",
-        learner_settings("ppo-balance"),
+        "ppo-pendulum",
+        learner_settings("ppo-pendulum"),
         steps=steps,
         source_steps=steps,
         seeds=seeds,

@@ -35,7 +35,10 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
     policy = load_policy(reference_policy(env_id))
     assert policy.card.env == env
     assert (policy.card.steps, policy.card.seed) == (reference.steps, reference.policy_seed)
-    assert policy.card.learner == reference.learner == default_learner(env)
+    assert policy.card.learner == reference.learner
+    # Those of the pendulums were trained when learners acted in N.
+    in_newtons = "Pendulum" in env_id and "Double" not in env_id
+    assert default_learner(env) == ("ppo-pendulum" if in_newtons else reference.learner)
     made = env.make()
     try:
         measures = [measure.name for measure in measures_of(made)]

@@ -120,7 +120,7 @@ class CatalogueEntry(msgspec.Struct, frozen=True):
 # For each family the module and class of its env, the learner settings tuned on it, and the reward
 # threshold of Gymnasium's v5 id.
 _FAMILIES: Final = {
-    "InvertedPendulum": ("pendulum:InvertedPendulumEnv", "ppo-balance", 950.0),
+    "InvertedPendulum": ("pendulum:InvertedPendulumEnv", "ppo-pendulum", 950.0),
     "Ant": ("ant:AntEnv", "ppo-run", 6000.0),
     "HalfCheetah": ("runners:HalfCheetahEnv", "ppo-run", 4800.0),
     "Hopper": ("runners:HopperEnv", "ppo-planar", 3800.0),
