@@ -5,6 +5,7 @@ Look at recordings, edit them, and convert them from and to other formats.
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -314,9 +315,17 @@ def _told(done: Repair) -> str:
     return ", ".join(parts)
 
 
+PARTLY_IMPORTED: Final = 3
+"""Exit code of an import that left something out."""
+
+
 @dataclass(frozen=True)
 class Import:
-    """Import a recording from another format, leaving the source unchanged."""
+    """Import a recording from another format, leaving the source unchanged.
+
+    What is whole is imported, and the rest is listed. The exit code is 0 if all was imported, 3 if
+    something was left out, and 2 if nothing could be imported.
+    """
 
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FROM")]
     """The folder to read."""
@@ -325,17 +334,36 @@ class Import:
     format: str = "auto"
     """Format of the folder: 2017, tub, minari, lerobot or csv; auto detects it."""
     camera: str = ""
-    """Which camera to take from a LeRobot dataset that has several, such as front."""
+    """Which camera to take from a LeRobot dataset or a tub that has several, such as front."""
+    hz: float | None = None
+    """Steps per second, for formats that do not state them; measured by their times otherwise."""
+    strict: bool = False
+    """Refuse a source that is incomplete or contradicts itself, in place of importing the rest."""
 
     def run(self) -> None:
-        """Import and print a summary."""
+        """Import and print a summary; exit with 3 if something was left out."""
         from shapechanger.demos.exchange import import_recording
 
-        done = import_recording(self.source, self.out, self.format, camera=self.camera)
+        done = import_recording(
+            self.source,
+            self.out,
+            self.format,
+            camera=self.camera,
+            hz=self.hz,
+            strict=self.strict,
+        )
         say(
             f"read {self.source} ({done.format}): {counted(done.episodes, 'episode')}, "
             f"{counted(done.steps, 'step')}, {counted(done.pictures, 'picture')}\nwrote {self.out}"
         )
+        for note in done.notes:
+            say(f"note: {note}")
+        for warning in done.warnings:
+            say(f"warning: {warning}", stderr=True)
+        for line in done.left_out:
+            say(f"left out {line}", stderr=True)
+        if done.left_out:
+            sys.exit(PARTLY_IMPORTED)
 
 
 @dataclass(frozen=True)

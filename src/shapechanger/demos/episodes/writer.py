@@ -124,6 +124,7 @@ class EpisodeWriter:
         *,
         spare_bytes: int = SPARE_BYTES,
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
+        created: str | None = None,
     ) -> EpisodeWriter:
         """Begin an episode in a recording; create the recording if it is missing.
 
@@ -131,7 +132,9 @@ class EpisodeWriter:
             recording: Folder of the recording.
             header: Metadata of the episode.
             spare_bytes: Disk space to leave free. A full disk would harm the robot.
-            now: Returns the current time, UTC.
+            now: Returns the time that the folder is named after, UTC.
+            created: Start time of an episode that was recorded before, ISO 8601; "" if unknown;
+                None for now.
 
         Raises:
             DemosError: If another process is recording there.
@@ -140,7 +143,7 @@ class EpisodeWriter:
         began = now()
         header = replace(
             header,
-            created=began.isoformat(timespec="milliseconds"),
+            created=began.isoformat(timespec="milliseconds") if created is None else created,
             version=version("shapechanger"),
         )
         try:

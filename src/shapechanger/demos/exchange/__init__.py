@@ -24,11 +24,13 @@ from shapechanger.demos.exchange.convert import (
     import_episodes,
     import_recording,
 )
+from shapechanger.demos.exchange.importing import ImportContext
 
 __all__ = [
     "FORMATS",
     "Exported",
     "Format",
+    "ImportContext",
     "Imported",
     "export_recording",
     "find_format",

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Final, Literal
@@ -21,6 +21,7 @@ from shapechanger.demos.episodes import (
 from shapechanger.demos.episodes.files import is_episode
 from shapechanger.demos.exchange.csv_files import TABLE, is_csv, read_csv, write_csv
 from shapechanger.demos.exchange.files import cannot_read, new_folder
+from shapechanger.demos.exchange.importing import ImportContext
 from shapechanger.demos.exchange.keys_2017 import LABELS, is_2017, read_2017, write_2017
 from shapechanger.demos.exchange.lerobot_export import INFO, write_lerobot
 from shapechanger.demos.exchange.lerobot_import import is_lerobot, read_lerobot
@@ -47,13 +48,15 @@ _DETECT: Final[dict[Format, Callable[[Path], bool]]] = {
     "lerobot": is_lerobot,
     "csv": is_csv,
 }
-_READ: Final[dict[Format, Callable[[Path], Iterator[ExchangeEpisode]]]] = {
+_READ: Final[dict[Format, Callable[[Path, ImportContext], Iterator[ExchangeEpisode]]]] = {
     "2017": read_2017,
     "tub": read_tub,
     "minari": read_minari,
     "lerobot": read_lerobot,
     "csv": read_csv,
 }
+_STATES_CAMERA: Final = ("lerobot", "tub")
+_NEEDS_RATE: Final = ("2017", "tub", "minari")
 _MARKS_DROPPED: Final = ("minari", "csv", "mcap")
 
 FORMATS: Final[tuple[Format, ...]] = (*_READ, "mcap")
@@ -91,12 +94,18 @@ class Imported:
         episodes: Number of episodes.
         steps: Number of steps.
         pictures: Number of pictures.
+        left_out: What is not imported, a line for each reason.
+        warnings: Contradictions in the source, as sentences.
+        notes: Further facts, as sentences.
     """
 
     format: Format
     episodes: int
     steps: int
     pictures: int
+    left_out: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def export_recording(
@@ -172,13 +181,15 @@ def export_recording(
 
 
 def import_episodes(
-    path: Path, format: str = "auto"
+    path: Path, format: str = "auto", context: ImportContext | None = None
 ) -> Iterator[tuple[EpisodeHeader, Iterator[tuple[Step, bytes | None]]]]:
     """Read a recording in another format, without writing anything.
 
     Args:
         path: A folder in one of the `FORMATS`.
         format: One of them, or "auto" to detect it.
+        context: Options; it collects what is left out. None to refuse a source that is incomplete
+            or contradicts itself.
 
     Yields:
         For each episode its header, and an iterator over its steps, each with the JPEG of its
@@ -190,39 +201,88 @@ def import_episodes(
         UnknownName: If there is no such format.
         MissingExtra: If a package that the format needs is not installed.
     """
-    for episode in _READ[_require_format(format, path)](path):
+    context = ImportContext(strict=True) if context is None else context
+    for episode in _read(path, format, context)[1]:
+        if context.strict:
+            context.require_whole(path)
         kept = enumerate(kept_steps(episode.rows))
         yield episode.header, ((replace(step, index=n), jpeg) for n, (step, jpeg) in kept)
+    if context.strict:
+        context.require_whole(path)
 
 
-def import_recording(path: Path, out: Path, format: str = "auto", *, camera: str = "") -> Imported:
-    """Import a recording.
+def import_recording(
+    path: Path,
+    out: Path,
+    format: str = "auto",
+    *,
+    camera: str = "",
+    hz: float | None = None,
+    strict: bool = False,
+) -> Imported:
+    """Import a recording: what is whole, with a report on the rest.
 
     Args:
         path: A folder in one of the `FORMATS`; it is not changed.
         out: The recording to create, atomically.
         format: One of the formats, or "auto" to detect it.
-        camera: Which camera of a LeRobot dataset to take, such as "front"; "" for the only one.
+        camera: Which camera to take, such as "front"; "" for the only one. LeRobot and tubs only.
+        hz: Steps per second; None to read or measure them. Only for formats that do not state it.
+        strict: Whether to refuse a source that is incomplete or contradicts itself.
 
     Raises:
-        DemosError: If `path` is damaged, or `out` exists or lies in it.
+        DemosError: If nothing in `path` is whole, or with `strict` not all of it, or `out` exists
+            or lies in it.
         UnknownName: If there is no such format.
         OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
     """
-    found = _require_format(format, path)
-    if camera and found != "lerobot":
-        raise DemosError(f"A camera is chosen among those of lerobot, and {path} is {found}.")
-    read = partial(read_lerobot, camera=camera) if camera else _READ[found]
-    began = datetime.now(UTC)
+    context = ImportContext(camera=camera, hz=hz, strict=strict)
+    found, read = _read(path, format, context)
+    named_after: datetime | None = None
     episodes = steps = pictures = 0
     with new_folder(out, path) as folder:
-        for episode in read(path):
-            added, shown = _write(episode, folder, began)
+        for episode in read:
+            named_after = named_after or _began(episode.header)
+            added, shown = _write(episode, folder, named_after)
             episodes, steps, pictures = episodes + 1, steps + added, pictures + shown
+        if strict:
+            context.require_whole(path)
         if not episodes:
-            raise DemosError(f"There are no episodes in {path}.")
-    return Imported(found, episodes, steps, pictures)
+            why = f": {'; '.join(lines)}" if (lines := context.left_out_lines()) else ""
+            raise DemosError(f"There is nothing to import in {path}{why}.")
+    return Imported(
+        found,
+        episodes,
+        steps,
+        pictures,
+        tuple(context.left_out_lines()),
+        tuple(context.warnings),
+        tuple(context.notes),
+    )
+
+
+def _read(
+    path: Path, format: str, context: ImportContext
+) -> tuple[Format, Iterator[ExchangeEpisode]]:
+    """Return the format of a folder, and an iterator over its episodes."""
+    found = _require_format(format, path)
+    if context.camera and found not in _STATES_CAMERA:
+        raise DemosError(f"A camera is chosen in lerobot and tub, and {path} is {found}.")
+    if context.hz is not None:
+        if found not in _NEEDS_RATE:
+            raise DemosError(f"The format {found} states the rate itself: leave out --hz.")
+        if not 0.0 < context.hz < math.inf:
+            raise DemosError(f"--hz must be positive, got {context.hz:g}.")
+    return found, _READ[found](path, context)
+
+
+def _began(header: EpisodeHeader) -> datetime:
+    """Return when an episode began; the current time if that is unknown."""
+    try:
+        return datetime.fromisoformat(header.created).astimezone(UTC)
+    except ValueError:
+        return datetime.now(UTC)
 
 
 def find_format(path: Path) -> Format:
@@ -279,12 +339,14 @@ def _formats_of(path: Path) -> list[Format]:
     return [name for name, detect in _DETECT.items() if detect(path)]
 
 
-def _write(episode: ExchangeEpisode, folder: Path, began: datetime) -> tuple[int, int]:
+def _write(episode: ExchangeEpisode, folder: Path, named_after: datetime) -> tuple[int, int]:
     """Write one episode of a recording; return its numbers of steps and pictures."""
     pictures = 0
     excluded: list[tuple[int, str]] = []
     # The folders of all episodes begin with the same time, so that their order is kept.
-    with EpisodeWriter.create(folder, episode.header, now=lambda: began) as writer:
+    with EpisodeWriter.create(
+        folder, episode.header, now=lambda: named_after, created=episode.header.created
+    ) as writer:
         for row in episode.rows:
             try:
                 index = writer.add(row.step, row.jpeg)

@@ -26,6 +26,7 @@ from shapechanger.demos.exchange.files import (
     read_text,
     resolve_file,
 )
+from shapechanger.demos.exchange.importing import ImportContext
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep, value_names
 from shapechanger.errors import DemosError, LayoutError, UnknownName
 from shapechanger.layout import Layout
@@ -73,7 +74,7 @@ def is_csv(folder: Path) -> bool:
     return bool(_tables_of(folder))
 
 
-def read_csv(folder: Path) -> Iterator[ExchangeEpisode]:
+def read_csv(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a folder.
 
     Raises:

@@ -29,6 +29,7 @@ from shapechanger.demos.exchange.files import (
     read_text,
     resolve_file,
 )
+from shapechanger.demos.exchange.importing import ImportContext
 from shapechanger.demos.exchange.recorded import (
     ExchangeEpisode,
     ExchangeStep,
@@ -73,7 +74,7 @@ def is_2017(folder: Path) -> bool:
     return (folder / LABELS).is_file()
 
 
-def read_2017(folder: Path) -> Iterator[ExchangeEpisode]:
+def read_2017(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a folder: one, unless there are long pauses.
 
     Raises:

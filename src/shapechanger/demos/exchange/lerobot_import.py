@@ -30,6 +30,7 @@ from shapechanger.demos.exchange.files import (
     parse_json_object,
     read_text,
 )
+from shapechanger.demos.exchange.importing import ImportContext
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
 from shapechanger.demos.exchange.video import read_video
 from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
@@ -60,12 +61,12 @@ def is_lerobot(folder: Path) -> bool:
     return (folder / names.INFO).is_file()
 
 
-def read_lerobot(folder: Path, camera: str = "") -> Iterator[ExchangeEpisode]:
+def read_lerobot(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a dataset.
 
     Args:
         folder: Folder of the dataset.
-        camera: Name of its camera, such as "front"; "" for the only one.
+        context: Its `camera` is a name such as "front".
 
     Raises:
         DemosError: If something is damaged or missing, or cannot be imported.
@@ -81,7 +82,7 @@ def read_lerobot(folder: Path, camera: str = "") -> Iterator[ExchangeEpisode]:
             "convert it with `python -m lerobot.datasets.v30.convert_dataset_v21_to_v30`."
         )
     features = _features(info, path)
-    kept = _Kept.of(features, camera, path)
+    kept = _Kept.of(features, context.camera, path)
     rate = info.get("fps")
     if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < math.inf:
         raise DemosError(f"{path}: fps must be a positive number, got {rate!r}.")
@@ -168,7 +169,7 @@ class _Kept:
 
         Args:
             features: All features.
-            camera: As for `read_lerobot`.
+            camera: Name of the camera, such as "front"; "" for the only one.
             path: The file that they stand in, for errors.
         """
         numbers = {feature.key: feature for feature in features if _NUMBERS.fullmatch(feature.kind)}

@@ -4,7 +4,7 @@ Of a foreign dataset, at most one part of an observation may be a picture; all o
 the state, in order, and those of an action the action. Units are unknown and written "?". Pictures
 that Minari stores as JPEG are kept; others are encoded as JPEG of quality 100, which changes them
 slightly. The driver is unknown and taken to be an "expert". The rate is that of the key
-`control_hz`, or 20 Hz.
+`control_hz`, that of `--hz`, or 20 Hz.
 
 Neither Minari's own folder nor the network is used, and no external HDF5 link is followed.
 """
@@ -33,6 +33,7 @@ from shapechanger.demos.exchange.files import (
     read_text,
     resolve_file,
 )
+from shapechanger.demos.exchange.importing import ImportContext
 from shapechanger.demos.exchange.minari_export import stored_as_jpeg
 from shapechanger.demos.exchange.recorded import DEFAULT_HZ, ExchangeEpisode, ExchangeStep
 from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
@@ -63,8 +64,12 @@ _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not a picture.
 _CHANNELS: Final = (1, 3)
 
 
-def read_minari(folder: Path) -> Iterator[ExchangeEpisode]:
+def read_minari(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a dataset.
+
+    Args:
+        folder: Folder of the dataset.
+        context: Its `hz` applies where the metadata has no `control_hz`.
 
     Raises:
         DemosError: If something is damaged or missing, or a space cannot be imported.
@@ -88,7 +93,7 @@ def read_minari(folder: Path) -> Iterator[ExchangeEpisode]:
     if names.HEADERS in metadata:
         yield from _read_own(main, path, metadata[names.HEADERS], count)
     else:
-        yield from _read_foreign(main, path, metadata, count)
+        yield from _read_foreign(main, path, metadata, count, context)
 
 
 def _require_stored(main: Path, count: int) -> None:
@@ -239,7 +244,7 @@ class _Leaf:
 
 
 def _read_foreign(
-    main: Path, path: Path, metadata: dict[str, Any], count: int
+    main: Path, path: Path, metadata: dict[str, Any], count: int, context: ImportContext
 ) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a dataset of others.
 
@@ -248,6 +253,7 @@ def _read_foreign(
         path: The metadata file, for errors.
         metadata: Its content.
         count: Number of episodes.
+        context: Options and findings of the import.
     """
     observed = list(_leaves_of(_space(metadata, "observation_space", path)))
     acted = list(_leaves_of(_space(metadata, "action_space", path)))
@@ -259,8 +265,10 @@ def _read_foreign(
             "one of them in the dataset."
         )
     sensed = [leaf for leaf in observed if leaf not in pictured]
-    hz = metadata.get("control_hz")
+    hz = metadata.get("control_hz", context.hz)
     known = isinstance(hz, int | float) and math.isfinite(hz) and hz > 0.0
+    if not known:
+        context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
     header = EpisodeHeader(
         action_layout=_layout_of(acted, "action").to_json(),
         state_layout=_layout_of(sensed, "observation").to_json() if sensed else "",

@@ -39,6 +39,7 @@ from shapechanger.demos.exchange.files import (
     read_text,
     resolve_file,
 )
+from shapechanger.demos.exchange.importing import ImportContext
 from shapechanger.demos.exchange.recorded import (
     ExchangeEpisode,
     ExchangeStep,
@@ -109,7 +110,7 @@ def is_tub(folder: Path) -> bool:
         raise cannot_read(folder, error) from error
 
 
-def read_tub(folder: Path) -> Iterator[ExchangeEpisode]:
+def read_tub(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a tub: its sessions, or its drives where it has no sessions.
 
     Records that are marked as deleted are left out.
