@@ -193,6 +193,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         path: Folder of the newest episode; None before the first.
         steps: Number of steps written, over all episodes.
         episodes: Number of episodes begun.
+        seconds: Duration of the closed episodes, s.
         outcome: Outcome of the newest closed episode.
 
     Raises:
@@ -217,6 +218,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         self.path: Path | None = None
         self.steps = 0
         self.episodes = 0
+        self.seconds = 0.0
         self.outcome = ""
         self._writer: EpisodeWriter | None = None
         self._seen: EncodedObservation | None = None
@@ -329,6 +331,7 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         self._seen = self._jpeg = self._decision = None
         if writer is not None:
             self.outcome = outcome
+            self.seconds += writer.seconds + 1.0 / self.control_hz
             writer.close(outcome)
 
     def close(self) -> None:

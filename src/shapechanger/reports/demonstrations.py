@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from itertools import groupby
+from itertools import accumulate, groupby
 from typing import Any, Final
 
 import numpy as np
@@ -221,7 +221,7 @@ def _timeline(episode: Episode) -> dict[str, Any]:
         ],
         "traces": traces,
         "range": f"-{reach:g} (below) to {reach:g} (above)",
-        "seconds": f"{len(episode.steps) / episode.header.control_hz:.1f}",
+        "seconds": f"{sum(episode.durations_s):.1f}",
     }
 
 
@@ -241,11 +241,14 @@ def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
     marked = [index for index in marks if index in {step.index for step in seen}][:_MAX_MARKED]
     chosen = evenly | set(marked)
     kept = {step.index for step in episode.kept}
+    # Times of starts: without the duration of the step itself.
+    starts_s = accumulate(episode.durations_s, initial=0.0)
+    since_start_s = dict(zip((step.index for step in episode.steps), starts_s, strict=False))
     frames: list[dict[str, Any]] = []
     for step in seen:
         if step.index not in chosen:
             continue
-        seconds = (step.index - episode.steps[0].index) / episode.header.control_hz
+        seconds = since_start_s[step.index]
         caption = [f"step {step.index}", f"{seconds:.1f} s"]
         if step.index not in kept:
             caption.append(_drop_reason(episode, step))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +24,8 @@ from shapechanger.demos.exchange import (
 )
 from shapechanger.errors import DemosError, OutputError, ShapechangerError, UnknownName
 from tests.demos.exchange.small import (
+    all_of,
+    content_of,
     drive,
     header,
     huge,
@@ -29,18 +33,17 @@ from tests.demos.exchange.small import (
     picture,
     record,
     snapshot,
-    tub_folder,
 )
 
 FIRST, SECOND, THIRD = (f"1499144070.{n}_0.12{n}.jpg" for n in (1, 2, 3))
 
 
-def refused(folder: Path, out: Path, format: str = "auto") -> str:
+def refused(folder: Path, out: Path, format: str = "auto", *, strict: bool = False) -> str:
     """Return the error of a refused import; check that no file was created or changed."""
     before = snapshot(folder) if folder.is_dir() else {}
     beside = sorted(out.parent.iterdir())
     with pytest.raises(ShapechangerError) as caught:
-        import_recording(folder, out, format)
+        import_recording(folder, out, format, strict=strict)
     assert sorted(out.parent.iterdir()) == beside
     assert (snapshot(folder) if folder.is_dir() else {}) == before
     text = str(caught.value)
@@ -76,38 +79,64 @@ def _pipe(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
-        (lambda f: (f / SECOND).unlink(), f"line 2 names '{SECOND}', which is not in"),
-        (_edit(SECOND, lambda jpeg: jpeg[:-300]), "is damaged"),
-        (_edit(THIRD, lambda jpeg: b""), "is empty"),
-        (_edit(THIRD, lambda jpeg: b"\x89PNG" + jpeg), "is not a JPEG"),
-        (_edit(SECOND, lambda jpeg: huge()), "claims 60000 x 60000 pixels"),
-        (_edit(FIRST, lambda jpeg: huge()), "claims 60000 x 60000 pixels"),
+        (lambda f: (f / SECOND).unlink(), "1 line with a picture that is missing: 2"),
+        (_edit(SECOND, lambda jpeg: jpeg[:-300]), "1 line with a damaged picture: 2"),
+        (_edit(THIRD, lambda jpeg: b""), "1 line with an empty picture: 3"),
+        (_edit(THIRD, lambda jpeg: bytes(900)), "1 line with an empty picture: 3"),
+        (_edit(THIRD, lambda jpeg: b"\x89PNG" + jpeg), "1 line with a damaged picture: 3"),
+        (_edit(THIRD, lambda jpeg: b"GIF89a" + jpeg), "that is not JPEG, PNG or BMP: 3"),
+        (_edit(SECOND, lambda jpeg: huge()), "1 line with a damaged picture: 2"),
         (_edit(SECOND, lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
-        (_edit(SECOND, lambda jpeg: picture(1, 48, 32)), "48 x 32 pixels, and not 40 x 32"),
-        (lambda f: (f / "extra.jpg").write_bytes(picture(5)), "have no line in labels.csv (extra"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"1.0,0.0,0.0,1.0"), "holds forward and left at once"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,0.5"), "line 2: left must be 0 or 1, got '0.5'"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,nan"), "line 2: left must be 0 or 1, got 'nan'"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0"), "line 2 has 4 cells"),
+        (_edit(FIRST, lambda jpeg: picture(1, 48, 32)), "another size than 40 x 32 pixels: 1"),
+        (lambda f: (f / "extra.jpg").write_bytes(picture(5)), "1 picture without a valid line"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"1.0,0.0,0.0,1.0"), "several keys held at once: 2"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,0.5"), "with a key that is not 0 or 1: 2"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,nan"), "with a key that is not 0 or 1: 2"),
+        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0"), "1 line that is not `file,forward"),
         (_labels(SECOND.encode(), b"1499144070.2_/../" + SECOND.encode()), "leaves the folder"),
         (_labels(SECOND.encode(), b"passwd"), "does not begin with the Unix time"),
-        (_labels(SECOND.encode(), FIRST.encode()), "which line 1 labels already"),
-        (_labels(b"0", b"\xff"), "is not text in UTF-8"),
-        (_edit("labels.csv", lambda t: t.decode().encode("utf-16")), "is not text in UTF-8"),
-        (_edit("labels.csv", lambda t: b""), "has no labels"),
-        (_edit("labels.csv", lambda t: t + b'"open'), "is not valid CSV"),
-        (_edit("labels.csv", lambda t: b"".join(t.splitlines(True)[::-1])), "Time runs backwards"),
-        (_link_away, "is a link that leaves the folder"),
-        (_pipe, "which is not in"),
+        (_labels(SECOND.encode(), FIRST.encode()), "the picture of another line: 2 (as 1)"),
+        (_link_away, "with a link that leaves the folder: 2"),
+        (_pipe, "it is not a regular file"),
     ],
 )
 def test_a_damaged_folder_of_2017(
     tmp_path: Path, spoil: Callable[[Path], object], expected: str
 ) -> None:
-    """The error names the file or line, and the remedy."""
+    """What is whole is imported, and the rest named; `strict` refuses instead."""
+    folder = keys_folder(tmp_path / "keys")
+    spoil(folder)
+    assert expected in refused(folder, tmp_path / "data", strict=True)
+    done = import_recording(folder, tmp_path / "data")
+    assert expected in "; ".join(done.left_out)
+    assert done.steps == (3 if "extra.jpg" in "".join(done.left_out) else 2)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (_labels(b"0", b"\xff"), "is not text in UTF-8"),
+        (_edit("labels.csv", lambda t: t.decode().encode("utf-16")), "but in UTF-16"),
+        (_edit("labels.csv", lambda t: b""), "There is nothing to import"),
+        (_edit("labels.csv", lambda t: t + b'"open'), "is not valid CSV"),
+    ],
+)
+def test_a_table_of_2017_that_cannot_be_read(
+    tmp_path: Path, spoil: Callable[[Path], object], expected: str
+) -> None:
+    """A table without a line that can be read is refused."""
     folder = keys_folder(tmp_path / "keys")
     spoil(folder)
     assert expected in refused(folder, tmp_path / "data")
+
+
+def test_lines_of_2017_are_read_in_the_order_of_their_times(tmp_path: Path) -> None:
+    """The names hold the times, so the order of the lines does not count, and is reported."""
+    folder = keys_folder(tmp_path / "keys")
+    _edit("labels.csv", lambda t: b"".join(t.splitlines(True)[::-1]))(folder)
+    done = import_recording(folder, tmp_path / "data")
+    assert done.steps == 3
+    assert "Time runs backwards by up to 0.1 s at line 2, line 3" in done.warnings[0]
 
 
 def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
@@ -115,58 +144,6 @@ def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
     folder = keys_folder(tmp_path / "keys")
     _edit("labels.csv", lambda text: b"\xef\xbb\xbf" + text)(folder)
     assert import_recording(folder, tmp_path / "data").steps == 3
-
-
-_GOOD = [{"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 50 * n} for n in range(3)]
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        ({"user/angle": 1.5}, "user/angle is 1.5"),
-        ({"user/angle": "left"}, "user/angle is 'left'"),
-        ({"user/angle": None}, "has no user/angle"),
-        ({"cam/image_array": None}, "has no picture"),
-        ({"cam/image_array": "../1.jpg"}, "leaves the folder"),
-        ({"cam/image_array": "gone.jpg"}, "is not in"),
-        ({"_timestamp_ms": 500}, "Time runs backwards"),
-    ],
-)
-def test_a_damaged_tub(tmp_path: Path, change: dict[str, object], expected: str) -> None:
-    """The error names the catalog and the line."""
-    records = [*_GOOD[:1], _GOOD[1] | change, *_GOOD[2:]]
-    text = refused(tub_folder(tmp_path / "tub", records), tmp_path / "data")
-    assert expected in text
-    assert "catalog_0.catalog, line 2" in text
-
-
-def test_a_tub_with_damaged_files(tmp_path: Path) -> None:
-    """Partial lines, truncated manifests, outside paths and empty tubs are refused."""
-    out = tmp_path / "data"
-    folder = tub_folder(tmp_path / "torn", _GOOD)
-    _edit("catalog_1.catalog", lambda text: text[:20])(folder)
-    assert "catalog_1.catalog, line 1 is not valid JSON" in refused(folder, out)
-    folder = tub_folder(tmp_path / "short", _GOOD)
-    _edit("manifest.json", lambda text: text.splitlines()[0])(folder)
-    assert "has 1 lines" in refused(folder, out)
-    folder = tub_folder(tmp_path / "away", _GOOD)
-    _edit("manifest.json", lambda text: text.replace(b"catalog_1", b"../catalog_1"))(folder)
-    assert "leaves the folder" in refused(folder, out)
-    folder = tub_folder(tmp_path / "none", _GOOD, deleted=[0, 1, 2])
-    assert "has no records that are not deleted" in refused(folder, out)
-
-
-def test_sessions_at_different_rates(tmp_path: Path) -> None:
-    """A data set has a single control rate."""
-    records = [
-        {"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": ms * n, "_session_id": str(ms)}
-        for ms in (50, 100)
-        for n in range(12)
-    ]
-    folder = tub_folder(tmp_path / "tub", records)
-    text = refused(folder, tmp_path / "data")
-    assert "catalog_6.catalog, line 1 has 10 steps a second" in text
-    assert "catalog_0.catalog, line 1 20, and a data set has one rate" in text
 
 
 @pytest.mark.parametrize(
@@ -178,26 +155,81 @@ def test_sessions_at_different_rates(tmp_path: Path) -> None:
         (_edit("header.json", lambda t: t.replace(b'"unit"', b'"u"')), "header.json: This is not"),
         (_edit("steps.csv", lambda t: t.replace(b"action/steering", b"steer")), "lacks action/"),
         (_edit("steps.csv", lambda t: t.replace(b"person", b"persona")), "Did you mean 'person'"),
-        (_edit("steps.csv", lambda t: t.replace(b"000001.jpg", b"../1.jpg")), "leaves the folder"),
-        (
-            _edit("steps.csv", lambda t: t.replace(b",0.3333333333333333,", b",x,")),
-            "must be a number, got 'x'",
-        ),
-        (
-            _edit("steps.csv", lambda t: t.replace(b"false,false", b"maybe,false")),
-            "expected true or false",
-        ),
-        (_edit("steps.csv", lambda t: t + t.splitlines(True)[1]), "step 0 comes after step 4"),
-        (lambda f: (f / "frames/000002.jpg").unlink(), "which is not in"),
-        (_edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)), "8 x 8 pixels, and not 40"),
     ],
 )
-def test_damaged_csv(tmp_path: Path, spoil: Callable[[Path], object], expected: str) -> None:
+def test_csv_that_cannot_be_read(
+    tmp_path: Path, spoil: Callable[[Path], object], expected: str
+) -> None:
     """Damage by a spreadsheet or an incomplete copy is named."""
     drive(tmp_path / "recorded")
     export_recording(tmp_path / "recorded", tmp_path / "csv", "csv")
     spoil(tmp_path / "csv")
     assert expected in refused(tmp_path / "csv", tmp_path / "data")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (_edit("steps.csv", lambda t: t.replace(b"000001.jpg", b"../1.jpg")), "leaves the folder"),
+        (
+            _edit("steps.csv", lambda t: t.replace(b",0.3333333333333333,", b",x,", 1)),
+            "must be a number, got 'x'",
+        ),
+        (
+            _edit("steps.csv", lambda t: t.replace(b"false,false", b"maybe,false", 1)),
+            "line 2: expected true or false",
+        ),
+        (_edit("steps.csv", lambda t: t + t.splitlines(True)[1]), "step 0 comes after step 4"),
+        (_edit("steps.csv", lambda t: t + b"5,x\n"), "line 7 has 2 cells instead of"),
+        (lambda f: (f / "frames/000002.jpg").unlink(), "which is not in"),
+        (_edit("frames/000002.jpg", lambda jpeg: picture(0, 8, 8)), "8 x 8 pixels, and not 40"),
+    ],
+)
+def test_damaged_lines_of_csv(
+    tmp_path: Path, spoil: Callable[[Path], object], expected: str
+) -> None:
+    """Damage by a spreadsheet or an incomplete copy is named, and the other lines imported."""
+    drive(tmp_path / "recorded")
+    export_recording(tmp_path / "recorded", tmp_path / "csv", "csv")
+    spoil(tmp_path / "csv")
+    assert expected in refused(tmp_path / "csv", tmp_path / "data", strict=True)
+    done = import_recording(tmp_path / "csv", tmp_path / "data")
+    assert expected in "; ".join(done.left_out)
+    assert done.steps == (5 if "comes after" in expected or "cells" in expected else 4)
+
+
+def _spreadsheet(text: bytes, separator: str, *, comma: bool = False) -> bytes:
+    """Return CSV as a spreadsheet writes it back."""
+    out = io.StringIO()
+    writer = csv.writer(out, delimiter=separator, quoting=csv.QUOTE_MINIMAL)
+    for row in csv.reader(io.StringIO(text.decode())):
+        decimal = [re.sub(r"^(-?\d+)\.(\d+)$", r"\1,\2", cell) for cell in row]
+        writer.writerow(decimal if comma else row)
+    return out.getvalue().encode()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda t: b"\xef\xbb\xbf" + t,
+        lambda t: t.replace(b"\n", b"\r\n"),
+        lambda t: t.replace(b"\n", b"\n\n"),
+        lambda t: t + b",,,,,,\r\n  \n",
+        lambda t: _spreadsheet(t, "\t"),
+        lambda t: _spreadsheet(t, ";"),
+        lambda t: _spreadsheet(t, ";", comma=True),
+        lambda t: b"\xef\xbb\xbfsep=;\r\n" + _spreadsheet(t, ";", comma=True),
+    ],
+)
+def test_csv_of_spreadsheets(tmp_path: Path, change: Callable[[bytes], bytes]) -> None:
+    """Separators, decimal commas, blank lines and marks of spreadsheets change no number."""
+    drive(tmp_path / "recorded")
+    export_recording(tmp_path / "recorded", tmp_path / "csv", "csv")
+    _edit("steps.csv", change)(tmp_path / "csv")
+    done = import_recording(tmp_path / "csv", tmp_path / "back", strict=True)
+    assert done.steps == 5
+    (before,), (after,) = all_of(tmp_path / "recorded"), all_of(tmp_path / "back")
+    assert content_of(after)["steps"] == content_of(before)["steps"]
 
 
 def _in_file(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
@@ -363,7 +395,7 @@ def test_a_file_that_disappears_is_named(tmp_path: Path) -> None:
     ((_, steps),) = list(import_episodes(folder))
     next(steps)
     shutil.rmtree(folder)
-    with pytest.raises(DemosError, match="is not in"):
+    with pytest.raises(DemosError, match="a picture that is missing"):
         next(steps)
     with pytest.raises(DemosError, match="There is no"):
         find_format(folder)

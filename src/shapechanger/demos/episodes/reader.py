@@ -30,6 +30,7 @@ from shapechanger.demos.episodes.records import (
     EpisodeHeader,
     Step,
     decode_line,
+    durations_s,
     encode_line,
     split_lines,
 )
@@ -182,10 +183,18 @@ class Episode:
             (gone.difference_update if drop.keep else gone.update)(reach)
         return tuple(step for step in self.steps if step.index not in gone)
 
+    @cached_property
+    def durations_s(self) -> tuple[float, ...]:
+        """How long each step lasted by its time, s; pauses count as one period."""
+        times_ns = [step.clock_ns for step in self.steps]
+        return tuple(durations_s(times_ns, self.header.control_hz))
+
     @property
     def seconds(self) -> float:
         """Duration of the kept steps, s."""
-        return len(self.kept) / self.header.control_hz
+        kept = {step.index for step in self.kept}
+        lasted = zip(self.steps, self.durations_s, strict=True)
+        return sum(seconds for step, seconds in lasted if step.index in kept)
 
     def jpeg(self, step: Step) -> bytes | None:
         """Return the picture of a step as it was received; None for none.

@@ -5,7 +5,9 @@ from __future__ import annotations
 import binascii
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
+from itertools import pairwise
 from typing import Any, Final, Literal, cast
 
 from shapechanger.errors import DemosError
@@ -286,6 +288,33 @@ class Step:
             )
         except (LookupError, TypeError, AttributeError, OverflowError) as error:
             raise ValueError(f"it is not a valid step ({error})") from error
+
+
+_PAUSE_PERIODS: Final = 30.0
+_SHORTEST_PAUSE_S: Final = 1.0  # A disk, or a rate that is not known well, takes this long.
+_NS_PER_S: Final = 1e9
+
+
+def longest_period_s(control_hz: float) -> float:
+    """Return the longest time from one step to the next that is not a pause, s."""
+    return max(_PAUSE_PERIODS / control_hz, _SHORTEST_PAUSE_S)
+
+
+def durations_s(times_ns: Sequence[int | None], control_hz: float) -> list[float]:
+    """Return how long each step lasted: until the next one, s.
+
+    A step lasts one period if it is the last one, if a pause follows, or if a time is unknown.
+
+    Args:
+        times_ns: Time of each step on one clock, ns.
+        control_hz: Steps per second.
+    """
+    period_s, longest_s = 1.0 / control_hz, longest_period_s(control_hz)
+    found: list[float] = []
+    for now, later in pairwise(times_ns):
+        passed_s = -1.0 if now is None or later is None else (later - now) / _NS_PER_S
+        found.append(passed_s if 0.0 <= passed_s <= longest_s else period_s)
+    return [*found, period_s] if times_ns else []
 
 
 def _written(values: Any) -> list[float | str | None]:

@@ -34,7 +34,9 @@ from shapechanger.demos.exchange.minari_export import (
 )
 from shapechanger.demos.exchange.minari_import import read_minari
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episode, kept_steps
-from shapechanger.demos.exchange.tub import MANIFEST, is_tub, read_tub, write_tub
+from shapechanger.demos.exchange.tub_export import MANIFEST, write_tub
+from shapechanger.demos.exchange.tub_files import is_tub
+from shapechanger.demos.exchange.tub_import import read_tub
 from shapechanger.errors import DemosError, OutputError, UnknownName
 from shapechanger.files import cannot_write
 
@@ -248,7 +250,7 @@ def import_recording(
             episodes, steps, pictures = episodes + 1, steps + added, pictures + shown
         if strict:
             context.require_whole(path)
-        if not episodes:
+        if not episodes or (context.left_out and not steps):
             why = f": {'; '.join(lines)}" if (lines := context.left_out_lines()) else ""
             raise DemosError(f"There is nothing to import in {path}{why}.")
     return Imported(

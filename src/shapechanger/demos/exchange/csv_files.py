@@ -8,7 +8,6 @@ one for a formula, and line ends and other special characters survive.
 from __future__ import annotations
 
 import csv
-import io
 import json
 import math
 from collections.abc import Iterator, Sequence
@@ -23,6 +22,7 @@ from shapechanger.demos.exchange.files import (
     cannot_read,
     parse_json,
     parse_json_object,
+    read_table,
     read_text,
     resolve_file,
 )
@@ -95,7 +95,7 @@ def read_csv(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
             raise DemosError(f"{path}: {error}") from error
         yield ExchangeEpisode(
             header=header,
-            rows=_rows(place, header, columns),
+            rows=_rows(place, header, columns, context),
             name=str(place),
             outcome=str(fields.get("outcome", "")),
         )
@@ -164,42 +164,44 @@ def _cell(value: Any) -> str:
 
 
 def _rows(
-    folder: Path, header: EpisodeHeader, columns: dict[str, list[str]]
+    folder: Path, header: EpisodeHeader, columns: dict[str, list[str]], context: ImportContext
 ) -> Iterator[ExchangeStep]:
     path = folder / TABLE
     pictures = Pictures(header.image_size)
-    reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
     names = list(chain.from_iterable(columns.values()))
+    separator, table = read_table(path, len(names))
+    _require_columns(table[0][1] if table else [], names, str(path))
     shown, before = "", -1
     frames: set[str] = set()
-    try:
-        _require_columns(next(reader, list[str]()), names, str(path))
-        for cells in reader:
-            where = f"{path}, line {reader.line_num}"
+    for line, cells in table[1:]:
+        where = f"{path}, line {line}"
+        try:
             if len(cells) != len(names):
-                raise DemosError(f"{where} has {len(cells)} cells instead of {len(names)}.")
-            row = _Row(dict(zip(names, cells, strict=True)), where)
+                hint = " (decimal commas need another separator)" if separator == "," else ""
+                raise DemosError(f"{where} has {len(cells)} cells instead of {len(names)}{hint}.")
+            row = _Row(dict(zip(names, cells, strict=True)), where, separator)
             number = row.number("step", int)
             if number is None:
                 raise DemosError(f"{where}: step is empty.")
             if number <= before:
                 raise DemosError(f"{where}: step {number} comes after step {before}.")
-            before = number
             step, frame, jpeg = row.step(columns), row.cells["frame"], None
             if frame != shown:
                 if header.image_size is None:
                     raise DemosError(f"{where} has a picture, but {_HEADER} has no image_size.")
-                shown = frame
                 if frame in frames:
                     raise DemosError(
                         f"{where} returns to the picture {frame!r} of an earlier step."
                     )
-                frames.add(frame)
                 jpeg = pictures.read(resolve_file(folder / _FRAMES, frame, where))
             marks = tuple(map(str, row.json("marks", list) or ()))
-            yield ExchangeStep(step=step, jpeg=jpeg, marks=marks, dropped=row.json("dropped", str))
-    except csv.Error as error:
-        raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
+            dropped = row.json("dropped", str)
+        except DemosError as error:
+            context.leave_out("line", f"of {path}", str(error).removeprefix(f"{path}, ")[:-1])
+            continue
+        before, shown = number, frame
+        frames.add(frame)
+        yield ExchangeStep(step=step, jpeg=jpeg, marks=marks, dropped=dropped)
 
 
 def _require_columns(found: Sequence[str], names: Sequence[str], where: str) -> None:
@@ -221,10 +223,12 @@ class _Row:
     Attributes:
         cells: The cells by the name of their column.
         where: How to name the line in errors.
+        separator: What separates the cells; other than commas, numbers may have decimal commas.
     """
 
     cells: dict[str, str]
     where: str
+    separator: str
 
     def step(self, columns: dict[str, list[str]]) -> Step:
         """Return the step; `columns` are those of each of its fields."""
@@ -275,7 +279,7 @@ class _Row:
 
     def _parsed(self, text: str, kind: type[_N], name: str) -> _N:
         try:
-            return kind(text)
+            return kind(text if self.separator == "," else text.replace(",", "."))
         except ValueError as error:
             what = "an integer" if kind is int else "a number"
             raise DemosError(f"{self.where}: {name} must be {what}, got {text!r}.") from error

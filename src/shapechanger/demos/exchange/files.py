@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import codecs
+import csv
+import io
 import json
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 
 from shapechanger.demos.episodes.files import (
     MAX_PICTURE_BYTES,
@@ -20,6 +24,9 @@ from shapechanger.demos.episodes.files import (
 from shapechanger.demos.jpeg import decode_picture, picture_size
 from shapechanger.errors import DemosError, MissingExtra, OutputError
 from shapechanger.files import cannot_write
+
+_SEPARATORS: Final = (",", "\t", ";")
+_SEPARATOR_LINE: Final = re.compile(r"sep=([,;\t])")  # As Excel writes it.
 
 
 def library(name: str, extra: str = "data") -> Any:
@@ -122,13 +129,48 @@ def read_text(path: Path) -> str:
         DemosError: If the file cannot be read, is too large, or is not UTF-8.
     """
     try:
-        return read_file(path, MAX_TEXT_BYTES).decode("utf-8-sig")
+        data = read_file(path, MAX_TEXT_BYTES)
+        if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            raise DemosError(f"{path} is not text in UTF-8 but in UTF-16: save it as UTF-8.")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DemosError(
             f"{path} is not text in UTF-8 (byte {error.start}): save it as UTF-8."
         ) from error
     except OSError as error:
         raise cannot_read(path, error) from error
+
+
+def read_table(path: Path, columns: int) -> tuple[str, list[tuple[int, list[str]]]]:
+    """Read a CSV file, also as spreadsheets write it: with semicolons or tabs, and blank lines.
+
+    Args:
+        path: The file.
+        columns: Number of its columns.
+
+    Returns:
+        What separates the cells, and the number and the cells of each line that is not blank.
+
+    Raises:
+        DemosError: If the file cannot be read, or is not CSV.
+    """
+    text = read_text(path)
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    stated = _SEPARATOR_LINE.fullmatch(first.strip())
+    separator = stated[1] if stated else _SEPARATORS[0]
+    if not stated:
+        found = [mark for mark in _SEPARATORS if first.count(mark) >= columns - 1]
+        # Decimal commas stand between semicolons, so the last one that fits separates.
+        separator = found[-1] if found else _SEPARATORS[0]
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
+    lines: list[tuple[int, list[str]]] = []
+    try:
+        for cells in reader:
+            if any(cell.strip() for cell in cells) and (lines or not stated or reader.line_num > 1):
+                lines.append((reader.line_num, cells))
+    except csv.Error as error:
+        raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
+    return separator, lines
 
 
 def parse_json(text: str, where: str) -> Any:

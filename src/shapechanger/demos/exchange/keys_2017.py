@@ -12,32 +12,21 @@ are kept, so that a round trip gives the same bytes.
 from __future__ import annotations
 
 import csv
-import io
 import re
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.files import (
-    Pictures,
-    cannot_read,
-    name_problem,
-    read_text,
-    resolve_file,
-)
-from shapechanger.demos.exchange.importing import ImportContext
-from shapechanger.demos.exchange.recorded import (
-    ExchangeEpisode,
-    ExchangeStep,
-    kept_steps,
-    rate_hz,
-    require_order,
-    split_at_gaps,
-)
+from shapechanger.demos.exchange.files import cannot_read, name_problem, read_table, read_text
+from shapechanger.demos.exchange.importing import ImportContext, few
+from shapechanger.demos.exchange.pictures import check_pictures, read_picture
+from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep, kept_steps
+from shapechanger.demos.exchange.times import Drive, TimeReport, choose_rates, iso_time
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 
@@ -49,7 +38,6 @@ _LAYOUT: Final = Layout(tuple(Feature(key, "1", 0.0, 1.0) for key in _KEYS))
 _ENDINGS: Final = (".jpg", ".jpeg")
 _TIME: Final = re.compile(r"([0-9]{1,12}(?:\.[0-9]{1,9})?)(?![0-9])")
 _NS_PER_S: Final = 10**9
-_MAX_NAMED: Final = 3
 
 # How `labels.csv` may be written; the first of each is how the cars of 2017 wrote it.
 _STYLES: Final[dict[str, tuple[object, object]]] = {
@@ -78,30 +66,42 @@ def read_2017(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]
     """Yield the episodes of a folder: one, unless there are long pauses.
 
     Raises:
-        DemosError: If something is damaged, missing or contradictory.
+        DemosError: If the table cannot be read.
     """
-    labels, style = _read_labels(folder / LABELS)
-    _require_all_labelled(folder, labels)
+    labels, style = _read_labels(folder / LABELS, context)
+    _leave_out_unlabelled(folder, labels, context)
+    paths: list[Path] = []
+    found: list[_Label] = []
+    for label in _in_order(labels, context):
+        path = folder / label.file
+        if path.resolve().is_relative_to(folder.resolve()):
+            found.append(label)
+            paths.append(path)
+        else:
+            context.leave_out("line", "with a link that leaves the folder", label.line)
+    good, size = check_pictures(paths, [str(label.line) for label in found], "line", context)
+    labels = [label for label, is_good in zip(found, good, strict=True) if is_good]
+    if not labels:
+        return
     times_ns = [label.wall_ns for label in labels]
-    require_order(
-        times_ns,
-        [f"line {label.line}" for label in labels],
-        f"sort the lines of {folder / LABELS} by their first column",
-    )
-    first = Pictures()
-    first.read(_picture(folder, labels[0]))
-    hz = rate_hz(times_ns)
-    for number, part in enumerate(split_at_gaps(times_ns), 1):
+    drive = Drive(times_ns, range(len(labels)), f"line {labels[0].line}")
+    (hz,), believed = choose_rates([drive], context)
+    report = TimeReport(context)
+    names = [f"line {label.line}" for label in labels]
+    parts = report.split(times_ns, names, hz) if believed else [slice(None)]
+    for number, part in enumerate(parts, 1):
         header = EpisodeHeader(
             action_layout=_LAYOUT.to_json(),
-            image_size=first.size,
+            image_size=size,
             control_hz=hz,
-            clock="none",
+            clock="real" if believed else "none",
             source="2017",
             notes={"files": [label.file for label in labels[part]], "labels": style},
+            created=iso_time(labels[part][0].wall_ns) if believed else "",
         )
-        rows = _rows(folder, labels[part], Pictures(first.size))
+        rows = _rows(folder, labels[part], timed=believed)
         yield ExchangeEpisode(header=header, rows=rows, name=f"{folder}, part {number}")
+    report.finish()
 
 
 def write_2017(episodes: Iterable[ExchangeEpisode], folder: Path) -> int:
@@ -159,82 +159,92 @@ def write_2017(episodes: Iterable[ExchangeEpisode], folder: Path) -> int:
     return len(lines)
 
 
-def _rows(folder: Path, labels: Sequence[_Label], pictures: Pictures) -> Iterator[ExchangeStep]:
+def _rows(folder: Path, labels: Sequence[_Label], *, timed: bool) -> Iterator[ExchangeStep]:
     for label in labels:
-        jpeg = pictures.read(_picture(folder, label))
-        step = Step(action=label.held, driver="person", wall_ns=label.wall_ns)
-        yield ExchangeStep(step=step, jpeg=jpeg)
+        step = Step(
+            action=label.held,
+            driver="person",
+            captured_ns=label.wall_ns if timed else None,
+            wall_ns=label.wall_ns,
+        )
+        yield ExchangeStep(step=step, jpeg=read_picture(folder / label.file)[0])
 
 
-def _picture(folder: Path, label: _Label) -> Path:
-    return resolve_file(folder, label.file, f"{folder / LABELS}, line {label.line}")
+def _in_order(labels: Sequence[_Label], context: ImportContext) -> list[_Label]:
+    """Return the labels in the order of their times."""
+    falls = [
+        (one.wall_ns - two.wall_ns, two.line)
+        for one, two in pairwise(labels)
+        if two.wall_ns < one.wall_ns
+    ]
+    if falls:
+        context.warn(
+            f"Time runs backwards by up to {max(falls)[0] / _NS_PER_S:.6g} s at "
+            f"{few([f'line {line}' for _, line in falls])}: the lines are read in the order of "
+            "their times."
+        )
+    return sorted(labels, key=lambda label: label.wall_ns)
 
 
-def _read_labels(path: Path) -> tuple[list[_Label], dict[str, Any]]:
+def _read_labels(path: Path, context: ImportContext) -> tuple[list[_Label], dict[str, Any]]:
     """Return the labels in order, and how they are written, so that an export can repeat it."""
-    text = read_text(path)
     labels: list[_Label] = []
     numbers: set[str] = set()
     headed = False
     lines: dict[str, int] = {}
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        for cells in reader:
-            if not cells:
-                continue
-            where = f"{path}, line {reader.line_num}"
-            if not labels and tuple(cell.strip().lower() for cell in cells) == _COLUMNS:
-                headed = True
-                continue
-            label = _label(cells, reader.line_num, where)
-            if label.file in lines:
-                raise DemosError(
-                    f"{where} labels {label.file!r}, which line {lines[label.file]} labels "
-                    "already: remove one of the two lines."
-                )
-            lines[label.file] = label.line
-            labels.append(label)
-            numbers.update(cells[1:])
-    except csv.Error as error:
-        raise DemosError(f"{path}, line {reader.line_num}, is not valid CSV: {error}.") from error
-    if not labels:
-        raise DemosError(f"{path} has no labels: a line must be `{','.join(_COLUMNS)}`.")
+    _, table = read_table(path, len(_COLUMNS))
+    for line, cells in table:
+        if not labels and tuple(cell.strip().lower() for cell in cells) == _COLUMNS:
+            headed = True
+            continue
+        label = _label(cells, line, context)
+        if label is None:
+            continue
+        if label.file in lines:
+            reason = "with the picture of another line"
+            context.leave_out("line", reason, f"{label.line} (as {lines[label.file]})")
+            continue
+        lines[label.file] = label.line
+        labels.append(label)
+        numbers.update(cells[1:])
     style = {
         "header": headed,
-        "newline": "\r\n" if "\r\n" in text else "\n",
+        "newline": "\r\n" if "\r\n" in read_text(path) else "\n",
         "numbers": "0" if numbers <= {"0", "1"} else "0.0",
     }
     return labels, style
 
 
-def _label(cells: list[str], line: int, where: str) -> _Label:
-    if len(cells) != len(_COLUMNS):
-        raise DemosError(
-            f"{where} has {len(cells)} cells instead of {len(_COLUMNS)}: a line must be "
-            f"`{','.join(_COLUMNS)}`."
-        )
+def _label(cells: list[str], line: int, context: ImportContext) -> _Label | None:
+    """Return a line as a label; None, with a finding, if it is not one."""
     name, *words = cells
+    reason = ""
     held: list[float] = []
-    for key, word in zip(_KEYS, words, strict=True):
-        try:
-            value = float(word)
-        except ValueError:
-            value = -1.0
-        if value not in {0.0, 1.0}:
-            raise DemosError(f"{where}: {key} must be 0 or 1, got {word!r}.")
-        held.append(abs(value))  # -0.0 is 0.
-    if sum(held) > 1.0:
-        both = " and ".join(key for key, value in zip(_KEYS, held, strict=True) if value)
-        raise DemosError(f"{where} holds {both} at once, but at most one key may be held.")
-    if problem := name_problem(name):
-        raise DemosError(f"{where}: the name {name!r} {problem}; pictures must be beside {LABELS}.")
     at_ns = _time_ns(name)
-    if at_ns is None:
-        raise DemosError(
-            f"{where}: the name {name!r} does not begin with the Unix time in seconds, as "
-            "`1499144070.72_0.1248.jpg` does."
-        )
+    if len(cells) != len(_COLUMNS):
+        reason = f"that is not `{','.join(_COLUMNS)}`"
+    elif problem := name_problem(name):
+        reason = f"whose picture's name {problem}"
+    elif at_ns is None:
+        reason = "whose picture's name does not begin with the Unix time in seconds"
+    else:
+        held = [number for word in words if (number := _held(word)) is not None]
+        if len(held) != len(_KEYS):
+            reason = "with a key that is not 0 or 1"
+        elif sum(held) > 1.0:
+            reason = "with several keys held at once"
+    if reason or at_ns is None:
+        context.leave_out("line", reason, line)
+        return None
     return _Label(name, tuple(held), at_ns, line)
+
+
+def _held(word: str) -> float | None:
+    try:
+        value = abs(float(word.replace(",", ".")))  # -0.0 is 0.
+    except ValueError:
+        return None
+    return value if value in {0.0, 1.0} else None
 
 
 def _time_ns(name: str) -> int | None:
@@ -243,23 +253,16 @@ def _time_ns(name: str) -> int | None:
     return int(Decimal(match[1]) * _NS_PER_S) if match else None
 
 
-def _require_all_labelled(folder: Path, labels: Sequence[_Label]) -> None:
-    """Refuse pictures without a label."""
+def _leave_out_unlabelled(folder: Path, labels: Sequence[_Label], context: ImportContext) -> None:
+    """Leave out the pictures without a label."""
     named = {label.file for label in labels}
     try:
-        stray = sorted(
-            path.name
-            for path in folder.iterdir()
-            if path.suffix.lower() in _ENDINGS and path.name not in named
-        )
+        children = sorted(path.name for path in folder.iterdir())
     except OSError as error:
         raise cannot_read(folder, error) from error
-    if stray:
-        few = ", ".join(stray[:_MAX_NAMED]) + (", ..." if len(stray) > _MAX_NAMED else "")
-        raise DemosError(
-            f"{len(stray)} of the pictures in {folder} have no line in {LABELS} ({few}): add their "
-            "lines, or move them away."
-        )
+    for name in children:
+        if name.lower().endswith(_ENDINGS) and name not in named:
+            context.leave_out("picture", f"without a valid line in {LABELS}", name)
 
 
 def _former_names(files: object) -> dict[int, deque[str]]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 from shapechanger.demos.episodes import Episode, EpisodeHeader, Step
@@ -14,9 +12,6 @@ from shapechanger.layout import Layout
 
 DEFAULT_HZ: Final = 20.0
 """Steps per second of an episode without any information on its rate, Hz."""
-
-_GAP_PERIODS: Final = 30.0  # A longer pause ends an episode.
-_NS_PER_S: Final = 1e9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,42 +141,3 @@ def _rows(episode: Episode, *, dropped: bool) -> Iterator[ExchangeStep]:
             marks=marks.get(step.index, ()),
             dropped=why.get(step.index, "") if excluded else None,
         )
-
-
-def require_order(times_ns: Sequence[int], names: Sequence[str], remedy: str) -> None:
-    """Refuse time that runs backwards; equal times are in order.
-
-    Args:
-        times_ns: Time of each step, ns.
-        names: How to name each step in errors.
-        remedy: What the user can do, as the end of a sentence.
-
-    Raises:
-        DemosError: If a step is earlier than the one before it.
-    """
-    for number, (earlier, later) in enumerate(pairwise(times_ns)):
-        if later < earlier:
-            raise DemosError(
-                f"Time runs backwards by {(earlier - later) / _NS_PER_S:.6g} s from "
-                f"{names[number]} to {names[number + 1]}: {remedy}."
-            )
-
-
-def rate_hz(times_ns: Sequence[int]) -> float:
-    """Return the steps per second, from the median period, Hz; `DEFAULT_HZ` without a period."""
-    periods = [later - earlier for earlier, later in pairwise(times_ns)]
-    period = statistics.median(periods) if periods else 0.0
-    return _NS_PER_S / period if period > 0.0 else DEFAULT_HZ
-
-
-def split_at_gaps(times_ns: Sequence[int]) -> list[slice]:
-    """Split a drive into episodes at each pause of more than 30 median periods."""
-    if not times_ns:
-        return []
-    longest = _GAP_PERIODS * _NS_PER_S / rate_hz(times_ns)
-    starts = [0] + [
-        number + 1
-        for number, (earlier, later) in enumerate(pairwise(times_ns))
-        if later - earlier > longest
-    ]
-    return [slice(first, last) for first, last in pairwise([*starts, len(times_ns)])]

@@ -17,6 +17,7 @@ from msgspec import Meta
 from shapechanger.demos.episodes import drop, keep
 from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode
 from shapechanger.demos.episodes.reader import read_header
+from shapechanger.demos.episodes.records import durations_s
 from shapechanger.errors import DemosError, ShapechangerError
 from shapechanger.link.messages import (
     MAX_EPISODES,
@@ -38,6 +39,8 @@ Answer = Recordings | Piece | Refused
 _EPISODE_ID: Final = re.compile(r"[0-9A-Za-z][0-9A-Za-z._-]{0,127}")
 # The start of `Step.to_json`. Steps are matched without parsing the JSON: there are 1200 a minute.
 _STEP: Final = re.compile(rb'\{"kind":"step","step":(\d{1,15}),')
+# The first of both is that of `Step.clock_ns`; a text in the line would have its quotes escaped.
+_TIMES: Final = re.compile(rb'"(?:captured|decided)_ns":(-?\d{1,19})')
 _MAX_TEXT: Final = 200
 _CHUNK: Final = 1 << 16
 _JOIN_S: Final = 2.0
@@ -310,11 +313,12 @@ def _summary(path: Path) -> EpisodeSummary:
     header, closed = read_header(path)
     steps, dropped = _steps(path / STEPS)
     kept = len(steps) - len(dropped)
+    lasted = zip(steps, durations_s(list(steps.values()), header.control_hz), strict=True)
     return EpisodeSummary(
         id=path.name,
         steps=len(steps),
         kept=kept,
-        seconds=kept / header.control_hz,
+        seconds=sum(seconds for index, seconds in lasted if index not in dropped),
         closed=closed is not None,
         created=header.created[:_MAX_TEXT],
         driver=header.driver[:_MAX_TEXT],
@@ -322,20 +326,21 @@ def _summary(path: Path) -> EpisodeSummary:
     )
 
 
-def _steps(file: Path) -> tuple[set[int], set[int]]:
-    """Return the indices of all steps, and of the dropped ones.
+def _steps(file: Path) -> tuple[dict[int, int | None], set[int]]:
+    """Return the time of each step by its index, ns, and the indices of the dropped ones.
 
     Raises:
         OSError: If the file cannot be read.
     """
-    steps: set[int] = set()
+    steps: dict[int, int | None] = {}
     dropped: set[int] = set()
     edits: list[_EditLine] = []
     with file.open("rb") as lines:
         for line in lines:
             step = _STEP.match(line)
             if step is not None and line.endswith(b"\n"):
-                steps.add(int(step[1]))
+                at = _TIMES.search(line)
+                steps[int(step[1])] = None if at is None else int(at[1])
             elif step is None and (edit := _edit(line)) is not None:
                 edits.append(edit)
     for edit in edits:

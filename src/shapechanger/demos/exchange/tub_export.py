@@ -1,0 +1,174 @@
+"""Export of recordings as tubs of Donkeycar, version 2; `tub_import` describes the format."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final, cast
+
+from shapechanger.demos.episodes import EpisodeHeader, Step
+from shapechanger.demos.exchange.recorded import ExchangeEpisode, kept_steps
+from shapechanger.errors import DemosError
+from shapechanger.layout import Feature, Layout
+
+ACTIONS: Final = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
+"""Layout of the actions of a tub."""
+
+MANIFEST: Final = "manifest.json"
+IMAGES: Final = "images"
+IMAGE: Final = "cam/image_array"
+MODE: Final = "user/mode"
+PERSON_DRIVES: Final = "user"
+AXES: Final = ("angle", "throttle")
+
+_POLICY_DRIVES: Final = "local"
+_CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
+_NS_PER_MS: Final = 1_000_000
+_NS_PER_S: Final = 1_000_000_000
+
+
+def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
+    """Write episodes into an existing folder, as the sessions of one tub of version 2.
+
+    Actions of people, experts and programs become the user's, those of policies the pilot's. Steps
+    of a simulated drive get the times of its own clock, since the recorder's tells how fast the
+    simulation ran; steps without a time follow the one before at the rate of the episode.
+
+    Args:
+        episodes: The episodes.
+        folder: Where to write.
+
+    Returns:
+        Number of steps written.
+
+    Raises:
+        DemosError: If the actions are not steering and throttle, or a step has no picture.
+    """
+    states = [_state_names(episode) for episode in episodes]
+    if any(state != states[0] for state in states):
+        raise DemosError("The episodes have different states: export each kind to its own tub.")
+    (folder / IMAGES).mkdir()
+    records: list[dict[str, Any]] = []
+    sessions: list[str] = []
+    for number, episode in enumerate(episodes):
+        sessions.append(f"{_created(episode.header):%y-%m-%d}_{number}")
+        timestamp_ms = _timestamps_ms(episode.header)
+        for step, jpeg in kept_steps(episode.rows):
+            if jpeg is None:
+                raise DemosError(f"A step of {episode.name} has no picture: export it to csv.")
+            name = f"{len(records)}_cam_image_array_.jpg"
+            (folder / IMAGES / name).write_bytes(jpeg)
+            fields = _fields(step, states[0], f"{episode.name}, record {len(records)}")
+            fields |= {IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
+            records.append(fields | {"_timestamp_ms": timestamp_ms(step)})
+    created_s = _created(episodes[0].header).timestamp()
+    paths = _write_catalogs(folder, records, created_s)
+    inputs = {IMAGE: "image_array", "user/angle": "float", "user/throttle": "float", MODE: "str"}
+    inputs |= {"pilot/angle": "float", "pilot/throttle": "float"}
+    inputs |= dict.fromkeys(states[0], "float")
+    named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
+    lines: tuple[object, ...] = (
+        list(inputs),
+        list(inputs.values()),
+        {},
+        {"created_at": created_s, "sessions": named},
+        {
+            "paths": paths,
+            "current_index": len(records),
+            "max_len": _CATALOG_LENGTH,
+            "deleted_indexes": [],
+        },
+    )
+    _write_lines(folder / MANIFEST, [json.dumps(line) for line in lines])
+    return len(records)
+
+
+def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
+    """Return the names of the values of the state."""
+    names = Layout.from_json(episode.header.action_layout).names
+    if names != ACTIONS.names:
+        raise DemosError(
+            f"The actions of {episode.name} are {', '.join(names)}, but those of a tub are "
+            f"{', '.join(ACTIONS.names)}: export it to minari or csv."
+        )
+    if not episode.header.state_layout:
+        return ()
+    state = Layout.from_json(episode.header.state_layout)
+    if state.size != len(state):
+        raise DemosError(f"The state of {episode.name} has array features: export it to csv.")
+    return state.names
+
+
+def _fields(step: Step, state: Sequence[str], where: str) -> dict[str, Any]:
+    by_policy = step.driver == "policy"
+    if any(abs(value) > 1.0 for value in step.action):
+        raise DemosError(f"{where}: the action {list(step.action)} is not from -1 to 1.")
+    fields: dict[str, Any] = {MODE: _POLICY_DRIVES if by_policy else PERSON_DRIVES}
+    # A tub always contains the user's action; while a policy drives, it is 0.
+    user = (0.0, 0.0) if by_policy else step.action
+    fields |= {f"user/{axis}": value for axis, value in zip(AXES, user, strict=True)}
+    pilot = step.action if by_policy else step.wanted
+    if pilot is not None and all(abs(value) <= 1.0 for value in pilot):
+        fields |= {f"pilot/{axis}": value for axis, value in zip(AXES, pilot, strict=True)}
+    known = zip(state, step.state, strict=True)
+    return fields | {name: value for name, value in known if math.isfinite(value)}
+
+
+def _timestamps_ms(header: EpisodeHeader) -> Callable[[Step], int]:
+    """Return a function that maps each step of an episode, in order, to its Unix time, ms.
+
+    The times always increase.
+    """
+    simulated = header.clock == "twin" or (header.clock == "none" and bool(header.env))
+    created_ns = round(_created(header).timestamp() * _NS_PER_S)
+    began_ns: int | None = None
+    last_ns: int | None = None
+
+    def timestamp_ms(step: Step) -> int:
+        nonlocal began_ns, last_ns
+        at_ns = step.wall_ns
+        if simulated:
+            clock_ns = step.clock_ns
+            began_ns = clock_ns if began_ns is None else began_ns
+            at_ns = None if clock_ns is None else created_ns + clock_ns - cast("int", began_ns)
+        if at_ns is None or (last_ns is not None and at_ns <= last_ns):
+            period_ns = round(_NS_PER_S / header.control_hz)
+            at_ns = created_ns if last_ns is None else last_ns + period_ns
+        last_ns = at_ns
+        return round(at_ns / _NS_PER_MS)
+
+    return timestamp_ms
+
+
+def _created(header: EpisodeHeader) -> datetime:
+    """Return when an episode began; the Unix epoch if unknown."""
+    try:
+        return datetime.fromisoformat(header.created)
+    except ValueError:
+        return datetime.fromtimestamp(0.0, UTC)
+
+
+def _write_catalogs(folder: Path, records: Sequence[dict[str, Any]], created_s: float) -> list[str]:
+    """Write the catalogs, each with its manifest; return the names of the catalogs."""
+    paths: list[str] = []
+    for number, start in enumerate(range(0, len(records), _CATALOG_LENGTH)):
+        part = records[start : start + _CATALOG_LENGTH]
+        lines = [json.dumps(record, allow_nan=False, sort_keys=True) for record in part]
+        paths.append(f"catalog_{number}.catalog")
+        _write_lines(folder / paths[-1], lines)
+        beside = f"catalog_{number}.catalog_manifest"
+        kept = {
+            "created_at": created_s,
+            "line_lengths": [len(line) + 1 for line in lines],
+            "path": beside,
+            "start_index": start,
+        }
+        _write_lines(folder / beside, [json.dumps(kept, sort_keys=True)])
+    return paths
+
+
+def _write_lines(path: Path, lines: Sequence[str]) -> None:
+    path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")

@@ -1,0 +1,467 @@
+"""Donkeycar tubs: numbers and times are read, and what is not whole is named."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import json
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from shapechanger.demos.exchange import Imported, import_recording
+from shapechanger.errors import DemosError, UnknownName
+from shapechanger.layout import Layout
+from tests.demos.exchange.small import all_of, picture, tub_folder
+
+T0_MS = 1_700_000_000_000
+
+
+def records(
+    count: int, first: int = 0, period_ms: float = 50.0, **more: Any
+) -> list[dict[str, Any]]:
+    """Return records whose steering is a hundredth of their `_index`."""
+    return [
+        {
+            "_index": first + n,
+            "_timestamp_ms": T0_MS + round(n * period_ms),
+            "user/angle": (first + n) / 100,
+            "user/throttle": 0.5,
+        }
+        | more
+        for n in range(count)
+    ]
+
+
+def imported(folder: Path, **options: Any) -> tuple[list[list[int]], Imported]:
+    """Import a tub, and return the numbers of the records of each episode, by their steering."""
+    out = folder.with_name(f"{folder.name}-data-{len(list(folder.parent.iterdir()))}")
+    done = import_recording(folder, out, **options)
+    return [[round(s.action[0] * 100) for s in e.steps] for e in all_of(out)], done
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    first=st.integers(0, 50),
+    count=st.integers(2, 12),
+    chosen=st.data(),
+    per_catalog=st.integers(1, 6),
+)
+def test_deletions_go_by_index(
+    tmp_path_factory: pytest.TempPathFactory,
+    first: int,
+    count: int,
+    chosen: st.DataObject,
+    per_catalog: int,
+) -> None:
+    """Whatever catalogs were removed, a deletion hits the record with its `_index`."""
+    kept = chosen.draw(st.integers(first, first + count - 1))
+    indexes = st.integers(first, first + count - 1)
+    deleted = chosen.draw(st.sets(indexes.filter(lambda n: n != kept)))
+    folder = tub_folder(
+        tmp_path_factory.mktemp("tub") / "tub",
+        [r | {"cam/image_array": None} for r in records(count, first)],
+        sorted(deleted),
+        per_catalog=per_catalog,
+    )
+    episodes, done = imported(folder)
+    assert episodes == [[n for n in range(first, first + count) if n not in deleted]]
+    assert not done.left_out
+
+
+def test_exclude_json_of_version_1(tmp_path: Path) -> None:
+    """The deletions of version 1 go by the numbers of the records."""
+    folder = tmp_path / "tub"
+    folder.mkdir()
+    for n in range(3, 12):
+        (folder / f"{n}_cam.jpg").write_bytes(picture(n))
+        fields = {"cam/image_array": f"{n}_cam.jpg", "user/angle": n / 100, "user/throttle": 0.5}
+        (folder / f"record_{n}.json").write_text(json.dumps(fields | {"milliseconds": 50 * n}))
+    (folder / "meta.json").write_text(json.dumps({"inputs": [], "types": [], "start": 1.5e9}))
+    (folder / "exclude.json").write_text("[5, 6, 40]")
+    ((numbers,), done) = imported(folder)
+    assert numbers == [3, 4, 7, 8, 9, 10, 11]
+    assert done.notes == ("2 records are deleted in the tub, and not imported.",)
+    (folder / "exclude.json").write_text('{"5": true}')
+    with pytest.raises(DemosError, match=r"numbers in .*exclude.json must be a list"):
+        imported(folder)
+
+
+def _lines(folder: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
+    path = folder / "catalog_0.catalog"
+    path.write_bytes(b"".join(change(path.read_bytes().splitlines(True))))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected", "kept"),
+    [
+        (lambda f: (f / "images/3_cam_image_array_.jpg").unlink(), "picture that is missing: 3", 9),
+        (
+            lambda f: (f / "images/3_cam_image_array_.jpg").write_bytes(b""),
+            "an empty picture: 3",
+            9,
+        ),
+        (
+            lambda f: (f / "images/3_cam_image_array_.jpg").write_bytes(picture(0)[:-99]),
+            "1 record with a damaged picture: 3",
+            9,
+        ),
+        (
+            lambda f: (f / "images/0_cam_image_array_.jpg").write_bytes(picture(0, 80, 32)),
+            "with a picture of another size than 40 x 32 pixels: 0",
+            9,
+        ),
+        (lambda f: _lines(f, lambda lines: [*lines, bytes(512)]), "line of NUL bytes, as", 10),
+        (lambda f: _lines(f, lambda lines: [*lines[:-1], lines[-1][:-9]]), "not valid JSON", 9),
+        (lambda f: _lines(f, lambda lines: [*lines, b"\xff{}\n"]), "not valid JSON", 10),
+        (lambda f: _lines(f, lambda lines: [*lines, lines[4]]), "that repeats another: 4", 10),
+        (
+            lambda f: _lines(f, lambda ls: [*ls, ls[4].replace(b"0.04", b"0.9")]),
+            "2 records with the _index of another record: 4, 4",
+            9,
+        ),
+        (
+            lambda f: _lines(
+                f, lambda ls: [ls[0].replace(b'"_index": 0', b'"_index": "x"'), *ls[1:]]
+            ),
+            "1 record without a valid _index",
+            9,
+        ),
+    ],
+)
+def test_the_rest_of_a_damaged_tub_is_imported(
+    tmp_path: Path, spoil: Callable[[Path], object], expected: str, kept: int
+) -> None:
+    """What is not whole is named with its reason; `strict` refuses it with the same words."""
+    folder = tub_folder(tmp_path / "tub", records(10), per_catalog=10)
+    spoil(folder)
+    with pytest.raises(DemosError, match="is not whole") as caught:
+        imported(folder, strict=True)
+    assert expected in str(caught.value)
+    episodes, done = imported(folder)
+    assert sum(map(len, episodes)) == kept
+    assert expected in "; ".join(done.left_out)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"user/angle": 1.5}, "with user/angle or user/throttle that is not a number from -1 to 1"),
+        ({"user/angle": "left"}, "with user/angle or user/throttle that is not a number"),
+        ({"user/angle": True}, "with user/angle or user/throttle that is not a number"),
+        ({"user/throttle": None}, "without user/throttle"),
+        ({"user/mode": "local"}, "without pilot/angle and pilot/throttle, although a pilot drove"),
+        ({"cam/image_array": None}, "without a picture"),
+        ({"cam/image_array": "../1.jpg"}, "with a picture name that leaves the folder"),
+        ({"cam/image_array": "a\0b.jpg"}, "with a picture name that leaves the folder"),
+        ({"cam/image_array": "gone.jpg"}, "with a picture that is missing"),
+    ],
+)
+def test_records_that_are_not_whole(tmp_path: Path, change: dict[str, Any], expected: str) -> None:
+    """Each kind of fault is one line, with the numbers of the first records and a count."""
+    good = records(10)
+    spoilt = [r | change if r["_index"] % 2 else r for r in good]
+    episodes, done = imported(tub_folder(tmp_path / "tub", spoilt))
+    assert episodes == [[0, 2, 4, 6, 8]]
+    (line,) = done.left_out
+    assert line.startswith("5 records ")
+    assert expected in line
+    assert line.endswith(": 1, 3, 5, and 2 more")
+
+
+def test_records_that_share_a_picture(tmp_path: Path) -> None:
+    """The file holds the picture of one of them, and nothing says of which."""
+    made = records(4)
+    made[3]["cam/image_array"] = "1_cam_image_array_.jpg"
+    episodes, done = imported(tub_folder(tmp_path / "tub", made))
+    assert episodes == [[0, 2]]
+    assert done.left_out == ("2 records with the picture of another record: 1, 3",)
+
+
+def test_catalogs_in_another_order(tmp_path: Path) -> None:
+    """Records are read in the order of their `_index`, which is reported."""
+    folder = tub_folder(tmp_path / "tub", records(6))
+    manifest = folder / "manifest.json"
+    paths = '["catalog_0.catalog", "catalog_1.catalog", "catalog_2.catalog"]'
+    other = '["catalog_2.catalog", "catalog_0.catalog", "catalog_1.catalog"]'
+    manifest.write_text(manifest.read_text().replace(paths, other))
+    episodes, done = imported(folder)
+    assert episodes == [[0, 1, 2, 3, 4, 5]]
+    assert done.warnings == (
+        "The _index falls 1 times, first from 5 to 0: the records are read in its order.",
+    )
+    (folder / "catalog_1.catalog").unlink()
+    episodes, done = imported(folder)
+    assert episodes == [[0, 1, 4, 5]]
+    assert done.left_out == ("1 catalog that is missing: catalog_1.catalog",)
+    assert "2 of the records 0 to 5 are in no catalog: 2 to 3." in done.notes
+
+
+def test_pictures_of_other_records(tmp_path: Path) -> None:
+    """The number in the name of a picture is compared with the record's."""
+    made = records(6)
+    for record in made:
+        record["cam/image_array"] = f"{record['_index'] + 2}_cam_image_array_.jpg"
+    folder = tub_folder(tmp_path / "tub", made)
+    for n in range(8):
+        (folder / f"images/{n}_cam_image_array_.jpg").write_bytes(picture(n))
+    _, done = imported(folder)
+    assert done.warnings == (
+        "6 records name a picture with another number, up to 2 off (0, 1, 2, and 3 more): look "
+        "whether they belong together.",
+    )
+
+
+def test_a_damaged_manifest(tmp_path: Path) -> None:
+    """A power cut while it was written: catalogs are found, and deletions are unknown."""
+    folder = tub_folder(tmp_path / "tub", records(6), [0])
+    manifest = folder / "manifest.json"
+    manifest.write_bytes(b"".join(manifest.read_bytes().splitlines(True)[:4]) + bytes(99))
+    episodes, done = imported(folder)
+    assert episodes == [[0, 1, 2, 3, 4, 5]]
+    assert "records that were deleted cannot be told" in done.warnings[0]
+    with pytest.raises(DemosError, match="cannot be told"):
+        imported(folder, strict=True)
+    manifest.write_bytes(b"")
+    assert imported(folder)[0] == [[0, 1, 2, 3, 4, 5]]
+
+
+def test_no_record_is_left(tmp_path: Path) -> None:
+    """A refusal says why each record was left out."""
+    out = tmp_path / "data"
+    with pytest.raises(DemosError, match=r"nothing to import .*: 3 records without user/angle"):
+        import_recording(tub_folder(tmp_path / "a", [{"speed": 1.0}] * 3), out)
+    folder = tub_folder(tmp_path / "b", records(3), [0, 1, 2])
+    with pytest.raises(DemosError, match="There is nothing to import"):
+        import_recording(folder, out)
+    manifest = folder / "manifest.json"
+    manifest.write_text(manifest.read_text().replace("catalog_1", "../catalog_1"))
+    with pytest.raises(DemosError, match="leaves the folder"):
+        import_recording(folder, out)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("period_ms", "hz", "measured"),
+    [
+        (50.0, 20.0, ""),
+        (51.0, 20.0, "19.61 a second"),
+        (33.34, 30.0, ""),
+        (100.9, 10.0, "9.911 a second"),
+        (41.67, 24.0, ""),
+        (130.0, 7.692, ""),
+    ],
+)
+def test_rates_by_times(tmp_path: Path, period_ms: float, hz: float, measured: str) -> None:
+    """Whole milliseconds do not round the rate; a loop's usual delay is named."""
+    made = [r | {"cam/image_array": None} for r in records(60, period_ms=period_ms)]
+    folder = tub_folder(tmp_path / "tub", made, range(20, 30))
+    _, done = imported(folder)
+    (episode,) = all_of(next(p for p in tmp_path.iterdir() if p != folder))
+    assert episode.header.control_hz == pytest.approx(hz, rel=2e-3)
+    assert measured in "".join(done.notes)
+    # The ten deleted records took time, too.
+    assert episode.seconds == pytest.approx(60 * period_ms / 1e3, rel=0.01)
+    assert episode.header.created == "2023-11-14T22:13:20.000+00:00"
+
+
+def test_times_of_a_conversion(tmp_path: Path) -> None:
+    """A rate that no robot has is reported; a stated rate replaces the times."""
+    made = [r | {"cam/image_array": None} for r in records(40, period_ms=3.0)]
+    folder = tub_folder(tmp_path / "tub", made)
+    _, done = imported(folder)
+    assert "State the rate with --hz" in done.warnings[0]
+    _, done = imported(folder, hz=20.0)
+    assert not done.warnings
+    assert "3 ms apart" in done.notes[0]
+    episodes = [e for p in sorted(tmp_path.iterdir()) if p != folder for e in all_of(p)]
+    assert {e.header.control_hz for e in episodes} == {333.0, 20.0}
+    stated = next(e for e in episodes if e.header.control_hz == 20.0)
+    assert {s.clock_ns for s in stated.steps} == {None}
+    assert stated.seconds == pytest.approx(2.0)
+    with pytest.raises(DemosError, match="--hz must be positive"):
+        imported(folder, hz=-1.0)
+
+
+def test_times_that_jump(tmp_path: Path) -> None:
+    """A pause and a clock that was set back each begin an episode, and are reported by size."""
+    made = records(30)
+    for record in made[10:]:
+        record["_timestamp_ms"] += 120_000
+    for record in made[20:]:
+        record["_timestamp_ms"] -= 3_600_000
+    session = {"_session_id": "s", "cam/image_array": None}
+    episodes, done = imported(tub_folder(tmp_path / "tub", [r | session for r in made]))
+    assert episodes == [[*range(10)], [*range(10, 20)], [*range(20, 30)]]
+    assert "1 pauses, of 120.05 s at most and 120.05 s in all" in done.notes[0]
+    assert done.warnings[0].startswith("Time runs backwards by up to 3599.95 s at 20:")
+
+
+def test_sessions_at_different_rates(tmp_path: Path) -> None:
+    """Each session keeps its rate, and both are named."""
+    made = records(24)
+    for n, record in enumerate(made):
+        record |= {"_session_id": "a" if n < 12 else "b", "cam/image_array": None}
+        record["_timestamp_ms"] = T0_MS + (50 * n if n < 12 else 100 * n)
+    folder = tub_folder(tmp_path / "tub", made)
+    _, done = imported(folder)
+    assert done.warnings == (
+        "The drive from record 12 has 10 steps a second, and the drive from record 0 20: a policy "
+        "learns from one rate at a time.",
+    )
+    _, done = imported(folder, hz=20.0)
+    assert done.steps == 24
+
+
+def _image(mode: str, form: str) -> bytes:
+    pixels = np.full((32, 40), 1000 if mode.startswith("I") else 100)
+    image = Image.fromarray(pixels.astype(np.uint16 if mode.startswith("I") else np.uint8))
+    out = io.BytesIO()
+    (image if mode.startswith("I") else image.convert(mode)).save(out, form)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("form", ["PNG", "BMP"])
+@pytest.mark.parametrize("mode", ["RGB", "L", "P", "1"])
+def test_pictures_of_other_formats(tmp_path: Path, form: str, mode: str) -> None:
+    """PNG and BMP are encoded as JPEG, which is noted."""
+    made = [r | {"cam/image_array": f"{r['_index']}_cam.{form.lower()}"} for r in records(3)]
+    folder = tub_folder(tmp_path / "tub", made)
+    for record in made:
+        (folder / "images" / record["cam/image_array"]).write_bytes(_image(mode, form))
+    _, done = imported(folder)
+    assert done.pictures == 3
+    assert done.notes == ("3 pictures were no JPEGs and are encoded with quality 100.",)
+
+
+def test_cameras_of_other_names(tmp_path: Path) -> None:
+    """The one camera is taken whatever its name, and of several one is chosen."""
+    key = {"cam/image_array": None}
+    made = [r | key | {"cam/left": f"{r['_index']}_left.jpg"} for r in records(3)]
+    folder = tub_folder(tmp_path / "one", made, inputs={"cam/left": "image_array"})
+    for n in range(3):
+        (folder / f"images/{n}_left.jpg").write_bytes(picture(n))
+        (folder / f"images/{n}_right.jpg").write_bytes(picture(9, 48, 32))
+    _, done = imported(folder)
+    assert (done.pictures, done.notes) == (3, ("The pictures are those of the column cam/left.",))
+    both = [r | {"cam/right": f"{r['_index']}_right.jpg"} for r in made]
+    two = tub_folder(
+        tmp_path / "two", both, inputs={"cam/left": "image_array", "cam/right": "jpeg"}
+    )
+    for path in (folder / "images").iterdir():
+        (two / "images" / path.name).write_bytes(path.read_bytes())
+    with pytest.raises(DemosError, match=r"2 cameras \(cam/left, cam/right\).*--camera cam/left"):
+        imported(two)
+    _, done = imported(two, camera="cam/right")
+    assert (done.pictures, done.notes) == (
+        3,
+        ("Columns that are not imported: cam/left (image_array).",),
+    )
+    with pytest.raises(UnknownName, match="Did you mean 'cam/left'"):
+        imported(two, camera="cam/lefty")
+
+
+def test_depth_and_lists_are_named(tmp_path: Path) -> None:
+    """Pictures of 16 bits are never taken for pictures of 8, and other columns never vanish."""
+    inputs = {"cam/depth_array": "gray16_array", "lidar": "nparray", "imu/gyr_z": "float"}
+    extra = {"cam/depth_array": "d.png", "lidar": [0.5], "imu/gyr_z": 2.5, "gear": "low"}
+    made = [r | extra for r in records(3)]
+    _, done = imported(tub_folder(tmp_path / "tub", made, inputs=inputs))
+    assert done.notes == (
+        "Columns that are not imported: cam/depth_array (gray16_array), lidar (nparray), "
+        "gear (str).",
+    )
+    alone = tub_folder(
+        tmp_path / "deep", [r | {"cam/image_array": None} for r in made], inputs=inputs
+    )
+    _, done = imported(alone)
+    assert "those of cam/depth_array have 16 bits" in done.warnings[0]
+    named = [r | {"cam/image_array": f"{r['_index']}_depth.png"} for r in records(3)]
+    folder = tub_folder(tmp_path / "wrong", named)
+    for n in range(3):
+        (folder / f"images/{n}_depth.png").write_bytes(_image("I;16", "PNG"))
+    with pytest.raises(DemosError, match="3 records with a picture of more than 8 bits"):
+        imported(folder)
+
+
+def test_unknown_times_and_starts(tmp_path: Path) -> None:
+    """Records without a time leave the drive without times, never with the import's."""
+    made = [r | {"cam/image_array": None} for r in records(4)]
+    made[2]["_timestamp_ms"] = "soon"
+    _, done = imported(tub_folder(tmp_path / "tub", made))
+    assert "1 of the 4 records from 0 have no valid time" in done.warnings[0]
+    for record in made:
+        del record["_timestamp_ms"]
+    folder = tub_folder(tmp_path / "none", made)
+    _, done = imported(folder)
+    assert done.notes == ("The rate is unknown and taken to be 20 Hz; --hz states it.",)
+    (episode,) = all_of(next(p for p in tmp_path.iterdir() if p.name.startswith("none-data")))
+    assert episode.header.created == ""
+
+
+_DONKEYCAR = importlib.util.find_spec("donkeycar")
+
+
+def _donkeycar(name: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Load a module of Donkeycar alone: its package imports what a car needs."""
+    assert _DONKEYCAR is not None
+    assert _DONKEYCAR.origin is not None
+    for package in ("donkeycar", "donkeycar.parts"):
+        monkeypatch.setitem(sys.modules, package, types.ModuleType(package))
+    for part in ("datastore_v2", name):
+        path = Path(_DONKEYCAR.origin).parent / "parts" / f"{part}.py"
+        spec = importlib.util.spec_from_file_location(f"donkeycar.parts.{part}", path)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, spec.name, module)
+        spec.loader.exec_module(module)
+    return sys.modules[f"donkeycar.parts.{name}"]
+
+
+@pytest.mark.skipif(_DONKEYCAR is None, reason="needs `pip install --no-deps donkeycar`")
+def test_a_tub_of_donkeycars_own_writer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Donkeycar's `Tub` writes what we read: sessions, deletions, vectors, several catalogs."""
+    tub_v2 = _donkeycar("tub_v2", monkeypatch)
+    clock = iter(range(10**9))
+    monkeypatch.setattr(tub_v2.time, "time", lambda: T0_MS / 1e3 + next(clock) * 0.05)
+    inputs = [
+        "cam/image_array",
+        "user/angle",
+        "user/throttle",
+        "user/mode",
+        "imu/gyr_z",
+        "behavior",
+    ]
+    types_ = ["image_array", "float", "float", "str", "float", "vector"]
+    for session in range(2):
+        tub = tub_v2.Tub(str(tmp_path / "tub"), inputs, types_, max_catalog_len=10)
+        for n in range(15):
+            tub.write_record(
+                {
+                    "cam/image_array": np.full((24, 32, 3), 8 * n, np.uint8),
+                    "user/angle": (15 * session + n) / 100,
+                    "user/throttle": 0.3,
+                    "user/mode": "user",
+                    "imu/gyr_z": 0.5,
+                    "behavior": [0.0, 1.0],
+                }
+            )
+        tub.delete_records(set(range(3, 6)))
+        tub.delete_last_n_records(2)
+        tub.close()
+    episodes, done = imported(tmp_path / "tub")
+    assert episodes == [[0, 1, 2, *range(6, 13)], [*range(15, 28)]]
+    assert not done.left_out
+    assert not done.warnings
+    assert "Columns that are not imported: behavior (vector)." in done.notes
+    first = all_of(next(p for p in tmp_path.iterdir() if p.name != "tub"))[0]
+    assert Layout.from_json(first.header.state_layout).names == ("imu/gyr_z",)
