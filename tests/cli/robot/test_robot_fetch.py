@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import random
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,7 +18,9 @@ from shapechanger.demos.episodes import (
     Step,
     drop,
     episodes_of,
+    keep,
     read_episode,
+    repair,
 )
 from shapechanger.errors import DemosError
 from shapechanger.remote.client import RobotClient
@@ -120,21 +124,79 @@ def test_an_interrupted_fetch_resumes(there: Path, robot: RobotClient, tmp_path:
         assert not part.exists()
 
 
-def test_local_changes_are_not_overwritten(
+@pytest.mark.parametrize("seed", range(4))
+def test_edits_of_both_sides_survive(
+    there: Path, robot: RobotClient, tmp_path: Path, seed: int
+) -> None:
+    """Whatever is edited where and when, no edit is lost, and the ones made here count last."""
+    rng = random.Random(seed)
+    episode, data = record(there, 12), tmp_path / "here"
+    local = data / episode.name
+    fetch_episode(robot, episode.name, data)
+    mine: list[bytes] = []
+    for _ in range(8):
+        side = rng.choice([episode, local])
+        first = rng.randrange(12)
+        rng.choice([drop, keep])(side, first, rng.randrange(first, 12), "bad")
+        if side is local:
+            mine.append((local / "steps.jsonl").read_bytes().splitlines(True)[-1])
+        if rng.random() < 0.5:
+            fetch_episode(robot, episode.name, data)
+    fetch_episode(robot, episode.name, data)
+    theirs = (episode / "steps.jsonl").read_bytes().splitlines(True)
+    lines = (local / "steps.jsonl").read_bytes().splitlines(True)
+    assert lines[: len(theirs)] == theirs
+    assert Counter(mine) - Counter(lines) == Counter()
+    assert len(read_episode(local).steps) == 12
+    before = files(local)
+    assert fetch_episode(robot, episode.name, data).came == 0
+    assert files(local) == before
+
+
+def test_marks_and_edits_stay_with_nothing_new(
+    there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Lines of the robot that are the beginning of those here are nothing new."""
+    episode, data = record(there, 6), tmp_path / "here"
+    fetch = ["robot", "fetch", "car", "--out", str(data)]
+    main(fetch)
+    main(["demos", "bad", str(data / episode.name), "--from", "1", "--to", "2"])
+    main(["demos", "mark", str(data / episode.name), "3", "kerb"])
+    before = files(data)
+    capsys.readouterr()
+    main(fetch)
+    assert "nothing new, and 2 edits made here stay" in capsys.readouterr().out
+    assert files(data) == before
+
+
+def test_a_repair_here_stays(there: Path, robot: RobotClient, tmp_path: Path) -> None:
+    """The robot's episode was cut off, and that here is closed already."""
+    header = json.loads((path := record(there, 6) / "episode.json").read_text())
+    path.write_text(json.dumps(header | {"closed": None}))
+    episode, data = path.parent, tmp_path / "here"
+    fetch_episode(robot, episode.name, data)
+    repair(data / episode.name)
+    before = files(data)
+    fetch_episode(robot, episode.name, data)
+    assert files(data) == before
+
+
+def test_other_steps_are_not_overwritten(
     there: Path, robot: RobotClient, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The conflict is reported, other episodes are fetched, and the exit code is 1."""
     first, data = record(there, 4), tmp_path / "here"
     fetch_episode(robot, first.name, data)
-    drop(data / first.name, 0, 0, "bad")
-    drop(first, 1, 1, "bad")
+    steps = first / "steps.jsonl"
+    steps.write_bytes(b"".join(steps.read_bytes().splitlines(True)[:3]))
     second = record(there, 2)
     before = files(data / first.name)
     with pytest.raises(SystemExit) as ended:
         main(["robot", "fetch", "car", "--out", str(data)])
     assert ended.value.code == 1
     output = capsys.readouterr()
-    assert "it was changed here" in output.err
+    assert "has other steps than" in output.err
+    assert "`--out` with another folder" in output.err
     assert second.name in output.out
     assert files(data / first.name) == before
     assert files(data / second.name) == files(second)

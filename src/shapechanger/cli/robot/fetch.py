@@ -7,14 +7,15 @@ import contextlib
 import os
 import sys
 import time
+from collections import Counter
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 import tyro
 
-from shapechanger.cli.console import say
+from shapechanger.cli.console import counted, say
 from shapechanger.demos.episodes.files import (
     FRAMES,
     HEADER,
@@ -25,8 +26,8 @@ from shapechanger.demos.episodes.files import (
 )
 from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import Step, decode_line, split_lines
-from shapechanger.errors import DemosError, RobotRefused, UnknownName
-from shapechanger.files import cannot_write
+from shapechanger.errors import DemosError, OutputError, RobotRefused, UnknownName
+from shapechanger.files import cannot_write, write_atomic
 from shapechanger.link.messages import EpisodeSummary, Piece
 from shapechanger.remote.known_robots import recall
 
@@ -60,20 +61,23 @@ class FetchEpisodes:
                     say(f"{episode.id} is still being recorded: fetch it later.")
                     continue
                 try:
-                    came = fetch_episode(robot, episode.id, self.out)
+                    fetched = fetch_episode(robot, episode.id, self.out)
                 except (DemosError, RobotRefused) as error:
                     failed += 1
                     say(f"{episode.id}: {error}", stderr=True)
                     continue
-                news = f"{came} lines came" if came else "nothing new"
+                news = f"{fetched.came} lines came" if fetched.came else "nothing new"
+                if fetched.own:
+                    news += f", and {counted(fetched.own, 'edit')} made here stay"
                 say(f"{episode.id}: {episode.kept} steps kept of {episode.steps}, {news}")
-                if not episode.closed:
+                if read_header(self.out / episode.id)[1] is None:
                     say(f"  it is incomplete: shapechanger demos repair {self.out / episode.id}")
         if failed:
             sys.exit(1)
 
 
 _PART: Final = ".fetching"
+_STEP: Final = b'{"kind":"step",'
 _LINES: Final = 1_000
 
 
@@ -98,21 +102,31 @@ def _episodes_there(robot: RobotClient, wanted: Sequence[str]) -> list[EpisodeSu
     return [episode for episode in found if not wanted or episode.id in wanted]
 
 
-def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
+class Fetched(NamedTuple):
+    """Result of a download.
+
+    Attributes:
+        came: Number of new lines of the robot.
+        own: Number of marks and edits that were made here, and are kept.
+    """
+
+    came: int
+    own: int
+
+
+def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
     """Download one episode, or the new part of it.
 
-    An incomplete episode is kept in a folder that readers ignore.
+    An incomplete episode is kept in a folder that readers ignore. Marks and edits that were made
+    here are kept after those of the robot, so that they override these.
 
     Args:
         robot: The robot.
         name: Id of the episode.
         data: Folder of the recording.
 
-    Returns:
-        Number of new lines.
-
     Raises:
-        DemosError: If the data is damaged, or the local part is not its beginning.
+        DemosError: If the data is damaged, or the local steps are not those of the robot.
         OutputError: If it cannot be written; the part before that is kept.
         LinkError: If the robot does not respond or refuses.
     """
@@ -125,34 +139,58 @@ def fetch_episode(robot: RobotClient, name: str, data: Path) -> int:
     fd = lock(folder / STEPS, f"Somebody else fetches or changes {folder} at this moment.")
     try:
         have = _complete_lines(folder, fd)
-        begin = len(have)
+        # Lines up to the last step are the robot's; marks and edits of both sides follow.
+        begin = 1 + max((n for n, line in enumerate(have) if line.startswith(_STEP)), default=-1)
+        edits, theirs = have[begin:], list[bytes]()
         piece = robot.fetch(name, max(begin - 1, 0), _LINES)
-        overlap = [line.encode() + b"\n" for line in piece.lines[:1]] if have else []
-        if piece.total < begin or overlap != have[-1:]:
+        if begin and [line.encode() + b"\n" for line in piece.lines[:1]] != have[begin - 1 : begin]:
             raise DemosError(
-                f"{folder} is not the beginning of what the robot has: it was changed here. Move "
-                "it away, and fetch it again."
+                f"{folder} has other steps than {name} on the robot, so it stays as it is: "
+                "`--out` with another folder fetches that of the robot."
             )
-        written = max(begin - 1, 0)
         while piece.lines:
             lines = _checked(piece, folder)
-            write_all(fd, b"".join(lines[max(begin - piece.first, 0) :]))
-            written = piece.first + len(lines)
-            piece = robot.fetch(name, written, _LINES)
+            new = lines[max(begin - piece.first, 0) :]
+            theirs += new
+            if not edits:
+                write_all(fd, b"".join(new))
+            piece = robot.fetch(name, piece.first + len(lines), _LINES)
+        own = _without(edits, theirs)
+        if edits and (merged := have[:begin] + theirs + own) != have:
+            write_atomic(folder / STEPS, b"".join(merged))
         os.fsync(fd)
-        header = folder / f".{HEADER}.part"
-        header.write_bytes(piece.header.encode())
-        header.replace(folder / HEADER)
-        read_header(folder)
+        _write_header(folder, piece.header)
         if folder is part:
             part.rename(here)
     except OSError as error:
-        if isinstance(error, ConnectionError):  # From the link, not the disk.
+        if isinstance(error, ConnectionError | OutputError):  # Of the link, or worded already.
             raise
         raise cannot_write(folder, error) from error
     finally:
         os.close(fd)
-    return max(written - begin, 0)
+    return Fetched(len(_without(theirs, edits)), len(own))
+
+
+def _without(lines: Sequence[bytes], others: Sequence[bytes]) -> list[bytes]:
+    """Return the lines that are not among others; of equal ones, the last ones remain."""
+    left = Counter(others)
+    found: list[bytes] = []
+    for line in lines:
+        if left[line]:
+            left[line] -= 1
+        else:
+            found.append(line)
+    return found
+
+
+def _write_header(folder: Path, content: str) -> None:
+    """Write the header of an episode, unless it was closed here, by a repair, and only here."""
+    if (folder / HEADER).is_file() and read_header(folder)[1] is not None:
+        return
+    header = folder / f".{HEADER}.part"
+    header.write_bytes(content.encode())
+    header.replace(folder / HEADER)
+    read_header(folder)
 
 
 def _complete_lines(folder: Path, fd: int) -> list[bytes]:
