@@ -16,7 +16,14 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import TimeLimit
 
 from shapechanger.demos.dataset import decode_picture, load_dataset
-from shapechanger.demos.episodes import Episode, EpisodeWriter, episodes_of, read_episode, repair
+from shapechanger.demos.episodes import (
+    Episode,
+    EpisodeWriter,
+    episodes_of,
+    read_episode,
+    repair,
+    writer,
+)
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.errors import DemosError, OutputError
 from tests.demos.corridor_env import SIZE, CorridorEnv, Shows
@@ -209,6 +216,22 @@ def test_a_full_disk_ends_the_recording_and_brings_the_env_to_rest(
     with RecordEpisodes(inner, tmp_path) as env:
         drive(env, 1)
     assert len(episodes_of(tmp_path)) == 2
+
+
+def test_a_full_episode_goes_on_in_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The steps of one reset are in several episodes, of which only the first has the seed."""
+    monkeypatch.setattr(writer, "FULL_BYTES", 1500)
+    with RecordEpisodes(CorridorEnv("both"), tmp_path) as env:
+        drive(env, 20, seed=3)
+    episodes = [read_episode(path) for path in episodes_of(tmp_path)]
+    assert env.episodes == len(episodes) > 2
+    assert [e.header.seed for e in episodes] == [3] + [None] * (len(episodes) - 1)
+    assert sum(len(e.steps) for e in episodes) == env.steps == 20
+    assert all(e.jpeg(step) for e in episodes for step in e.steps)
+    assert [e.outcome for e in episodes] == ["continued"] * (len(episodes) - 1) + ["collision"]
+    assert env.seconds == pytest.approx(sum(e.seconds for e in episodes))
 
 
 def test_a_full_disk_raises_before_the_first_action(tmp_path: Path) -> None:

@@ -19,12 +19,11 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.demos.episodes.files import is_episode
 from shapechanger.demos.jpeg import decode_picture
+from shapechanger.demos.statistics import is_same_rate, rate_jitter
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 
 _NS_PER_S: Final = 1e9
-# Two recorders at 20 Hz may write 20 and 20.000001.
-_RATE_TOLERANCE: Final = 0.01
 
 Shrink = Callable[[NDArray[np.uint8], EpisodeHeader], NDArray[np.uint8]]
 """Function that reduces a picture of an episode, shape (H, W, 3), to save memory."""
@@ -45,6 +44,7 @@ class Dataset:
         state_layout: Meaning of the values of a state; None without states.
         control_hz: Steps per second.
         body: Kind of robot of the first episode, such as "car"; "" if unknown.
+        rate_jitter: How far the rate varied, as a share of it; see `statistics.rate_jitter`.
     """
 
     pictures: NDArray[np.uint8] | None
@@ -57,6 +57,7 @@ class Dataset:
     state_layout: Layout | None
     control_hz: float
     body: str = ""
+    rate_jitter: float = 0.0
 
     def __len__(self) -> int:
         """Return the number of steps."""
@@ -110,6 +111,7 @@ def load_dataset(
         state_layout=Layout.from_json(layout) if layout else None,
         control_hz=first.header.control_hz,
         body=first.header.body,
+        rate_jitter=_jitter(parts),
     )
 
 
@@ -145,6 +147,16 @@ class _Part(NamedTuple):
                 "with `shapechanger demos bad`."
             )
         return times_s
+
+
+def _jitter(parts: list[_Part]) -> float:
+    """Return how far the rate of all parts varied, as a share of it."""
+    periods: list[float] = []
+    for part in parts:
+        if all(step.captured_ns is not None for step in part.steps):
+            indices = [step.index for step in part.steps]
+            periods += np.diff(part.times_s())[np.diff(indices) == 1].tolist()
+    return rate_jitter(periods, parts[0].header.control_hz)
 
 
 def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Iterator[_Part]:
@@ -202,13 +214,12 @@ def _require_same(parts: list[_Part]) -> None:
     """Refuse episodes that differ in layout, picture size or rate."""
     first = parts[0]
     for part in parts[1:]:
-        ratio = part.header.control_hz / first.header.control_hz
         same = {
             "actions": part.header.action_layout == first.header.action_layout,
             "states": part.header.state_layout == first.header.state_layout,
             "pictures": part.header.image_size == first.header.image_size
             and bool(part.pictures) == bool(first.pictures),
-            "steps a second": abs(ratio - 1.0) < _RATE_TOLERANCE,
+            "steps a second": is_same_rate(part.header.control_hz, first.header.control_hz),
         }
         if other := next((what for what, is_same in same.items() if not is_same), ""):
             raise DemosError(

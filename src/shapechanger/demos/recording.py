@@ -275,6 +275,8 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
             raise gym.error.ResetNeeded("Call reset() before the first step of an episode.")
         # Before the step, so that an unwritable folder is found before anything moves.
         writer = self._writer or self._begin(seen)
+        if writer.is_full:
+            writer = self._go_on(writer)
         try:
             observation, reward, terminated, truncated, info = super().step(action)
         except BaseException as error:
@@ -345,6 +347,14 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         self._writer = EpisodeWriter.create(
             self._recording, self._header(seen), spare_bytes=self._spare_bytes
         )
+        self.path = self._writer.path
+        self.episodes += 1
+        return self._writer
+
+    def _go_on(self, full: EpisodeWriter) -> EpisodeWriter:
+        self.seconds += full.seconds + 1.0 / self.control_hz
+        self._writer = None  # In case that the next one cannot be created.
+        self._writer = full.continued()
         self.path = self._writer.path
         self.episodes += 1
         return self._writer

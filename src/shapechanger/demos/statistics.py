@@ -88,6 +88,42 @@ def gaps_s(episode: Episode) -> list[float]:
     ]
 
 
+_SAME_RATE: Final = 0.01  # Two recorders at 20 Hz may write 20 and 20.000001.
+_MOST_JITTER: Final = 0.25  # Two settings of a rate differ by at least a third.
+_MIN_PERIODS: Final = 20
+_MIDDLE: Final = (5.0, 95.0)  # %
+
+
+def rate_jitter(periods_s: Iterable[float], control_hz: float) -> float:
+    """Return how far the rate of a recording varied, as a share of the rate.
+
+    Args:
+        periods_s: Times between consecutive steps, s.
+        control_hz: Steps per second, as recorded.
+
+    Returns:
+        The larger deviation of the 5th and the 95th percentile of the periods; at most 0.25, and 0
+        for fewer than 20 periods.
+    """
+    periods = np.fromiter(periods_s, np.float64)
+    if len(periods) < _MIN_PERIODS:
+        return 0.0
+    low, high = np.percentile(periods, _MIDDLE) * control_hz
+    return float(min(max(1.0 - low, high - 1.0, 0.0), _MOST_JITTER))
+
+
+def is_same_rate(recorded_hz: float, control_hz: float, jitter: float = 0.0) -> bool:
+    """Return whether a robot has the rate of a recording, within 1 % or the recording's jitter.
+
+    Args:
+        recorded_hz: Steps per second of the recording.
+        control_hz: Steps per second of the robot, or of another recording.
+        jitter: Result of `rate_jitter`.
+    """
+    allowed = max(_SAME_RATE, min(jitter, _MOST_JITTER))
+    return abs(recorded_hz / control_hz - 1.0) <= allowed
+
+
 _BINS: Final = 21
 """Number of bins. It is odd, so that 0 has a bin of its own in a symmetric range."""
 

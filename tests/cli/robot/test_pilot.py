@@ -9,6 +9,7 @@ import subprocess
 from collections.abc import Generator
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -60,6 +61,25 @@ def test_policies_that_do_not_fit(
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
         require_fit(card, origin, robot, measures=False)
     assert words in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("hz", "jitter", "fits"),
+    [
+        (19.61, 0.0, False),
+        (19.61, 0.03, True),
+        (19.0, 0.03, False),
+        (10.0, 0.9, False),  # No jitter makes half of a rate the same.
+        (20.1, "much", True),
+    ],
+)
+def test_a_rate_within_the_jitter_of_the_recording_fits(
+    hz: float, jitter: object, fits: bool
+) -> None:
+    """A policy's own demonstrations say how exactly its rate is known."""
+    card = msgspec.structs.replace(_CLONE, data={"rate_jitter": jitter})
+    with contextlib.nullcontext() if fits else pytest.raises(PolicyError, match="control_hz = 20"):
+        require_fit(card, Origin("car", hz), _CAR, measures=False)
 
 
 @pytest.fixture(scope="module")

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import EpisodeWriter, drop, mark, read_episode
-from shapechanger.demos.statistics import gaps_s, spread, summary
+from shapechanger.demos.episodes.records import durations_s
+from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter, spread, summary
 from tests.demos.episodes.making import header, recorded, step
 
 
@@ -54,6 +59,54 @@ def test_summary_of_an_episode(tmp_path: Path) -> None:
     assert (found.reward, found.collisions, found.stopped, found.marks) == (7.0, 1, 1, 1)
     assert found.seconds == pytest.approx(7 / 20)
     assert (found.outcome, found.closed) == ("collision", True)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    hz=st.floats(1.0, 100.0),
+    spread_by=st.floats(0.0, 0.2),
+    pauses_s=st.lists(st.floats(31.0, 1e5), max_size=3),
+    dropped=st.integers(0, 20),
+)
+def test_durations_are_those_of_the_times(
+    hz: float, spread_by: float, pauses_s: list[float], dropped: int
+) -> None:
+    """Steps last until the next one, without pauses, whatever rate the header states."""
+    rng = np.random.default_rng(1)
+    periods_s = (1 + rng.uniform(-spread_by, spread_by, 40)) / hz
+    parts = [periods_s[n * 10 : (n + 1) * 10] for n in range(len(pauses_s) + 1)]
+    times_s: list[float] = [0.0]
+    for part, pause_s in zip(parts, [*pauses_s, 0.0], strict=True):
+        times_s += (times_s[-1] + np.cumsum(part)).tolist()
+        times_s += [times_s[-1] + pause_s] if pause_s else []
+    found = durations_s([round(at_s * 1e9) for at_s in times_s], hz)
+    driven_s = sum(part.sum() for part in parts) + (len(pauses_s) + 1) / hz
+    assert sum(found) == pytest.approx(driven_s, rel=1e-6)
+    assert durations_s([None] * 8, hz) == [1 / hz] * 8
+    assert durations_s([], hz) == []
+
+
+def test_an_episode_lasts_as_long_as_its_times_say(tmp_path: Path) -> None:
+    """A robot that is commanded at a fourth of its rate drives four times as long."""
+    with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
+        for number in range(100):
+            writer.add(replace(step(number), captured_ns=number * 200_000_000, decided_ns=None))
+    episode = read_episode(writer.path)
+    assert episode.header.control_hz == 20.0
+    assert episode.seconds == pytest.approx(99 * 0.2 + 0.05)
+    drop(writer.path, 0, 49, "bad")
+    assert read_episode(writer.path).seconds == pytest.approx(49 * 0.2 + 0.05)
+
+
+def test_jitter_is_measured_and_bounded() -> None:
+    """A few outliers do not count, and two settings never become one."""
+    assert rate_jitter([0.05] * 100, 20.0) == pytest.approx(0.0)
+    assert rate_jitter([0.051] * 97 + [5.0] * 3, 20.0) == pytest.approx(0.02)
+    assert rate_jitter([0.05, 0.2] * 50, 20.0) == 0.25
+    assert rate_jitter([0.2] * 3, 20.0) == 0.0
+    assert is_same_rate(19.61, 20.0, 0.02)
+    assert not is_same_rate(19.61, 20.0)
+    assert not is_same_rate(10.0, 20.0, 9.9)
 
 
 def test_gaps_skip_dropped_steps(tmp_path: Path) -> None:

@@ -15,7 +15,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.demos.episodes import EpisodeHeader, Step, episodes_of, read_episode, repair
+from shapechanger.demos.episodes import (
+    EpisodeHeader,
+    Step,
+    episodes_of,
+    read_episode,
+    repair,
+    writer,
+)
 from shapechanger.link.messages import Mark, Observation, Undo
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity
@@ -61,6 +68,35 @@ def test_all_calls_are_written_in_order(tmp_path: Path) -> None:
     assert [s.action[1] for s in episode.steps] == [number / 1e6 for number in range(40)]
     assert (len(episode.kept), thread.progress.dropped) == (30, 10)
     assert [mark.step for mark in episode.marks] == [39]
+
+
+def test_a_full_episode_goes_on_in_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every step is in one of the episodes, each with its picture, and marks hit the newest."""
+    monkeypatch.setattr(writer, "FULL_BYTES", 2000)
+    reports: list[tuple[str, str]] = []
+    answers: list[str] = []
+    thread = EpisodeThread(tmp_path, HEADER, lambda *report: reports.append(report))
+    for number in range(40):
+        made, jpeg = step(number)
+        assert thread.add(made, jpeg if number % 3 == 0 else None)
+        thread.edit(Mark(text=str(number)), answers.append)
+    thread.end("time")
+    assert thread.join(WITHIN_S)
+    episodes = [read_episode(path) for path in episodes_of(tmp_path)]
+    assert len(episodes) > 3
+    assert reports == [("begun", "")] * len(episodes) + [("ended", "")]
+    assert [e.outcome for e in episodes] == ["continued"] * (len(episodes) - 1) + ["time"]
+    assert [e.header.notes.get("continues") for e in episodes[1:]] == [
+        e.path.name for e in episodes[:-1]
+    ]
+    numbers = [round(s.action[1] * 1e6) for e in episodes for s in e.steps]
+    assert numbers == list(range(40))
+    seen = [e.jpeg(s) for e in episodes for s in e.steps]
+    assert seen == [step(number - number % 3)[1] for number in range(40)]
+    assert set(answers) == {""}
+    assert [len(e.marks) for e in episodes] == [len(e.steps) for e in episodes]
 
 
 @pytest.mark.parametrize("bytes_each", [0, 1 << 20])

@@ -17,6 +17,7 @@ from shapechanger.cli.env_arguments import env_ref, opened
 from shapechanger.demos.dataset import decode_picture
 from shapechanger.demos.episodes import Episode, Step
 from shapechanger.demos.overlay import blank, overlay
+from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from shapechanger.errors import DemosError, LinkError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Welcome
@@ -214,7 +215,6 @@ def film(episode: Episode, path: Path) -> None:
     say(f"wrote {path}: {len(frames)} steps, {len(frames) / episode.header.control_hz:.1f} s{rest}")
 
 
-_SAME_RATE: Final = 0.01
 _LOOK_S: Final = 0.5
 
 
@@ -261,7 +261,7 @@ def _require_fit(episode: Episode, welcome: Welcome) -> None:
             f"{_told(recorded)}."
         )
     rate, own = episode.header.control_hz, welcome.control_hz
-    if abs(rate / own - 1.0) > _SAME_RATE:
+    if not is_same_rate(rate, own, rate_jitter(gaps_s(episode), rate)):
         raise DemosError(
             f"{welcome.robot} takes {own:g} commands a second, and {episode.path.name} has "
             f"{rate:g} steps a second."

@@ -115,6 +115,7 @@ class TrainClone:
             steps=len(data),
             body="" if view is not None else data.body,
             control_hz=data.control_hz,
+            rate_jitter=round(data.rate_jitter, 4),
             **origin,
         )
         note = f"These are the last {len(data) - n} of {len(data)} steps, which it never saw."

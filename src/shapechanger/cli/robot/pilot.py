@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.pictures import PolicyError
+from shapechanger.demos.statistics import is_same_rate
 from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
 from shapechanger.envs.remote.waypoints import RemoteWaypointEnv
 from shapechanger.envs.waypoints import ACTION_LAYOUT
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 # s. A reset waits in steps of this length, and checks between them whether to end.
 _LOOK_EVERY_S: Final = 1.0
 _END_S: Final = 10.0
-_SAME_RATE: Final = 0.01
 _WAITS_ON_BOARD: Final = "It waits until nobody has control and you arm the robot for it."
 
 
@@ -143,10 +143,13 @@ def require_fit(card: CloneCard, origin: Origin, robot: RobotFacts, *, measures:
             "only policies of waypoints move from one body to another."
         )
     rate = origin.control_hz
-    if rate is not None and abs(rate / robot.control_hz - 1.0) > _SAME_RATE:
+    jitter = card.data.get("rate_jitter", 0.0)
+    jitter = float(jitter) if isinstance(jitter, int | float) else 0.0
+    if rate is not None and not is_same_rate(rate, robot.control_hz, jitter):
+        within = f" (varying by {100 * jitter:.0f} %)" if jitter else ""
         raise PolicyError(
-            f"The policy learned at {rate:g} actions a second, and {robot.name} has control_hz = "
-            f"{robot.control_hz:g}."
+            f"The policy learned at {rate:g} actions a second{within}, and {robot.name} has "
+            f"control_hz = {robot.control_hz:g}."
         )
     has_waypoints = points_ways(card)
     if not has_waypoints:

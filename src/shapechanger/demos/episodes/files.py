@@ -20,7 +20,11 @@ FRAMES: Final = "frames"
 LOST: Final = "lost"
 
 MAX_TEXT_BYTES: Final = 256 << 20
-"""Largest text file to read, bytes; an hour of a car's steps has about 30 MB."""
+"""Largest text file to read, bytes. An hour of steps has 30 MB in a car and 200 MB in a finger."""
+
+FULL_BYTES: Final = MAX_TEXT_BYTES * 3 // 4
+"""Size of `steps.jsonl` from which recorders begin the next episode, bytes; marks and edits, which
+come later, have the rest."""
 
 MAX_PICTURE_BYTES: Final = 16 << 20
 """Largest picture to write or read, bytes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import binascii
 import json
+import math
 import os
 import re
 import stat
@@ -194,7 +195,7 @@ class Episode:
         """Duration of the kept steps, s."""
         kept = {step.index for step in self.kept}
         lasted = zip(self.steps, self.durations_s, strict=True)
-        return sum(seconds for step, seconds in lasted if step.index in kept)
+        return math.fsum(seconds for step, seconds in lasted if step.index in kept)
 
     def jpeg(self, step: Step) -> bytes | None:
         """Return the picture of a step as it was received; None for none.

@@ -17,6 +17,7 @@ from typing import Final, Self
 
 from shapechanger.demos.episodes.files import (
     FRAMES,
+    FULL_BYTES,
     MAX_PICTURE_BYTES,
     STEPS,
     free_path,
@@ -83,6 +84,9 @@ class Syncer:
 SPARE_BYTES: Final = 64 << 20
 """Disk space to leave free by default."""
 
+CONTINUED: Final = "continued"
+"""Outcome of an episode that was full, and goes on in the next one."""
+
 _LOCK: Final = ".recording"
 _JPEG: Final = b"\xff\xd8"
 _SPACE_CHECK_STEPS: Final = 20  # Free space changes slowly.
@@ -91,6 +95,9 @@ _NS_PER_S: Final = 1e9
 
 class EpisodeWriter:
     """Writer of one episode; use `create` to construct one.
+
+    Readers refuse files above a limit. A recorder therefore goes on with `continued`, once the
+    episode `is_full`.
 
     Attributes:
         path: Folder of the episode.
@@ -110,6 +117,8 @@ class EpisodeWriter:
         self._sizes = header.action_size, header.state_size
         self._lock, self._fd = locks
         self._spare_bytes = spare_bytes
+        self._bytes = 0
+        self._jpeg: bytes | None = None
         self._before: Step | None = None
         # Index and time, ns, of each kept step, for `undo`. Floats of seconds since 1970 would be
         # too coarse.
@@ -169,6 +178,26 @@ class EpisodeWriter:
     def __exit__(self, *_: object) -> None:
         """Close the episode."""
         self.close()
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the next step should be that of another episode, so that readers accept both."""
+        return self._bytes >= FULL_BYTES
+
+    def continued(self) -> EpisodeWriter:
+        """Close the episode, and return the writer of the next one, with the newest picture.
+
+        Raises:
+            OutputError: If the next one cannot be created; this one is closed then.
+        """
+        self.close(CONTINUED)
+        # The next episode does not begin with a reset of the env.
+        header = replace(
+            self._header, seed=None, notes=self._header.notes | {"continues": self.path.name}
+        )
+        writer = EpisodeWriter.create(self.path.parent, header, spare_bytes=self._spare_bytes)
+        writer._jpeg = self._jpeg
+        return writer
 
     @property
     def seconds(self) -> float:
@@ -275,14 +304,17 @@ class EpisodeWriter:
             os.close(self._lock)
 
     def _append(self, fields: dict[str, object]) -> None:
+        line = encode_line(fields)
         try:
-            write_all(self._fd, encode_line(fields))
+            write_all(self._fd, line)
         except OSError as error:
             raise cannot_write(self.path / STEPS, error) from error
+        self._bytes += len(line)
 
     def _frame(self, jpeg: bytes | None) -> dict[str, object]:
         """Write a picture, and return the fields of the step that name it."""
         before = self._before
+        jpeg = self._jpeg if jpeg is None and before is None else jpeg
         if jpeg is None:
             if before is None:
                 return {}
@@ -291,6 +323,7 @@ class EpisodeWriter:
                 "frame_bytes": before.frame_bytes,
                 "frame_crc": before.frame_crc,
             }
+        self._jpeg = jpeg
         name = f"{self.steps:06d}.jpg"
         path = self.path / FRAMES / name
         try:

@@ -359,6 +359,11 @@ def _write(episode: ExchangeEpisode, folder: Path, named_after: datetime) -> tup
                 writer.mark(mark)
             if row.dropped is not None:
                 excluded.append((index, row.dropped))
+        if writer.is_full:
+            raise DemosError(
+                f"{episode.name} is longer than an episode may be, which is about an hour at 100 "
+                f"Hz: it has {writer.steps} steps. Split it."
+            )
         writer.close(episode.outcome)
     # Consecutive steps that were dropped for one reason become one line.
     runs = groupby(enumerate(excluded), key=lambda pair: (pair[1][1], pair[1][0] - pair[0]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import queue
 import re
@@ -318,7 +319,7 @@ def _summary(path: Path) -> EpisodeSummary:
         id=path.name,
         steps=len(steps),
         kept=kept,
-        seconds=sum(seconds for index, seconds in lasted if index not in dropped),
+        seconds=math.fsum(seconds for index, seconds in lasted if index not in dropped),
         closed=closed is not None,
         created=header.created[:_MAX_TEXT],
         driver=header.driver[:_MAX_TEXT],

@@ -34,6 +34,9 @@ _NOT_RECORDING: Final = "Nothing is being recorded."
 
 _Post = Callable[[RobotMessage], None]
 
+_Job = Callable[[EpisodeWriter], EpisodeWriter]
+"""Writes to an episode, and returns the writer of the episode that is open after that."""
+
 _Write = Callable[[Step, bytes | None], object]
 """Writes a step and its frame, which is None if it is that of the step before."""
 
@@ -161,12 +164,13 @@ class StepBuilder:
 
 
 class EpisodeThread:
-    """Thread that writes one episode, in the order of the calls.
+    """Thread that writes one episode, in the order of the calls; a full one goes on in the next.
 
     Args:
         folder: Folder of the recordings.
         header: Header of the episode.
-        report: Called in the thread with "begun" and with "ended", and the error or "".
+        report: Called in the thread with "begun" for each episode, and with "ended" and the error
+            or "".
         after: The previous thread, to wait for; None for none.
 
     Attributes:
@@ -187,7 +191,7 @@ class EpisodeThread:
         self._after = after
         self._outcome = ""
         self._ending = False
-        self._jobs: deque[tuple[Callable[[EpisodeWriter], None], int]] = deque()
+        self._jobs: deque[tuple[_Job, int]] = deque()
         self._bytes = 0
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
@@ -204,9 +208,13 @@ class EpisodeThread:
             False if the disk is too slow, which ends the episode.
         """
 
-        def write(writer: EpisodeWriter) -> None:
+        def write(writer: EpisodeWriter) -> EpisodeWriter:
+            if writer.is_full:
+                writer = writer.continued()
+                self._report("begun", "")
             writer.add(step, jpeg)
             self._note(writer)
+            return writer
 
         return self._put(write, len(jpeg or b""))
 
@@ -218,7 +226,7 @@ class EpisodeThread:
             then: Called in the thread with the reason for a refusal, or "".
         """
 
-        def edit(writer: EpisodeWriter) -> None:
+        def edit(writer: EpisodeWriter) -> EpisodeWriter:
             refusal = ""
             if isinstance(request, Undo):
                 refusal = "" if writer.undo(request.seconds) else "There is nothing to undo."
@@ -228,6 +236,7 @@ class EpisodeThread:
                 refusal = "There is no step to mark yet."
             self._note(writer)
             then(refusal)
+            return writer
 
         self._put(edit, 0)
 
@@ -243,7 +252,7 @@ class EpisodeThread:
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
-    def _put(self, job: Callable[[EpisodeWriter], None], size: int) -> bool:
+    def _put(self, job: _Job, size: int) -> bool:
         with self._changed:
             if self._ending:
                 return True
@@ -256,7 +265,7 @@ class EpisodeThread:
             self._changed.notify()
             return fits
 
-    def _next(self) -> Callable[[EpisodeWriter], None] | None:
+    def _next(self) -> _Job | None:
         """Return the next job, or None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._jobs or self._ending)
@@ -289,7 +298,7 @@ class EpisodeThread:
             self._note(writer)
             self._report("begun", "")
             while (job := self._next()) is not None:
-                job(writer)
+                writer = job(writer)
         except BaseException as error:
             # On a full disk this may fail too. All steps are there all the same, and
             # `shapechanger demos repair` closes the episode.
