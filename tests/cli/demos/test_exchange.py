@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.cli import main
 from shapechanger.cli.demos.recordings import Export, Import
 from shapechanger.demos.episodes import drop
 from shapechanger.errors import UnknownName
-from tests.demos.exchange.small import drive, keys_folder
+from tests.demos.exchange.small import drive, keys_folder, tub_folder
 
 
 def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -19,6 +20,40 @@ def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[s
         f"read {tmp_path / 'keys'} (2017): 1 episode, 3 steps, 3 pictures\n"
         f"wrote {tmp_path / 'data'}\n"
     )
+
+
+def test_a_partial_import_has_an_exit_code_of_its_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """0 for all, 3 for a part, 2 for nothing; findings are on the standard error."""
+    records = [
+        {"user/angle": 0.0, "user/throttle": 0.0, "_timestamp_ms": 51 * n, "lap": 1}
+        for n in range(30)
+    ]
+    tub = tub_folder(tmp_path / "tub", records)
+    for n in (3, 5, 8, 9):
+        (tub / f"images/{n}_cam_image_array_.jpg").write_bytes(b"")
+    command = ["demos", "import", str(tub), "--out", str(tmp_path / "data")]
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--strict"])
+    assert ended.value.code == 2
+    sentence = capsys.readouterr().err
+    assert (
+        "is not whole (left out: 4 records with an empty picture: 3, 5, 8, and 1 more)" in sentence
+    )
+    assert not (tmp_path / "data").exists()
+    with pytest.raises(SystemExit) as ended:
+        main(command)
+    assert ended.value.code == 3
+    output = capsys.readouterr()
+    assert "1 episode, 26 steps, 26 pictures" in output.out
+    assert "note: Columns that are not imported: lap (float).\n" in output.out
+    assert "which is taken to be 20 Hz; --hz states another rate.\n" in output.out
+    assert output.err == "left out 4 records with an empty picture: 3, 5, 8, and 1 more\n"
+    with pytest.raises(SystemExit) as ended:
+        main(["demos", "import", str(tub), "--out", str(tmp_path / "b"), "--hz", "10"])
+    assert ended.value.code == 3
+    assert "these times are left out" in capsys.readouterr().out
 
 
 def test_export_prints_a_summary_and_how_to_load(

@@ -89,7 +89,7 @@ def test_exclude_json_of_version_1(tmp_path: Path) -> None:
     (folder / "exclude.json").write_text("[5, 6, 40]")
     ((numbers,), done) = imported(folder)
     assert numbers == [3, 4, 7, 8, 9, 10, 11]
-    assert done.notes == ("2 records are deleted in the tub, and not imported.",)
+    assert done.notes == ("2 records deleted in the tub, and not imported.",)
     (folder / "exclude.json").write_text('{"5": true}')
     with pytest.raises(DemosError, match=r"numbers in .*exclude.json must be a list"):
         imported(folder)
@@ -196,7 +196,7 @@ def test_catalogs_in_another_order(tmp_path: Path) -> None:
     episodes, done = imported(folder)
     assert episodes == [[0, 1, 2, 3, 4, 5]]
     assert done.warnings == (
-        "The _index falls 1 times, first from 5 to 0: the records are read in its order.",
+        "The _index falls in 1 place, first from 5 to 0: the records are read in its order.",
     )
     (folder / "catalog_1.catalog").unlink()
     episodes, done = imported(folder)
@@ -215,7 +215,7 @@ def test_pictures_of_other_records(tmp_path: Path) -> None:
         (folder / f"images/{n}_cam_image_array_.jpg").write_bytes(picture(n))
     _, done = imported(folder)
     assert done.warnings == (
-        "6 records name a picture with another number, up to 2 off (0, 1, 2, and 3 more): look "
+        "6 records with the picture of another number, up to 2 off (0, 1, 2, and 3 more): look "
         "whether they belong together.",
     )
 
@@ -301,7 +301,7 @@ def test_times_that_jump(tmp_path: Path) -> None:
     session = {"_session_id": "s", "cam/image_array": None}
     episodes, done = imported(tub_folder(tmp_path / "tub", [r | session for r in made]))
     assert episodes == [[*range(10)], [*range(10, 20)], [*range(20, 30)]]
-    assert "1 pauses, of 120.05 s at most and 120.05 s in all" in done.notes[0]
+    assert "after 1 pause, of 120.05 s at most and 120.05 s in all" in done.notes[0]
     assert done.warnings[0].startswith("Time runs backwards by up to 3599.95 s at 20:")
 
 
@@ -339,7 +339,7 @@ def test_pictures_of_other_formats(tmp_path: Path, form: str, mode: str) -> None
         (folder / "images" / record["cam/image_array"]).write_bytes(_image(mode, form))
     _, done = imported(folder)
     assert done.pictures == 3
-    assert done.notes == ("3 pictures were no JPEGs and are encoded with quality 100.",)
+    assert done.notes == ("3 pictures encoded as JPEG of quality 100.",)
 
 
 def test_cameras_of_other_names(tmp_path: Path) -> None:

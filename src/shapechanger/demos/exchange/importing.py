@@ -63,7 +63,7 @@ class ImportContext:
         """
         groups = sorted(self.left_out.items(), key=lambda group: -len(group[1]))
         return [
-            f"{len(names)} {what}{'' if len(names) == 1 else 's'} {reason}: {few(names)}"
+            f"{counted(len(names), what)} {reason}: {few(names)}"
             for (what, reason), names in groups
         ]
 
@@ -83,6 +83,11 @@ class ImportContext:
                 f"{source} is not whole ({'; '.join(findings)}): repair it, or import it with "
                 "`shapechanger demos import` and without --strict."
             )
+
+
+def counted(number: int, what: str) -> str:
+    """Format a count, such as "1 record" or "2 records"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def few(names: Sequence[object]) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES, read_file
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.importing import ImportContext
+from shapechanger.demos.exchange.importing import ImportContext, counted
 from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture, encode_picture, picture_size
 from shapechanger.errors import DemosError
 
@@ -73,7 +73,7 @@ def check_pictures(
             reason = "with a picture of another size than {} x {} pixels".format(*common)
             context.leave_out(what, reason, name)
     if encoded:
-        context.note(f"{encoded} pictures were no JPEGs and are encoded with quality 100.")
+        context.note(f"{counted(encoded, 'picture')} encoded as JPEG of quality 100.")
     return [size == common for size in sizes], common
 
 

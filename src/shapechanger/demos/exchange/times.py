@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from shapechanger.demos.episodes.records import longest_period_s
-from shapechanger.demos.exchange.importing import ImportContext, few
+from shapechanger.demos.exchange.importing import ImportContext, counted, few
 from shapechanger.demos.exchange.recorded import DEFAULT_HZ
 
 _NS_PER_S: Final = 1e9
@@ -170,7 +170,7 @@ class TimeReport:
         if self._pauses_s:
             count = len(self._pauses_s)
             self._context.note(
-                f"A new episode begins after each of {count} pauses, of "
+                f"A new episode begins after {counted(count, 'pause')}, of "
                 f"{_seconds(max(self._pauses_s))} at most and {_seconds(sum(self._pauses_s))} in "
                 "all."
             )

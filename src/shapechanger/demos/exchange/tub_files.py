@@ -33,7 +33,7 @@ from shapechanger.demos.exchange.files import (
     parse_json_object,
     read_text,
 )
-from shapechanger.demos.exchange.importing import ImportContext, few
+from shapechanger.demos.exchange.importing import ImportContext, counted, few
 from shapechanger.demos.exchange.tub_export import IMAGES, MANIFEST
 from shapechanger.errors import DemosError
 
@@ -168,28 +168,33 @@ def _read_catalog(
     start = cast("dict[str, Any]", about).get("start_index") if isinstance(about, dict) else None
     if not isinstance(start, int) or isinstance(start, bool):
         start = rows[-1][0] + 1 if rows else 0
-    counted = start
-    for number, line in enumerate(_read_bytes(path).split(b"\n"), 1):
+    try:
+        lines = _read_bytes(path).split(b"\n")
+    except DemosError as error:
+        context.leave_out("catalog", f"that cannot be read ({error})", path.name)
+        return
+    position = start
+    for number, line in enumerate(lines, 1):
         name = f"{path.name}, line {number}"
         if not line.strip():
             continue
         fields = _parsed(line)
         if isinstance(fields, dict):
-            rows.append((counted, cast("dict[str, Any]", fields)))
+            rows.append((position, cast("dict[str, Any]", fields)))
         else:
             reason = _DAMAGED if line.strip(b"\0\r") else "of NUL bytes, as after a power cut"
             context.leave_out("line", reason, name)
-        counted += 1
+        position += 1
 
 
 def _numbered(rows: Sequence[tuple[int, dict[str, Any]]], context: ImportContext) -> list[Record]:
     """Return records in the order of their `_index`, without those whose number is unclear."""
     has_index = any("_index" in fields for _, fields in rows)
     records: list[Record] = []
-    for counted, fields in rows:
-        number = fields.get("_index") if has_index else counted
+    for position, fields in rows:
+        number = fields.get("_index") if has_index else position
         if isinstance(number, bool) or not isinstance(number, int):
-            context.leave_out("record", "without a valid _index", f"the one counted as {counted}")
+            context.leave_out("record", "without a valid _index", f"the one at position {position}")
             continue
         session = fields.get("_session_id")
         time_ns = _in_ns(fields.get("_timestamp_ms"), _NS_PER_MS)
@@ -213,15 +218,15 @@ def _numbered(rows: Sequence[tuple[int, dict[str, Any]]], context: ImportContext
     falls = [(a.number, b.number) for a, b in pairwise(records) if b.number < a.number]
     if falls:
         context.warn(
-            f"The _index falls {len(falls)} times, first from {falls[0][0]} to {falls[0][1]}: the "
-            "records are read in its order."
+            f"The _index falls in {counted(len(falls), 'place')}, first from {falls[0][0]} to "
+            f"{falls[0][1]}: the records are read in its order."
         )
     return sorted(unique, key=lambda record: record.number)
 
 
 def _note_deleted(count: int, context: ImportContext) -> None:
     if count:
-        context.note(f"{count} records are deleted in the tub, and not imported.")
+        context.note(f"{counted(count, 'record')} deleted in the tub, and not imported.")
 
 
 def _report_missing(
@@ -242,7 +247,7 @@ def _report_missing(
             f"{len(missing)} of the records 0 to {last} are in no catalog: {runs(missing)}."
         )
     if strange := sorted(deleted - numbers - set(missing)):
-        context.warn(f"{len(strange)} deleted indexes are those of no record: {few(strange)}.")
+        context.warn(f"{len(strange)} of the deleted indexes belong to no record: {few(strange)}.")
 
 
 def _read_v1(folder: Path, context: ImportContext) -> Tub:

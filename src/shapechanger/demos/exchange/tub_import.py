@@ -18,7 +18,7 @@ from pathlib import Path, PurePath
 from typing import Any, Final
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.importing import ImportContext, few
+from shapechanger.demos.exchange.importing import ImportContext, counted, few
 from shapechanger.demos.exchange.pictures import check_pictures, read_picture
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
 from shapechanger.demos.exchange.times import Drive, TimeReport, choose_rates, iso_time
@@ -247,7 +247,7 @@ def _with_pictures(
                 offsets[number] = int(match[1]) - number
     if offsets:
         context.warn(
-            f"{len(offsets)} records name a picture with another number, up to "
+            f"{counted(len(offsets), 'record')} with the picture of another number, up to "
             f"{max(map(abs, offsets.values()))} off ({few(list(offsets))}): look whether they "
             "belong together."
         )
