@@ -15,12 +15,15 @@ import pytest
 import simplejpeg
 from minari.data_collector import EpisodeBuffer
 
+from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.exchange import (
+    ImportContext,
     export_recording,
     find_format,
     import_episodes,
     import_recording,
 )
+from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 from tests.demos.exchange.small import (
     all_of,
@@ -263,3 +266,25 @@ def test_episodes_are_read_without_writing(tmp_path: Path) -> None:
     assert head.source == "2017"
     assert [(step.index, jpeg) for step, jpeg in steps] == [(n, picture(n)) for n in range(3)]
     assert snapshot(tmp_path) == before
+
+
+def test_a_source_that_is_not_whole_is_refused_or_collected(tmp_path: Path) -> None:
+    """Readers without a report are strict, and so is learning from a tub directly."""
+    records = [r | {"_timestamp_ms": 1000 + 50 * n} for n, r in enumerate(_RECORDS[:3] * 4)]
+    folder = tub_folder(tmp_path / "tub", records)
+    (folder / "images/4_cam_image_array_.jpg").write_bytes(b"")
+    with pytest.raises(DemosError, match=r"is not whole .*1 record with an empty picture: 4"):
+        list(import_episodes(folder))
+    with pytest.raises(DemosError, match="import it with `shapechanger demos import`"):
+        load_dataset(folder)
+    context = ImportContext()
+    ((_, steps),) = list(import_episodes(folder, context=context))
+    assert len(list(steps)) == 11
+    assert context.left_out_lines() == ["1 record with an empty picture: 4"]
+    csv = tmp_path / "csv"
+    drive(tmp_path / "data")
+    export_recording(tmp_path / "data", csv, "csv")
+    with pytest.raises(DemosError, match="leave out --hz"):
+        import_recording(csv, tmp_path / "out", hz=20.0)
+    with pytest.raises(DemosError, match="A camera is chosen in lerobot and tub"):
+        import_recording(csv, tmp_path / "out", camera="front")

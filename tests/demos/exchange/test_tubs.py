@@ -291,6 +291,24 @@ def test_times_of_a_conversion(tmp_path: Path) -> None:
         imported(folder, hz=-1.0)
 
 
+def test_a_rate_in_the_metadata_counts(tmp_path: Path) -> None:
+    """It is read where it exists; times that contradict it are reported with their size."""
+    made = [r | {"cam/image_array": None} for r in records(40, period_ms=52.0)]
+    folder = tub_folder(tmp_path / "tub", made)
+    manifest = (folder / "manifest.json").read_text().splitlines()
+    for stated, warned in (("19.2", False), ("20", False), ("50", True), ("soon", False)):
+        manifest[2] = json.dumps({"DRIVE_LOOP_HZ": stated})
+        (folder / "manifest.json").write_text("\n".join(manifest))
+        _, done = imported(folder)
+        assert bool(done.warnings) == warned
+        if warned:
+            assert (
+                "52 ms apart, 19.23 a second by their times, and not the 50 Hz" in done.warnings[0]
+            )
+    rates = [all_of(p)[0].header.control_hz for p in tmp_path.iterdir() if p != folder]
+    assert sorted(rates) == [19.2, 19.23, 20.0, 50.0]
+
+
 def test_times_that_jump(tmp_path: Path) -> None:
     """A pause and a clock that was set back each begin an episode, and are reported by size."""
     made = records(30)

@@ -55,26 +55,29 @@ class Drive:
         return [(later - now) / max(1, after - at) for (now, later), (at, after) in pairs]
 
 
-def choose_rates(drives: Sequence[Drive], context: ImportContext) -> tuple[list[float], bool]:
-    """Measure the rates of drives, or take the stated one, and report what is odd about them.
+def choose_rates(
+    drives: Sequence[Drive], context: ImportContext, stated_hz: float | None = None
+) -> tuple[list[float], bool]:
+    """Measure the rates of drives, or take a stated one, and report what is odd about them.
 
     Args:
         drives: The drives of one source.
-        context: Options and findings of the import.
+        context: Options and findings of the import; its `hz` counts before anything else.
+        stated_hz: Steps per second that the source states; None if it does not.
 
     Returns:
         Steps per second of each drive, and whether the times of the records can be believed.
     """
     periods = [drive.periods_ns() for drive in drives]
     pooled = measured_hz([period for part in periods for period in part])
-    if context.hz is not None:
-        if pooled is None or 1.0 / _RATE_RATIO < pooled / context.hz < _RATE_RATIO:
-            return [context.hz] * len(drives), True
-        context.note(
-            f"The records are {_described(pooled)} by their times, and not the {context.hz:g} Hz "
-            "that were stated: these times are left out."
+    if (hz := context.hz or stated_hz) is not None:
+        if pooled is None or 1.0 / _RATE_RATIO < pooled / hz < _RATE_RATIO:
+            return [hz] * len(drives), True
+        (context.warn if context.hz is None else context.note)(
+            f"The records are {_described(pooled)} by their times, and not the {hz:g} Hz that are "
+            "stated: these times are left out."
         )
-        return [context.hz] * len(drives), False
+        return [hz] * len(drives), False
     if pooled is None:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
         return [DEFAULT_HZ] * len(drives), True

@@ -20,6 +20,7 @@ ACTIONS: Final = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle"
 MANIFEST: Final = "manifest.json"
 IMAGES: Final = "images"
 IMAGE: Final = "cam/image_array"
+LOOP_HZ: Final = "DRIVE_LOOP_HZ"
 MODE: Final = "user/mode"
 PERSON_DRIVES: Final = "user"
 AXES: Final = ("angle", "throttle")
@@ -70,10 +71,11 @@ def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
     inputs |= {"pilot/angle": "float", "pilot/throttle": "float"}
     inputs |= dict.fromkeys(states[0], "float")
     named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
+    rates = {episode.header.control_hz for episode in episodes}
     lines: tuple[object, ...] = (
         list(inputs),
         list(inputs.values()),
-        {},
+        {LOOP_HZ: f"{rates.pop():g}"} if len(rates) == 1 else {},
         {"created_at": created_s, "sessions": named},
         {
             "paths": paths,

@@ -8,7 +8,7 @@ the car that it belongs to, and `cam/image_array` names a file in `images/`. Bes
 `NAME.catalog_manifest` has its `start_index` and the lengths of its lines. Version 1 has a file
 `record_N.json` per record, its picture beside it, optionally `milliseconds` since the start,
 `meta.json` with inputs, types and optionally the Unix time of the start, and `exclude.json` with
-the numbers of deleted records.
+the numbers of deleted records. A car may write settings into its metadata (`--meta NAME:VALUE`).
 
 Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py (`Manifest`,
 `ManifestIterator`, `Tub.write_record`) for version 2, parts/datastore.py for version 1, read at
@@ -17,6 +17,7 @@ the commits 1e831b81, 38a1c2db and b253cef6, and in the package 5.3.0.
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -34,7 +35,7 @@ from shapechanger.demos.exchange.files import (
     read_text,
 )
 from shapechanger.demos.exchange.importing import ImportContext, counted, few
-from shapechanger.demos.exchange.tub_export import IMAGES, MANIFEST
+from shapechanger.demos.exchange.tub_export import IMAGES, LOOP_HZ, MANIFEST
 from shapechanger.errors import DemosError
 
 _META: Final = "meta.json"
@@ -43,6 +44,7 @@ _RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
 _CATALOG_NAME: Final = re.compile(r"catalog_([0-9]{1,9})\.catalog")
 _DAMAGED: Final = "that is not valid JSON"
 _MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
+_MAX_NS: Final = 1 << 61  # Half of what a step can hold: version 1 adds two times.
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
 
@@ -75,6 +77,7 @@ class Tub:
         start_ns: Unix time at which the tub was begun, ns; None if unknown.
         is_unix: Whether times of records are Unix times, and not times since some start.
         restarts: Whether times start again at each start of the car.
+        stated_hz: Steps per second that its metadata state; None if they do not.
     """
 
     inputs: dict[str, str]
@@ -83,6 +86,7 @@ class Tub:
     start_ns: int | None
     is_unix: bool
     restarts: bool
+    stated_hz: float | None
 
 
 def is_tub(folder: Path) -> bool:
@@ -151,6 +155,7 @@ def _read_v2(folder: Path, context: ImportContext) -> Tub:
         ),
         is_unix=True,
         restarts=False,
+        stated_hz=_stated_hz(_parsed(lines[2])),
     )
 
 
@@ -281,6 +286,7 @@ def _read_v1(folder: Path, context: ImportContext) -> Tub:
         start_ns=start_ns,
         is_unix=start_ns is not None,
         restarts=start_ns is None,
+        stated_hz=_stated_hz(meta),
     )
 
 
@@ -338,8 +344,20 @@ def _numbers(value: Any, what: str) -> set[int]:
     return set(numbers)
 
 
+def _stated_hz(metadata: Any) -> float | None:
+    """Return the rate in the metadata of a tub, where they have the name of Donkeycar's setting."""
+    try:
+        hz = float(metadata[LOOP_HZ])
+    except (LookupError, TypeError, ValueError, OverflowError):
+        return None
+    return hz if 0.0 < hz < math.inf else None
+
+
 def _in_ns(value: Any, unit_ns: int) -> int | None:
     """Return a time as ns; None for anything that cannot be a time."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return round(value * unit_ns) if abs(value) < _MAX_TIME else None
+    if not abs(value) < _MAX_TIME:
+        return None
+    in_ns = round(value * unit_ns)
+    return in_ns if abs(in_ns) < _MAX_NS else None

@@ -81,7 +81,7 @@ def read_tub(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         Drive(known, [row.record.number for row in part], f"record {part[0].record.number}")
         for part, known in zip(parts, times, strict=True)
     ]
-    rates, believed = choose_rates(drives, context)
+    rates, believed = choose_rates(drives, context, tub.stated_hz)
     report = TimeReport(context)
     for part, known, hz in zip(parts, times, rates, strict=True):
         names = [str(row.record.number) for row in part]
