@@ -26,7 +26,7 @@ from shapechanger.demos.exchange.files import cannot_read, name_problem, read_ta
 from shapechanger.demos.exchange.importing import ImportContext, few
 from shapechanger.demos.exchange.pictures import check_pictures, read_picture
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep, kept_steps
-from shapechanger.demos.exchange.times import Drive, TimeReport, choose_rates, iso_time
+from shapechanger.demos.exchange.times import TimedDrive, TimeReport, choose_rates, iso_time
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 
@@ -84,7 +84,7 @@ def read_2017(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]
     if not labels:
         return
     times_ns = [label.wall_ns for label in labels]
-    drive = Drive(times_ns, range(len(labels)), f"line {labels[0].line}")
+    drive = TimedDrive(times_ns, range(len(labels)), f"line {labels[0].line}")
     (hz,), believed = choose_rates([drive], context)
     report = TimeReport(context)
     names = [f"line {label.line}" for label in labels]

@@ -36,7 +36,7 @@ _WHOLE: Final = ((1.0, 0.005), (5.0, 0.025))
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class TimedDrive:
     """Consecutive records of one session.
 
     Attributes:
@@ -56,7 +56,7 @@ class Drive:
 
 
 def choose_rates(
-    drives: Sequence[Drive], context: ImportContext, stated_hz: float | None = None
+    drives: Sequence[TimedDrive], context: ImportContext, stated_hz: float | None = None
 ) -> tuple[list[float], bool]:
     """Measure the rates of drives, or take a stated one, and report what is odd about them.
 

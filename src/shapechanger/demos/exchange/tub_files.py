@@ -50,7 +50,7 @@ _NS_PER_S: Final = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class TubRecord:
     """One record of a tub.
 
     Attributes:
@@ -81,7 +81,7 @@ class Tub:
     """
 
     inputs: dict[str, str]
-    records: list[Record]
+    records: list[TubRecord]
     images: Path
     start_ns: int | None
     is_unix: bool
@@ -192,10 +192,12 @@ def _read_catalog(
         position += 1
 
 
-def _numbered(rows: Sequence[tuple[int, dict[str, Any]]], context: ImportContext) -> list[Record]:
+def _numbered(
+    rows: Sequence[tuple[int, dict[str, Any]]], context: ImportContext
+) -> list[TubRecord]:
     """Return records in the order of their `_index`, without those whose number is unclear."""
     has_index = any("_index" in fields for _, fields in rows)
-    records: list[Record] = []
+    records: list[TubRecord] = []
     for position, fields in rows:
         number = fields.get("_index") if has_index else position
         if isinstance(number, bool) or not isinstance(number, int):
@@ -203,10 +205,10 @@ def _numbered(rows: Sequence[tuple[int, dict[str, Any]]], context: ImportContext
             continue
         session = fields.get("_session_id")
         time_ns = _in_ns(fields.get("_timestamp_ms"), _NS_PER_MS)
-        records.append(Record(fields, number, time_ns, "" if session is None else str(session)))
+        records.append(TubRecord(fields, number, time_ns, "" if session is None else str(session)))
     counts = Counter(record.number for record in records)
-    unique: list[Record] = []
-    seen: dict[int, Record] = {}
+    unique: list[TubRecord] = []
+    seen: dict[int, TubRecord] = {}
     for record in records:
         if counts[record.number] == 1:
             unique.append(record)
@@ -235,7 +237,7 @@ def _note_deleted(count: int, context: ImportContext) -> None:
 
 
 def _report_missing(
-    records: Sequence[Record], deleted: set[int], count: Any, context: ImportContext
+    records: Sequence[TubRecord], deleted: set[int], count: Any, context: ImportContext
 ) -> None:
     """Report numbers that the manifest has and no record."""
     numbers = {record.number for record in records}
@@ -265,7 +267,7 @@ def _read_v1(folder: Path, context: ImportContext) -> Tub:
     if exclude.is_file():
         deleted = _numbers(parse_json(read_text(exclude), str(exclude)), f"numbers in {exclude}")
     start_ns = _in_ns(meta.get("start"), _NS_PER_S)
-    records: list[Record] = []
+    records: list[TubRecord] = []
     _note_deleted(len(deleted & found.keys()), context)
     for number in sorted(found.keys() - deleted):
         path = folder / found[number]
@@ -278,7 +280,7 @@ def _read_v1(folder: Path, context: ImportContext) -> Tub:
         time_ns = _in_ns(cast("dict[str, Any]", fields).get("milliseconds"), _NS_PER_MS)
         if time_ns is not None:
             time_ns += start_ns or 0
-        records.append(Record(cast("dict[str, Any]", fields), number, time_ns, ""))
+        records.append(TubRecord(cast("dict[str, Any]", fields), number, time_ns, ""))
     return Tub(
         inputs=_typed(meta.get("inputs", []), meta.get("types", []), folder / _META),
         records=records,

@@ -21,9 +21,9 @@ from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange.importing import ImportContext, counted, few
 from shapechanger.demos.exchange.pictures import check_pictures, read_picture
 from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
-from shapechanger.demos.exchange.times import Drive, TimeReport, choose_rates, iso_time
+from shapechanger.demos.exchange.times import TimedDrive, TimeReport, choose_rates, iso_time
 from shapechanger.demos.exchange.tub_export import ACTIONS, AXES, IMAGE, MODE, PERSON_DRIVES
-from shapechanger.demos.exchange.tub_files import Record, Tub, read_tub_files
+from shapechanger.demos.exchange.tub_files import Tub, TubRecord, read_tub_files
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Feature, Layout
 
@@ -42,7 +42,7 @@ _UNIT_UNKNOWN: Final = "?"
 class _Row:
     """A record that can be imported; without a path it has no picture."""
 
-    record: Record
+    record: TubRecord
     step: Step
     path: Path | None
 
@@ -78,7 +78,7 @@ def read_tub(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     parts = list(_drives(rows, restarts=tub.restarts))
     times = [_times_ns(part, context) for part in parts]
     drives = [
-        Drive(known, [row.record.number for row in part], f"record {part[0].record.number}")
+        TimedDrive(known, [row.record.number for row in part], f"record {part[0].record.number}")
         for part, known in zip(parts, times, strict=True)
     ]
     rates, believed = choose_rates(drives, context, tub.stated_hz)
@@ -176,7 +176,7 @@ def _state_layout(inputs: Mapping[str, str]) -> Layout | None:
     return Layout(tuple(Feature(name, _UNIT_UNKNOWN) for name in names)) if names else None
 
 
-def _step(record: Record, state: Layout | None, context: ImportContext) -> Step | None:
+def _step(record: TubRecord, state: Layout | None, context: ImportContext) -> Step | None:
     """Return a record as a step; None, with a finding, if it has no valid action."""
     mode = record.fields.get(MODE, PERSON_DRIVES)
     by_person = mode == PERSON_DRIVES
