@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from shapechanger.demos.exchange import Imported, import_recording
+from shapechanger.demos.exchange.times import measured_hz
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 from tests.demos.exchange.small import all_of, picture, tub_folder
@@ -271,6 +272,25 @@ def test_rates_by_times(tmp_path: Path, period_ms: float, hz: float, measured: s
     # The ten deleted records took time, too.
     assert episode.seconds == pytest.approx(60 * period_ms / 1e3, rel=0.01)
     assert episode.header.created == "2023-11-14T22:13:20.000+00:00"
+
+
+@given(st.lists(st.floats(0.0, 1e12), min_size=1, max_size=30))
+def test_a_measured_rate_is_that_of_some_periods(periods_ns: list[float]) -> None:
+    """It is finite for any periods, and no period prevails by being in the middle of two kinds."""
+    hz = measured_hz(periods_ns)
+    positive = [period for period in periods_ns if period > 0.0]
+    if not positive:
+        assert hz is None
+        return
+    assert hz is not None
+    zeros = len(periods_ns) / len(positive)  # Those of a coarse clock.
+    assert 1e9 / max(positive) * (1 - 1e-9) <= hz <= 1e9 / min(positive) * zeros * (1 + 1e-9)
+
+
+def test_periods_of_two_kinds() -> None:
+    """Where neither prevails, the steps in a second are counted; a few others do not count."""
+    assert measured_hz([50e6, 430e6] * 50) == pytest.approx(1 / 0.24)
+    assert measured_hz([50e6] * 60 + [430e6] * 40) == pytest.approx(20.0)
 
 
 def test_times_of_a_conversion(tmp_path: Path) -> None:

@@ -118,13 +118,14 @@ def measured_hz(periods_ns: Sequence[float]) -> float | None:
     positive = [period for period in periods_ns if period > 0.0]
     if not positive:
         return None
-    typical = statistics.median(positive)
+    typical = statistics.median_low(positive)
+    driven = [period for period in positive if period <= _PAUSE_PERIODS * typical]
     if 2 * len(positive) < len(periods_ns):  # The clock is coarser than a period.
-        driven = sum(period for period in positive if period <= _PAUSE_PERIODS * typical)
-        return _NS_PER_S * len(periods_ns) / driven
+        return _NS_PER_S * len(periods_ns) / sum(driven)
     low, high = _NEAR
-    near = [period for period in positive if low * typical <= period <= high * typical]
-    return _NS_PER_S / statistics.fmean(near)
+    near = [period for period in driven if low * typical <= period <= high * typical]
+    # Where no period prevails, the rate is that of all.
+    return _NS_PER_S / statistics.fmean(near if 2 * len(near) > len(driven) else driven)
 
 
 def nominal_hz(measured: float) -> float:
@@ -204,7 +205,7 @@ def _report_rate(measured: float, nominal: float, context: ImportContext) -> Non
 
 def _report_irregular(periods_ns: Sequence[float], context: ImportContext) -> None:
     driven = [p for p in periods_ns if p > 0.0]
-    typical = statistics.median(driven)
+    typical = statistics.median_low(driven)
     driven = [period for period in driven if period <= _PAUSE_PERIODS * typical]
     low, high = _NEAR
     odd = sum(not low * typical <= period <= high * typical for period in driven)
