@@ -155,7 +155,6 @@ def test_the_rest_of_a_damaged_tub_is_imported(
     ("change", "expected"),
     [
         ({"user/angle": 1.5}, "with user/angle or user/throttle that is not a number from -1 to 1"),
-        ({"user/angle": "left"}, "with user/angle or user/throttle that is not a number"),
         ({"user/throttle": None}, "without user/throttle"),
         ({"user/mode": "local"}, "without pilot/angle and pilot/throttle, although a pilot drove"),
         ({"cam/image_array": None}, "without a picture"),
@@ -255,7 +254,6 @@ def test_no_record_is_left(tmp_path: Path) -> None:
         (51.0, 20.0, "19.61 a second"),
         (33.34, 30.0, ""),
         (100.9, 10.0, "9.911 a second"),
-        (41.67, 24.0, ""),
     ],
 )
 def test_rates_by_times(tmp_path: Path, period_ms: float, hz: float, measured: str) -> None:
@@ -447,13 +445,15 @@ _DONKEYCAR = importlib.util.find_spec("donkeycar")
 
 def _donkeycar(name: str, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Load a module of Donkeycar alone: its package imports what a car needs."""
-    assert _DONKEYCAR and _DONKEYCAR.origin
+    assert _DONKEYCAR is not None
+    assert _DONKEYCAR.origin is not None
     for package in ("donkeycar", "donkeycar.parts"):
         monkeypatch.setitem(sys.modules, package, types.ModuleType(package))
     for part in ("datastore_v2", name):
         path = Path(_DONKEYCAR.origin).parent / "parts" / f"{part}.py"
         spec = importlib.util.spec_from_file_location(f"donkeycar.parts.{part}", path)
-        assert spec and spec.loader
+        assert spec is not None
+        assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         monkeypatch.setitem(sys.modules, spec.name, module)
         spec.loader.exec_module(module)
