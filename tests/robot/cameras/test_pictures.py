@@ -1,11 +1,14 @@
 """Barcodes, checks and streams of frames, without a camera."""
 
+import operator
+from collections.abc import Iterable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 import simplejpeg
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from shapechanger.errors import RobotError
@@ -139,56 +142,73 @@ def test_rotating_twice_restores_the_image() -> None:
     np.testing.assert_allclose(twice, image, atol=30)
 
 
-@given(values=st.lists(st.integers(0, 255), min_size=1, max_size=5), cut=st.integers(1, 400))
-def test_a_stream_is_split_for_any_chunk_size(values: list[int], cut: int) -> None:
-    """Frames are found wherever reads cut the stream."""
-    pictures = [_jpeg(value) for value in values]
-    stream = b"".join(pictures)
+def _split(stream: bytes, cuts: Iterable[int] = ()) -> tuple[list[bytes], int]:
+    """Return the frames of a stream that arrives in parts, and the number of bytes skipped."""
     splitter = JpegSplitter()
     found: list[bytes] = []
-    for start in range(0, len(stream), cut):
-        splitter.feed(stream[start : start + cut])
+    for first, last in pairwise([0, *cuts, len(stream)]):
+        splitter.feed(stream[first:last])
         while (jpeg := splitter.next()) is not None:
             found.append(jpeg)
-    assert found == pictures
+    return found, splitter.skipped
 
 
-@given(garbage=st.binary(max_size=200), data=st.data())
-def test_a_stream_recovers_after_garbage(garbage: bytes, data: st.DataObject) -> None:
-    """After any garbage, later frames are found, and the splitter ends."""
-    picture = _jpeg()
-    splitter = JpegSplitter()
-    splitter.feed(picture[: data.draw(st.integers(0, len(picture)))] + garbage)
-    splitter.feed(picture * 3)
-    found: list[bytes | None] = []
-    for _ in range(1000):
-        try:
-            found.append(splitter.next())
-        except RobotError:
-            continue
-        if found[-1] is None:
-            break
-    assert found.count(picture) >= 1 or found == [None]  # A damaged length may skip some.
-    splitter.feed(picture * 400)
-    for _ in range(5000):
-        try:
-            jpeg = splitter.next()
-        except RobotError:
-            continue
-        if jpeg is None:
-            break
-        found.append(jpeg)
-    assert found.count(picture) >= 1
+def _with_thumbnail(jpeg: bytes, thumbnail: bytes) -> bytes:
+    """Put a thumbnail into a frame, in the segment of Exif."""
+    size = (len(thumbnail) + 8).to_bytes(2, "big")
+    return jpeg[:2] + b"\xff\xe1" + size + b"Exif\0\0" + thumbnail + jpeg[2:]
 
 
-def test_an_endless_frame_is_refused() -> None:
-    """A frame of more than 4 MiB raises an error and frees its memory."""
-    splitter = JpegSplitter()
-    splitter.feed(_jpeg()[:-2] + bytes(4 * 1024 * 1024))
-    with pytest.raises(RobotError, match="more than"):
-        splitter.next()
-    splitter.feed(_jpeg(7))
-    assert splitter.next() == _jpeg(7)
+_FRAMES = [_jpeg(3), _with_thumbnail(_jpeg(90), _jpeg(5)), _with_comment(_jpeg(7), b"\xff\xd9")]
+_BETWEEN = st.binary(max_size=40).filter(lambda data: b"\xff\xd8" not in data)
+
+
+@given(between=st.lists(_BETWEEN, min_size=4, max_size=4), cuts=st.sets(st.integers(0, 3000)))
+@example(between=[b"\xff", b"\xff\xff", b"\xff\xd9", b"--boundary\r\n\r\n"], cuts=set(range(3000)))
+@example(between=[b""] * 4, cuts=set(range(3000)))
+def test_a_stream_yields_its_frames_and_no_others(between: list[bytes], cuts: set[int]) -> None:
+    """Whatever stands between frames, and wherever reads cut the stream."""
+    stream = between[0] + b"".join(map(operator.add, _FRAMES, between[1:]))
+    found, skipped = _split(stream, sorted(cut for cut in cuts if cut < len(stream)))
+    assert found == _FRAMES
+    # A last FF may begin the next frame.
+    assert skipped == sum(map(len, between)) - between[-1].endswith(b"\xff")
+
+
+@given(frame=st.sampled_from(_FRAMES), data=st.data())
+def test_a_frame_that_is_cut_off_is_skipped(frame: bytes, data: st.DataObject) -> None:
+    """The frames after it are found, once more bytes arrive than a segment may claim."""
+    cut = data.draw(st.integers(0, len(frame) - 1))
+    after = [_jpeg(value) for value in (1, 2)] * 60
+    found, _ = _split(frame[:cut] + b"".join(after))
+    # A thumbnail whose frame is cut off looks like a frame, and a segment that is cut off may end
+    # exactly at the end of the next frame.
+    assert [jpeg for jpeg in found if jpeg != _jpeg(5)] in (after, after[1:])
+
+
+@given(garbage=st.binary(max_size=200))
+def test_a_stream_recovers_after_garbage(garbage: bytes) -> None:
+    """After bytes that look like the start of a frame, frames are found once enough follow."""
+    found, _ = _split(_jpeg(9)[:20] + garbage + _jpeg(1) * 150)
+    assert found.count(_jpeg(1)) >= 30
+
+
+def test_a_stream_without_frames_is_refused() -> None:
+    """More than 1 MiB without a frame raises an error and frees its memory."""
+    for nothing in (_jpeg()[:-2] + bytes(4 << 20), bytes(2 << 20), b"\xff\xd8\xff\xd9" * 270_000):
+        splitter = JpegSplitter()
+        splitter.feed(nothing)
+        with pytest.raises(RobotError, match="without a complete JPEG"):
+            splitter.next()
+        splitter.feed(_jpeg(7))
+        assert splitter.next() == _jpeg(7)
+
+
+def test_padding_of_a_frame_is_cut_off() -> None:
+    """Some cameras and phones write bytes after a frame."""
+    plan = CameraPlan("file", size=(32, 24))
+    for after in (bytes(99), b"\xff", b"\0more"):
+        assert checked_frame(_jpeg(1) + after, 0, plan).jpeg == _jpeg(1)
 
 
 def test_the_capture_time_is_read_from_the_comment() -> None:

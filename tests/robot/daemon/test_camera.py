@@ -141,6 +141,17 @@ def test_a_camera_that_sends_only_garbage_is_reopened(camera: FakeCamera, watche
     assert len([text for text in watched.reports if "cannot be decoded" in text]) == 1
 
 
+def test_bytes_between_frames_are_reported_once(camera: FakeCamera, watched: Watched) -> None:
+    """Some streams have bytes between all frames, such as the headers of HTTP."""
+    for at in range(1, 4):
+        camera.put(Frame(picture(at), at, skipped=62))
+    watched.until(lambda: len(watched.frames) == 3)
+    assert [
+        report for report in watched.reports if "62 before this one" in report
+    ] == watched.reports
+    assert (len(watched.reports), watched.reader.errors) == (1, 0)
+
+
 def test_closing_ends_a_camera_without_frames(watched: Watched) -> None:
     """A camera that hangs does not keep the daemon from exiting."""
     watched.reader.close()

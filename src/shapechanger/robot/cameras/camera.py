@@ -31,11 +31,13 @@ class Frame:
         captured_ns: Time of capture on the robot's monotonic clock, ns.
         encoded_here: Whether this process encoded the JPEG from an image of the right size. Such a
             frame decodes, so it needs no further check.
+        skipped: Number of bytes between this frame and the one before that are part of no frame.
     """
 
     jpeg: bytes
     captured_ns: int
     encoded_here: bool = False
+    skipped: int = 0
 
 
 @dataclass(frozen=True, slots=True)

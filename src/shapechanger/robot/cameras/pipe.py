@@ -12,6 +12,7 @@ import shlex
 import stat
 import subprocess
 import time
+from dataclasses import replace
 from typing import Final
 
 from shapechanger.errors import RobotError
@@ -45,7 +46,8 @@ class Pipe:
         self._live = not stat.S_ISREG(os.fstat(self._fd).st_mode)
 
     def read(self) -> Frame:
-        """Wait for the next frame; see `Camera.read`. After garbage, the next call continues."""
+        """Wait for the next frame; see `Camera.read`. Bytes between frames are skipped."""
+        skipped = self._splitter.skipped
         jpeg: bytes | None = self._splitter.next()
         while jpeg is None:
             self._feed()
@@ -58,7 +60,9 @@ class Pipe:
             jpeg = self._newest(jpeg)
             captured_ns = captured_ns_of(jpeg)
         arrived_ns = time.monotonic_ns()
-        return checked_frame(jpeg, arrived_ns if captured_ns is None else captured_ns, self._plan)
+        at_ns = arrived_ns if captured_ns is None else captured_ns
+        frame = checked_frame(jpeg, at_ns, self._plan)
+        return replace(frame, skipped=self._splitter.skipped - skipped)
 
     def close(self) -> None:
         """Interrupt a waiting `read`, and end the program."""

@@ -208,7 +208,6 @@ class V4l2:
             buffer = Buffer.unpack(data)
             if not buffer.flags & BUFFER_FLAG_ERROR:
                 monotonic = buffer.flags & BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC
-                # Cameras pad frames with zeros.
-                jpeg = self._buffers[buffer.index][: buffer.used].rstrip(b"\0")
+                jpeg = self._buffers[buffer.index][: buffer.used]
                 newest = jpeg, buffer.at_ns if monotonic else time.monotonic_ns()
             self._ioctl(self._fd, QUEUE, data)

@@ -59,7 +59,7 @@ class FrameReader:
         checks: Checks each frame.
         deliver: Called in the thread with each valid, new frame.
         report: Called in the thread with a sentence when the camera fails, once for each kind of
-            failure, and when it recovers.
+            failure, and when it recovers; once if its stream has bytes between frames.
         opener: Opens the camera.
 
     Attributes:
@@ -81,6 +81,7 @@ class FrameReader:
         self._report = report
         self._open = opener
         self._trouble = ""
+        self._skips = False
         self._end = threading.Event()
         self._camera: Camera | None = None
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
@@ -137,6 +138,12 @@ class FrameReader:
                 continue
             good, bad = True, 0
             self._deliver(frame)
+            if frame.skipped and not self._skips:
+                self._skips = True  # Some streams have bytes between all frames.
+                self._report(
+                    f"The camera's stream has bytes between its frames that are no JPEG, "
+                    f"{frame.skipped} before this one: they are skipped."
+                )
             if self._trouble:
                 self._trouble = ""
                 self._report("The camera works again.")
