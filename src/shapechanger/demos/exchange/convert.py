@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -246,8 +247,9 @@ def import_recording(
     with new_folder(out, path) as folder:
         for episode in read:
             named_after = named_after or _began(episode.header)
-            added, shown = _write(episode, folder, named_after)
-            episodes, steps, pictures = episodes + 1, steps + added, pictures + shown
+            added, shown = _write(episode, folder, named_after, context)
+            whole = added > 0 or not context.left_out
+            episodes, steps, pictures = episodes + whole, steps + added, pictures + shown
         if strict:
             context.require_whole(path)
         if not episodes or (context.left_out and not steps):
@@ -341,7 +343,9 @@ def _formats_of(path: Path) -> list[Format]:
     return [name for name, detect in _DETECT.items() if detect(path)]
 
 
-def _write(episode: ExchangeEpisode, folder: Path, named_after: datetime) -> tuple[int, int]:
+def _write(
+    episode: ExchangeEpisode, folder: Path, named_after: datetime, context: ImportContext
+) -> tuple[int, int]:
     """Write one episode of a recording; return its numbers of steps and pictures."""
     pictures = 0
     excluded: list[tuple[int, str]] = []
@@ -370,4 +374,6 @@ def _write(episode: ExchangeEpisode, folder: Path, named_after: datetime) -> tup
     for why, group in runs:
         indexes = [index for _, (index, _) in group]
         drop(writer.path, indexes[0], indexes[-1], why[0])
+    if not writer.steps and context.left_out:  # All its steps.
+        shutil.rmtree(writer.path)
     return writer.steps, pictures

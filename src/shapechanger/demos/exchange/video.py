@@ -7,12 +7,15 @@ one: as MP4 only, without references to other files, and with a limit of pixels.
 from __future__ import annotations
 
 import contextlib
+import os
+import re
 import subprocess
 import tempfile
 from collections.abc import Generator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Final, cast
+from typing import IO, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,16 +27,18 @@ from shapechanger.errors import DemosError, OutputError
 # Constant quality, 0 to 51; see the measured error in docs/exchange.md.
 _QUALITY: Final = 18
 _KEY_FRAMES: Final = 2  # Each second picture stands alone, so that learners can read any quickly.
-_LONGEST_LINE: Final = 64
+_LONGEST_LINE: Final = 256
+_DISCARDED: Final = re.compile(rb"F=0x[0-9A-F]*[4-7C-F]\b")  # Cut off by the list of edits.
+_PIXELS: Final = re.compile(rb"Stream #0:.*: Video: [^,]*, (\w+)")
 
 
-def _ffmpeg(arguments: Sequence[str]) -> list[str]:
-    """Return the command line of FFmpeg."""
+def _ffmpeg(arguments: Sequence[str], log: str = "error") -> list[str]:
+    """Return the command line of FFmpeg, with the level of its log."""
     try:
         path = cast("str", library("imageio_ffmpeg", "lerobot").get_ffmpeg_exe())
     except RuntimeError as error:  # Where its wheel brings none.
         raise DemosError(f"Videos need FFmpeg: {error}") from error
-    return [path, "-hide_banner", "-loglevel", "error", "-nostdin", *arguments]
+    return [path, "-hide_banner", "-nostats", "-loglevel", log, "-nostdin", *arguments]
 
 
 class VideoWriter:
@@ -118,60 +123,179 @@ class VideoWriter:
         return OutputError(f"Cannot write {self._path}: {_last_line(self._log) or 'FFmpeg ended'}.")
 
 
-def read_video(
-    path: Path, start_s: float, count: int, rate_hz: float, size: tuple[int, int]
+@dataclass(frozen=True, slots=True)
+class VideoTimes:
+    """When each picture of a video is shown.
+
+    Attributes:
+        ticks: Times in ticks, ascending, shape (n,).
+        tick_s: Length of a tick, s.
+        size: Width and height of the pictures, pixels.
+        is_cut_off: Whether the end of the file is missing.
+    """
+
+    ticks: NDArray[np.int64]
+    tick_s: Fraction
+    size: tuple[int, int]
+    is_cut_off: bool
+
+    @property
+    def seconds(self) -> NDArray[np.float64]:
+        """Times in seconds, shape (n,)."""
+        return self.ticks.astype(np.float64) * float(self.tick_s)
+
+
+def read_times(path: Path) -> VideoTimes:
+    """Read the times of the pictures of an MP4 video, without decoding them.
+
+    Raises:
+        DemosError: If the video is damaged, or is of depth.
+        MissingExtra: If there is no FFmpeg.
+    """
+    taken = ["-map", "0:v:0", "-c", "copy", "-copyinkf", "-f", "framecrc", "pipe:1"]
+    command = _ffmpeg([*_reading(path), *taken], log="info")
+    ticks: list[int] = []
+    about: dict[str, str] = {}
+    most = path.stat().st_size  # Each picture has at least one byte.
+    with tempfile.TemporaryFile() as log, _running(command, log) as process:
+        for line in iter(lambda: _stream(process).readline(_LONGEST_LINE), b""):
+            if line.startswith(b"#"):
+                name, _, value = line[1:].decode(errors="replace").partition(":")
+                about[name.strip()] = value.strip()
+            elif not _DISCARDED.search(line):
+                ticks.append(_tick(line))
+            if len(ticks) > most:
+                raise DemosError(f"{path} claims more pictures than it has bytes.")
+        process.wait()
+        if not ticks or process.returncode:
+            why = f" ({problem})" if (problem := _last_line(log)) else ""
+            raise DemosError(f"{path} has no pictures{why}: restore it.")
+        log.seek(0)
+        said = log.read(1 << 20)
+    found = _PIXELS.search(said)
+    pixels = found[1].decode() if found else "unknown"
+    if pixels.startswith(("gray", "ya")) and pixels.endswith(("le", "be")):
+        raise DemosError(
+            f"{path} has grey pictures of more than 8 bits ({pixels}), like those of a depth "
+            "camera, which cannot be imported."
+        )
+    try:
+        width, height = (int(n) for n in about["dimensions 0"].split("x"))
+        tick_s = Fraction(about["tb 0"])
+    except (KeyError, ValueError, ZeroDivisionError) as error:
+        raise DemosError(f"{path} has no size and no clock: restore it.") from error
+    shown = np.unique(np.array(ticks, np.int64))
+    return VideoTimes(shown, tick_s, (width, height), b"partial file" in said)
+
+
+def read_pictures(
+    path: Path,
+    times: VideoTimes,
+    wanted: Sequence[int],
+    size: tuple[int, int],
+    *,
+    from_start: bool = False,
 ) -> Generator[NDArray[np.uint8]]:
-    """Yield consecutive pictures of an MP4 video, shape (height, width, 3).
+    """Yield the pictures of an MP4 video at some times, shape (height, width, 3).
 
     Args:
         path: The file.
-        start_s: Time of the first picture, s.
-        count: Number of pictures.
-        rate_hz: Pictures per second.
+        times: Its times.
+        wanted: The times to read, of those, ascending, in ticks.
         size: Width and height that the pictures must have, pixels.
+        from_start: Whether to decode the video from its start, not from the key frame before.
 
     Raises:
-        DemosError: If the video is damaged, shorter, or of another size.
+        DemosError: If the video is damaged, or has pictures of another size.
         MissingExtra: If there is no FFmpeg.
     """
-    since_s = max(0.0, start_s - 0.5 / rate_hz)  # Rounding must not miss the first picture.
-    reading = ["-protocol_whitelist", "file", "-max_pixels", str(MAX_PIXELS), "-f", "mov"]
-    seek = ["-ss", f"{since_s:.6f}"] if since_s else []
-    taken = ["-map", "0:v:0", "-frames:v", str(count), "-fps_mode", "passthrough"]
-    out = ["-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "pipe:1"]
-    command = _ffmpeg([*reading, *seek, "-i", f"file:{path.absolute()}", *taken, *out])
     width, height = size
+    seek: list[str] = []
+    if wanted[0] > times.ticks[0] and not from_start:
+        # To the key frame before, by the file's own times; rounding must not miss it. An accurate
+        # seek would add the time of the first picture once more.
+        since_s = float(wanted[0] * times.tick_s) - 1e-3
+        seek = ["-noaccurate_seek", "-seek_timestamp", "1", "-ss", f"{since_s:.6f}"]
+    read_fd, write_fd = os.pipe()
+    taken = ["-map", "0:v:0", "-fps_mode", "passthrough"]
+    # A line for each picture, just before it: its time, as in the file.
+    timed = ["-stats_enc_pre", f"pipe:{write_fd}", "-stats_enc_pre_fmt", "{ptsi}"]
+    out = ["-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "pipe:1"]
+    command = _ffmpeg([*_reading(path, seek), *taken, *timed, *out])
     with (
         tempfile.TemporaryFile() as log,
-        subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log
-        ) as process,
+        os.fdopen(read_fd, "rb") as lines,
+        _running(command, log, write_fd) as process,
     ):
-        assert process.stdout is not None
+        for tick in wanted:
+            shown, data = _next_picture(path, size, lines, process)
+            while data and shown < tick:
+                shown, data = _next_picture(path, size, lines, process)
+            if seek and tick == wanted[0] and shown != tick:  # That was no key frame.
+                yield from read_pictures(path, times, wanted, size, from_start=True)
+                return
+            if not data or shown != tick:
+                process.kill()
+                why = f" ({problem})" if (problem := _last_line(log)) else ""
+                raise DemosError(
+                    f"{path} is damaged: the picture at {float(tick * times.tick_s):.3f} s "
+                    f"cannot be decoded{why}."
+                )
+            yield np.frombuffer(data, np.uint8).reshape(height, width, 3)
+
+
+def _next_picture(
+    path: Path, size: tuple[int, int], lines: IO[bytes], process: subprocess.Popen[bytes]
+) -> tuple[int, bytes]:
+    """Return the time of the next picture in ticks, and its pixels; b"" at the end."""
+    line = lines.readline(_LONGEST_LINE)
+    if not line.strip():
+        return 0, b""
+    # Each picture is a PPM: "P6", width and height, 255, and the pixels.
+    stream = _stream(process)
+    head = [stream.readline(_LONGEST_LINE) for _ in range(3)]
+    width, height = size
+    if head[0] and head != [b"P6\n", f"{width} {height}\n".encode(), b"255\n"]:
+        found = head[1].decode(errors="replace").strip().replace(" ", " x ")
+        raise DemosError(
+            f"The pictures in {path} have {found} pixels, but meta/info.json says "
+            f"{width} x {height}."
+        )
+    data = stream.read(width * height * 3)
+    return int(line), data if len(data) == width * height * 3 else b""
+
+
+def _reading(path: Path, seek: Sequence[str] = ()) -> list[str]:
+    """Return the options to read a file of a stranger, with its own times."""
+    limits = ["-protocol_whitelist", "file", "-max_pixels", str(MAX_PIXELS), "-copyts"]
+    return [*limits, "-f", "mov", *seek, "-i", f"file:{path.absolute()}"]
+
+
+@contextlib.contextmanager
+def _running(
+    command: Sequence[str], log: IO[bytes], *fds: int
+) -> Generator[subprocess.Popen[bytes]]:
+    """Run FFmpeg, to which some further descriptors are handed over, and end it."""
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, pass_fds=fds
+    ) as process:
+        for fd in fds:
+            os.close(fd)
         try:
-            for number in range(count):
-                # Each picture is a PPM: "P6", width and height, 255, and the pixels.
-                head = [process.stdout.readline(_LONGEST_LINE) for _ in range(3)]
-                if not head[0]:
-                    process.wait()
-                    why = f" ({problem})" if (problem := _last_line(log)) else ""
-                    raise DemosError(
-                        f"{path} ends after {number} of the {count} pictures of an episode{why}: "
-                        "restore it."
-                    )
-                if head != [b"P6\n", f"{width} {height}\n".encode(), b"255\n"]:
-                    found = head[1].decode(errors="replace").strip().replace(" ", " x ")
-                    raise DemosError(
-                        f"The pictures in {path} have {found} pixels, but meta/info.json says "
-                        f"{width} x {height}."
-                    )
-                data = process.stdout.read(width * height * 3)
-                if len(data) < width * height * 3:
-                    raise DemosError(f"{path} is damaged at picture {number} of an episode.")
-                yield np.frombuffer(data, np.uint8).reshape(height, width, 3)
+            yield process
         finally:
             with contextlib.suppress(OSError):
                 process.kill()
+
+
+def _stream(process: subprocess.Popen[bytes]) -> IO[bytes]:
+    assert process.stdout is not None
+    return process.stdout
+
+
+def _tick(line: bytes) -> int:
+    """Return the time of a packet in ticks: "stream, decoding time, presentation time, ..."."""
+    return int(line.split(b",")[2])
 
 
 def _last_line(log: object) -> str:
