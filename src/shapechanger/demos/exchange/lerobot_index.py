@@ -415,12 +415,13 @@ def _with_pictures(
     tick_s = float(times.tick_s)
     at_s = first_s + located.times_ns / _NS_PER_S
     most_s = _tolerance_s(at_s) + 0.5 * tick_s
-    if at_s[-1] > end_s - 2.0 * most_s[-1] or at_s[-1] > times.seconds[-1] + most_s[-1]:
-        # A picture is lost, and the ones after it moved up; which one is unknown.
-        have_s = min(end_s, float(times.seconds[-1]) + _period_s(times)) - first_s
+    period_s = _period_s(times)
+    if at_s[-1] > min(end_s - 2.0 * most_s[-1], times.seconds[-1] + 0.5 * period_s):
+        # If a picture is lost, the ones after it moved up; which one is unknown.
+        have_s = min(end_s, float(times.seconds[-1]) + period_s) - first_s
         raise _Contradiction(
             "with fewer pictures than steps",
-            f"{have_s:.4g} s of video, and a last step at {at_s[-1] - first_s:.4g} s",
+            f"{max(0.0, have_s):.4g} s of video, and a last step at {at_s[-1] - first_s:.4g} s",
         )
     newest = len(times.ticks) - 1
     after = np.asarray(np.searchsorted(times.seconds, at_s), np.int64).clip(max=newest)
@@ -429,7 +430,7 @@ def _with_pictures(
     nearest = np.where(earlier_s < off_s, before, after)
     off_s = np.minimum(off_s, earlier_s)
     shown = off_s <= most_s
-    if 2 * np.count_nonzero(shown) < len(shown):
+    if 2 * np.count_nonzero(shown) <= len(shown):
         raise _Contradiction(
             "without a picture at the time of most steps",
             f"{np.count_nonzero(~shown)} of {len(shown)}, by up to {off_s.max():.3g} s",

@@ -28,7 +28,8 @@ from shapechanger.errors import DemosError, OutputError
 _QUALITY: Final = 18
 _KEY_FRAMES: Final = 2  # Each second picture stands alone, so that learners can read any quickly.
 _LONGEST_LINE: Final = 256
-_DISCARDED: Final = re.compile(rb"F=0x[0-9A-F]*[4-7C-F]\b")  # Cut off by the list of edits.
+_FLAGS: Final = re.compile(rb"F=0x([0-9A-F]+)")
+_LEFT_OUT: Final = 0x2 | 0x4  # Flags of packets: damaged, or cut off by the list of edits.
 _PIXELS: Final = re.compile(rb"Stream #0:.*: Video: [^,]*, (\w+)")
 
 
@@ -162,7 +163,7 @@ def read_times(path: Path) -> VideoTimes:
             if line.startswith(b"#"):
                 name, _, value = line[1:].decode(errors="replace").partition(":")
                 about[name.strip()] = value.strip()
-            elif not _DISCARDED.search(line):
+            elif not (flags := _FLAGS.search(line)) or not int(flags[1], 16) & _LEFT_OUT:
                 ticks.append(_tick(line))
             if len(ticks) > most:
                 raise DemosError(f"{path} claims more pictures than it has bytes.")
@@ -221,7 +222,9 @@ def read_pictures(
     # A line for each picture, just before it: its time, as in the file.
     timed = ["-stats_enc_pre", f"pipe:{write_fd}", "-stats_enc_pre_fmt", "{ptsi}"]
     out = ["-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "pipe:1"]
-    command = _ffmpeg([*_reading(path, seek), *taken, *timed, *out])
+    # Without these, damaged pictures would be filled up with others.
+    strict = ["-xerror", "-err_detect", "explode"]
+    command = _ffmpeg([*_reading(path, [*strict, *seek]), *taken, *timed, *out])
     with (
         tempfile.TemporaryFile() as log,
         os.fdopen(read_fd, "rb") as lines,
