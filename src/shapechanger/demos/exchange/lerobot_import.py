@@ -301,8 +301,9 @@ class _Pictures:
         self._unpacked = unpacked
         self._frames: Iterator[NDArray[np.uint8]] | None = None
         self._files = list(located.rows)
-        self._read = b""
+        self._read: Any = ...
         self._jpeg: bytes | None = None
+        self._fault = ""
         self._shown: bytes | None = None
         if located.video is not None and located.times is not None and size is not None:
             wanted = located.ticks.tolist()
@@ -319,13 +320,17 @@ class _Pictures:
             return encode_picture(next(self._frames))
         if self._feature is None:
             return None
-        stored = _stored(row[self._feature.key])
+        stored = row[self._feature.key]
         if stored != self._read:  # Else the steps share a picture.
-            self._count(len(stored))
-            self._read, self._jpeg = stored, None
-            self._jpeg = _as_jpeg(stored, self._check)
-        if self._jpeg is None:
-            raise _BadStep("with the damaged picture of the step before")
+            self._read = stored
+            try:
+                data = _stored(stored)
+                self._count(len(data))
+                self._jpeg, self._fault = _as_jpeg(data, self._check), ""
+            except _BadStep as error:
+                self._fault = str(error)
+        if self._fault:
+            raise _BadStep(self._fault)
         return self._jpeg
 
     def unless_shown(self, jpeg: bytes | None) -> bytes | None:
@@ -360,7 +365,8 @@ def _as_jpeg(data: bytes, pictures: Pictures) -> bytes:
         try:
             pictures.check(data, "in the table")
         except DemosError as error:
-            raise _BadStep(f"with a picture that cannot be taken: {error}") from error
+            why = str(error).removesuffix(".")
+            raise _BadStep(f"with a picture that cannot be taken: {why}") from error
         return data
     if not data.startswith(_PNG):
         raise _BadStep("with a picture that is neither JPEG nor PNG")

@@ -1,0 +1,214 @@
+"""Features of LeRobot datasets: each is imported as it is, or named in the report."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from PIL import Image
+
+from shapechanger.demos.episodes import Step
+from shapechanger.demos.exchange import ImportContext, export_recording, import_recording
+from shapechanger.demos.exchange.lerobot_import import read_lerobot
+from shapechanger.errors import DemosError, UnknownName
+from shapechanger.layout import Layout
+from tests.demos.exchange.lerobot_set import CAMERA, SIZE, VIDEO, pairs_of, write_set, write_video
+from tests.demos.exchange.small import all_of, header, picture, record
+
+AXES = ["height", "width", "channels"]
+COUNT = 16
+
+
+def png(pixels: np.ndarray, kind: str = "PNG") -> bytes:
+    """Return an image file."""
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, kind)
+    return file.getvalue()
+
+
+def plain(number: int, channels: int = 3) -> np.ndarray:
+    """Return a picture whose brightness is its number."""
+    return np.full((SIZE, SIZE, channels), 6 * number, np.uint8).squeeze()
+
+
+def stored(images: list[Any], feature: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Return options of a dataset with images in its table."""
+    column = pa.array([{"bytes": data, "path": f"{n}.png"} for n, data in enumerate(images)])
+    described = {"dtype": "image", "shape": [SIZE, SIZE, 3], "names": AXES} | (feature or {})
+    return {"video": False, "columns": {CAMERA: column}, "features": {CAMERA: described}}
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda n: png(plain(n)),
+        lambda n: png(plain(n, 1)),  # Grey.
+        lambda n: png(np.dstack([plain(n), np.full((SIZE, SIZE), 255, np.uint8)])),
+        lambda n: png(np.asarray(Image.fromarray(plain(n)).quantize())),
+    ],
+)
+def test_images_of_8_bits_keep_their_brightness(tmp_path: Path, draw: Any) -> None:
+    """Colour, grey, opaque and with a palette."""
+    folder = write_set(tmp_path / "set", **stored([draw(n) for n in range(COUNT)]))
+    pairs, context = pairs_of(folder)
+    assert pairs == [[(n, n) for n in range(8)], [(n, n) for n in range(8, 16)]]
+    assert not context.left_out
+
+
+DEPTH = np.linspace(400, 4000, SIZE * SIZE).reshape(SIZE, SIZE)
+FADED = np.dstack([plain(5), np.full((SIZE, SIZE), 128, np.uint8)])
+
+
+@pytest.mark.parametrize(
+    ("image", "reason"),
+    [
+        (png(DEPTH.astype(np.uint16)), "16 bits a value, like that of a depth camera"),
+        (png(DEPTH.astype(np.float32), "TIFF"), "neither JPEG nor PNG"),
+        (png(plain(5), "WEBP"), "neither JPEG nor PNG"),
+        (png(FADED), "partly transparent"),
+        (png(np.zeros((8, 16, 3), np.uint8)), "of 16 x 8 pixels, and not 32 x 32"),
+        pytest.param(png(plain(5))[:60], "a damaged picture", id="cut PNG"),
+        (picture(0, SIZE, SIZE)[:200], "cannot be taken"),
+        (picture(0, 16, 8), "cannot be taken.*16 x 8"),
+        (b"", "not in the table"),
+        (None, "not in the table"),
+    ],
+)
+def test_other_images_are_named(tmp_path: Path, image: bytes | None, reason: str) -> None:
+    """A step with another image is left out; a dataset with nothing else is refused."""
+    images = [png(plain(n)) for n in range(COUNT)]
+    folder = write_set(tmp_path / "set", **stored([*images[:5], image, *images[6:]]))
+    pairs, context = pairs_of(folder)
+    assert pairs == [[(n, n) for n in range(8) if n != 5], [(n, n) for n in range(8, 16)]]
+    with pytest.raises(DemosError, match=f"1 step (with|whose).*{reason}.*5 of episode 0"):
+        context.require_whole(folder)
+    folder = write_set(tmp_path / "all", **stored([image] * COUNT))
+    with pytest.raises(DemosError, match=f"nothing to import.*16 steps (with|whose).*{reason}"):
+        import_recording(folder, tmp_path / "back")
+
+
+def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
+    """Also if the first of the steps is left out."""
+    images = [png(plain(n // 4)) for n in range(COUNT)]
+
+    def spoil(rows: list[dict[str, Any]]) -> None:
+        rows[4]["action"] = [4.0, float("nan")]
+
+    folder = write_set(tmp_path / "set", rows=spoil, **stored(images))
+    context = ImportContext()
+    rows = [list(episode.rows) for episode in read_lerobot(folder, context)]
+    assert [[row.jpeg is not None for row in episode] for episode in rows] == [
+        [True, False, False, False, True, False, False],
+        [True, False, False, False] * 2,
+    ]
+    assert context.left_out_lines() == ["1 step with an action that is not finite: 4 of episode 0"]
+
+
+@pytest.mark.parametrize(
+    ("shape", "named"),
+    [
+        ([3, SIZE, 16], ["channels", "height", "width"]),
+        ([16, SIZE, 3], ["width", "height", "channel"]),
+        ([SIZE, 16, 3], None),
+        ([3, SIZE, 16], None),
+        ([SIZE, 16, 3], ["channels", "height", "width"]),  # Names that do not fit.
+        ([4, SIZE, 16], ["c", "h", "w"]),
+    ],
+)
+def test_axes_are_found_by_their_names(
+    tmp_path: Path, shape: list[int], named: list[str] | None
+) -> None:
+    """Or else by the number of colours; the pictures must agree."""
+    images = [png(plain(n)[:, :16]) for n in range(COUNT)]
+    options = stored(images, {"shape": shape, "names": named})
+    import_recording(write_set(tmp_path / "set", **options), tmp_path / "back")
+    assert {one.header.image_size for one in all_of(tmp_path / "back")} == {(16, SIZE)}
+
+
+def test_other_features_are_named(tmp_path: Path) -> None:
+    """Images of an unknown kind are left out, and other features noted."""
+    numbers = pa.array([[[[7]] * 4] * 4] * COUNT, pa.list_(pa.list_(pa.list_(pa.uint16()))))
+    folder = write_set(
+        tmp_path / "set",
+        features={
+            "observation.images.depth": {"dtype": "uint16", "shape": [4, 4, 1], "names": AXES},
+            "observation.points": {"dtype": "float32", "shape": [480, 640, 3], "names": None},
+            "observation.scan": {"dtype": "depth16", "shape": [480, 640], "names": None},
+            "observation.words": {"dtype": "string", "shape": [1], "names": None},
+            "next.success": {"dtype": "bool", "shape": [1], "names": None},
+        },
+        columns={"observation.images.depth": numbers},
+    )
+    pairs, context = pairs_of(folder)
+    assert sum(map(len, pairs)) == COUNT
+    (line,) = context.left_out_lines()
+    assert line == (
+        "3 features with pictures of an unknown kind or of depth: observation.images.depth "
+        "(uint16, 4 x 4 x 1), observation.points (float32, 480 x 640 x 3), observation.scan "
+        "(depth16, 480 x 640)"
+    )
+    assert context.notes == [
+        "The feature observation.words (string, 1) is not imported.",
+        "The feature next.success (bool, 1) is not imported.",
+    ]
+
+
+@pytest.mark.parametrize("flag", ["video.is_depth_map", "is_depth_map"])
+def test_a_camera_of_depth_is_not_chosen(tmp_path: Path, flag: str) -> None:
+    """It is named, and the other camera is the only one."""
+    depth = {"dtype": "video", "shape": [SIZE, SIZE, 1], "names": AXES, "info": {flag: True}}
+    folder = write_set(tmp_path / "set", features={"observation.images.depth": depth})
+    _, context = pairs_of(folder)
+    assert "1 feature with pictures of an unknown kind or of depth" in context.left_out_lines()[0]
+    with pytest.raises(UnknownName, match="There are: front"):
+        pairs_of(folder, "depth")
+
+
+def test_a_video_of_depth_is_refused(tmp_path: Path) -> None:
+    """Grey values of more than 8 bits would become dark pictures."""
+    folder = write_set(tmp_path / "set")
+    write_video(folder / VIDEO, range(COUNT), 20, "-c:v", "ffv1", "-pix_fmt", "gray16le")
+    with pytest.raises(DemosError, match=r"more than 8 bits \(gray16le\)"):
+        import_recording(folder, tmp_path / "back")
+
+
+@pytest.mark.parametrize(
+    ("named", "expected", "noted"),
+    [
+        (["pan", "tilt"], ("pan", "tilt"), False),
+        ({"motors": ["pan", "tilt"]}, ("pan", "tilt"), False),
+        ({"tilt": 1, "pan": 0}, ("pan", "tilt"), False),
+        (["pan", "tilt", "grip"], ("action/0", "action/1"), True),
+        (["pan", "pan"], ("action/0", "action/1"), True),
+        (None, ("action/0", "action/1"), False),
+    ],
+)
+def test_names_and_units_of_values(
+    tmp_path: Path, named: Any, expected: tuple[str, ...], noted: bool
+) -> None:
+    """Names come from the feature if they fit, and the report says if they do not."""
+    action = {"dtype": "float32", "shape": [2], "names": named, "units": ["rad", "deg"]}
+    folder = write_set(tmp_path / "set", video=False, features={"action": action})
+    done = import_recording(folder, tmp_path / "back")
+    layout = Layout.from_json(all_of(tmp_path / "back")[0].header.action_layout)
+    assert (layout.names, [feature.unit for feature in layout]) == (expected, ["rad", "deg"])
+    assert any("names of action do not fit its 2 values" in note for note in done.notes) == noted
+
+
+def test_the_start_of_our_own_episodes_comes_back(tmp_path: Path) -> None:
+    """A dataset of others has no start."""
+    record(
+        tmp_path / "data",
+        header(image_size=None),
+        [(Step(action=(0.0, 0.0), driver="person", state=(1.0, 2.0)), None)] * 3,
+    )
+    export_recording(tmp_path / "data", tmp_path / "set", "lerobot")
+    import_recording(tmp_path / "set", tmp_path / "back")
+    created = [all_of(tmp_path / name)[0].header.created for name in ("data", "back")]
+    assert created[0] == created[1] != ""
+    import_recording(write_set(tmp_path / "other", video=False), tmp_path / "theirs")
+    assert all_of(tmp_path / "theirs")[0].header.created == ""
