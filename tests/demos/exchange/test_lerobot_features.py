@@ -23,10 +23,11 @@ AXES = ["height", "width", "channels"]
 COUNT = 16
 
 
-def png(pixels: np.ndarray, kind: str = "PNG") -> bytes:
+def png(pixels: np.ndarray | Image.Image, kind: str = "PNG") -> bytes:
     """Return an image file."""
     file = io.BytesIO()
-    Image.fromarray(pixels).save(file, kind)
+    image = pixels if isinstance(pixels, Image.Image) else Image.fromarray(pixels)
+    image.save(file, kind)
     return file.getvalue()
 
 
@@ -48,7 +49,7 @@ def stored(images: list[Any], feature: dict[str, Any] | None = None) -> dict[str
         lambda n: png(plain(n)),
         lambda n: png(plain(n, 1)),  # Grey.
         lambda n: png(np.dstack([plain(n), np.full((SIZE, SIZE), 255, np.uint8)])),
-        lambda n: png(np.asarray(Image.fromarray(plain(n)).quantize())),
+        lambda n: png(Image.fromarray(plain(n)).quantize()),
     ],
 )
 def test_images_of_8_bits_keep_their_brightness(tmp_path: Path, draw: Any) -> None:

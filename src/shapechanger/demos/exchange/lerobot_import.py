@@ -301,7 +301,7 @@ class _Pictures:
         self._unpacked = unpacked
         self._frames: Iterator[NDArray[np.uint8]] | None = None
         self._files = list(located.rows)
-        self._read: Any = ...
+        self._read = b""
         self._jpeg: bytes | None = None
         self._fault = ""
         self._shown: bytes | None = None
@@ -320,13 +320,12 @@ class _Pictures:
             return encode_picture(next(self._frames))
         if self._feature is None:
             return None
-        stored = row[self._feature.key]
-        if stored != self._read:  # Else the steps share a picture.
-            self._read = stored
+        data = _stored(row[self._feature.key])
+        if data != self._read:  # Else the steps share a picture.
+            self._count(len(data))
+            self._read, self._fault = data, ""
             try:
-                data = _stored(stored)
-                self._count(len(data))
-                self._jpeg, self._fault = _as_jpeg(data, self._check), ""
+                self._jpeg = _as_jpeg(data, self._check)
             except _BadStep as error:
                 self._fault = str(error)
         if self._fault:
