@@ -104,6 +104,32 @@ def test_every_value_is_there(exported: Path) -> None:
     assert {content["format"] for _, content in pictures} == {"jpeg"}
 
 
+@pytest.mark.parametrize(
+    ("clock_ns", "expected_ns"),
+    [
+        ([None, None, 900, 1000], [700, 800, 900, 1000]),
+        ([None, None], [0, 100]),
+        ([500, None, None, 300], [500, 600, 700, 300]),  # A clock that jumps back is shown.
+        ([-5, None, 250], [50, 150, 250]),
+    ],
+)
+def test_unknown_times_fit_the_known_ones(
+    tmp_path: Path, clock_ns: list[int | None], expected_ns: list[int]
+) -> None:
+    """Known times are not changed; in milliseconds, at 10 Hz."""
+    with EpisodeWriter.create(
+        tmp_path / "data", header(state_layout="", image_size=None, control_hz=10.0)
+    ) as writer:
+        for n, at in enumerate(clock_ns):
+            at_ns = None if at is None else at * 10**6
+            writer.add(Step(action=(n / 10, 0.0), driver="person", captured_ns=at_ns), None)
+        writer.close("time")
+    export_recording(tmp_path / "data", tmp_path / "out", "mcap")
+    found = of(messages(tmp_path / "out/episode-0001.mcap"), "/action")
+    times = {round(10 * content["steering"]): at / 10**6 for at, content in found}
+    assert [times[n] for n in range(len(clock_ns))] == expected_ns
+
+
 def test_schemas_and_metadata(exported: Path) -> None:
     """Schemas say what is measured in which unit; the header is kept."""
     with exported.open("rb") as file:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +207,53 @@ def test_dropped_steps_are_not_exported(tmp_path: Path) -> None:
     (after,) = all_of(tmp_path / "back")
     assert [step.action[0] for step in after.kept] == [1.0, 2.0, 3.0]
     assert [after.jpeg(step) for step in after.kept] == [picture(0), picture(0), picture(3)]
+
+
+def with_a_pause(data: Path) -> Path:
+    """Record eight steps, the last four of which come 7 s later and 5 ms slower each."""
+    times_ns = [n * 50_000_000 if n < 4 else 7 * 10**9 + n * 80_000_000 for n in range(8)]
+    steps = [
+        Step(action=(n / 10, 0.0), driver="person", state=(0.0, 0.0), captured_ns=0, decided_ns=at)
+        for n, at in enumerate(times_ns)
+    ]
+    # All steps share a picture.
+    jpegs = [picture(0), *[None] * 7]
+    return record(data, header(), list(zip(steps, jpegs, strict=True)), "time")
+
+
+@pytest.mark.parametrize(("name", "folder"), [("lerobot", "out"), ("minari", "out-v0")])
+def test_steps_that_do_not_follow_each_other_are_separate_episodes(
+    tmp_path: Path, name: str, folder: str
+) -> None:
+    """An export to a format without gaps splits episodes there, and says so."""
+    drop(with_a_pause(tmp_path / "data"), 1, 1, "bad")
+    done = export_recording(tmp_path / "data", tmp_path / folder, name)
+    assert (done.episodes, done.steps, done.left_out) == (3, 7, 1)
+    assert (
+        "split at excluded or missing steps (1 times) and pauses (1, up to 7.17 s)" in done.notes[0]
+    )
+    off = [note for note in done.notes if "off by more than half a period" in note]
+    assert [("in 1 of 3 episodes, by up to 0.09 s" in note) for note in off] == (
+        [True] if name == "lerobot" else []
+    )
+    import_recording(tmp_path / folder, tmp_path / "back")
+    back = all_of(tmp_path / "back")
+    actions = [[round(10 * step.action[0]) for step in one.steps] for one in back]
+    assert actions == [[0], [2, 3], [4, 5, 6, 7]]
+    assert [one.outcome for one in back] == ["", "", "time"]
+    assert all(one.jpeg(one.steps[0]) for one in back)
+    began = [datetime.fromisoformat(one.header.created) for one in back]
+    after_s = [round((one - began[0]).total_seconds(), 3) for one in began]
+    assert after_s == [0.0, 0.1, 7.32]
+
+
+def test_a_whole_episode_is_not_split(tmp_path: Path) -> None:
+    """With the excluded steps, or in a format with times."""
+    drop(with_a_pause(tmp_path / "data"), 1, 1, "bad")
+    assert export_recording(tmp_path / "data", tmp_path / "csv", "csv").episodes == 1
+    done = export_recording(tmp_path / "data", tmp_path / "all-v0", "minari", dropped=True)
+    assert (done.episodes, done.steps) == (2, 8)
+    assert "missing" not in done.notes[0]
 
 
 @pytest.mark.parametrize("clock", ["twin", "none"])

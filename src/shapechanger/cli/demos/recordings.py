@@ -398,6 +398,8 @@ class Export:
         if done.left_out:
             where = "; --dropped includes them" if done.format in {"minari", "csv", "mcap"} else ""
             say(f"left out {done.left_out} dropped steps{where}")
+        for note in done.notes:
+            say(f"note: {note}")
         if done.format == "lerobot":
             say(f"load it with LeRobotDataset({self.out.name!r}, root={str(self.out)!r})")
         if done.format == "minari":

@@ -34,7 +34,12 @@ from shapechanger.demos.exchange.minari_export import (
     write_minari,
 )
 from shapechanger.demos.exchange.minari_import import read_minari
-from shapechanger.demos.exchange.recorded import ExchangeEpisode, exchange_episode, kept_steps
+from shapechanger.demos.exchange.recorded import (
+    ConsecutiveParts,
+    ExchangeEpisode,
+    exchange_episode,
+    kept_steps,
+)
 from shapechanger.demos.exchange.tub_export import MANIFEST, write_tub
 from shapechanger.demos.exchange.tub_files import is_tub
 from shapechanger.demos.exchange.tub_import import read_tub
@@ -60,6 +65,8 @@ _READ: Final[dict[Format, Callable[[Path, ImportContext], Iterator[ExchangeEpiso
 }
 _STATES_CAMERA: Final = ("lerobot", "tub")
 _NEEDS_RATE: Final = ("2017", "tub", "minari")
+_CONSECUTIVE: Final = {"lerobot": "LeRobot", "minari": "Minari"}
+"""Formats in which each step follows the one before, and how to name them."""
 _MARKS_DROPPED: Final = ("minari", "csv", "mcap")
 
 FORMATS: Final[tuple[Format, ...]] = (*_READ, "mcap")
@@ -80,12 +87,14 @@ class Exported:
         episodes: Number of episodes.
         steps: Number of steps written.
         left_out: Number of excluded steps that were not written.
+        notes: What differs from the recording, as sentences.
     """
 
     format: Format
     episodes: int
     steps: int
     left_out: int
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +160,11 @@ def export_recording(
     read = [read_episode(path) for path in episodes_of(data)]
     if not any(episode.steps if dropped else episode.kept for episode in read):
         raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
-    episodes = [exchange_episode(episode, dropped=dropped) for episode in read]
+    parts = ConsecutiveParts(_CONSECUTIVE.get(format, format))
+    if format in _CONSECUTIVE:
+        episodes = [part for one in read for part in parts.of(one, dropped=dropped)]
+    else:
+        episodes = [exchange_episode(episode, dropped=dropped) for episode in read]
     with new_folder(out, data) as folder:
         try:
             match format:
@@ -180,7 +193,8 @@ def export_recording(
         except OverflowError as error:
             raise DemosError(f"A number in {data} is too large for {format}: {error}.") from error
     total = sum(len(episode.steps) for episode in read)
-    return Exported(format, len(read), steps, total - steps)
+    notes = parts.notes(timed=format == "minari")
+    return Exported(format, len(episodes), steps, total - steps, tuple(notes))
 
 
 def import_episodes(

@@ -10,8 +10,9 @@
 ```
 
 Messages are JSON, and their schemas state the units. Log times are those of the robot's clock, ns:
-of the capture for pictures and states, of the decision for actions. Where a time is unknown, the
-step follows the one before at the rate of the episode. The header of the episode is the metadata
+of the capture for pictures and states, of the decision for actions, and never moved. Where a time
+is unknown, the step follows the one before at the rate of the episode, or precedes the first one
+with a time. The header of the episode is the metadata
 `shapechanger`. Format: mcap.dev/spec.
 """
 
@@ -22,7 +23,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange.files import library
@@ -83,17 +84,25 @@ def write_mcap(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
 
 def _write(episode: ExchangeEpisode, writer: Any) -> int:
     """Write the messages of an episode; return its number of steps."""
-    header = episode.header
-    topics = _Topics(header, writer)
-    at_ns, steps = -1, 0
+    topics = _Topics(episode.header, writer)
+    period_ns = round(_NS_PER_S / episode.header.control_hz)
+    waiting: list[ExchangeStep] = []  # Of unknown time, before the first step of a known one.
+    at_ns, steps = -period_ns, 0
     for row in episode.rows:
-        step = row.step
-        clock_ns = step.clock_ns
-        if clock_ns is None or clock_ns < 0:  # MCAP has no negative times.
-            clock_ns = 0 if at_ns < 0 else at_ns + round(_NS_PER_S / header.control_hz)
-        at_ns = max(at_ns, clock_ns)
-        topics.add(row, at_ns, max(at_ns, step.decided_ns or 0))
+        clock_ns = row.step.clock_ns
+        known = clock_ns is not None and clock_ns >= 0  # MCAP has no negative times.
         steps += 1
+        if at_ns < 0 and not known and episode.header.clock != "none":
+            waiting.append(row)
+            continue
+        for number, earlier in enumerate(waiting):
+            before_ns = cast("int", clock_ns) - (len(waiting) - number) * period_ns
+            topics.add(earlier, max(0, before_ns))
+        waiting.clear()
+        at_ns = cast("int", clock_ns) if known else max(0, at_ns + period_ns)
+        topics.add(row, at_ns)
+    for number, row in enumerate(waiting):
+        topics.add(row, number * period_ns)
     return steps
 
 
@@ -124,15 +133,15 @@ class _Topics:
         if header.image_size is not None:
             self._channels[_CAMERA] = self._channel(_CAMERA, "foxglove.CompressedImage", _IMAGE)
 
-    def add(self, row: ExchangeStep, seen_ns: int, acted_ns: int) -> None:
+    def add(self, row: ExchangeStep, seen_ns: int) -> None:
         """Write the messages of a step.
 
         Args:
             row: The step.
             seen_ns: Time of its observation.
-            acted_ns: Time of its action.
         """
         step = row.step
+        acted_ns = max(seen_ns, step.decided_ns or 0)
         if row.jpeg is not None:
             sec, nsec = divmod(seen_ns, _NS_PER_S)
             picture = {"timestamp": {"sec": sec, "nsec": nsec}, "frame_id": _CAMERA}
