@@ -274,7 +274,7 @@ def test_a_damaged_minari_dataset(
     drive(tmp_path / "recorded")
     export_recording(tmp_path / "recorded", tmp_path / "set-v0", "minari")
     spoil(tmp_path / "set-v0")
-    assert expected in refused(tmp_path / "set-v0", tmp_path / "data")
+    assert expected in refused(tmp_path / "set-v0", tmp_path / "data", strict=True)
 
 
 def test_folders_of_unknown_format(tmp_path: Path) -> None:

@@ -1,0 +1,177 @@
+"""Minari datasets of others: what is whole is imported, and the rest is named."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import h5py
+import numpy as np
+import pytest
+from minari.serialization import serialize_space
+
+from shapechanger.demos.exchange import ImportContext, export_recording, import_recording
+from shapechanger.demos.exchange.minari_import import read_minari
+from shapechanger.errors import DemosError
+from shapechanger.layout import Layout
+from tests.demos.exchange.small import all_of, drive
+
+STATE = gym.spaces.Box(-1.0, 1.0, (2,))
+STEPS = 4
+
+
+def write_set(
+    folder: Path,
+    observed: gym.Space[Any] = STATE,
+    change: Callable[[h5py.File], object] = lambda file: None,
+    episodes: int = 2,
+    **metadata: Any,
+) -> Path:
+    """Write a dataset whose actions count its steps, with random observations."""
+    place = folder / "data"
+    place.mkdir(parents=True)
+    described = {
+        "dataset_id": "others/set-v0",
+        "data_format": "hdf5",
+        "total_episodes": episodes,
+        "total_steps": episodes * STEPS,
+        "observation_space": serialize_space(observed),
+        "action_space": serialize_space(gym.spaces.Box(-99.0, 99.0, (1,))),
+        "jpeg_encoding": False,
+    }
+    (place / "metadata.json").write_text(json.dumps(described | metadata))
+    with h5py.File(place / "main_data.hdf5", "w") as file:
+        for number in range(episodes):
+            group = file.create_group(f"episode_{number}")
+            group.attrs["total_steps"] = STEPS
+            actions = np.arange(STEPS, dtype=float)[:, None] + STEPS * number
+            group.create_dataset("actions", data=actions, maxshape=(None, 1))
+            group["rewards"] = np.ones(STEPS)
+            group["terminations"] = np.zeros(STEPS, bool)
+            group["truncations"] = np.arange(STEPS) == STEPS - 1
+            _observe(group, "observations", observed)
+        change(file)
+    return folder
+
+
+def _observe(group: h5py.Group, name: str, space: gym.Space[Any]) -> None:
+    if isinstance(space, gym.spaces.Dict):
+        for key, inner in space.items():
+            _observe(group, f"{name}/{key}", inner)
+    elif isinstance(space, gym.spaces.Text):
+        group[name] = ["word"] * (STEPS + 1)
+    else:
+        space.seed(0)
+        group[name] = np.array([space.sample() for _ in range(STEPS + 1)])
+
+
+def actions_of(folder: Path) -> tuple[list[list[int]], ImportContext]:
+    """Return the actions of each episode, and the findings."""
+    context = ImportContext()
+    episodes = [list(episode.rows) for episode in read_minari(folder, context)]
+    return [[int(row.step.action[0]) for row in rows] for rows in episodes], context
+
+
+BOTH = [[0, 1, 2, 3], [4, 5, 6, 7]]
+
+
+def removed(name: str) -> Callable[[h5py.File], object]:
+    """Return a change that removes a column of the second episode."""
+    return lambda file: file["episode_1"].__delitem__(name)
+
+
+def resized(length: int) -> Callable[[h5py.File], object]:
+    """Return a change of the number of actions of the second episode."""
+    return lambda file: file["episode_1/actions"].resize(length, axis=0)
+
+
+def endless(file: h5py.File) -> None:
+    """Spoil an action of the second episode."""
+    file["episode_1/actions"][2] = np.inf
+
+
+@pytest.mark.parametrize(
+    ("change", "expected", "finding"),
+    [
+        (
+            removed("actions"),
+            BOTH[:1],
+            "1 episode that .*has no 'episode_1/actions'",
+        ),
+        (removed("terminations"), BOTH[:1], "has no 'episode_1/terminations'"),
+        (resized(5), BOTH[:1], r"actions' has 5 entries, but '.*terminations' 4\): 1"),
+        (resized(3), BOTH[:1], "actions' has 3 entries, but"),
+        (removed("observations"), BOTH[:1], "has no 'episode_1/observations'"),
+        (
+            lambda file: file["episode_1"].attrs.__setitem__("total_steps", 9),
+            BOTH[:1],
+            "episode_1 has 4 steps, and its total_steps says 9",
+        ),
+        (lambda file: file.__delitem__("episode_1"), BOTH[:1], "episode that cannot be read"),
+        (endless, [[0, 1, 2, 3], [4, 5, 7]], r"1 step that .*not finite\): 2 of episode_1"),
+    ],
+)
+def test_episodes_that_are_whole_are_imported(
+    tmp_path: Path, change: Callable[[h5py.File], object], expected: list[list[int]], finding: str
+) -> None:
+    """The others are named, with what is missing and by how much columns differ."""
+    folder = write_set(tmp_path / "set", change=change)
+    found, context = actions_of(folder)
+    assert found == expected
+    with pytest.raises(DemosError, match=finding):
+        context.require_whole(folder)
+
+
+def test_missing_rewards_are_unknown(tmp_path: Path) -> None:
+    """Steps without rewards are whole otherwise."""
+    folder = write_set(tmp_path / "set", change=removed("rewards"))
+    done = import_recording(folder, tmp_path / "back")
+    assert done.warnings == ("main_data.hdf5 has no rewards: the steps have none.",)
+    first, second = all_of(tmp_path / "back")
+    assert {step.reward for step in first.steps} == {1.0}
+    assert {step.reward for step in second.steps} == {None}
+
+
+def test_episodes_beyond_the_stated_number_are_reported(tmp_path: Path) -> None:
+    """They may be left over from another dataset."""
+    _, context = actions_of(write_set(tmp_path / "set", total_episodes=1))
+    assert context.warnings == ["total_episodes is 1, and main_data.hdf5 has 2 episodes."]
+
+
+def test_parts_of_observations_are_imported_or_named(tmp_path: Path) -> None:
+    """Numbers become the state, and images that are no pictures are left out by name."""
+    observed = gym.spaces.Dict(
+        {
+            "depth": gym.spaces.Box(0, 65535, (16, 24, 1), np.uint16),
+            "flat": gym.spaces.Box(0, 65535, (16, 24), np.uint16),
+            "camera": gym.spaces.Box(0, 255, (16, 24, 3), np.uint8),
+            "mission": gym.spaces.Text(9),
+            "near": STATE,
+            "points": gym.spaces.Box(-1.0, 1.0, (300, 500)),
+        }
+    )
+    done = import_recording(write_set(tmp_path / "set", observed), tmp_path / "back")
+    assert done.pictures == 2 * STEPS
+    header = all_of(tmp_path / "back")[0].header
+    assert Layout.from_json(header.state_layout).names == ("near/0", "near/1")
+    text = "\n".join(done.left_out)
+    assert "2 observations with pictures of an unknown kind or of depth: depth (Box(" in text
+    assert "1 observation of more than 131072 values: points" in text
+    assert any("observation mission (Text" in note for note in done.notes)
+
+
+def test_a_damaged_picture_of_our_own_is_left_out(tmp_path: Path) -> None:
+    """The steps around it are kept."""
+    drive(tmp_path / "data", 5)
+    export_recording(tmp_path / "data", tmp_path / "set-v0", "minari")
+    with h5py.File(tmp_path / "set-v0/data/main_data.hdf5", "a") as file:
+        pictures = file["episode_0/observations/image"]
+        pictures[2] = pictures[2][:-300]
+    done = import_recording(tmp_path / "set-v0", tmp_path / "back")
+    assert (done.steps, done.pictures) == (4, 4)
+    assert done.left_out[0].startswith("1 step that cannot be read (The picture in the file")
+    (episode,) = all_of(tmp_path / "back")
+    assert [round(10 * step.action[0]) for step in episode.steps] == [0, 1, 3, 4]
