@@ -64,7 +64,8 @@ def test_export_prints_a_summary_and_how_to_load(
     drop(path, 1, 2, "bad")
     Export(tmp_path / "data", tmp_path / "sets/drive-v0", "minari").run()
     output = capsys.readouterr().out
-    assert "3 steps of 1 episode\n" in output
+    assert "3 steps of 2 episodes\n" in output
+    assert "note: Episodes are split at excluded or missing steps (1 times)" in output
     assert "left out 2 dropped steps; --dropped includes them" in output
     assert f"MINARI_DATASETS_PATH={tmp_path / 'sets'}" in output
     assert "minari.load_dataset('drive-v0')" in output

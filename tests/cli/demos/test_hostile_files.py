@@ -366,7 +366,7 @@ LEROBOTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "a million rows": (many_rows, "bytes, but claims"),
     "an episode twice": (
         column(PLACES, "episode_index", lambda n: [0] * n),
-        "does not number the episodes",
+        "meta/episodes has twice: 0",
     ),
     "an action of 10^9 values": (
         lambda f: edit(f / "meta/info.json", "2\n            ],", "1000000000\n            ],"),

@@ -40,6 +40,7 @@ from shapechanger.demos.exchange.lerobot_index import LocatedEpisode, locate, re
 from shapechanger.demos.exchange.lerobot_tables import (
     MAX_PACKED,
     MAX_UNPACKED,
+    UnpacksToTooMuch,
     inside,
     rows_at,
     table_rows,
@@ -100,11 +101,11 @@ def read_lerobot(folder: Path, context: ImportContext) -> Iterator[ExchangeEpiso
     )
     tasks = _tasks(folder)
     video = camera.key if camera is not None and camera.kind == "video" else ""
-    places = read_places(folder, video, context)
+    places, twice = read_places(folder, video, context)
     _require_counts(info, places, context)
     own = _own_headers(folder, places[-1]["episode_index"] + 1 if places else 0)
     unpacked: dict[Path, int] = {}
-    for located in locate(folder, info, places, video, header.image_size, context):
+    for located in locate(folder, info, places, twice, video, header.image_size, context):
         about, drivers, outcome = header, _Drivers([]), ""
         task = located.place.get("tasks")
         said = ", ".join(map(str, cast("list[Any]", task))) if isinstance(task, list) else ""
@@ -245,6 +246,8 @@ def _rows(
             )
             left_from = number + 1
             yield ExchangeStep(step=step, jpeg=pictures.unless_shown(jpeg))
+    except UnpacksToTooMuch:
+        raise
     except DemosError as error:
         reason = f"that cannot be read: {str(error).removesuffix('.')}"
     for frame in frames[left_from:]:
@@ -345,7 +348,7 @@ class _Pictures:
         most = MAX_UNPACKED + MAX_PACKED * sum(file.stat().st_size for file in self._files)
         self._unpacked[path] = self._unpacked.get(path, 0) + size
         if self._unpacked[path] > most:
-            raise DemosError(f"{path} unpacks to more than {most} bytes of pictures.")
+            raise UnpacksToTooMuch(f"{path} unpacks to more than {most} bytes of pictures.")
 
 
 def _stored(stored: Any) -> bytes:

@@ -9,7 +9,7 @@ nothing says which.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from shapechanger.demos.exchange import lerobot_export as names
 from shapechanger.demos.exchange.importing import ImportContext, few
 from shapechanger.demos.exchange.lerobot_tables import (
+    UnpacksToTooMuch,
     fill_place,
     inside,
     number_columns,
@@ -69,8 +70,10 @@ class LocatedEpisode:
     ticks: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
 
-def read_places(folder: Path, camera: str, context: ImportContext) -> list[dict[str, Any]]:
-    """Return the rows of `meta/episodes`, in order of their episodes.
+def read_places(
+    folder: Path, camera: str, context: ImportContext
+) -> tuple[list[dict[str, Any]], set[int]]:
+    """Return the rows of `meta/episodes` in order, and the numbers that are there twice.
 
     Args:
         folder: Folder of the dataset.
@@ -110,13 +113,14 @@ def read_places(folder: Path, camera: str, context: ImportContext) -> list[dict[
         context.leave_out(_EPISODE, f"that {names.EPISODES} has twice", number)
     for number in sorted(set(range(max(found))) - found.keys()):
         context.leave_out(_EPISODE, f"that {names.EPISODES} does not have", number)
-    return [found[number] for number in sorted(found.keys() - twice)]
+    return [found[number] for number in sorted(found.keys() - twice)], twice
 
 
 def locate(
     folder: Path,
     info: Mapping[str, Any],
     places: Sequence[dict[str, Any]],
+    twice: Set[int],
     camera: str,
     size: tuple[int, int] | None,
     context: ImportContext,
@@ -127,6 +131,7 @@ def locate(
         folder: Folder of the dataset.
         info: Content of `info.json`.
         places: Rows of `meta/episodes`.
+        twice: Numbers of episodes that are there twice.
         camera: Key of the video that is imported; "" without one.
         size: Width and height of the pictures, pixels; None without any.
         context: Findings of the import.
@@ -134,7 +139,7 @@ def locate(
     Raises:
         DemosError: If `info.json` leads out of the folder.
     """
-    tables = _Tables(folder, info, places, context)
+    tables = _Tables(folder, info, places, twice, context)
     videos = _Videos(folder, info, places, camera, size) if camera else None
     rate_hz = float(info["fps"])
     for place in places:
@@ -164,6 +169,7 @@ class _Tables:
         folder: Path,
         info: Mapping[str, Any],
         places: Sequence[dict[str, Any]],
+        twice: Set[int],
         context: ImportContext,
     ) -> None:
         self.parts: dict[int, list[tuple[Path, NDArray[np.int64]]]] = defaultdict(list)
@@ -182,7 +188,7 @@ class _Tables:
             self._read(folder, one)
         for one in self._broken.keys() - self._named.values():
             context.leave_out("file", "that cannot be read", one.relative_to(folder))
-        for number in sorted(self.parts.keys() - self._named.keys()):
+        for number in sorted(self.parts.keys() - self._named.keys() - twice):
             context.leave_out(_EPISODE, f"that {names.EPISODES} does not have", number)
         moved = [
             number
@@ -213,6 +219,8 @@ class _Tables:
             for key, values in keys.items():
                 if not np.isfinite(values).all() or (key != _TIME and (values % 1.0).any()):
                     raise DemosError(f"{path} has a {key} that is empty or no number.")
+        except UnpacksToTooMuch:
+            raise
         except DemosError as error:
             self._broken[path] = str(error).removesuffix(".")
             return

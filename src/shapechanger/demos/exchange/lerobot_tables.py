@@ -26,6 +26,10 @@ _MAX_TEXT: Final = 4096  # Characters of a task.
 _PLACE: Final = re.compile(r"\{(video_key|chunk_index|file_index)(?::0?(\d)d)?\}")
 
 
+class UnpacksToTooMuch(DemosError):
+    """A file claims far more than it holds: nothing of it is imported."""
+
+
 def inside(folder: Path, name: str, named_by: Path) -> Path:
     """Return a file below a folder that a dataset names."""
     path = folder / name
@@ -60,7 +64,9 @@ def open_parquet(path: Path) -> Generator[Any]:
             columns = list(_columns_of(file, range(file.metadata.num_row_groups)))
             claimed = sum(max(c.total_uncompressed_size, 8 * c.num_values) for c in columns)
             if claimed > MAX_UNPACKED + MAX_PACKED * size or file.metadata.num_rows > size:
-                raise DemosError(f"{path} has {size} bytes, but claims to unpack to {claimed}.")
+                raise UnpacksToTooMuch(
+                    f"{path} has {size} bytes, but claims to unpack to {claimed}."
+                )
             yield file
     except (arrow.ArrowException, OSError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__

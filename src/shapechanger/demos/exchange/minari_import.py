@@ -112,10 +112,11 @@ def _require_stored(main: Path, count: int) -> None:
     claimed = 0
     with open_hdf5(main) as file:
         for number in range(count):
-            with suppress(DemosError):  # It is left out later.
-                claimed += int(column(file, f"episode_{number}/{_ENDS[0]}", main, 0).shape[0])
+            for name in ("rewards", *_ENDS):
+                with suppress(DemosError):  # It is left out later.
+                    claimed += int(column(file, f"episode_{number}/{name}", main, 0).shape[0])
             if claimed > size:
-                raise DemosError(f"{main} claims at least {claimed} steps, but has {size} bytes.")
+                raise DemosError(f"{main} claims at least {claimed} values, but has {size} bytes.")
 
 
 def _whole(
@@ -399,7 +400,7 @@ class _Leaves:
                     f"{one.name!r} has {one.shape[0]} entries, but {steps + 1} are needed"
                 )
         stated = file[group].attrs.get("total_steps", steps)
-        if np.size(stated) != 1 or int(np.ravel(stated)[0]) != steps:
+        if not np.array_equal(np.ravel(stated), [steps]):
             raise DemosError(f"{group} has {steps} steps, and its total_steps says {stated}")
 
 
