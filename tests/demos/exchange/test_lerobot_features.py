@@ -158,6 +158,17 @@ def test_other_features_are_named(tmp_path: Path) -> None:
     ]
 
 
+def test_columns_without_a_feature_are_named(tmp_path: Path) -> None:
+    """Nothing says what they are."""
+    images = pa.array([{"bytes": png(DEPTH.astype(np.uint16)), "path": "x.png"}] * COUNT)
+    folder = write_set(tmp_path / "set", columns={"observation.images.depth": images})
+    pairs, context = pairs_of(folder)
+    assert sum(map(len, pairs)) == COUNT
+    assert context.left_out_lines() == [
+        "1 column that meta/info.json does not describe: observation.images.depth"
+    ]
+
+
 @pytest.mark.parametrize("flag", ["video.is_depth_map", "is_depth_map"])
 def test_a_camera_of_depth_is_not_chosen(tmp_path: Path, flag: str) -> None:
     """It is named, and the other camera is the only one."""

@@ -44,6 +44,23 @@ def without(*steps: int) -> list[list[tuple[int, int]]]:
         ({"options": ["-vf", "select=not(eq(n\\,8))", "-fps_mode", "vfr"]}, without(8)),
         # More pictures than steps.
         ({"fps": 10, "video_fps": 30, "pictures": [n // 3 for n in range(48)]}, BOTH),
+        # A video that begins later, as its entries say.
+        (
+            {
+                "options": ["-output_ts_offset", "0.5"],
+                "places": lambda entries: [
+                    entry
+                    | {
+                        f"videos/{CAMERA}/{key}": entry[f"videos/{CAMERA}/{key}"] + 0.5
+                        for key in ("from_timestamp", "to_timestamp")
+                    }
+                    for entry in entries
+                ],
+            },
+            BOTH,
+        ),
+        # One picture.
+        ({"lengths": (1,)}, [[(0, 0)]]),
         # Times in milliseconds.
         ({"fps": 30, "options": ["-video_track_timescale", "1000"]}, BOTH),
     ],
@@ -54,7 +71,7 @@ def test_pictures_are_found_by_their_time(
     """No step has the picture of another one, and steps without a picture are reported."""
     pairs, context = pairs_of(write_set(tmp_path / "set", **options))
     assert pairs == expected
-    lost = 16 - sum(map(len, expected))
+    lost = sum(options.get("lengths", (8, 8))) - sum(map(len, expected))
     assert sum(map(len, context.left_out.values())) == lost
     assert not context.warnings
 

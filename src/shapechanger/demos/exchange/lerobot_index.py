@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,6 +175,9 @@ class _Tables:
         self.parts: dict[int, list[tuple[Path, NDArray[np.int64]]]] = defaultdict(list)
         self.keys: dict[Path, dict[str, NDArray[np.float64]]] = {}
         self._broken: dict[Path, str] = {}
+        self._described = set(cast("dict[str, Any]", info["features"]))
+        self._context = context
+        self._unknown: set[str] = set()
         self._named: dict[int, Path] = {}
         path = folder / names.INFO
         for place in places:
@@ -213,7 +216,8 @@ class _Tables:
     def _read(self, folder: Path, path: Path) -> None:
         name = path.relative_to(folder)
         try:
-            keys = number_columns(inside(folder, str(name), folder / names.EPISODES), _KEYS)
+            inside(folder, str(name), folder / names.EPISODES)
+            keys, columns = number_columns(path, _KEYS)
             if missing := [key for key in _KEYS if key not in keys and key != _INDEX]:
                 raise DemosError(f"{path} has no column {missing[0]!r}.")
             for key, values in keys.items():
@@ -224,6 +228,11 @@ class _Tables:
         except DemosError as error:
             self._broken[path] = str(error).removesuffix(".")
             return
+        for column in sorted(columns - self._described - self._unknown):
+            if column.startswith("__index_level_"):  # Of pandas.
+                continue
+            self._unknown.add(column)
+            self._context.leave_out("column", f"that {names.INFO} does not describe", column)
         self.keys[path] = keys
         owners = keys["episode_index"].astype(np.int64)
         order = np.argsort(owners, kind="stable")
@@ -334,7 +343,7 @@ class _Videos:
         self.key = f"videos/{camera}"
         self._folder = folder
         self._size = size
-        self._rate_hz = float(info["fps"])
+        self.rate_hz = float(info["fps"])
         self._read: dict[str, VideoTimes | str] = {}
         self._names: dict[int, str] = {}
         self._places: dict[str, list[dict[str, Any]]] = defaultdict(list)
@@ -376,7 +385,7 @@ class _Videos:
                 f"{self._size[0]} x {self._size[1]}"
             )
         places = sorted(self._places[name], key=self._span)
-        period_s = _period_s(times)
+        period_s = _period_s(times, self.rate_hz)
         for one, two in pairwise(places):
             if (by_s := self._span(one)[1] - self._span(two)[0]) > 0.5 * period_s:
                 for place in (one, two):
@@ -398,7 +407,7 @@ class _Videos:
         if times.is_cut_off:
             context.leave_out("file", "that is cut off, without the pictures after that", name)
         elif late_s < -0.5 * period_s:
-            step_s = 1.0 / self._rate_hz
+            step_s = 1.0 / self.rate_hz
             steps_s = max(self._span(p)[0] + (p["length"] - 1) * step_s for p in places)
             if steps_s > float(times.seconds[-1]) + 0.5 * period_s:
                 return (
@@ -409,9 +418,9 @@ class _Videos:
         return times
 
 
-def _period_s(times: VideoTimes) -> float:
-    """Return the time from one picture to the next, s."""
-    return float(np.median(np.diff(times.seconds))) if len(times.ticks) > 1 else 0.0
+def _period_s(times: VideoTimes, rate_hz: float) -> float:
+    """Return the time from one picture to the next, s; that of the steps for a single picture."""
+    return float(np.median(np.diff(times.seconds))) if len(times.ticks) > 1 else 1.0 / rate_hz
 
 
 def _with_pictures(
@@ -423,7 +432,7 @@ def _with_pictures(
     tick_s = float(times.tick_s)
     at_s = first_s + located.times_ns / _NS_PER_S
     most_s = _tolerance_s(at_s) + 0.5 * tick_s
-    period_s = _period_s(times)
+    period_s = _period_s(times, videos.rate_hz)
     if at_s[-1] > min(end_s - 2.0 * most_s[-1], times.seconds[-1] + 0.5 * period_s):
         # If a picture is lost, the ones after it moved up; which one is unknown.
         have_s = min(end_s, float(times.seconds[-1]) + period_s) - first_s

@@ -126,8 +126,13 @@ def vectors(column: Any, size: int, what: str) -> NDArray[np.float64]:
     raise DemosError(f"{what} does not have {size} numbers in each row.")
 
 
-def number_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
-    """Return columns of single numbers, shape (n,) each; those that a file lacks are left out."""
+def number_columns(
+    path: Path, names: Sequence[str]
+) -> tuple[dict[str, NDArray[np.float64]], set[str]]:
+    """Return columns of single numbers, shape (n,) each, and the names of all columns.
+
+    Those that the file lacks are left out.
+    """
     found: dict[str, list[NDArray[np.float64]]] = {}
     with open_parquet(path) as file:
         known = [name for name in names if name in file.schema_arrow.names]
@@ -135,7 +140,8 @@ def number_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.flo
             for name in known:
                 part = vectors(batch.column(name), 1, f"{path}: {name!r}")[:, 0]
                 found.setdefault(name, []).append(part)
-        return {name: np.concatenate(found.get(name, [np.empty(0)])) for name in known}
+        columns = {name: np.concatenate(found.get(name, [np.empty(0)])) for name in known}
+        return columns, set(file.schema_arrow.names)
 
 
 def rows_at(
