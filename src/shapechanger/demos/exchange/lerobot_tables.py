@@ -172,14 +172,15 @@ def rows_at(
         for batch in _batches(file, wanted, groups):
             here = np.flatnonzero(np.isin(places[done : done + batch.num_rows], rows))
             done += batch.num_rows
-            part = batch.take(library("pyarrow", "lerobot").array(here))
+            # Not of the pictures: a copy of them may not fit into memory.
+            part = batch.select(list(sizes)).take(library("pyarrow", "lerobot").array(here))
             numbers = {
                 key: vectors(part.column(key), size, f"{path}: {key!r}")
                 for key, size in sizes.items()
             }
-            for row in range(len(here)):
-                yield {key: values[row] for key, values in numbers.items()} | {
-                    key: part.column(key)[row].as_py() for key in stored
+            for number, row in enumerate(here.tolist()):
+                yield {key: values[number] for key, values in numbers.items()} | {
+                    key: batch.column(key)[row].as_py() for key in stored
                 }
             if places[done - 1] >= rows[-1]:
                 return
