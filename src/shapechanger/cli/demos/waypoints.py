@@ -192,7 +192,8 @@ def _fitted(data: Dataset) -> SteeringResponse:
             f"{_MEASURE}."
         )
     try:
-        return fit_response(*(_column(data, name) for name in _MOTION), data.times_s)
+        steering, speed, yaw_rate = (_column(data, name) for name in _MOTION)
+        return fit_response(steering, speed, yaw_rate, data.times_s)
     except StudyError as error:
         raise DemosError(f"{str(error).rstrip('.')}: {_MEASURE}.") from error
 
