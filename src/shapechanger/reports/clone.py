@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.demos.cloning.judge import Judgement, named
 from shapechanger.demos.cloning.learn import Training
+from shapechanger.demos.cloning.outlook import outlook
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.files import write_json
 from shapechanger.reports.page import png_uri, render, svg_uri
@@ -32,7 +33,15 @@ def write_numbers(
     Raises:
         OutputError: If it cannot be written.
     """
-    write_json(path, {"judgement": judgement, "training": training, "policy": policy.card})
+    write_json(
+        path,
+        {
+            "judgement": judgement,
+            "training": training,
+            "policy": policy.card,
+            "outlook": outlook(policy.card),
+        },
+    )
 
 
 def clone_html(
@@ -65,6 +74,7 @@ def clone_html(
         title=name,
         verdict=_verdict(judgement, data_note),
         cards=_cards(judgement),
+        outlook=outlook(policy.card),
         judgement=judgement,
         errors=[
             (number, f"{error:.4g}")

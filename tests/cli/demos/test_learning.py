@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 from pathlib import Path
 
@@ -51,6 +52,11 @@ def test_a_recording_becomes_a_policy_with_a_report(
     assert "http" not in page.replace("http://www.w3.org", "")
     report = json.loads(out.with_suffix(".json").read_text())
     assert report["judgement"]["steps"] == 30
+    assert report["outlook"]["minutes"] == 0.1  # 120 of 150 steps at 20 Hz.
+    printed = " ".join(capsys.readouterr().out.split())
+    for told in (report["outlook"]["expected"], report["outlook"]["next_step"]):
+        assert told in printed
+        assert told in " ".join(html.unescape(page).split())
     assert CameraPolicy.load(out).card.data["learned"] == 120
     capsys.readouterr()
     Evaluate(out, data).run()

@@ -69,6 +69,7 @@ class TrainClone:
         from shapechanger.demos.cloning.demonstrations import judged_steps
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.learn import learn, settings_for
+        from shapechanger.demos.cloning.outlook import duration_s, outlook
         from shapechanger.reports.clone import clone_html, write_numbers
         from shapechanger.transfer.learners.presets import LEARNERS
         from shapechanger.transfer.learners.sb3 import use_one_thread
@@ -112,6 +113,7 @@ class TrainClone:
             data=str(self.data),
             digest=shrinking.digest(data.actions),
             learned=n,
+            learned_s=n / len(data) * duration_s(data.times_s, data.episodes, data.control_hz),
             steps=len(data),
             body="" if view is not None else data.body,
             control_hz=data.control_hz,
@@ -132,6 +134,9 @@ class TrainClone:
         write_numbers(numbers, policy, judgement, training)
         say(f"wrote {self.out}, {page} and {numbers}")
         say(note)
+        if (ahead := outlook(policy.card)) is not None:
+            say(ahead.expected)
+            say(ahead.next_step)
         _print_judgement(judgement)
 
     def _view(self) -> CanonicalView | None:
