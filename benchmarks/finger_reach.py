@@ -20,7 +20,8 @@ from shapechanger.envs.finger.gap import GAPS
 from shapechanger.envs.finger.oracle import FingerOracle
 from shapechanger.envs.finger.postures import angles_for, joint_torque
 from shapechanger.tasks.finger import fingertip, fingertip_jacobian
-from shapechanger.transfer.learners.evaluation import EVALUATION_SEED
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners.evaluation import evaluation_seed
 
 # With a larger gain, 1/s, a finger on a rig's path of commands oscillates; a smaller one, 6, leaves
 # it on its way after 2 s.
@@ -34,8 +35,9 @@ _BALANCED_NM: Final = 1e-5
 _STARTS: Final = 4
 _SPREAD_RAD: Final = 0.3
 FINGERS: Final = 10
-TARGETS: Final = 20
+TARGETS: Final = 60
 _RIG: Final = GAPS["real-like"]
+_GAP_FINGER: Final = EnvRef("shapechanger/Finger-v1", {"gap": "real-like"})
 
 
 def _nominal(*names: str) -> dict[str, Any]:
@@ -154,11 +156,12 @@ def causes() -> list[Row]:
     """
     many = int(os.environ.get("FINGERS", FINGERS))
     fingers = [_RIG.draw(np.random.default_rng(seed)) for seed in range(many)]
+    first = [evaluation_seed(_GAP_FINGER.having({"finger_seed": i}), TARGETS) for i in range(many)]
     rows: list[Row] = []
     for what, changes in _REPLACED.items():
         shares = [
-            float(np.mean(held_by_controller(finger.replace(**changes), EVALUATION_SEED, TARGETS)))
-            for finger in fingers
+            float(np.mean(held_by_controller(finger.replace(**changes), first[seed], TARGETS)))
+            for seed, finger in enumerate(fingers)
         ]
         rows.append(
             Row(

@@ -103,6 +103,9 @@ def test_rows_of_a_study_that_has_not_ended_name_their_fingers() -> None:
     assert (tuned.value, tuned.target, tuned.met) == ("70%", ">= 70%", True)
     assert (identified.value, identified.met) == ("85%", False)
     assert "over 2 fingers: 80%, 60%" in tuned.spread
-    assert identified.spread.endswith("over 2 fingers: 90%, 80%; after 1,000 simulated steps")
+    assert identified.spread.endswith(
+        "over 2 fingers: 90%, 80%; at least 80% on 2 of 2 fingers; after 1,000 simulated steps"
+    )
+    assert tuned.spread.endswith("at least 80% on 1 of 2 fingers, not on seeds 1")
     assert tuned.name.endswith("within 5 mm")
     assert identified.name.endswith("within 5 mm, seeds 0, 6")

@@ -9,12 +9,47 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.errors import UnknownName
 from shapechanger.tasks.measure import FORWARD_SPEED
-from shapechanger.transfer.learners.evaluation import evaluate, random_actions
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners.evaluation import (
+    EVALUATION_SEED,
+    evaluate,
+    evaluation_seed,
+    random_actions,
+)
+from shapechanger.transfer.learners.presets import learner_settings
+
+
+@given(st.sets(st.integers(0, 99_999), min_size=2, max_size=2), st.integers(1, 10_000))
+def test_each_finger_of_a_gap_is_judged_on_targets_of_its_own(pair: set[int], many: int) -> None:
+    """No episode of one finger is another's, and both are the same at every call."""
+    first, second = (
+        evaluation_seed(EnvRef("shapechanger/Finger-v1", {"gap": "wide", "finger_seed": i}), many)
+        for i in sorted(pair)
+    )
+    assert EVALUATION_SEED <= first <= second - many
+    assert second + many < 2**32
+
+
+@pytest.mark.parametrize("seed", [0, 99_999, 100_000, 2**32 - 1])
+@pytest.mark.parametrize("kwargs", [{}, {"finger_seed": None}])
+def test_every_seed_of_a_finger_gives_seeds_that_exist(seed: int, kwargs: dict[str, Any]) -> None:
+    """Seeds of episodes stay below 2^32; without individuals they are those of any env."""
+    env = EnvRef("shapechanger/Finger-v1", kwargs)
+    assert evaluation_seed(env, 60) == EVALUATION_SEED
+    assert 0 <= evaluation_seed(env.having({"finger_seed": seed}), 10**9) < 2**32
+
+
+@pytest.mark.parametrize("learner", ["ppo-finger", "ppo-rig"])
+def test_a_finger_is_judged_on_sixty_targets_or_more(learner: str) -> None:
+    """With twenty, one target more or less changes a share by 5 %."""
+    assert learner_settings(learner).eval_episodes >= 60
 
 
 class Countdown(gym.Env[NDArray[np.float64], NDArray[np.float32]]):

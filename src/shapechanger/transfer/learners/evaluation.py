@@ -23,7 +23,12 @@ from shapechanger.transfer.env_ref import (
 from shapechanger.transfer.learners.settings import LimbSettings, Settings
 
 EVALUATION_SEED: Final = 10_000_000
-"""Seed of the first evaluation episode: far from those of training, the same for every run."""
+"""Seed of the first evaluation episode: far from those of training."""
+# Option of an env that selects one of many bodies by its seed, and how many bodies get episodes of
+# their own before those repeat: seeds of episodes end at 2^32.
+_INDIVIDUAL: Final = "finger_seed"
+_MOST_INDIVIDUALS: Final = 100_000
+_MOST_EPISODES: Final = 10_000
 
 # Observations of shape (n, ...) in, actions of shape (n, ...) out.
 Act = Callable[[NDArray[Any]], NDArray[Any]]
@@ -62,6 +67,21 @@ class Evaluation(msgspec.Struct, frozen=True):
         if measure not in known:
             raise UnknownName("measure", measure, known)
         return known[measure]
+
+
+def evaluation_seed(env: EnvRef, episodes: int) -> int:
+    """Return the seed of the first evaluation episode in an env.
+
+    It is the same for all policies, so arms are compared on equal episodes. Each individual body,
+    such as a finger of a gap, has episodes of its own, so that a mean over bodies is also one over
+    many targets.
+
+    Args:
+        env: The env.
+        episodes: Number of episodes of an evaluation.
+    """
+    individual = int(env.kwargs.get(_INDIVIDUAL) or 0) % _MOST_INDIVIDUALS
+    return EVALUATION_SEED + min(episodes, _MOST_EPISODES) * individual
 
 
 def evaluation_envs(env: EnvRef, settings: Settings) -> list[gym.Env[Any, Any]]:

@@ -27,10 +27,10 @@ from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin, igno
 from shapechanger.transfer.learners.algorithms import build_model
 from shapechanger.transfer.learners.cloning import is_clone
 from shapechanger.transfer.learners.evaluation import (
-    EVALUATION_SEED,
     Evaluation,
     evaluate,
     evaluation_envs,
+    evaluation_seed,
 )
 from shapechanger.transfer.learners.policy_file import (
     Normalisation,
@@ -158,8 +158,16 @@ class Sb3Learner:
             if start is not None and isinstance(settings, LimbSettings):
                 require_same_columns(start.card.observation, layouts[0], env.id)
             model, explores = _first_model(envs, settings, seed, self._tensorboard, start, body_map)
+            first_seed = evaluation_seed(env, settings.eval_episodes)
             evaluations = _PeriodicEvaluation(
-                self._name, settings, eval_envs, layouts[1], single, on_evaluation, on_steps
+                self._name,
+                settings,
+                eval_envs,
+                layouts[1],
+                first_seed,
+                single,
+                on_evaluation,
+                on_steps,
             )
             # Before `learn`: it starts with a reset, which already changes the running statistics.
             if on_evaluation is not ignore:
@@ -199,9 +207,8 @@ class Sb3Learner:
         else:
             envs = [MappedEnv(one, body_map) for one in envs]
         try:
-            return evaluate(
-                policy.act, envs, EVALUATION_SEED, episodes=self._settings.eval_episodes
-            )
+            episodes = self._settings.eval_episodes
+            return evaluate(policy.act, envs, evaluation_seed(env, episodes), episodes=episodes)
         finally:
             for one in envs:
                 one.close()
@@ -392,6 +399,7 @@ class _PeriodicEvaluation(BaseCallback):
         settings: Sb3Settings,
         envs: list[gym.Env[Any, Any]],
         action: Layout,
+        first_seed: int,
         single: bool,
         on_evaluation: OnEvaluation,
         on_steps: OnSteps,
@@ -401,6 +409,7 @@ class _PeriodicEvaluation(BaseCallback):
         self._settings = settings
         self._envs = envs
         self._action = action
+        self._first_seed = first_seed
         self._single = single
         self._on_evaluation = on_evaluation
         self._on_steps = on_steps
@@ -429,7 +438,7 @@ class _PeriodicEvaluation(BaseCallback):
         return evaluate(
             actor(model, _statistics(envs), self._action),
             self._envs,
-            EVALUATION_SEED,
+            self._first_seed,
             steps,
             episodes=self._settings.eval_episodes,
         )

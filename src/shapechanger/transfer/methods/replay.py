@@ -19,7 +19,7 @@ from shapechanger.layout import Layout
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, EnvTraits, layouts_of
-from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate, evaluation_envs
+from shapechanger.transfer.learners.evaluation import evaluate, evaluation_envs, evaluation_seed
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, actor
 from shapechanger.transfer.learners.settings import OffPolicySettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
@@ -343,7 +343,7 @@ class _Correction(BaseCallback):
         found = evaluate(
             actor(cast("Any", self.model), None, self._action),
             self._judges,
-            EVALUATION_SEED,
+            evaluation_seed(run.target, run.settings.eval_episodes),
             episodes=run.settings.eval_episodes,
         )
         run.report(msgspec.structs.replace(found, steps=run.steps if last else self._steps))
