@@ -49,6 +49,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "atlas-claims": _suite("atlas", "claims"),
     "atlas-pages": _suite("atlas", "pages"),
     "bodies": _suite("bodies", "bodies"),
+    "cloning-held-out": _suite("cloning_real", "held_out"),
     "cloning-real": _suite("cloning_real", "real"),
     "console": _suite("console", "console"),
     "corrections": _suite("corrections", "corrections"),
