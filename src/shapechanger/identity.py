@@ -8,6 +8,7 @@ averaged and a policy is never taken for one of another robot.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
@@ -166,13 +167,13 @@ def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[t
     """Yield name and hash of each file that an argument names, such as a robot's profile."""
     for text in texts_in(arguments):
         for suffix in _OF_A_NAME:
-            # JSON of a body is no path, and may be too long to be asked for.
-            path = (
-                Path(f"{text}{suffix}") if text and len(text) < 1000 and "\n" not in text else None
-            )
-            if path is not None and path.is_file() and not path.name.endswith(without or ("\0",)):
-                content = b"\n".join(path.read_bytes().splitlines())
-                yield path.name, hashlib.sha256(content).hexdigest()[:HASH_DIGITS]
+            # Unlike `Path.is_file`, this is false for texts that are too long for a path, such as
+            # the JSON of a body.
+            if text and os.path.isfile(place := f"{text}{suffix}"):  # noqa: PTH113
+                path = Path(place)
+                if not path.name.endswith(without or ("\0",)):
+                    content = b"\n".join(path.read_bytes().splitlines())
+                    yield path.name, hashlib.sha256(content).hexdigest()[:HASH_DIGITS]
 
 
 def _sees(space: gym.Space[Any]) -> bool:

@@ -49,4 +49,4 @@ def test_the_clones_of_the_package_are_sources(vehicle: str) -> None:
     assert isinstance(settings, CloningSettings)
     env = EnvRef(f"shapechanger/{vehicle.capitalize()}-v1", {"put_back": True})
     origin = CloneLearner("cloning", settings).origin(CLONES[vehicle])
-    assert origin == PolicyOrigin(env, 12_000)
+    assert origin == PolicyOrigin(env, 12_000, {})
