@@ -169,7 +169,7 @@ def _files(arguments: Mapping[str, Any], without: tuple[str, ...]) -> Iterator[t
         for suffix in _OF_A_NAME:
             # Unlike `Path.is_file`, this is false for texts that are too long for a path, such as
             # the JSON of a body.
-            if text and os.path.isfile(place := f"{text}{suffix}"):  # noqa: PTH113
+            if text and os.path.isfile(place := f"{text}{suffix}"):
                 path = Path(place)
                 if not path.name.endswith(without or ("\0",)):
                     content = b"\n".join(path.read_bytes().splitlines())
