@@ -18,6 +18,9 @@ RUN := $(BIN)/python
 LEROBOT := integrations/lerobot_robot_shapechanger
 LEROBOT_VENV := .venv-lerobot
 INSTALLED_LEROBOT := $(LEROBOT_VENV)/.installed
+# Models of other people's robots: packages of which nothing is imported.
+ROBOT_FILES := .robot-files
+INSTALLED_ROBOTS := $(ROBOT_FILES)/.installed
 # Written after a successful installation: for the demo, and for everything else.
 INSTALLED_ALL := $(VENV)/.installed-all
 INSTALLED_DEV := $(VENV)/.installed-dev
@@ -37,7 +40,7 @@ VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # Two installations at once would interfere.
-.PHONY: help setup demo test test-system test-all test-matrix release test-lerobot check bench docs gallery clean
+.PHONY: help setup demo test test-system test-all test-matrix release test-lerobot test-robots check bench docs gallery clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
@@ -70,6 +73,9 @@ test-lerobot: $(INSTALLED_LEROBOT)  ## test our robots in LeRobot; installs 6 GB
 	$(RUN) -m pyright -p $(LEROBOT)
 	$(LEROBOT_VENV)/bin/python -m pytest -c $(LEROBOT)/pyproject.toml --rootdir . $(LEROBOT)/tests
 
+test-robots: $(INSTALLED_ROBOTS)  ## test robot files of other projects' packages; installs 1 GB
+	$(RUN) -m pytest tests/envs/test_real_robots.py
+
 check: $(INSTALLED_DEV)  ## check format, lint and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -86,7 +92,7 @@ gallery: $(INSTALLED_DEV)  ## draw all pictures and clips of the documentation; 
 	$(RUN) scripts/draw_pictures.py
 
 clean:  ## remove build products and environments; keep results/
-	rm -rf $(VENV) $(LEROBOT_VENV) build dist site htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \
+	rm -rf $(VENV) $(LEROBOT_VENV) $(ROBOT_FILES) build dist site htmlcov .coverage .coverage.* .hypothesis .pytest_cache .ruff_cache \
 		MUJOCO_LOG.TXT
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -110,4 +116,9 @@ $(INSTALLED_LEROBOT): pyproject.toml $(LEROBOT)/pyproject.toml $(LEROBOT)/constr
 	$(PYTHON) -m venv $(LEROBOT_VENV)
 	$(RUN) -m uv pip install --quiet --python $(LEROBOT_VENV)/bin/python \
 		-c $(LEROBOT)/constraints.txt -e . -e '$(LEROBOT)[test]'
+	@touch $@
+
+$(INSTALLED_ROBOTS): tests/robot_files.txt $(INSTALLED_DEV)
+	rm -rf $(ROBOT_FILES)
+	$(RUN) -m pip install --quiet --no-deps --no-compile --target $(ROBOT_FILES) -r $<
 	@touch $@

@@ -115,8 +115,13 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
     env = make()
     env.reset(seed=_SEED)
     env.action_space.seed(_SEED)
-    for _ in range(_STEPS):
+    for step in range(_STEPS):
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
+        _require(
+            not info.get("diverged"),
+            f"The simulation diverges at step {step + 1} of random actions: give the actuators a "
+            "narrower range, or the model a shorter time step.",
+        )
         terms = [
             float(value)
             for name, value in info.items()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from shapechanger.tasks.measure import Measure
 from shapechanger.tasks.own import RobotState
 
@@ -67,3 +69,14 @@ class Hoist:
     def reward(self, robot: RobotState) -> dict[str, float]:
         """Return the distance, m, as a cost."""
         return {"near": -abs(robot["lift/position"] - 0.5)}
+
+
+class Move:
+    """Move all joints, whatever the robot."""
+
+    def reward(self, robot: RobotState) -> dict[str, float]:
+        """Return the mean speed of the joints, at most 1, and the cost of the actions."""
+        return {
+            "speed": float(np.clip(np.abs(robot.data.qvel), 0.0, 1.0).mean()),
+            "control": -0.1 * float(np.square(robot.scaled_action).mean()),
+        }

@@ -12,14 +12,15 @@ from typing import Any, Final
 import mujoco
 
 from shapechanger.bodies.families import Family
-from shapechanger.errors import BrokenModel, MorphologyError, UnknownName
+from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
 from shapechanger.morphology import Body, name_elements, reason_of, reshape, to_json
 
 # Names of the package are those of its modules.
 _DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")
 _PACKAGE: Final = "robot_descriptions"
 # Paths of ROS and Gazebo.
-_IN_PACKAGE: Final = re.compile(r"(package|model)://(?P<name>[^/]+)/(?P<rest>.+)")
+_COLLADA: Final = ".dae"
+_IN_PACKAGE: Final = re.compile(r"(package|model)://+(?P<name>[^/]+)/(?P<rest>.+)")
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class OwnFamily(Family):
             path: The file.
 
         Raises:
-            BrokenModel: If MuJoCo cannot read it, or no folder has a file of a package.
+            BrokenModel: If MuJoCo cannot read or compile it, or no folder has a file of a package.
             MorphologyError: If the rig does not fit it.
         """
         try:
@@ -58,12 +59,23 @@ class OwnFamily(Family):
         # The base of a URDF would vanish in the world, and its names with it.
         spec.compiler.fusestatic = False
         name_elements(spec)
-        return reshape(spec, self.rig)
+        try:
+            return reshape(spec, self.rig)
+        except (ValueError, mujoco.FatalError) as error:
+            if isinstance(error, ShapechangerError):
+                raise
+            reason = reason_of(error)
+            raise BrokenModel(f"MuJoCo does not compile {Path(path).name}: {reason}.") from error
 
 
 def _find_packages(spec: mujoco.MjSpec, path: Path) -> None:
     """Replace the `package://` paths of a URDF, which only ROS resolves, by those of files."""
     for element in (*spec.meshes, *spec.textures):
+        if element.file.lower().endswith(_COLLADA):
+            raise BrokenModel(
+                f"{path.name} names the mesh {element.file}, and MuJoCo does not read COLLADA: "
+                "convert it to OBJ or STL."
+            )
         package = _IN_PACKAGE.fullmatch(element.file)
         if package is None:
             continue

@@ -287,9 +287,11 @@ def _geoms(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return the middle of the body's geoms, their places (n, 3), and their radii (n,), m."""
     of_body = model.geom_bodyid > 0
-    places = data.geom_xpos[of_body]
-    middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
-    return middle, places, model.geom_rbound[of_body]
+    places, radii = data.geom_xpos[of_body], model.geom_rbound[of_body]
+    if not len(places):
+        # A URDF may have no shape that touches anything, and then its links are points.
+        places, radii = data.xpos[1:], np.zeros(model.nbody - 1)
+    return 0.5 * (places.min(axis=0) + places.max(axis=0)), places, radii
 
 
 def prepare_scene(spec: mujoco.MjSpec, *, bare_floors: bool = False) -> None:

@@ -1,0 +1,285 @@
+"""Robot files of other projects: each does all that an own robot can do, or is refused by name.
+
+`make test-robots` installs the packages of `tests/robot_files.txt` for it, of which only models are
+read.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import gymnasium as gym
+import msgspec
+import mujoco
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.callbacks import BaseCallback
+
+import shapechanger
+from shapechanger.errors import EmptyShift, MorphologyError, ShapechangerError
+from shapechanger.morphology import (
+    AddFloor,
+    AddFreeJoint,
+    AddMotor,
+    Body,
+    Mass,
+    Radius,
+    Stretch,
+    to_json,
+)
+from shapechanger.morphology.robot import robot_bodies
+from shapechanger.testing import PROMISES, BrokenPromise, examine
+from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.transfer.learners import ignore
+from shapechanger.transfer.learners.presets import learner_settings
+from shapechanger.transfer.learners.sb3 import Sb3Learner
+from tests.envs.own_robots import Move
+
+FILES: Final = Path(".robot-files")
+_DM: Final = "dm_control"
+_GYM: Final = "gymnasium_robotics/envs/assets"
+_MYO: Final = "myo_sim/models/legacy"
+_SUITE: Final = "robosuite/models/assets"
+_URDF: Final = "cmeel.prefix/share/example-robot-data/robots"
+_BIG: Final = 1.5
+# A pose counts as closed below this gap, m or rad, or at that of the file.
+_CLOSED: Final = 1e-3
+
+_INERTIA: Final = r"'.+' has its inertia written out, so it would not follow a new shape"
+_MOTORS: Final = (AddMotor("*"),)
+_WILD: Final = r"The simulation diverges at step \d+ of random actions: give the actuators"
+_MESH: Final = r"'.+' holds '.+', a mesh; only spheres, capsules"
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not FILES.is_dir(), reason="needs robot files: run `make test-robots`"),
+    # MuJoCo's compiler on files of older versions.
+    pytest.mark.filterwarnings("ignore:.*is deprecated:UserWarning"),
+]
+
+
+class _Robot(NamedTuple):
+    """A robot file.
+
+    Attributes:
+        path: Path in the folder of packages.
+        rig: Edits that it needs.
+        no_scale: The sentence that refuses to scale it; empty if it scales.
+        no_exam: The sentence with which it fails the exam; empty if it passes.
+    """
+
+    path: str
+    rig: Body = ()
+    no_scale: str = ""
+    no_exam: str = ""
+
+    @property
+    def file(self) -> Path:
+        """The file."""
+        return FILES / self.path
+
+    def make(self, body: Body = (), **arguments: Any) -> gym.Env[Any, Any]:
+        """Make its env."""
+        return shapechanger.from_mjcf(self.file, Move, rig=self.rig, body=body, **arguments)
+
+
+ROBOTS: Final = (
+    _Robot(f"{_DM}/suite/cheetah.xml"),
+    _Robot(f"{_DM}/suite/finger.xml"),
+    _Robot(f"{_DM}/suite/fish.xml"),
+    _Robot(f"{_DM}/suite/quadruped.xml"),
+    _Robot(f"{_DM}/suite/humanoid_CMU.xml"),
+    _Robot(f"{_DM}/locomotion/walkers/assets/humanoid_CMU_V2020.xml"),
+    _Robot(f"{_DM}/locomotion/walkers/assets/rodent.xml"),
+    _Robot(f"{_DM}/suite/dog.xml", no_scale=_INERTIA),
+    _Robot(f"{_DM}/suite/manipulator.xml", no_scale=_INERTIA),
+    _Robot(f"{_GYM}/adroit_hand/adroit_hammer.xml", no_scale=_INERTIA),
+    _Robot(f"{_GYM}/fetch/pick_and_place.xml", no_scale=_INERTIA),
+    _Robot(f"{_GYM}/hand/manipulate_block_touch_sensors.xml", no_scale=_INERTIA),
+    _Robot(f"{_GYM}/kitchen_franka/kitchen_assets/kitchen_env_model.xml", no_scale=_MESH),
+    _Robot("gym_aloha/assets/bimanual_viperx_insertion.xml", no_scale=_MESH, no_exam=_WILD),
+    _Robot("metaworld/assets/sawyer_xyz/sawyer_reach_v3.xml", no_scale=_MESH),
+    _Robot(f"{_MYO}/elbow/myoelbow_2dof6muscles.xml", no_scale=_INERTIA),
+    _Robot(f"{_MYO}/finger/myofinger_v0.xml", no_scale="The tendon 'dflx' would start .+ long"),
+    # The file tears the loops of its knees open by 5 cm.
+    _Robot(f"{_MYO}/osl/myolegs_osl.xml", no_scale=_INERTIA),
+    _Robot(f"{_SUITE}/grippers/jaco_three_finger_gripper.xml", no_scale=_INERTIA),
+    _Robot(f"{_SUITE}/robots/baxter/robot.xml", no_scale=_INERTIA),
+    # Its motors take 20,000 N·m.
+    _Robot(f"{_SUITE}/robots/gr1/robot.xml", no_scale=_INERTIA, no_exam=_WILD),
+    _Robot(f"{_SUITE}/robots/panda/robot.xml", no_scale=_INERTIA),
+    _Robot(f"{_SUITE}/robots/ur5e/robot.xml", no_scale=_INERTIA),
+    # Nothing of it touches anything, so MuJoCo keeps no shape.
+    _Robot(
+        f"{_URDF}/alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf", _MOTORS, _INERTIA
+    ),
+    _Robot(
+        f"{_URDF}/go2_description/urdf/go2.urdf",
+        (*_MOTORS, AddFreeJoint("base"), AddFloor()),
+        _INERTIA,
+    ),
+    _Robot(f"{_URDF}/panda_description/urdf/panda.urdf", _MOTORS, _INERTIA),
+    _Robot(f"{_URDF}/so_arm_description/urdf/so101.urdf", _MOTORS, _INERTIA),
+    # 12 joints of its hands follow others.
+    _Robot(f"{_URDF}/talos_data/robots/talos_full_v2.urdf", _MOTORS, _INERTIA),
+    _Robot(f"{_URDF}/ur_description/urdf/ur5_robot.urdf", _MOTORS, _INERTIA),
+)
+
+REFUSED: Final = {
+    f"{_DM}/suite/swimmer.xml": "has no actuators: add them",
+    f"{_GYM}/fetch/reach.xml": "has no actuators: add them",
+    f"{_SUITE}/grippers/robotiq_gripper_85.xml": "repeated name 'robotiq_arg2f_base_link' in mesh",
+    f"{_SUITE}/grippers/xarm7_gripper.xml": "unrecognized attribute: 'group'",
+    f"{_URDF}/allegro_hand_description/urdf/allegro_right_hand.urdf": "inertia must satisfy",
+    f"{_URDF}/baxter_description/urdf/baxter.urdf": "MuJoCo does not read COLLADA: convert it",
+    f"{_URDF}/double_pendulum_description/urdf/double_pendulum.urdf": "no largest torque or force",
+    f"{_URDF}/go1_description/urdf/go1.urdf": "inertia must have positive eigenvalues",
+    f"{_URDF}/iris_description/robots/iris_simple.urdf": r"No joint matches '\*'",
+    f"{_URDF}/simple_humanoid_description/urdf/simple_humanoid.urdf": "number of faces should be",
+}
+
+
+def _name(robot: _Robot) -> str:
+    parts = Path(robot.path).parts
+    return f"{parts[0]}/{parts[-2]}/{parts[-1]}"
+
+
+each_robot = pytest.mark.parametrize("robot", ROBOTS, ids=_name)
+
+
+@pytest.mark.parametrize(("path", "sentence"), REFUSED.items())
+def test_a_file_that_is_no_robot_says_why(path: str, sentence: str) -> None:
+    """In one sentence, before anything is simulated."""
+    with pytest.raises(ShapechangerError, match=sentence):
+        _Robot(path, _MOTORS if path.endswith(".urdf") else ()).make()
+
+
+@each_robot
+def test_it_starts_closed_and_steps(robot: _Robot) -> None:
+    """Its equalities hold at each start, as well as in the file, and random actions move it."""
+    env = robot.make()
+    inner: Any = env.unwrapped
+    model, data = inner.model, mujoco.MjData(inner.model)
+    written = _gap(model, model.qpos0, data)
+    for seed in range(5):
+        env.reset(seed=seed)
+        assert _gap(model, inner.data.qpos, data) <= max(_CLOSED, written)
+    env.action_space.seed(0)
+    for _ in range(50):
+        observation, reward, terminated, _, _ = env.step(env.action_space.sample())
+        assert np.isfinite(observation).all()
+        assert np.isfinite(reward)
+        if terminated:
+            env.reset()
+    env.close()
+
+
+@each_robot
+def test_it_grows_alike_or_refuses(robot: _Robot) -> None:
+    """Lengths grow by the factor and masses by its cube; equalities stay closed."""
+    body = (Stretch("*", _BIG), Radius("*", _BIG))
+    if robot.no_scale:
+        with pytest.raises(MorphologyError, match=robot.no_scale):
+            robot.make(body)
+        return
+    before: Any = robot.make().unwrapped
+    after: Any = robot.make(body).unwrapped
+    moving = before.model.body_mass > 0.0
+    np.testing.assert_allclose(
+        after.model.body_mass[moving], _BIG**3 * before.model.body_mass[moving], rtol=1e-9
+    )
+    old, new = _distances(before.model), _distances(after.model)
+    np.testing.assert_allclose(new, _BIG * old, rtol=1e-6, atol=1e-9)
+    data = mujoco.MjData(after.model)
+    written = _gap(before.model, before.model.qpos0, mujoco.MjData(before.model))
+    after.reset(seed=0)
+    assert _gap(after.model, after.data.qpos, data) <= max(_CLOSED, _BIG * written)
+
+
+@each_robot
+def test_its_shift_is_certified(robot: _Robot) -> None:
+    """A change of all masses is one, and no edit is none."""
+    source, target = robot.make(), robot.make((Mass("*", scale=1.3),))
+    certificate = source.unwrapped.certify_shift(source, target)
+    assert "mass" in str(certificate)
+    with pytest.raises(EmptyShift, match="behave alike"):
+        source.unwrapped.certify_shift(source, robot.make())
+
+
+@each_robot
+def test_it_maps_to_itself(robot: _Robot) -> None:
+    """By the identity."""
+    env = robot.make()
+    inner: Any = env.unwrapped
+    layouts = inner.observation_layout, inner.action_layout
+    ours = BodyMap.between(layouts[0], layouts[0], layouts[1], layouts[1])
+    observation, _ = env.reset(seed=0)
+    np.testing.assert_array_equal(ours.adapt_observation(observation), observation)
+    action = env.action_space.sample()
+    np.testing.assert_array_equal(ours.adapt_action(action), action)
+
+
+@each_robot
+def test_it_passes_the_exam(robot: _Robot) -> None:
+    """The exam of `shapechanger envs check`."""
+    if robot.no_exam:
+        with pytest.raises(BrokenPromise, match=robot.no_exam):
+            list(examine(robot.make))
+        return
+    assert len(list(examine(robot.make))) == len(PROMISES)
+
+
+@pytest.mark.usefixtures("one_thread")
+@each_robot
+def test_it_can_learn(robot: _Robot) -> None:
+    """2,048 steps of PPO leave finite weights, and reach both ends of each actuator's range."""
+    task = f"{Move.__module__}:{Move.__qualname__}"
+    arguments = {"path": str(robot.file), "task": task, "rig": to_json(robot.rig)}
+    env = EnvRef("shapechanger/OwnRobot-v1", {**arguments, "max_episode_steps": 50})
+    settings = msgspec.structs.replace(learner_settings("ppo-run"), eval_episodes=1)
+    settings = settings.for_budget(2048)
+    reached = _Reached()
+    learner = Sb3Learner("ppo-run", settings)
+    policy = learner.train(env, 2048, 0, callback=reached, on_evaluation=ignore)
+    assert policy.card.steps == 2048
+    for name, weights in policy.model.policy.state_dict().items():
+        assert torch.isfinite(weights).all(), name
+    model: Any = robot.make().unwrapped.model
+    np.testing.assert_allclose(reached.lowest, model.actuator_ctrlrange[:, 0], rtol=1e-6)
+    np.testing.assert_allclose(reached.highest, model.actuator_ctrlrange[:, 1], rtol=1e-6)
+
+
+class _Reached(BaseCallback):
+    """Least and largest number that each actuator was sent."""
+
+    lowest: NDArray[np.float64]
+    highest: NDArray[np.float64]
+
+    def _on_training_start(self) -> None:
+        self.lowest, self.highest = np.array(np.inf), np.array(-np.inf)
+
+    def _on_step(self) -> bool:
+        for data in self.training_env.get_attr("data"):
+            self.lowest = np.minimum(self.lowest, data.ctrl)
+            self.highest = np.maximum(self.highest, data.ctrl)
+        return True
+
+
+def _gap(model: mujoco.MjModel, pose: NDArray[np.float64], data: mujoco.MjData) -> float:
+    """Return the largest violation of an equality at a pose, m or rad."""
+    data.qpos[:] = pose
+    mujoco.mj_fwdPosition(model, data)
+    return float(np.abs(data.efc_pos[: data.ne]).max(initial=0.0))
+
+
+def _distances(model: mujoco.MjModel) -> NDArray[np.float64]:
+    """Return the distances between all geoms and joints of a robot, (n, n), m."""
+    data, robot = mujoco.MjData(model), robot_bodies(model)
+    mujoco.mj_kinematics(model, data)
+    geoms = data.geom_xpos[robot[model.geom_bodyid]]
+    places = np.concatenate([geoms, data.xanchor[robot[model.jnt_bodyid]]])
+    return np.linalg.norm(places[:, None] - places[None], axis=-1)
