@@ -242,6 +242,17 @@ class Single(Walk):
         return self.state.astype(np.float32)
 
 
+class Wild(Walk):
+    """Env whose simulation diverges in its third step, after which it reports no terms."""
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, _Info]:
+        """Diverge."""
+        self.steps = getattr(self, "steps", 0) + 1
+        if self.steps < 3:
+            return super().step(action)
+        return self.seen(), 0.0, True, False, {"diverged": True}
+
+
 # Each env with the promise that it breaks, and the message of the exam.
 _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
     (Liar, passes_gymnasiums_checker, "Gymnasium's checker says: .*not within the observ"),
@@ -258,6 +269,7 @@ _BROKEN: list[tuple[MakeEnv, Callable[[MakeEnv], None], str]] = [
     (Richer, pickles, "copy of the env behaves differently"),
     (Brief, pickles, "copy of the env behaves differently"),
     (Vague, reward_is_the_sum_of_its_terms, "reports no reward terms"),
+    (Wild, reward_is_the_sum_of_its_terms, "diverges at step 3 of random actions: give the act"),
     (Generous, reward_is_the_sum_of_its_terms, "its terms add up to"),
     (Still, starts_where_it_may, "Every start is the same"),
     (Outside, starts_where_it_may, "Starts out of range: point/x"),

@@ -12,7 +12,14 @@ import pytest
 
 from shapechanger.bodies.own import model_file, own_family, require_robot
 from shapechanger.errors import BrokenModel, MorphologyError, UnknownName
-from shapechanger.morphology import AddFloor, AddFreeJoint, AddMotor, Stretch, compile_body
+from shapechanger.morphology import (
+    AddFloor,
+    AddFreeJoint,
+    AddMotor,
+    Stretch,
+    TotalMass,
+    compile_body,
+)
 from tests.morphology.edits.test_rigging import URDF
 from tests.morphology.models import LEG
 
@@ -109,6 +116,42 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path, text: str, senten
     with pytest.raises(BrokenModel, match=sentence) as refusal:
         own_family(path).load(path)
     assert "\n" not in str(refusal.value)
+
+
+_LINK = """
+<robot name="link"><link name="base"/><link name="tip"><inertial><mass value="1"/>
+  <inertia ixx=".1" iyy=".1" izz="{inertia}" ixy="0" ixz="0" iyz="0"/></inertial>
+  <collision><geometry><mesh filename="{mesh}"/></geometry></collision></link>
+  <joint name="hinge" type="revolute"><parent link="base"/><child link="tip"/>
+  <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="7" velocity="1"/></joint></robot>
+"""
+
+
+@pytest.mark.parametrize("path", ["package://parts/wedge.obj", "package:///parts/wedge.obj"])
+def test_packages_of_a_urdf_are_folders_around_it(tmp_path: Path, path: str) -> None:
+    """However many slashes precede them."""
+    (tmp_path / "parts").mkdir()
+    _written(tmp_path / "parts", "wedge.obj", _OBJ)
+    file = _written(tmp_path, "link.urdf", _LINK.format(mesh=path, inertia=".1"))
+    assert compile_body(own_family(file).load(file)).nmesh == 1
+    (tmp_path / "parts" / "wedge.obj").unlink()
+    with pytest.raises(BrokenModel, match=r"neither a folder 'parts' that it is in"):
+        own_family(file).load(file)
+
+
+def test_a_rig_on_a_robot_that_does_not_compile_is_refused(tmp_path: Path) -> None:
+    """With MuJoCo's reason, as without a rig; a mesh of COLLADA with the formats that it reads."""
+    _written(tmp_path, "wedge.obj", _OBJ)
+    file = _written(tmp_path, "link.urdf", _LINK.format(mesh="wedge.obj", inertia="9"))
+    # It compiles the robot to know its mass.
+    family = own_family(file, (TotalMass(2.0),))
+    with pytest.raises(BrokenModel, match=r"MuJoCo does not compile link\.urdf: inertia must"):
+        family.load(file)
+    with pytest.raises(UnknownName, match="No joint matches 'knee'"):
+        own_family(file, (AddMotor("knee"),)).load(file)
+    _written(tmp_path, "link.urdf", _LINK.format(mesh="wedge.DAE", inertia=".1"))
+    with pytest.raises(BrokenModel, match=r"wedge\.DAE, and MuJoCo does not read COLLADA"):
+        family.load(file)
 
 
 def test_robots_need_motors_with_a_range(tmp_path: Path) -> None:

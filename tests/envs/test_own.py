@@ -36,7 +36,7 @@ from shapechanger.morphology import (
 from shapechanger.tasks.measure import FORWARD_SPEED, RETURN
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.env_ref import EnvRef, env_traits
-from tests.envs.own_robots import DOG, Nonsense, Rear
+from tests.envs.own_robots import DOG, Move, Nonsense, Rear
 from tests.morphology.edits.test_rigging import URDF
 
 REAR = "tests.envs.own_robots:Rear"
@@ -137,6 +137,17 @@ def test_a_task_of_ones_own(dog: Path) -> None:
     np.testing.assert_array_equal(observation[-1], inner.data.cfrc_ext[2, 5])
     inner.set_state(np.array([0.0, 0.0, 2.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(8))
     assert env.step(np.zeros(2))[2]
+
+
+def test_a_robot_without_shapes_is_a_robot(tmp_path: Path) -> None:
+    """A URDF whose links touch nothing; its links are points, from which it is seen."""
+    path = tmp_path / "arm.urdf"
+    start, end = URDF.index("<collision>"), URDF.index("</collision>") + len("</collision>")
+    path.write_text(URDF[:start] + URDF[end:])
+    inner = _inner(shapechanger.from_mjcf(path, Move, rig=AddMotor("*", 1.0)))
+    assert inner.model.ngeom == 0
+    # The elbow is 0.3 m above base and shoulder.
+    assert inner.reach == pytest.approx(0.15)
 
 
 def test_every_number_can_be_read(dog: Path) -> None:

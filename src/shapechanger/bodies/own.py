@@ -18,8 +18,8 @@ from shapechanger.morphology import Body, name_elements, reason_of, reshape, to_
 # Names of the package are those of its modules.
 _DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")
 _PACKAGE: Final = "robot_descriptions"
-# Paths of ROS and Gazebo.
 _COLLADA: Final = ".dae"
+# Paths of ROS and Gazebo.
 _IN_PACKAGE: Final = re.compile(r"(package|model)://+(?P<name>[^/]+)/(?P<rest>.+)")
 
 
