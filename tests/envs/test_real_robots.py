@@ -240,8 +240,8 @@ def test_it_can_learn(robot: _Robot) -> None:
     task = f"{Move.__module__}:{Move.__qualname__}"
     arguments = {"path": str(robot.file), "task": task, "rig": to_json(robot.rig)}
     env = EnvRef("shapechanger/OwnRobot-v1", {**arguments, "max_episode_steps": 50})
-    settings = msgspec.structs.replace(learner_settings("ppo-run"), eval_episodes=1)
-    settings = settings.for_budget(2048)
+    short = {"n_envs": 8, "n_steps": 256, "eval_every": 2048, "eval_episodes": 1}
+    settings = msgspec.structs.replace(learner_settings("ppo-run"), **short)
     reached = _Reached()
     learner = Sb3Learner("ppo-run", settings)
     policy = learner.train(env, 2048, 0, callback=reached, on_evaluation=ignore)
