@@ -164,3 +164,13 @@ def test_a_hint_for_a_typo_is_a_name_that_matches() -> None:
         layout.matching("wheel0]")
     assert layout.matching("wheel[0]") == (layout["wheel[0]"],)
     assert len(layout.matching("wheel*")) == 2
+
+
+def test_features_have_places() -> None:
+    """A layout is indexed by name, or by place as a tuple is."""
+    layout = Layout((Feature("a", "m"), Feature("b", "1")))
+    assert layout[0] == layout["a"]
+    assert layout[-1] == layout["b"]
+    assert [feature.name for feature in layout] == ["a", "b"]
+    with pytest.raises(IndexError):
+        layout[2]

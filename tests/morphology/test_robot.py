@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.morphology import TotalMass, reshape
+from shapechanger.morphology import TotalMass, compile_body, reshape
 from shapechanger.morphology.pose import (
     StartRules,
     floor_height,
@@ -17,6 +17,7 @@ from shapechanger.morphology.pose import (
 )
 from shapechanger.morphology.robot import moved_trees, robot_bodies
 from shapechanger.morphology.tree import tree_of
+from tests.morphology.scenes import asset
 
 # Objects come first, so that nothing is right by the order of the file.
 _SCENE = """
@@ -187,3 +188,22 @@ def test_the_floor_need_not_be_at_zero(floor: str, height: float) -> None:
     text = text.replace('conaffinity="0"', "") if "pos" in floor else text
     model = mujoco.MjModel.from_xml_string(text)
     assert floor_height(model, start_pose(model)) == pytest.approx(height)
+
+
+def test_a_single_tree_is_the_robot() -> None:
+    """All its numbers are the robot's."""
+    model = asset("ant")
+    assert StartRules(model).robot_places.all()
+
+
+def test_large_models_have_dense_jacobians_on_mujoco_4_0_0() -> None:
+    """Newton's solver factorises a wrong Hessian there from 60 degrees of freedom on."""
+    spec = mujoco.MjSpec()
+    body = spec.worldbody
+    for i in range(61):
+        body = body.add_body(name=f"link{i}", pos=[0.0, 0.0, 0.1])
+        body.add_joint(name=f"joint{i}", axis=[0.0, 1.0, 0.0])
+        body.add_geom(size=[0.02, 0.02, 0.02])
+    assert mujoco.mj_isSparse(spec.copy().compile())
+    sparse = mujoco.mj_isSparse(compile_body(spec))
+    assert sparse == (mujoco.__version__ != "4.0.0")

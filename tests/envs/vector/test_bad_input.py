@@ -83,6 +83,23 @@ def test_unknown_ids_and_modes_are_refused() -> None:
         shapechanger.make_vec("Ant", 2, autoreset_mode="SomeStep")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"backend": "warp", "pool": []}, "a `pool` of some bodies"),
+        ({"backend": "warp", "autoreset_mode": "Disabled"}, "has no autoreset mode Disabled"),
+        ({"pool": ["Ant"]}, "backend='threads' has no pool: use backend='warp'"),
+        ({"njmax": 3}, "backend='threads' has no njmax"),
+    ],
+)
+def test_arguments_of_the_other_backend_are_refused(
+    arguments: dict[str, Any], sentence: str
+) -> None:
+    """Before the packages of the other backend are imported."""
+    with pytest.raises(VectorEnvError, match=sentence):
+        shapechanger.make_vec("Ant", 2, **arguments)
+
+
 def test_spaces_must_be_boxes() -> None:
     """Other action spaces are refused."""
     with pytest.raises(VectorEnvError, match="action space of a vector env must be a Box"):

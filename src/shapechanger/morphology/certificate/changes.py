@@ -229,9 +229,12 @@ def compare(
     before, after = standing_height
     if before is not None and after is not None and not _equal((before,), (after,), 0.0):
         changes.append(change("standing height", "robot", (before,), (after,), "m"))
-    unnamed = (effective_model(model, anonymous=True) for model in (source, target))
-    if _alike(one, two) or _alike(*unnamed):
+    if _alike(one, two):
         return tuple(changes)
+    if names_of(source) != names_of(target):
+        unnamed = (effective_model(model, anonymous=True) for model in (source, target))
+        if _alike(*unnamed):
+            return tuple(changes)
     changes += _totals(source, target)
     changes += _lengths(source, target, one, two)
     return (*changes, *compare_effective(one, two, derived=not changes, sizes=False))
