@@ -166,11 +166,43 @@ def _judged(network: Network, seed: int) -> Scores:
             ANT.having({"bodies": msgspec.to_builtins(draw)}), STEPS, seed, on_evaluation=ignore
         )
         save_policy(policy.described(command=COMMAND), file)
-    splits = {split: [_speed_in(file, body) for body in _bodies(split)] for split in SPLITS}
-    splits[AGAIN] = [_speed_in(file, body) for body in _bodies("extrapolation", draw=1)]
-    scores = Scores(network, seed, splits, _speed_in(file, EXTENDED))
+    scores = _scores(network, seed, file)
     write_json(result, scores)
     return scores
+
+
+def _scores(network: str, seed: int, file: Path) -> Scores:
+    """Measure the speed of a policy in every body."""
+    splits = {split: [_speed_in(file, body) for body in _bodies(split)] for split in SPLITS}
+    splits[AGAIN] = [_speed_in(file, body) for body in _bodies("extrapolation", draw=1)]
+    return Scores(network, seed, splits, _speed_in(file, EXTENDED))
+
+
+def of_gpu() -> list[Row]:
+    """Judge the policy that the trial of a GPU trained in many ants."""
+    file = OUT / "limbs-gpu.safetensors"
+    card = load_policy(file).card
+    scores = _scores("limbs", card.seed, file)
+    learned = f"one policy, {card.steps:,} steps in {card.env.kwargs['bodies']['count']} ants"
+    return [
+        *(
+            Row(
+                f"{len(speeds)} ants, {split}: forward speed, learned on a GPU",
+                f"{np.mean(speeds):.2f} m/s",
+                f"{min(speeds):.2f} to {max(speeds):.2f} m/s in a body; {learned}",
+                "none: whatever comes out",
+                True,
+            )
+            for split, speeds in scores.splits.items()
+        ),
+        Row(
+            "ExtendedAnt, zero-shot: forward speed, learned on a GPU",
+            f"{scores.extended:.2f} m/s",
+            learned,
+            "none: whatever comes out",
+            True,
+        ),
+    ]
 
 
 def _settings(network: str) -> LimbSettings:

@@ -12,9 +12,13 @@ import sys
 import time
 from typing import Any, Final
 
+import torch
+
 from benchmarks import gpu
 from shapechanger.envs.warp.devices import wp
 from shapechanger.morphology import Stretch
+from shapechanger.transfer.env_ref import each_body
+from shapechanger.transfer.limbs.envs import together
 
 # Compute capability 9.0: H100 and H200.
 ARCHITECTURE: Final = 90
@@ -51,6 +55,10 @@ def launched() -> set[tuple[Any, int]]:
         gpu.rollouts("cpu")
         envs = gpu.made("Ant", 4, "cpu", pool=["Ant", [Stretch("shank_*", 1.1)]])
         envs.step(gpu.actions(envs, 1)[0])
+        # Drawn ants have other numbers of joints.
+        drawn = each_body(gpu.ANT.having({"bodies": gpu.GENERALIST_BODIES}))
+        envs = gpu.made("Ant", len(drawn), "cpu", **together(drawn).kwargs)
+        envs.step([torch.zeros(space.shape) for space in envs.action_space])
     finally:
         wp.launch, wp.launch_tiled = launch, launch_tiled
     return found

@@ -69,6 +69,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "gpu": _suite("gpu", "gpu"),
     "references": _suite("references", "references"),
     "generalist": _suite("generalist", "generalist"),
+    "generalist-gpu": _suite("generalist", "of_gpu"),
     "speed": _suite("speed", "single"),
     "speed-vector": _suite("speed_vector", "vector"),
     "robot-link": _suite("robots", "link"),

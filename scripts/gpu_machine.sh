@@ -5,7 +5,7 @@
 #                                    and .gpu2, each below 60 MB; some fifteen minutes of two cores
 #   scripts/gpu_machine.sh install   there, with the repository, .gpu1 and .gpu2 (one after the other
 #                                    will do): unpack them into /tmp/gpu; half a minute
-#   scripts/gpu_machine.sh run       there: the trial, at most eight minutes; results in $OUT
+#   scripts/gpu_machine.sh run       there: the trial, $LIMIT seconds (480); results in $OUT
 #
 # That machine has an NVIDIA driver, x86-64 Linux, Python 3.12, NumPy, SciPy, and PyTorch with CUDA.
 set -euo pipefail
@@ -74,10 +74,12 @@ run() {
     nvidia-smi --query-gpu=name,driver_version,memory.used,clocks.sm --format=csv,noheader
     export PYTHONPATH=$there/site:$PWD/src:$PWD WARP_CACHE_PATH=$there/kernels
     export GPU_REFERENCE=$there/parts/reference.npz PYTHONUNBUFFERED=1 OMP_NUM_THREADS=8
+    export LIMIT=${LIMIT:-480}
     local status=0
-    timeout "${LIMIT:-480}" python3 -W ignore -m benchmarks.run gpu 2>&1 | tee "$out/log.txt" ||
+    timeout $((LIMIT + 30)) python3 -W ignore -m benchmarks.run gpu 2>&1 | tee "$out/log.txt" ||
         status=$?
     cp benchmarks/results/gpu.json "$out/"
+    cp results/generalist/limbs-gpu.safetensors "$out/" || true
     return "$status"
 }
 
