@@ -35,6 +35,8 @@ prepare() {
     unzip -q "$work"/warp_lang-*.whl -d "$work/warp" -x 'warp/examples/*' 'warp/tests/*' \
         'warp/bin/warp-clang.so'
     rm "$work"/warp_lang-*.whl
+    # Our own package runs from `src`, and looks up its version.
+    cp -r .venv/lib/python3*/site-packages/shapechanger-*.dist-info "$work/warp/"
     sha256sum <"$work/warp/warp/bin/warp.so" | cut -d' ' -f1 >.gpu2/warp.so.sha256
     nice xz -c --x86 --lzma2="preset=${XZ_PRESET:-9e},dict=192MiB" "$work/warp/warp/bin/warp.so" |
         split -b 44M -d - "$work/warp.so.xz."
@@ -72,7 +74,7 @@ run() {
     local out=${OUT:-/tmp/gpu/out}
     mkdir -p "$out"
     nvidia-smi --query-gpu=name,driver_version,memory.used,clocks.sm --format=csv,noheader
-    export PYTHONPATH=$there/site:$PWD/src:$PWD WARP_CACHE_PATH=$there/kernels
+    export PYTHONPATH=$PWD/src:$there/site:$PWD WARP_CACHE_PATH=$there/kernels
     export GPU_REFERENCE=$there/parts/reference.npz PYTHONUNBUFFERED=1 OMP_NUM_THREADS=8
     export LIMIT=${LIMIT:-480}
     local status=0
