@@ -67,6 +67,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "finger-learned": _suite("finger_learned", "learned"),
     "finger-identify": _suite("finger_identify", "identified"),
     "gpu": _suite("gpu", "gpu"),
+    "gpu-generalist": _suite("gpu", "generalist"),
     "references": _suite("references", "references"),
     "generalist": _suite("generalist", "generalist"),
     "generalist-gpu": _suite("generalist", "of_gpu"),

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Run the trial of a GPU (`python -m benchmarks.run gpu`) on a machine that has no network.
+# Run benchmarks of a GPU on a machine that has no network.
 #
 #   scripts/gpu_machine.sh prepare   here: wheels, Warp's library and compiled kernels into .gpu1
 #                                    and .gpu2, each below 60 MB; some fifteen minutes of two cores
 #   scripts/gpu_machine.sh install   there, with the repository, .gpu1 and .gpu2 (one after the other
 #                                    will do): unpack them into /tmp/gpu; half a minute
-#   scripts/gpu_machine.sh run       there: the trial, $LIMIT seconds (480); results in $OUT
+#   scripts/gpu_machine.sh run       there: `python -m benchmarks.run gpu`, or the suites that follow
+#                                    `run`; two minutes; results in $OUT
 #
 # That machine has an NVIDIA driver, x86-64 Linux, Python 3.12, NumPy, SciPy, and PyTorch with CUDA.
 set -euo pipefail
@@ -76,17 +77,15 @@ run() {
     nvidia-smi --query-gpu=name,driver_version,memory.used,clocks.sm --format=csv,noheader
     export PYTHONPATH=$PWD/src:$there/site:$PWD WARP_CACHE_PATH=$there/kernels
     export GPU_REFERENCE=$there/parts/reference.npz PYTHONUNBUFFERED=1 OMP_NUM_THREADS=8
-    export LIMIT=${LIMIT:-480}
     local status=0
-    timeout $((LIMIT + 30)) python3 -W ignore -m benchmarks.run gpu 2>&1 | tee "$out/log.txt" ||
-        status=$?
-    cp benchmarks/results/gpu.json "$out/"
-    cp results/generalist/limbs-gpu.safetensors "$out/" || true
+    python3 -W ignore -m benchmarks.run "${@:-gpu}" 2>&1 | tee "$out/log.txt" || status=$?
+    cp benchmarks/results/gpu*.json "$out/"
+    if [ -d results/generalist ]; then cp results/generalist/*-gpu.safetensors "$out/"; fi
     return "$status"
 }
 
 case ${1:-} in
-    prepare | install | run) "$1" ;;
+    prepare | install | run) "$@" ;;
     *)
         sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//;p}' "$0"
         exit 2
