@@ -180,7 +180,7 @@ def _scores(network: str, seed: int, file: Path) -> Scores:
 
 def of_gpu() -> list[Row]:
     """Judge the policy that the trial of a GPU trained in many ants."""
-    file = OUT / "limbs-gpu.safetensors"
+    file = Path("benchmarks", "results", "generalist-gpu.safetensors")
     card = load_policy(file).card
     scores = _scores("limbs", card.seed, file)
     learned = f"one policy, {card.steps:,} steps in {card.env.kwargs['bodies']['count']} ants"

@@ -1,12 +1,12 @@
 """The trial of a GPU: parity with the CPU, speed, waiting, training, and what bodies cost.
 
-Each part writes its rows as it ends, and a part that fails is a row with its error. On a machine
-without a GPU the parts that a CPU can judge run on Warp's CPU device, and the others say "not
-measured". `scripts/gpu_machine.sh` prepares what a machine without a network lacks, and runs it
-there.
+Each part writes its rows as it ends, and a part that fails is a row with its error. Without a GPU
+nothing is measured and the results stay as they are; `python -m benchmarks.run gpu-on-cpu` measures
+the ratios that Warp's CPU device can show. `scripts/gpu_machine.sh` prepares what a machine without
+a network lacks, and runs the trial there.
 
 `python -m benchmarks.run gpu-generalist` trains one policy in many bodies on a GPU and keeps it in
-`results/generalist`, where `python -m benchmarks.run generalist-gpu` judges it on a CPU.
+`benchmarks/results`, and `python -m benchmarks.run generalist-gpu` judges it on a CPU.
 
     LIMIT: Seconds for that training, which is shortened to as many steps as fit.
     GPU_REFERENCE: A file of `python -m benchmarks.gpu FILE`, written on a machine on which Warp
@@ -56,7 +56,7 @@ TRAINING_SETTINGS: Final = {"n_envs": 512, "n_steps": 32}
 GENERALIST: Final = 100_000_000
 GENERALIST_BODIES: Final = {"count": 256, "seed": 0}
 GENERALIST_SETTINGS: Final = {"n_envs": 2 * MANY, "n_steps": 24, "batch_size": 49_152}
-GENERALIST_FILE: Final = Path("results", "generalist", "limbs-gpu.safetensors")
+GENERALIST_FILE: Final = Path("benchmarks", "results", "generalist-gpu.safetensors")
 # Seconds of its evaluations and of the making of its bodies, and the part of the rest that it may
 # plan for.
 ASIDE_S: Final = 40
@@ -74,12 +74,28 @@ TASKS: Final = ("Ant", "HalfCheetah", "InvertedDoublePendulum", "Humanoid", "Fin
 
 def gpu() -> Iterator[Row]:
     """Measure all parts, in the order of what must be known first."""
-    yield from _all(parity, speed, waiting, graphs, construction, differing, training, humanoid)
+    if _there():
+        yield from _all(parity, speed, waiting, graphs, construction, differing, training, humanoid)
+
+
+def on_cpu() -> Iterator[Row]:
+    """Measure on Warp's CPU device what it can show."""
+    if GPU:
+        sys.exit("This machine has a GPU: run `python -m benchmarks.run gpu`.")
+    yield from _all(graphs, construction, differing)
 
 
 def generalist() -> Iterator[Row]:
     """Train one policy in many bodies."""
-    yield from _all(many)
+    if _there():
+        yield from _all(many)
+
+
+def _there() -> bool:
+    """Return whether there is a GPU, and say so if not."""
+    if not GPU:
+        sys.stderr.write("There is no GPU here: its results stay as they are.\n")
+    return GPU
 
 
 def _all(*parts: Callable[[], Iterator[Row]]) -> Iterator[Row]:
@@ -94,10 +110,6 @@ def _all(*parts: Callable[[], Iterator[Row]]) -> Iterator[Row]:
             traceback.print_exc()
             yield Row(part.__name__, "failed", f"{type(error).__name__}: {error}", "none", False)
         sys.stderr.write(f"{part.__name__} took {time.monotonic() - began:.0f} s.\n")
-
-
-def _not_measured(name: str, target: str) -> Row:
-    return Row(name, "not measured", "there is no GPU here", target, False)
 
 
 def _card() -> str:
@@ -173,9 +185,6 @@ def parity() -> Iterator[Row]:
     """Compare a start, a step and four steps with Warp's CPU device."""
     target = f"< {PARITY:g} in a step"
     file = os.environ.get("GPU_REFERENCE")
-    if not GPU:
-        yield _not_measured("parity with the CPU device, worst of all tasks", target)
-        return
     reference: Any = np.load(file) if file else rollouts("cpu")
     here = rollouts(DEVICE)
     for name in TASKS:
@@ -194,9 +203,6 @@ def speed() -> Iterator[Row]:
     """Measure whole env steps, with observations, rewards and restarts, and physics alone."""
     name = f"Ant, N={MANY}: env steps per second on a GPU"
     target = f">= {SPEED:,}"
-    if not GPU:
-        yield _not_measured(name, target)
-        return
     envs = made("Ant", MANY, task_infos=False)
     step = _stepper(envs, actions(envs, 50))
     _seconds(step, STEPS)  # Until worlds restart at different times.
@@ -219,9 +225,6 @@ def speed() -> Iterator[Row]:
 def waiting() -> Iterator[Row]:
     """Count how often a step waits for the GPU, by CUDA's own account."""
     name = "Ant: questions to the GPU in a step"
-    if not GPU:
-        yield _not_measured(name, "1")
-        return
     envs = made("Ant", FEW)
     step = _stepper(envs, actions(envs, 5))
     _seconds(step, 3)
@@ -333,9 +336,6 @@ def training() -> Iterator[Row]:
     """Measure a training with PPO, and what it has learned."""
     name = f"Ant: seconds of PPO with rsl-rl for {TRAINING:,} steps on a GPU"
     target = f"< {LONGEST_S}"
-    if not GPU:
-        yield _not_measured(name, target)
-        return
     # Until its kernels are compiled.
     _trained("rsl-ppo", TRAINING_SETTINGS, ANT, math.prod(TRAINING_SETTINGS.values()))
     _, seconds, speeds = _trained("rsl-ppo", TRAINING_SETTINGS, ANT, TRAINING)
@@ -346,9 +346,6 @@ def training() -> Iterator[Row]:
 def many() -> Iterator[Row]:
     """Train one policy in many bodies, and keep it."""
     count = GENERALIST_BODIES["count"]
-    if not GPU:
-        yield _not_measured(f"one policy in {count} ants: steps on a GPU", "none")
-        return
     ends = time.monotonic() + float(os.environ.get("LIMIT", "inf"))
     update = GENERALIST_SETTINGS["n_envs"] * GENERALIST_SETTINGS["n_steps"]
     # How long an update takes, after one in which kernels are compiled, in few bodies.
@@ -366,7 +363,6 @@ def many() -> Iterator[Row]:
     steps = int(min(GENERALIST, max(update, left / seconds * update)))
     env = ANT.having({"bodies": GENERALIST_BODIES})
     policy, seconds, speeds = _trained("rsl-limbs", GENERALIST_SETTINGS, env, steps)
-    GENERALIST_FILE.parent.mkdir(parents=True, exist_ok=True)
     save_policy(
         policy.described(command="python -m benchmarks.run gpu-generalist"), GENERALIST_FILE
     )
@@ -383,9 +379,6 @@ def many() -> Iterator[Row]:
 def humanoid() -> Iterator[Row]:
     """Measure whole env steps of the largest body."""
     name = f"Humanoid, N={MANY}: env steps per second on a GPU"
-    if not GPU:
-        yield _not_measured(name, "none: whatever comes out")
-        return
     envs = made("Humanoid", MANY, task_infos=False)
     step = _stepper(envs, [0.4 * action for action in actions(envs, 10)])
     _seconds(step, 12)

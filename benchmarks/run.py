@@ -67,6 +67,7 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
     "finger-learned": _suite("finger_learned", "learned"),
     "finger-identify": _suite("finger_identify", "identified"),
     "gpu": _suite("gpu", "gpu"),
+    "gpu-on-cpu": _suite("gpu", "on_cpu"),
     "gpu-generalist": _suite("gpu", "generalist"),
     "references": _suite("references", "references"),
     "generalist": _suite("generalist", "generalist"),
@@ -99,7 +100,17 @@ SUITES: dict[str, Callable[[], Iterable[Row]]] = {
 
 def _asked() -> str:
     """Return the environment variables that were set, as shell assignments."""
-    names = ("TRIALS", "FINGERS", "LAYOUTS", "SEEDS", "ONLY", "ENDED", "VEHICLE", "LP_NUM_THREADS")
+    names = (
+        "TRIALS",
+        "FINGERS",
+        "LAYOUTS",
+        "SEEDS",
+        "ONLY",
+        "ENDED",
+        "VEHICLE",
+        "LP_NUM_THREADS",
+        "LIMIT",
+    )
     return "".join(
         f"{name}={shlex.quote(os.environ[name])} " for name in names if name in os.environ
     )

@@ -79,8 +79,7 @@ run() {
     export GPU_REFERENCE=$there/parts/reference.npz PYTHONUNBUFFERED=1 OMP_NUM_THREADS=8
     local status=0
     python3 -W ignore -m benchmarks.run "${@:-gpu}" 2>&1 | tee "$out/log.txt" || status=$?
-    cp benchmarks/results/gpu*.json "$out/"
-    if [ -d results/generalist ]; then cp results/generalist/*-gpu.safetensors "$out/"; fi
+    cp benchmarks/results/{gpu*.json,generalist-gpu.safetensors} "$out/"
     return "$status"
 }
 

@@ -39,8 +39,9 @@ ALWAYS = {"final_obs", "final_info", "diverged"}
 
 # The device computes in single precision. Over the five or fewer physics steps of an action, the
 # largest differences seen in several hundred steps are 4e-5 of an observation's numbers and 6e-6 of
-# a reward, relative to 1 + the number.
-OBSERVATION_TOLERANCE = 2e-4
+# a reward, relative to 1 + the number. On a GPU, where threads add forces in any order, the largest
+# was 2.5e-4, in the contact forces of a Humanoid (an H200).
+OBSERVATION_TOLERANCE = 2e-4 if DEVICE == "cpu" else 1e-3
 REWARD_TOLERANCE = 5e-5
 
 
