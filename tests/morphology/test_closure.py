@@ -145,3 +145,26 @@ def test_inactive_equalities_close_nothing() -> None:
     speed = np.array([1.0, 2.0, 3.0])
     assert rules.closure is not None
     np.testing.assert_array_equal(rules.closure.still(drawn, speed, mujoco.MjData(model)), speed)
+
+
+@pytest.mark.parametrize(("limits", "gap_m"), [("-65 -10", 0.0), ("10 90", 0.0227)])
+def test_a_file_that_starts_outside_its_limits_starts_inside(limits: str, gap_m: float) -> None:
+    """Closed, with the elbow bent to its other side; or as closed as its limits allow."""
+    model = mujoco.MjModel.from_xml_string(
+        f"""
+        <mujoco><worldbody>
+          <body name="hand" mocap="true"/>
+          <body><joint name="shoulder" axis="0 1 0" range="-90 90"/>
+            <geom type="capsule" fromto="0 0 0 .5 0 0" size=".02"/>
+            <body name="lower" pos=".5 0 0" euler="0 30 0">
+              <joint name="elbow" axis="0 1 0" range="{limits}"/>
+              <geom type="capsule" fromto="0 0 0 .4 0 0" size=".02"/></body></body>
+        </worldbody>
+        <equality><connect body1="lower" body2="hand" anchor=".4 0 0"/></equality>
+        <actuator><motor joint="elbow" ctrlrange="-1 1"/></actuator></mujoco>"""
+    )
+    rules, start, data = StartRules(model), start_pose(model), mujoco.MjData(model)
+    for pose in (start, rules.feasible(start + 0.02, data, start)):
+        assert np.all(rules.lowest <= pose)
+        assert np.all(pose <= rules.highest)
+        assert _gap(model, pose) == pytest.approx(gap_m, abs=1e-4)
