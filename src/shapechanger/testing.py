@@ -120,7 +120,7 @@ def reward_is_the_sum_of_its_terms(make: MakeEnv) -> None:
         _require(
             not info.get("diverged"),
             f"The simulation diverges at step {step + 1} of random actions: give the actuators a "
-            "narrower range, or the model a shorter time step.",
+            "narrower range, motors of a rig a smaller gear, or the model a shorter time step.",
         )
         terms = [
             float(value)

@@ -50,7 +50,6 @@ def folder(done: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 _POLICY = "suite/a-to-b/runs/scratch-0/policy.safetensors"
 
 
-@pytest.mark.filterwarnings("ignore:.*possible render_modes")
 def test_a_policy_is_evaluated_in_its_own_robot_until_that_changes(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

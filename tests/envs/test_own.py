@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import shapechanger
+from shapechanger.envs.own import OwnRobotEnv
 from shapechanger.errors import (
     BrokenModel,
     EmptyShift,
@@ -188,6 +189,21 @@ def test_a_robot_is_made_again_from_its_spec(dog: Path) -> None:
     assert again.spec is not None
     assert again.spec.max_episode_steps == 7
     assert again.spec.kwargs["task"] == REAR
+
+
+def test_arguments_of_gymnasium_may_be_objects(dog: Path) -> None:
+    """The spec records path, task, rig and body as JSON."""
+    dog.write_text(DOG.replace('<geom name="floor" type="plane" size="20 20 1"/>', ""))
+    given = {"path": dog, "task": Rear, "rig": (AddFloor(),), "body": Stretch("back", 1.2)}
+    env = gym.make("shapechanger/OwnRobot-v1", **given)
+    assert env.spec is not None
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    np.testing.assert_array_equal(again.reset(seed=3)[0], env.reset(seed=3)[0])
+
+
+def test_render_modes_are_known_before_there_is_an_env() -> None:
+    """`gym.make` warns otherwise."""
+    assert "rgb_array" in OwnRobotEnv.metadata["render_modes"]
 
 
 def test_a_study_makes_it_by_id(dog: Path) -> None:
@@ -391,4 +407,11 @@ def test_models_that_do_not_compile_are_refused(dog: Path) -> None:
         DOG.replace('name="front" pos', 'name="paw" pos').replace(' mass="3"', ' mass="0"')
     )
     with pytest.raises(BrokenModel, match=r"compile dog\.xml: mass and inertia of moving bodies"):
+        shapechanger.from_mjcf(dog)
+
+
+def test_models_without_joints_are_refused(dog: Path) -> None:
+    """Motors would not help."""
+    dog.write_text('<mujoco><worldbody><body><geom size=".1"/></body></worldbody></mujoco>')
+    with pytest.raises(MorphologyError, match=r"dog\.xml has no joints, so nothing of it can move"):
         shapechanger.from_mjcf(dog)

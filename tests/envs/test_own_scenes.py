@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import shapechanger
-from shapechanger.errors import BrokenModel
+from shapechanger.errors import BrokenModel, TaskError
 from shapechanger.morphology import AddMotor
 from tests.envs.own_robots import DOG
 
@@ -167,6 +167,10 @@ def test_a_base_that_slides_in_a_plane_can_walk(tmp_path: Path) -> None:
         _, _, terminated, _, info = env.step(np.array([2.0]))
         assert not terminated
     assert info["x_velocity"] == pytest.approx(2.0, abs=0.05)
+    locked = text.replace(' axis="1 0 0"/>', ' axis="1 0 0" damping="1e11"/>')
+    locked = locked.replace(' axis="0 1 0"/>', ' axis="0 1 0" damping="1e11"/>')
+    with pytest.raises(TaskError, match="needs a robot that can travel"):
+        _env(tmp_path, locked)
 
 
 def test_a_copy_begins_an_episode_of_its_own(tmp_path: Path) -> None:

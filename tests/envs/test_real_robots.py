@@ -139,7 +139,7 @@ REFUSED: Final = {
     f"{_URDF}/baxter_description/urdf/baxter.urdf": "MuJoCo does not read COLLADA: convert it",
     f"{_URDF}/double_pendulum_description/urdf/double_pendulum.urdf": "no largest torque or force",
     f"{_URDF}/go1_description/urdf/go1.urdf": "inertia must have positive eigenvalues",
-    f"{_URDF}/iris_description/robots/iris_simple.urdf": r"No joint matches '\*'",
+    f"{_URDF}/iris_description/robots/iris_simple.urdf": "has no joints, so there is nothing",
     f"{_URDF}/simple_humanoid_description/urdf/simple_humanoid.urdf": "number of faces should be",
 }
 

@@ -164,8 +164,10 @@ def require_robot(model: mujoco.MjModel, path: Path) -> None:
         path: Its file.
 
     Raises:
-        MorphologyError: If it has no actuators, or one whose range is unknown.
+        MorphologyError: If it has no joints, no actuators, or one whose range is unknown.
     """
+    if not model.njnt:
+        raise MorphologyError(f"{path.name} has no joints, so nothing of it can move.")
     if not model.nu:
         motors = "rig=AddMotor('*')" if path.suffix == ".urdf" else "rig=AddMotor('*', GEAR)"
         raise MorphologyError(

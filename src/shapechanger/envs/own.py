@@ -131,8 +131,13 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         reset_noise_scale: As given.
     """
 
+    # `gym.make` reads it before there is an env; the rate of the frames follows from the model.
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it without ClassVar.
+        "render_modes": ["human", "rgb_array", "depth_array", "rgbd_tuple"]
+    }
     measures: tuple[Measure, ...]
     _draws_bare_floors = True
+    _as_json = frozenset({"path", "task", "rig"})
 
     def __init__(
         self,
@@ -163,13 +168,10 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
             frame_skip = max(1, round(_CONTROL_STEP_S / spec.option.timestep))
         if frame_skip < 1:
             raise EnvArgumentError(f"frame_skip must be at least 1, got {frame_skip}.")
-        # Gymnasium compares the rate of its frames, which it expects in the class, with the model.
-        modes = ["human", "rgb_array", "depth_array", "rgbd_tuple"]
-        self.metadata: dict[str, Any] = {"render_modes": modes}
         # `_finish` replaces the space by that of the layout.
         space = gym.spaces.Box(-np.inf, np.inf, (0,), np.float64)
         cast("Any", MujocoEnv).__init__(self, str(self._file.path), frame_skip, space, **arguments)
-        self.metadata["render_fps"] = round(1.0 / self.dt)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.dt)}
         self._finish(arguments)
         self._ezpickle_kwargs |= {
             "path": fspath(path),

@@ -107,6 +107,8 @@ class Reshapable(MujocoEnv):
     standing_height: float | None
     _spec: EnvSpec | None = None
     fast_model: bool = True
+    # Arguments that may be objects, and whose record for pickling is JSON.
+    _as_json: frozenset[str] = frozenset()
     # Whether planes without a material are drawn.
     _draws_bare_floors: bool = False
     # Whether a state has been set since the env was made.
@@ -167,12 +169,15 @@ class Reshapable(MujocoEnv):
 
     @property
     def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """The registered spec, with the present body as JSON."""
+        """The registered spec, with the present body and other objects as their JSON."""
         return self._spec
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
         self._spec = copy.deepcopy(spec)
+        if self._spec is not None:
+            given = self._spec.kwargs
+            given |= {name: self._ezpickle_kwargs[name] for name in self._as_json & {*given}}
         self._record_body()
 
     def _record_body(self) -> None:

@@ -97,9 +97,18 @@ def trunk_lift(model: mujoco.MjModel) -> Lift | None:
     return None
 
 
+def _moving_dofs(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Return whether each degree of freedom can move, shape (nv,).
+
+    Files lock a joint with a damping of 1e11, and MuJoCo diverges unless it is at rest.
+    """
+    return model.dof_damping * model.opt.timestep <= _LOCKED * model.dof_M0
+
+
 def _unlimited_slides(model: mujoco.MjModel) -> list[int]:
-    """Return the slides without limits of the robot's bodies on the world."""
+    """Return the slides that can go anywhere, of the robot's bodies on the world."""
     slides = (model.jnt_type == _J.mjJNT_SLIDE) & (model.jnt_limited == 0)
+    slides &= _moving_dofs(model)[model.jnt_dofadr]
     return _in_robot(model, slides & (model.body_parentid[model.jnt_bodyid] == 0))
 
 
@@ -238,10 +247,8 @@ class StartRules:
     @property
     def robot_dofs(self) -> NDArray[np.bool_]:
         """Whether each number of qvel is one of the robot's, and not locked, shape (nv,)."""
-        model = self._model
-        # Files lock a joint with a damping of 1e11, and MuJoCo diverges unless it is at rest.
-        moves = model.dof_damping * model.opt.timestep <= _LOCKED * model.dof_M0
-        return moves if self._robot is None else moves & self._robot[model.dof_bodyid]
+        moves = _moving_dofs(self._model)
+        return moves if self._robot is None else moves & self._robot[self._model.dof_bodyid]
 
     def keep_within_limits(self, pose: _Array, inside: float = 0.0) -> _Array:
         """Return a pose, shape (nq,), with the robot's hinges and slides moved inside their limits.

@@ -67,6 +67,26 @@ def test_a_joint_gets_one_motor() -> None:
         reshape(urdf(), [AddMotor("elbw")])
 
 
+def test_a_motor_of_something_else_is_no_motor_of_the_joint() -> None:
+    """A tendon and a joint may share a name."""
+    spec = spec_of(
+        """
+        <mujoco><worldbody>
+          <body><joint name="pull" axis="0 1 0"/><geom size=".1"/></body></worldbody>
+        <tendon><fixed name="pull"><joint joint="pull" coef="1"/></fixed></tendon>
+        <actuator><motor name="muscle" tendon="pull"/></actuator></mujoco>"""
+    )
+    assert built(spec, AddMotor("*", 2.0)).nu == 2
+
+
+def test_a_model_without_joints_gets_no_motor() -> None:
+    """The sentence says so."""
+    with pytest.raises(MorphologyError, match="has no joints, so there is nothing to add a motor"):
+        reshape(
+            spec_of('<mujoco><worldbody><geom size=".1"/></worldbody></mujoco>'), [AddMotor("*")]
+        )
+
+
 def test_a_fixed_robot_is_set_free() -> None:
     """It falls with its whole mass, although MuJoCo merges a URDF's base with the world."""
     fixed = built(urdf())

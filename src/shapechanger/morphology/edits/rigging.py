@@ -16,6 +16,7 @@ from shapechanger.morphology.edits.edit import Edit
 from shapechanger.morphology.spec.elements import limbs_and_trunks, require_free_name, select
 
 _J: Final = mujoco.mjtJoint
+_MOVES_JOINT: Final = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 _MOVES_ONE_WAY: Final = (_J.mjJNT_HINGE, _J.mjJNT_SLIDE)
 # MuJoCo's default friction of a geom: sliding, torsional [m] and rolling [m].
 _TORSIONAL: Final = 0.005
@@ -45,7 +46,9 @@ class AddMotor(Edit, frozen=True):
 
     def apply(self, spec: mujoco.MjSpec) -> None:
         """Add a motor to every joint that fits and has none."""
-        moved = {actuator.target for actuator in spec.actuators}
+        if not spec.joints:
+            raise MorphologyError("The model has no joints, so there is nothing to add a motor to.")
+        moved = {actuator.target for actuator in spec.actuators if actuator.trntype in _MOVES_JOINT}
         # Also of a model that makes two joints follow each other: one of them has a motor.
         moved |= {
             coupling.name1
