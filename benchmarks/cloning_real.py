@@ -47,6 +47,7 @@ from torch import nn
 from torch.nn import functional
 
 from benchmarks.row import Row
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.card import class_numbers
 from shapechanger.demos.cloning.judge import macro_f1, output_fields
 from shapechanger.demos.cloning.learn import DEMOS, clone, learn
@@ -55,7 +56,6 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.envs.vehicle.drivers import CLONES
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations
 
 SPLITS: Final = 5

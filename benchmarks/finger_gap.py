@@ -25,11 +25,11 @@ from benchmarks.row import Row, asked
 from shapechanger.bodies.finger import FingerParameters
 from shapechanger.cli import main
 from shapechanger.cli.transfer import write_study_report
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.finger.env import SMOOTHNESS
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.files import read_json
 from shapechanger.reports.numbers import share_text
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Processes
 from shapechanger.transfer.learners.evaluation import evaluation_seed
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy

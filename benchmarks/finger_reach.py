@@ -16,11 +16,11 @@ from benchmarks.row import Row
 from shapechanger.bodies.finger import NOMINAL, FingerParameters, build_finger, drive_of
 from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, PHALANX_LENGTH_M
 from shapechanger.bodies.finger.tensions import tensions_for_torque
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.finger.gap import GAPS
 from shapechanger.envs.finger.oracle import FingerOracle
 from shapechanger.envs.finger.postures import angles_for, joint_torque
 from shapechanger.tasks.finger import fingertip, fingertip_jacobian
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import evaluation_seed
 
 # With a larger gain, 1/s, a finger on a rig's path of commands oscillates; a smaller one, 6, leaves

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from benchmarks.row import Row
+from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body
 from shapechanger.files import read_json, write_json
-from shapechanger.transfer.env_ref import BodyDraw, EnvRef, each_body
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.learners.policy_file import load_policy, save_policy

@@ -32,9 +32,9 @@ import torch
 
 import shapechanger
 from benchmarks.row import Row
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.warp.devices import on, wp
 from shapechanger.morphology import Stretch
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, save_policy
 from shapechanger.transfer.learners.presets import learner_settings

@@ -17,7 +17,7 @@ import torch
 from benchmarks import gpu
 from shapechanger.envs.warp.devices import wp
 from shapechanger.morphology import Stretch
-from shapechanger.transfer.env_ref import each_body
+from shapechanger.contract.env_ref import each_body
 from shapechanger.transfer.limbs.envs import together
 
 # Compute capability 9.0: H100 and H200.

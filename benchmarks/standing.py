@@ -19,9 +19,9 @@ import numpy as np
 from scipy.stats import binomtest
 
 from benchmarks.row import Row
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.vehicle import RangesEnv
 from shapechanger.envs.vehicle.drivers import observe_ranges
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.presets import LEARNERS

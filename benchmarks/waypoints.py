@@ -28,6 +28,7 @@ from benchmarks.row import Row, asked
 from benchmarks.vehicles import counted
 from shapechanger.cli.demos.train import Shrinking
 from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.learn import clone, learn
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset
@@ -39,7 +40,6 @@ from shapechanger.envs.vehicle.drivers import CLONES, VehicleDemonstrator
 from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
 from shapechanger.envs.vehicle.waypoints import WaypointDemonstrator
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.sb3 import use_one_thread

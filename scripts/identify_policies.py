@@ -14,10 +14,10 @@ from pathlib import Path
 import msgspec
 
 import shapechanger  # noqa: F401  # Registers the ids.
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.files import write_atomic
 from shapechanger.tensor_file import read_tensors, tensor_bytes
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.references import FOLDER
 from shapechanger.transfer.versions import ENV, identify, known
 

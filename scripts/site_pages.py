@@ -18,6 +18,7 @@ import gymnasium as gym
 
 import shapechanger
 from scripts.wiring_diagrams import draw_wiring, part_list, pin_table
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
@@ -31,7 +32,6 @@ from shapechanger.envs.catalogue import (
 from shapechanger.errors import EmptyShift, RenderError
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.profile import load_profile, shipped_profiles
-from shapechanger.transfer.env_ref import EnvRef, layouts_of
 
 SRC: Final = Path(shapechanger.__file__).parents[1]
 
@@ -388,7 +388,7 @@ def _about(path: Path) -> str:
 MODULES: Final = (
     "shapechanger.layout",
     "shapechanger.errors",
-    "shapechanger.testing",
+    "shapechanger.contract.testing",
     "shapechanger.demos.dataset",
     "shapechanger.demos.recording",
     "shapechanger.envs.ant",

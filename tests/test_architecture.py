@@ -57,11 +57,11 @@ _RULES = {
     # Courses, their scenes, and the expert that drives them with a vehicle.
     "worlds": _Rule(_names("errors rendering bodies"), never=_HARDWARE | {"torch", "gymnasium"}),
     # Rewards and endings: no model file.
-    "tasks": _Rule(_names("errors layout"), _names("numpy msgspec scipy")),
+    "tasks": _Rule(_names("errors layout contract"), _names("numpy msgspec scipy")),
     # Envs join bodies and tasks. A vehicle's env runs the whole robot in one process, and the
     # remote ones reach it over the link.
     "envs": _Rule(
-        _names("errors layout rendering morphology bodies tasks")
+        _names("errors layout contract rendering morphology bodies tasks")
         | _names("link robot remote twin worlds identify envs.warp"),
         never=_HARDWARE | {"torch"},
     ),
@@ -69,14 +69,15 @@ _RULES = {
     "envs.warp": _Rule(_names("errors layout morphology bodies tasks envs"), never=_HARDWARE),
     # Transfer does not distinguish simulators from robots. Cloning is one of its learners.
     "transfer": _Rule(
-        _names("errors files identity layout own_modules tasks demos shapechanger tensor_file"),
+        _names("contract errors files identity layout own_modules demos shapechanger tensor_file"),
         never=_HARDWARE | _SIMULATORS,
     ),
     "reports": _Rule(
-        _names("errors files layout transfer demos identify bodies"), never=_HARDWARE | _SIMULATORS
+        _names("contract errors files layout transfer demos identify bodies"),
+        never=_HARDWARE | _SIMULATORS,
     ),
     # The exam for third-party envs.
-    "testing": _Rule(_names("errors layout transfer"), never=_HARDWARE | _SIMULATORS),
+    "contract": _Rule(_names("errors layout identity"), never=_HARDWARE | _SIMULATORS),
     # Runs on the robot. From `demos` it uses the writer of episodes, which needs no other package.
     "robot": _Rule(_names("errors layout link demos"), never=_HEAVY | {"gymnasium"}),
     "remote": _Rule(_names("errors layout link tasks"), never=_HEAVY),
@@ -92,8 +93,10 @@ _RULES = {
     # The command line composes everything, and nothing imports it.
     "cli": _Rule(
         _names("errors files layout link morphology bodies tasks envs transfer robot remote twin")
-        | _names("teleop demos reports testing shapechanger rendering worlds identify identity hub")
-        | _names("own_modules")
+        | _names(
+            "teleop demos reports contract shapechanger rendering worlds identify identity hub"
+        )
+        | _names("contract own_modules")
     ),
     "identify": _Rule(
         _names("errors layout morphology bodies tasks"),
@@ -101,7 +104,7 @@ _RULES = {
     ),
     # The package registers the ids; other names are imported on first use.
     "shapechanger": _Rule(
-        _names("errors layout envs demos identify morphology remote testing transfer"),
+        _names("errors layout contract envs demos identify morphology remote transfer"),
         _names("gymnasium numpy msgspec"),
     ),
 }

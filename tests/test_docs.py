@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from shapechanger.cli.env_arguments import env_ref
+from shapechanger.contract.env_ref import layouts_of
 from shapechanger.transfer import study
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import layouts_of
 from shapechanger.transfer.plan import Plan
 
 ROOT = Path(__file__).parents[1]

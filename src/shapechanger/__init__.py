@@ -36,6 +36,7 @@ from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
 
 if TYPE_CHECKING:
+    from shapechanger.contract.testing import examine
     from shapechanger.demos.dataset import Dataset, load_dataset
     from shapechanger.envs.own import from_mjcf
     from shapechanger.identify import load_log
@@ -70,7 +71,6 @@ if TYPE_CHECKING:
     )
     from shapechanger.morphology.certificate import Certificate, certify
     from shapechanger.remote.client import RobotClient
-    from shapechanger.testing import examine
     from shapechanger.transfer import BodyMap, TransferTask
     from shapechanger.transfer.learners.policy_file import save_policy
     from shapechanger.transfer.policies import load_policy
@@ -131,6 +131,7 @@ __all__ = [
 __version__: Final = version("shapechanger")
 
 _MODULES: Final = {
+    "contract.testing": ("examine",),
     "demos.dataset": ("Dataset", "load_dataset"),
     "envs.own": ("from_mjcf",),
     "identify": ("load_log",),
@@ -143,7 +144,6 @@ _MODULES: Final = {
     ),
     "morphology.certificate": ("Certificate", "certify"),
     "remote.client": ("RobotClient",),
-    "testing": ("examine",),
     "transfer": ("BodyMap", "TransferTask"),
     "transfer.learners.policy_file": ("save_policy",),
     "transfer.policies": ("load_policy",),

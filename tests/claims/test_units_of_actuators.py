@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner

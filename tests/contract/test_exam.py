@@ -1,4 +1,4 @@
-"""Every env of the catalogue passes the checks of `shapechanger.testing`."""
+"""Every env of the catalogue passes the checks of `shapechanger.contract.testing`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from stable_baselines3.common.env_checker import check_env
 
+from shapechanger.contract.testing import PROMISES, MakeEnv, examine
 from shapechanger.envs import CATALOGUE
 from shapechanger.envs.catalogue import (
     FINGER_ENVS,
@@ -24,7 +25,6 @@ from shapechanger.envs.catalogue import (
     WAYPOINT_ENVS,
 )
 from shapechanger.tasks.own import RobotState
-from shapechanger.testing import PROMISES, MakeEnv, examine
 
 # Bodies without an id, and arguments that change a space.
 _VARIANTS: dict[str, MakeEnv] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapechanger.tasks.measure import Measure
+from shapechanger.contract.measure import Measure
 from shapechanger.tasks.own import RobotState
 
 # A dog in a plane: two legs with a hinge each, of which one is a servo.

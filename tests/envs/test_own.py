@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import shapechanger
+from shapechanger.contract.env_ref import EnvRef, env_traits
+from shapechanger.contract.measure import FORWARD_SPEED, RETURN
 from shapechanger.envs.own import OwnRobotEnv
 from shapechanger.errors import (
     BrokenModel,
@@ -34,9 +36,7 @@ from shapechanger.morphology import (
     Stretch,
     to_json,
 )
-from shapechanger.tasks.measure import FORWARD_SPEED, RETURN
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef, env_traits
 from tests.envs.own_robots import DOG, Move, Nonsense, Rear
 from tests.morphology.edits.test_rigging import URDF
 

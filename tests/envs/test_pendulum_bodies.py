@@ -6,9 +6,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from shapechanger.contract.testing import examine
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import Lock, Remove, Split
-from shapechanger.testing import examine
 
 
 def test_a_split_pole_has_two_hinges() -> None:

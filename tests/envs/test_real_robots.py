@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
 import shapechanger
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.contract.testing import PROMISES, BrokenPromise, examine
 from shapechanger.errors import EmptyShift, MorphologyError, ShapechangerError
 from shapechanger.morphology import (
     AddFloor,
@@ -32,9 +34,7 @@ from shapechanger.morphology import (
 )
 from shapechanger.morphology.pose import StartRules
 from shapechanger.morphology.robot import robot_bodies
-from shapechanger.testing import PROMISES, BrokenPromise, examine
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import shapechanger
+from shapechanger.contract.env_ref import env_traits
 from shapechanger.errors import SpaceMismatch, UnknownName
-from shapechanger.transfer.env_ref import env_traits
 
 
 def _heights(env: gym.Env[object, object], seeds: list[int | None]) -> list[float]:

@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 
 from shapechanger import testing
+from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.contract.testing import MakeEnv
 from shapechanger.envs.remote.four_way import FOUR_WAYS, FourWay
 from shapechanger.envs.remote.vehicle import RemoteVehicleEnv, Schedule
 from shapechanger.errors import LinkError, RenderError, RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.layout import Element, Feature
 from shapechanger.link import messages as m
 from shapechanger.remote.known_robots import remember
-from shapechanger.testing import MakeEnv
-from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from tests.remote.robot import FULL_SPEED, STATE, THROTTLE, WALL, Robot, eventually
 
 pytestmark = pytest.mark.realtime

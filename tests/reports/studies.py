@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise

@@ -12,10 +12,10 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import MissingExtra
 from shapechanger.reports.study import study_html
 from shapechanger.reports.verdict import measure_rows, verdict
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.study import Study
 from tests.reports.studies import make_study, rising, same_body
 

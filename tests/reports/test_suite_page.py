@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
 from shapechanger.reports.suite import FilmStrip, Sweep, suite_html
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.study import Study
 from tests.reports.studies import make_study, rising
 from tests.reports.test_report_page import EVIL, Reader

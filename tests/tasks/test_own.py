@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from shapechanger.contract.measure import FORWARD_SPEED
 from shapechanger.errors import TaskError, UnknownName
-from shapechanger.tasks.measure import FORWARD_SPEED
 from shapechanger.tasks.own import (
     RobotState,
     Walk,

@@ -9,10 +9,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import CloningSettings
 
 _ROWS, _COLUMNS = 12, 20

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import OWN_ROBOT
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask

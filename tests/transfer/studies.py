@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import make_plan

@@ -13,11 +13,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import SpaceMismatch
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.algorithms import SpacesOnly
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import load_policy, save_policy

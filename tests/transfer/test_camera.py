@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.errors import StudyError
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
 from shapechanger.transfer.learners.cloning import CloneLearner
 from shapechanger.transfer.learners.presets import learner_settings

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import shapechanger  # noqa: F401  # Registers the ids.
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.contract.measure import FORWARD_SPEED
 from shapechanger.errors import UnknownName
-from shapechanger.tasks.measure import FORWARD_SPEED
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     evaluate,

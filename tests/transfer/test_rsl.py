@@ -12,8 +12,8 @@ import pytest
 import torch
 
 import shapechanger
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import load_policy, save_policy

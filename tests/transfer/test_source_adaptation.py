@@ -10,11 +10,11 @@ import gymnasium as gym
 import pytest
 
 from shapechanger.bodies.finger import NOMINAL, FingerParameters
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.finger import identification
 from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.errors import RobotError, StudyError
 from shapechanger.reports.verdict import arm_rows, caveats
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.plan import ARMS, Run, TransferTask

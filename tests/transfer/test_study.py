@@ -16,6 +16,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from shapechanger.contract.env_ref import EnvRef, certify_shift
 from shapechanger.errors import (
     CorruptStudy,
     EmptyShift,
@@ -28,7 +29,6 @@ from shapechanger.errors import (
 )
 from shapechanger.files import read_json
 from shapechanger.layout import Feature, Layout
-from shapechanger.transfer.env_ref import EnvRef, certify_shift
 from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.plan import ARMS, Run, TransferTask

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study

@@ -10,7 +10,7 @@ import pytest
 from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
-from shapechanger.transfer.env_ref import EnvRef
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.transfer.learners.vec_env import ThreadVecEnv, training_vec_env
 from tests.drawing import draws, missing
 from tests.envs.vector.sameness import require_same

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal, cast
 import gymnasium as gym
 import tyro
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
@@ -36,7 +37,6 @@ from shapechanger.errors import (
 )
 from shapechanger.files import make_folder
 from shapechanger.rendering import require_known_gl
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Executor, Processes
 from shapechanger.transfer.references import reference_policy
 

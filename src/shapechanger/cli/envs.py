@@ -20,6 +20,7 @@ from shapechanger.cli.env_arguments import (
     opened,
     options_of,
 )
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.envs.catalogue import (
     CATALOGUE,
     FINGER_ENVS,
@@ -30,7 +31,6 @@ from shapechanger.envs.catalogue import (
     WAYPOINT_ENVS,
 )
 from shapechanger.layout import Layout
-from shapechanger.transfer.env_ref import EnvRef, layouts_of
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class CheckEnv:
 
     def run(self) -> None:
         """Run the exam on the env."""
-        from shapechanger.testing import examine
+        from shapechanger.contract.testing import examine
 
         ref = _env(self.env, self.body, self.options)
         for question in examine(ref.make):

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from shapechanger.cli.console import print_table, say
 from shapechanger.cli.env_arguments import EnvId, env_ref, options_of, require_file, require_seed
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import FingerError, OutputError, UnknownName
 from shapechanger.files import write_atomic
-from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
     from shapechanger.bodies.finger import FingerParameters

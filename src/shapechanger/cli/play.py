@@ -19,9 +19,9 @@ from shapechanger.cli.env_arguments import (
     policy_file,
     require_seed,
 )
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
-from shapechanger.transfer.env_ref import EnvRef
 
 
 @dataclass(frozen=True, kw_only=True)

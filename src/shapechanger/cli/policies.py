@@ -24,13 +24,13 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.cli.hub import PullPolicy, PushPolicy
 from shapechanger.cli.play import Watching
+from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError, no_policy_file
 from shapechanger.identity import identify_env
 from shapechanger.own_modules import texts_in
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
-from shapechanger.transfer.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
 from shapechanger.transfer.learners.settings import (
     LimbSettings,
     OffPolicySettings,

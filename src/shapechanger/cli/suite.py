@@ -39,10 +39,10 @@ from shapechanger.cli.env_arguments import (
     short_name,
 )
 from shapechanger.cli.transfer import run_steps, write_study_report
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
 from shapechanger.files import place_of, read_json, read_text, write_json
 from shapechanger.reports.numbers import estimate_text
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.plan import SOURCE, Plan, TransferTask

@@ -23,9 +23,9 @@ from shapechanger.cli.env_arguments import (
     require_seed,
     settings_of,
 )
+from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.files import make_folder
-from shapechanger.transfer.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.transfer.learners.presets import IN_MANY_BODIES, resolve_learner, tuning_text
 from shapechanger.transfer.learners.settings import (
     LimbSettings,

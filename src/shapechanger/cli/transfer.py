@@ -26,10 +26,10 @@ from shapechanger.cli.env_arguments import (
     require_seed,
     settings_of,
 )
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.files import read_text
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.settings import Settings, study_budgets
 from shapechanger.transfer.methods import load_method, method_names

@@ -20,6 +20,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 
 from shapechanger.bodies.ant import ANT
 from shapechanger.bodies.families import BodyLike
+from shapechanger.contract.measure import FORWARD_SPEED, RETURN
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
 from shapechanger.envs.stepping.tuned import (
@@ -31,7 +32,6 @@ from shapechanger.envs.stepping.tuned import (
 )
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Feature
-from shapechanger.tasks.measure import FORWARD_SPEED, RETURN
 
 # An ant this many times higher than it stands has been thrown up. This gives Ant a ceiling of 0.98
 # m, where Gymnasium has 1.0, and BigAnt one of 1.80 m, where the 2017 release had 2.0.

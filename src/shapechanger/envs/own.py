@@ -23,6 +23,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
 
 from shapechanger.bodies.families import BodyLike
 from shapechanger.bodies.own import own_family, require_robot
+from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
 from shapechanger.envs.reshapable import Reshapable
@@ -37,7 +38,6 @@ from shapechanger.morphology.pose import (
     trunk_lift,
 )
 from shapechanger.morphology.robot import robot_bodies
-from shapechanger.tasks.measure import RETURN, Measure
 from shapechanger.tasks.own import RobotState, as_task, has_ended, observed, reference, reward_terms
 
 _Floats = NDArray[np.float64]

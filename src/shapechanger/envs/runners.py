@@ -23,6 +23,7 @@ except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
 from shapechanger.bodies.families import HALF_CHEETAH, HOPPER, HUMANOID, SWIMMER, WALKER2D, BodyLike
+from shapechanger.contract.measure import FORWARD_SPEED, RETURN, Measure
 from shapechanger.envs.layouts import (
     contact_features,
     drive_features,
@@ -35,7 +36,6 @@ from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.pose import Lift, standing_height, start_pose, trunk_lift
-from shapechanger.tasks.measure import FORWARD_SPEED, RETURN, Measure
 
 # Where Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
 _CLIPPED_AT: Final = 10.0

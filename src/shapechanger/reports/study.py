@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.reports.numbers import UNDEFINED, count, number
 from shapechanger.reports.page import png_uri, render, svg_uri
 from shapechanger.reports.verdict import (
@@ -28,7 +29,6 @@ from shapechanger.reports.verdict import (
 )
 from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
 from shapechanger.transfer.body_map.rules import SAME_NAME
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.presets import tuning_text
 from shapechanger.transfer.learners.settings import CloningSettings, Settings
 from shapechanger.transfer.metrics import Reference, Summary

@@ -8,11 +8,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
 from shapechanger.reports.numbers import count, estimate_text, number
 from shapechanger.reports.page import jpeg_uri, render, svg_uri
 from shapechanger.reports.verdict import direction, finals, is_flat, machine_text, verdict
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.metrics import (
     Estimate,
     Reference,

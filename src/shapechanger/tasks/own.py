@@ -23,8 +23,8 @@ from typing import Any, Final, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.measure import FORWARD_SPEED, RETURN, Measure
 from shapechanger.errors import TaskError, UnknownName
-from shapechanger.tasks.measure import FORWARD_SPEED, RETURN, Measure
 
 _Floats = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class OwnTask(Protocol):
     - `observe`: names or globs of the numbers to observe, such as `("*/angle", "*/contact/*")`; by
       default all positions and velocities but the place on the floor.
     - `terminated(robot)`: whether the episode ends; by default never.
-    - `measures`: what a policy is measured by (`shapechanger.tasks.measure`), the default first.
+    - `measures`: what a policy is measured by (`shapechanger.contract.measure`), the default first.
     - `check(robot)`: called once with the robot at its start; raises `TaskError` if the robot does
       not fit.
     """

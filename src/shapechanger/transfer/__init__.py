@@ -6,8 +6,8 @@ This package exports what needs no learner. `shapechanger.transfer.study` runs s
 
 from __future__ import annotations
 
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
-from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.transfer.plan import Plan, TransferTask

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import (
     CorruptStudy,
     MissingExtra,
@@ -26,7 +27,6 @@ from shapechanger.files import write_atomic
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 from shapechanger.transfer.actions import ActionScale
-from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.policy_file import TrainedPolicy

@@ -10,11 +10,11 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.contract.measure import RETURN
 from shapechanger.errors import StudyError, check_seed
 from shapechanger.identity import Identity
-from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.settings import Settings
 from shapechanger.transfer.methods import load_method
 

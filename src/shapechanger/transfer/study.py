@@ -16,6 +16,14 @@ import msgspec
 import numpy as np
 
 import shapechanger
+from shapechanger.contract.env_ref import (
+    EnvRef,
+    EnvTraits,
+    certify_shift,
+    env_traits,
+    is_reward_term,
+)
+from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.errors import (
     ForeignStudy,
     ShapechangerError,
@@ -24,15 +32,7 @@ from shapechanger.errors import (
     UnknownName,
 )
 from shapechanger.files import make_folder, read_json, write_json
-from shapechanger.tasks.measure import RETURN, Measure
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import (
-    EnvRef,
-    EnvTraits,
-    certify_shift,
-    env_traits,
-    is_reward_term,
-)
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
 from shapechanger.transfer.learners.settings import RslSettings, Settings, study_budgets
 from shapechanger.transfer.methods import load_method

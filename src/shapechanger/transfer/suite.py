@@ -15,9 +15,9 @@ from typing import Final
 
 import msgspec
 
+from shapechanger.contract.measure import RETURN
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
 from shapechanger.files import make_folder
-from shapechanger.tasks.measure import RETURN
 from shapechanger.transfer.metrics import Estimate, LearningCurves, steps_to_reach
 from shapechanger.transfer.plan import SOURCE, Plan
 from shapechanger.transfer.runs import load_result

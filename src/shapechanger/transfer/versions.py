@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import gymnasium as gym
 import msgspec
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import ForeignStudy, ShapechangerError
 from shapechanger.files import make_folder, write_atomic
 from shapechanger.identity import (
@@ -25,7 +26,6 @@ from shapechanger.identity import (
     model_changes,
 )
 from shapechanger.own_modules import texts_in
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.methods import load_method
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapechanger.contract.env_ref import TaskDemonstrator
 from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
 from shapechanger.errors import ProfileError
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.transfer.env_ref import TaskDemonstrator
 from shapechanger.worlds.course import HOME
 
 

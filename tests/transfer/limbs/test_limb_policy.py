@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import torch
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError, TransplantError
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy

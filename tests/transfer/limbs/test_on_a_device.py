@@ -11,10 +11,10 @@ import pytest
 import torch
 
 import shapechanger
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError, TransplantError, UnknownName
 from shapechanger.morphology import JointRange
 from shapechanger.morphology.body import to_json
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy

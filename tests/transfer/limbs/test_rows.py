@@ -8,9 +8,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from shapechanger.contract.env_ref import EnvRef, each_body
 from shapechanger.errors import LayoutError, StudyError, TransplantError, UnknownName
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.transfer.env_ref import EnvRef, each_body
 from shapechanger.transfer.limbs.envs import LimbEnv, LimbVecEnv, fitted, limb_envs, rows_of_each
 from shapechanger.transfer.limbs.rows import DESCRIBED, require_same_columns, rows_of
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import torch
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.learners.presets import learner_settings

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import torch
 
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner

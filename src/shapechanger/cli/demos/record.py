@@ -23,10 +23,10 @@ from shapechanger.cli.env_arguments import (
     options_of,
     require_seed,
 )
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
-from shapechanger.transfer.env_ref import EnvRef, layouts_of
 
 if TYPE_CHECKING:
     from shapechanger.demos.drivers import (

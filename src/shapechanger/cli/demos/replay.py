@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from shapechanger.cli.console import say
 from shapechanger.cli.demos.recordings import episode_at
 from shapechanger.cli.env_arguments import env_ref, opened
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.dataset import decode_picture
 from shapechanger.demos.episodes import Episode, Step
 from shapechanger.demos.overlay import blank, overlay
@@ -23,7 +24,6 @@ from shapechanger.layout import Layout
 from shapechanger.link.messages import Welcome
 from shapechanger.remote.known_robots import recall
 from shapechanger.teleop import Terminal
-from shapechanger.transfer.env_ref import EnvRef
 
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import Step

@@ -22,6 +22,7 @@ from shapechanger.bodies.finger import (
 from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, MOST_TENSION_N
 from shapechanger.bodies.finger.model import FingerFigure
 from shapechanger.bodies.finger.parameters import PARAMETER_SETS
+from shapechanger.contract.measure import Measure
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.finger.drawing import tendon_legend
 from shapechanger.envs.finger.gap import (
@@ -38,7 +39,6 @@ from shapechanger.errors import FingerError, UnknownName, check_seed
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.rendering import choose_gl, require_screen
 from shapechanger.tasks.finger import FingerSenses, FingertipReward, features_of_senses
-from shapechanger.tasks.measure import Measure
 
 if TYPE_CHECKING:
     from gymnasium.envs.registration import EnvSpec

@@ -10,12 +10,12 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.bodies.finger.anatomy import PHALANX_LENGTH_M
+from shapechanger.contract.measure import RETURN, SUCCESS
 from shapechanger.envs.finger.env import SMOOTHNESS, FingerEnv, as_numbers
 from shapechanger.envs.finger.postures import draw_posture
 from shapechanger.errors import FingerError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.tasks.finger import FingerSenses, fingertip, place_features
-from shapechanger.tasks.measure import RETURN, SUCCESS
 
 _TARGET: Final = Element("task", "target")
 TOLERANCE_M: Final = 0.005

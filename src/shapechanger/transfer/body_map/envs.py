@@ -10,12 +10,12 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import layouts_of
 from shapechanger.errors import SpaceMismatch
 from shapechanger.layout import Layout
 from shapechanger.transfer.body_map.map import BodyMap
 from shapechanger.transfer.body_map.matching import Units
 from shapechanger.transfer.body_map.rules import RuleLike, Zero
-from shapechanger.transfer.env_ref import layouts_of
 
 Array = NDArray[Any]
 

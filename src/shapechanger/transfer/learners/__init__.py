@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from shapechanger.contract.env_ref import EnvRef, EnvTraits
 from shapechanger.identity import Identity
-from shapechanger.transfer.env_ref import EnvRef, EnvTraits
 
 if TYPE_CHECKING:
     from shapechanger.transfer.body_map import BodyMap

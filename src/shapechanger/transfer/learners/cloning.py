@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef, EnvTraits, HasDemonstrator, layouts_of
 from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
@@ -20,7 +21,6 @@ from shapechanger.errors import StudyError
 from shapechanger.files import make_folder
 from shapechanger.tensor_file import kind_of
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef, EnvTraits, HasDemonstrator, layouts_of
 from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,

@@ -11,15 +11,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import UnknownName
-from shapechanger.tasks.measure import RETURN, Measure
-from shapechanger.transfer.env_ref import (
+from shapechanger.contract.env_ref import (
     EnvRef,
     HasHeldOutStarts,
     is_reward_term,
     is_single_instance,
     measures_of,
 )
+from shapechanger.contract.measure import RETURN, Measure
+from shapechanger.errors import UnknownName
 from shapechanger.transfer.learners.settings import LimbSettings, Settings
 
 EVALUATION_SEED: Final = 10_000_000

@@ -22,13 +22,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import CorruptStudy, MissingExtra, no_policy_file
 from shapechanger.files import write_atomic
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
 from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
 from shapechanger.transfer.actions import ActionScale
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
 from shapechanger.transfer.learners.settings import RslSettings, Sb3Settings
 from shapechanger.transfer.limbs.policy import LimbPolicy

@@ -18,10 +18,10 @@ from typing import Any, Final, cast
 import numpy as np
 
 import shapechanger
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners import DemonstrationFile, ignore
 from shapechanger.transfer.learners import sb3 as _sb3
 from shapechanger.transfer.learners.algorithms import SpacesOnly

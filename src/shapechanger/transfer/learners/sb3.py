@@ -11,18 +11,18 @@ import gymnasium as gym
 import numpy as np
 
 import shapechanger
-from shapechanger.errors import MissingExtra, SpaceMismatch, StudyError, TransplantError
-from shapechanger.layout import Layout
-from shapechanger.transfer.actions import require_ranges
-from shapechanger.transfer.body_map import BodyMap, MappedEnv
-from shapechanger.transfer.body_map.envs import check_size
-from shapechanger.transfer.env_ref import (
+from shapechanger.contract.env_ref import (
     EnvRef,
     EnvTraits,
     each_body,
     is_single_instance,
     layouts_of,
 )
+from shapechanger.errors import MissingExtra, SpaceMismatch, StudyError, TransplantError
+from shapechanger.layout import Layout
+from shapechanger.transfer.actions import require_ranges
+from shapechanger.transfer.body_map import BodyMap, MappedEnv
+from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin, ignore
 from shapechanger.transfer.learners.algorithms import build_model
 from shapechanger.transfer.learners.cloning import is_clone

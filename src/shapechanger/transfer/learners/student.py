@@ -18,12 +18,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import CanBeTaught, EnvRef, TaskDemonstrator
 from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.pictures import prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError
-from shapechanger.transfer.env_ref import CanBeTaught, EnvRef, TaskDemonstrator
 from shapechanger.transfer.learners.cloning import stated
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.versions import ENV, identify, require_same_env

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shapechanger
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import MissingExtra
 from shapechanger.layout import Layout
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
-from shapechanger.transfer.env_ref import EnvRef
 
 try:
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecEnvWrapper

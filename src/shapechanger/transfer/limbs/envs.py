@@ -9,9 +9,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import EnvRef, each_body
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.layout import Layout
-from shapechanger.transfer.env_ref import EnvRef, each_body
 from shapechanger.transfer.learners.vec_env import training_vec_env
 from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns, rows_of
 

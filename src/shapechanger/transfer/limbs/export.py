@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from torch import nn
 
-from shapechanger.transfer.env_ref import EnvRef, layouts_of
+from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.limbs.envs import fitted
 from shapechanger.transfer.limbs.policy import LimbNetwork

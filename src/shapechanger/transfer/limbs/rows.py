@@ -14,9 +14,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.env_ref import HasTree, layouts_of
 from shapechanger.errors import LayoutError, StudyError, TransplantError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.transfer.env_ref import HasTree, layouts_of
 
 _Floats = NDArray[np.float64]
 

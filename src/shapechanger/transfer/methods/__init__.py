@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import msgspec
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError, UnknownName
-from shapechanger.transfer.env_ref import EnvRef
 from shapechanger.transfer.learners import DemonstrationFile, ignore
 
 if TYPE_CHECKING:
+    from shapechanger.contract.env_ref import EnvTraits
     from shapechanger.transfer.body_map import BodyMap
-    from shapechanger.transfer.env_ref import EnvTraits
     from shapechanger.transfer.learners import Learner
     from shapechanger.transfer.learners.evaluation import Evaluation
     from shapechanger.transfer.learners.settings import Settings

@@ -6,8 +6,8 @@ from abc import abstractmethod
 from contextlib import closing
 from typing import Any, Final, cast
 
+from shapechanger.contract.env_ref import EnvTraits, HasBodyFamily, SourceAdaptation
 from shapechanger.files import write_json
-from shapechanger.transfer.env_ref import EnvTraits, HasBodyFamily, SourceAdaptation
 from shapechanger.transfer.learners.settings import Settings
 from shapechanger.transfer.methods import Method, MethodRun
 

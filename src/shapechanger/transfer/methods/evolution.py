@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import msgspec
 
+from shapechanger.contract.env_ref import EnvRef, EnvTraits, HasBodyFamily, layouts_of
 from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef, EnvTraits, HasBodyFamily, layouts_of
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.settings import Sb3Settings, Settings
 from shapechanger.transfer.methods import Method, MethodRun

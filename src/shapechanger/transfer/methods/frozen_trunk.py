@@ -7,7 +7,7 @@ from typing import Any, cast
 from stable_baselines3.common.callbacks import BaseCallback
 from torch import nn
 
-from shapechanger.transfer.env_ref import EnvTraits
+from shapechanger.contract.env_ref import EnvTraits
 from shapechanger.transfer.learners.settings import PpoSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import msgspec
 
-from shapechanger.transfer.env_ref import BodyDraw, EnvTraits
+from shapechanger.contract.env_ref import BodyDraw, EnvTraits
 from shapechanger.transfer.learners.settings import LimbSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 

@@ -11,11 +11,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 from torch.nn.utils import clip_grad_norm_
 
+from shapechanger.contract.env_ref import EnvTraits
 from shapechanger.layout import Layout
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.body_map.rules import Learn
-from shapechanger.transfer.env_ref import EnvTraits
 from shapechanger.transfer.learners.evaluation import Act
 from shapechanger.transfer.learners.settings import PpoSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun

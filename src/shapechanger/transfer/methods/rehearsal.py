@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from shapechanger.transfer.env_ref import EnvTraits
+from shapechanger.contract.env_ref import EnvTraits
 from shapechanger.transfer.learners.cloning import load_or_record
 from shapechanger.transfer.learners.settings import CloningSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun

@@ -15,10 +15,10 @@ from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import Tensor, nn
 from torch.nn import functional
 
+from shapechanger.contract.env_ref import EnvRef, EnvTraits, layouts_of
 from shapechanger.layout import Layout
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.env_ref import EnvRef, EnvTraits, layouts_of
 from shapechanger.transfer.learners.evaluation import evaluate, evaluation_envs, evaluation_seed
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, actor
 from shapechanger.transfer.learners.settings import OffPolicySettings, Settings

@@ -12,8 +12,8 @@ from typing import Final
 
 import msgspec
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import UnknownName
-from shapechanger.transfer.env_ref import EnvRef
 
 __all__ = ["FOLDER", "EnvReference", "load_references", "reference_of", "reference_policy"]
 

@@ -1,6 +1,6 @@
 """Checks that every env must pass, for the tests of Shapechanger and of third-party envs.
 
->>> from shapechanger.testing import examine
+>>> from shapechanger.contract.testing import examine
 >>> for check in examine(lambda: gym.make("shapechanger/Ant-v1")):
 ...     print(check)
 """
@@ -18,9 +18,9 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
+from shapechanger.contract.env_ref import is_reward_term, layouts_of
 from shapechanger.errors import LayoutError, ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.transfer.env_ref import is_reward_term, layouts_of
 
 MakeEnv = Callable[[], gym.Env[Any, Any]]
 """Makes a new env."""

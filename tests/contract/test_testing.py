@@ -10,9 +10,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.errors import ShapechangerError
-from shapechanger.layout import Feature, Layout
-from shapechanger.testing import (
+from shapechanger.contract.testing import (
     PROMISES,
     BrokenPromise,
     MakeEnv,
@@ -25,6 +23,8 @@ from shapechanger.testing import (
     shares_no_memory,
     starts_where_it_may,
 )
+from shapechanger.errors import ShapechangerError
+from shapechanger.layout import Feature, Layout
 
 _Info = dict[str, Any]
 

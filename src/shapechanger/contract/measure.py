@@ -1,4 +1,4 @@
-"""Measures: what tells how well a robot does its task, beside the return."""
+"""Task performance metrics, in addition to the return."""
 
 from __future__ import annotations
 

@@ -11,10 +11,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.errors import LayoutError, ShapechangerError, StudyError, UnknownName
 from shapechanger.identity import IdentifiedEnv, identify_env
 from shapechanger.layout import Layout
-from shapechanger.tasks.measure import RETURN, Measure
 
 
 class EnvRef(msgspec.Struct, frozen=True):
