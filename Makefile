@@ -76,9 +76,10 @@ test-lerobot: $(INSTALLED_LEROBOT)  ## test our robots in LeRobot; installs 6 GB
 test-robots: $(INSTALLED_ROBOTS)  ## test robot files of other projects' packages; installs 1 GB
 	$(RUN) -m pytest tests/envs/test_real_robots.py
 
-check: $(INSTALLED_DEV)  ## check format, lint and types
+check: $(INSTALLED_DEV)  ## check format, lint, imports and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/lint-imports --no-cache
 	$(RUN) -m pyright --threads $(JOBS)
 
 bench: $(INSTALLED_DEV)  ## measure every number that the documentation states

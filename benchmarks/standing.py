@@ -20,6 +20,7 @@ from scipy.stats import binomtest
 
 from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
+from shapechanger.contract.world import Pose
 from shapechanger.envs.vehicle import RangesEnv
 from shapechanger.envs.vehicle.drivers import observe_ranges
 from shapechanger.transfer.learners import ignore
@@ -28,7 +29,6 @@ from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.worlds.course import HELD_OUT
-from shapechanger.worlds.world import Pose
 
 OUT: Final = Path("results", "standing")
 SEEDS: Final = 3

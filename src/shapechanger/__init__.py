@@ -31,7 +31,6 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
 
 from shapechanger.envs.catalogue import register_all
-from shapechanger.envs.vector.make import make_vec
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
 
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from shapechanger.contract.testing import examine
     from shapechanger.demos.dataset import Dataset, load_dataset
     from shapechanger.envs.own import from_mjcf
+    from shapechanger.envs.vector.make import make_vec
     from shapechanger.identify import load_log
     from shapechanger.morphology import (
         AddFloor,
@@ -134,6 +134,7 @@ _MODULES: Final = {
     "contract.testing": ("examine",),
     "demos.dataset": ("Dataset", "load_dataset"),
     "envs.own": ("from_mjcf",),
+    "envs.vector.make": ("make_vec",),
     "identify": ("load_log",),
     "morphology": (
         *("AddLimb", "AddSegment", "Cut", "Damping", "Density", "Friction", "Gear", "Gravity"),

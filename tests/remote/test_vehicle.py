@@ -15,7 +15,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger import testing
+from shapechanger.contract import testing
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.contract.testing import MakeEnv
 from shapechanger.envs.remote.four_way import FOUR_WAYS, FourWay

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from shapechanger.contract.world import Pose, Readings
 from shapechanger.twin.chips import SimulatedMpu6050
-from shapechanger.worlds.world import Pose, Readings
 
 _READINGS = Readings(
     Pose(0.0, 0.0, 0.0),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from shapechanger.bodies.finger import JOINTS, NOMINAL
+from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.as5600 import connect_encoders, open_driver
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
@@ -16,7 +17,6 @@ from shapechanger.twin.in_process import LocalBoard
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.finger import FingerWorld
 from shapechanger.twin.world.vehicle import DrivingWorld
-from shapechanger.worlds.world import World
 
 _TURN = 2.0 * math.pi
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from shapechanger.bodies.vehicles import vehicle_model
+from shapechanger.contract.world import Pose
 from shapechanger.errors import WorldError
 from shapechanger.worlds.rectify import (
     CANONICAL_SIZE,
@@ -21,7 +22,6 @@ from shapechanger.worlds.rectify import (
     pitch_of_horizon,
 )
 from shapechanger.worlds.simulation import MujocoWorld
-from shapechanger.worlds.world import Pose
 
 _SIZE = (160, 120)
 

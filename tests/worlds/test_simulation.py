@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from shapechanger.bodies.vehicles import SIM_DT, VEHICLES
+from shapechanger.contract.world import RESTING_V, Pose
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds import simulation
 from shapechanger.worlds.camera import CameraJitter
 from shapechanger.worlds.course import HOME, Course
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.simulation import MujocoWorld
-from shapechanger.worlds.world import RESTING_V, Pose
 
 _AHEAD: Mapping[str, Mapping[str, float]] = {
     "car": {"wheels": 0.5, "steering": 0.0},

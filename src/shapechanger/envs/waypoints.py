@@ -10,10 +10,10 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.world import STANDING_MPS, STANDING_RADPS
 from shapechanger.errors import SpaceMismatch, StudyError
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.worlds.rectify import CANONICAL_SIZE
-from shapechanger.worlds.world import STANDING_MPS, STANDING_RADPS
 
 AHEAD_M: Final = 0.8
 """Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""

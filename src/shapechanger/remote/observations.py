@@ -1,10 +1,10 @@
-"""Gymnasium spaces, observations and rewards from the messages of a robot."""
+"""Gymnasium spaces, observations and measured steps from the messages of a robot."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -14,7 +14,6 @@ from shapechanger.errors import LinkError, MissingExtra, RobotRefused, SpaceMism
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.link.messages import Observation, Welcome
 from shapechanger.remote.inbox import Received
-from shapechanger.tasks.drive import DriveReward
 
 try:
     import simplejpeg  # pyright: ignore[reportMissingTypeStubs]  # Typed, but for its arrays.
@@ -266,27 +265,39 @@ class RobotSpaces:
         return gym.spaces.Dict({"image": image, "state": state}) if self._has_state else image
 
 
-class StepScorer:
-    """Rewards of one robot's steps, one after another.
+class StepMeasures(NamedTuple):
+    """Measured quantities of one step, from which a task computes its reward.
+
+    Attributes:
+        speed_mps: Forward speed, m/s, negative backwards; None if it is not measured.
+        collided: Whether the robot touches something that it did not touch before; None if unknown.
+        stalled: Whether it pushes without moving; None if unknown.
+        dt_s: Duration of the step, s, at least 0.
+    """
+
+    speed_mps: float | None
+    collided: bool | None
+    stalled: bool | None
+    dt_s: float
+
+
+class StepMeter:
+    """Measures one robot's steps, one after another.
 
     Args:
         spaces: Reads the robot's messages.
-        reward: Weights of the task.
     """
 
-    def __init__(self, spaces: RobotSpaces, reward: DriveReward) -> None:
+    def __init__(self, spaces: RobotSpaces) -> None:
         self._spaces = spaces
-        self._reward = reward
         self._touched = False
 
     def start(self, seen: Observation) -> None:
         """Begin an episode; an obstacle that is touched already does not count as a collision."""
         self._touched = bool(self._touches(seen)[0])
 
-    def judge(
-        self, before: Observation, seen: Observation, bumped: bool
-    ) -> tuple[bool, dict[str, float]]:
-        """Return whether the task is over, and the terms of the reward.
+    def measure(self, before: Observation, seen: Observation, bumped: bool) -> StepMeasures:
+        """Return the measured quantities of a step.
 
         Args:
             before: The observation before the step.
@@ -298,10 +309,12 @@ class StepScorer:
         hits = bool(touches) or bumped
         collided = None if touches is None else hits and not self._touched
         self._touched = hits
-        dt_s = max(0, seen.state_ns - before.state_ns) / _NS_PER_S
-        speed = self._spaces.quantity(seen, "speed")
-        stalled = None if stall is None else bool(stall)
-        return self._reward.ends(collided), self._reward.terms(speed, collided, stalled, dt_s)
+        return StepMeasures(
+            self._spaces.quantity(seen, "speed"),
+            collided,
+            None if stall is None else bool(stall),
+            max(0, seen.state_ns - before.state_ns) / _NS_PER_S,
+        )
 
     def sources(self, seen: Observation) -> dict[str, str]:
         """Return the source of each quantity of the reward."""

@@ -15,7 +15,6 @@ import gymnasium as gym
 import msgspec
 import numpy as np
 
-import shapechanger
 from shapechanger.contract.env_ref import (
     EnvRef,
     EnvTraits,
@@ -277,7 +276,7 @@ def make_plan(
         individual=traits.target.individual,
         exclusive=traits.target.exclusive,
         versions={
-            "shapechanger": shapechanger.__version__,
+            "shapechanger": version_of("shapechanger"),
             "python": platform.python_version(),
             **{name: version_of(name) for name in packages},
         },

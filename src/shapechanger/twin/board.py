@@ -19,6 +19,7 @@ from typing import Final, NamedTuple
 
 import msgspec
 
+from shapechanger.contract.world import RESTING_V
 from shapechanger.errors import RobotError, WorldError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import run_early
@@ -44,7 +45,6 @@ from shapechanger.twin.signals import LedgerWriter
 from shapechanger.twin.start import BoardAt, BoardSettings
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.place import open_world
-from shapechanger.worlds.world import RESTING_V
 
 _WORLD_STEP_NS: Final = 10_000_000
 _LOOK_FOR_READER_S: Final = 0.05

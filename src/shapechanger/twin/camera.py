@@ -11,9 +11,9 @@ from typing import Final, Literal, get_args
 import numpy as np
 import simplejpeg
 
+from shapechanger.contract.world import World
 from shapechanger.errors import UnknownName
 from shapechanger.robot.cameras.pattern import draw_barcode
-from shapechanger.worlds.world import World
 
 CameraFault = Literal["", "off", "freeze", "garbage", "short"]
 """Faults of a camera: no pictures, the same one again, noise, or half a picture; "" for none."""

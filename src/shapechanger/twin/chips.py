@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Final, Literal, Protocol, runtime_checkable
 
+from shapechanger.contract.world import Readings, World
 from shapechanger.errors import UnknownName
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.twin.signals import Pulse
-from shapechanger.worlds.world import Readings, World
 
 
 class Chip(Protocol):

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 import simplejpeg
 
+from shapechanger.contract.world import World
 from shapechanger.errors import RobotError
 from shapechanger.link.messages import Observation, Welcome
 from shapechanger.robot.cameras.camera import Frame
@@ -28,7 +29,6 @@ from shapechanger.twin.messages import HardwareRequest
 from shapechanger.twin.pin_board import PinBoard
 from shapechanger.twin.server import START_NS
 from shapechanger.twin.wiring import TwinWiring
-from shapechanger.worlds.world import World
 
 _log = logging.getLogger(__name__)
 

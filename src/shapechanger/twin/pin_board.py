@@ -7,6 +7,7 @@ import random
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
+from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.twin.chips import Chip, SimulatedAs5600, SimulatedPca9685, Tca9548a, chips_of
 from shapechanger.twin.messages import (
@@ -23,7 +24,6 @@ from shapechanger.twin.sensors import Surroundings
 from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import LedgerWriter, Levels, Pulse, PwmChannel
 from shapechanger.twin.wiring import TwinWiring
-from shapechanger.worlds.world import World
 
 
 class Owner(Protocol):

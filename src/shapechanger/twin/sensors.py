@@ -6,13 +6,13 @@ import heapq
 import math
 from typing import Final
 
+from shapechanger.contract.world import Readings, World
 from shapechanger.robot.drivers.servos.settings import DRIVER
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.twin.messages import Edge
 from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.signals import Levels
 from shapechanger.twin.wiring import TwinWiring
-from shapechanger.worlds.world import Readings, World
 
 # HC-SR04, from its user guide: a ping takes eight cycles of 40 kHz, and the echo line is high for
 # as long as the sound travels; after 38 ms without an echo it gives up. It measures 2 cm to 4 m.

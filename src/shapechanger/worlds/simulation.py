@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from shapechanger.bodies.vehicles import SIM_DT, Motion, add_vehicle, vehicle_model
 from shapechanger.bodies.vehicles.parts import CameraMount, aim_camera
+from shapechanger.contract.world import RESTING_V, Pose, Readings
 from shapechanger.errors import WorldError
 from shapechanger.worlds.camera import CameraJitter, OnboardCamera, OutsideCamera, move_camera
 from shapechanger.worlds.course import HOME, Course, require_element
@@ -24,7 +25,6 @@ from shapechanger.worlds.layout import lay_out, start_pose
 from shapechanger.worlds.lens import find_lens
 from shapechanger.worlds.look import Look
 from shapechanger.worlds.scene import add_course
-from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
 BUMPER_SPREAD: Final = math.radians(60.0)
 """Largest bearing, rad, from the middle of the vehicle, at which a contact presses the bumper."""

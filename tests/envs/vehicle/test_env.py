@@ -13,6 +13,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from shapechanger.contract.world import Pose
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.envs.vehicle import VehicleEnv
 from shapechanger.errors import (
@@ -24,7 +25,6 @@ from shapechanger.errors import (
     WorldError,
 )
 from shapechanger.worlds.course import HELD_OUT, HOME
-from shapechanger.worlds.world import Pose
 
 _AHEAD = np.array([0.0, 0.6], np.float32)
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from shapechanger.bodies.vehicles import VEHICLES
+from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.expert import CourseExpert, CourseProgress, Disturbance
 from shapechanger.worlds.expert.traits import TRAITS
 from shapechanger.worlds.layout import lay_out, start_pose
-from shapechanger.worlds.world import Pose
 from tests.worlds.expert.courses import ring
 from tests.worlds.expert.kinematic import SIZES, TOP, Kinematic
 

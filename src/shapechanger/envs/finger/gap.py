@@ -11,10 +11,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, CommandPath, FingerParameters
+from shapechanger.bodies.finger import JOINTS, NOMINAL, CommandPath, FingerParameters
 from shapechanger.bodies.finger.tensions import spans_all_torques, tensions_for_torque
 from shapechanger.errors import FingerError, UnknownName
-from shapechanger.robot.profile.load import find_profile, load_profile
 
 # Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
 # two hundred with arm errors of 25 %.
@@ -135,13 +134,12 @@ def _log_uniform(rng: np.random.Generator, bounds: Range) -> float:
 
 _DEGREE: Final = math.radians(1.0)
 
-RIG: Final = "finger"
-"""Name of the shipped profile of a rig."""
-
-# Rates and slew of the shipped profile, and the resolution of its servos' tension.
+# Rates, slew and tensions of the shipped profile; a test compares them.
 _RIG: Final = NOMINAL.replace(
     path=CommandPath(control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0)
 )
+_RIG_MOST_N: Final = (15.0, 15.0, 7.0, 15.0, 6.4, 15.0, 15.0)  # As `TENDONS`.
+_RIG_LEAST_N: Final = 1.0
 
 # A finger on the shipped rig: seven XL330-M077 with spools of 1 cm.
 _REAL_LIKE: Final = Gap(
@@ -209,14 +207,7 @@ def with_gears(parameters: FingerParameters) -> FingerParameters:
 
 def shipped_rig() -> FingerParameters:
     """Return the nominal finger on the shipped rig, with its motors, tensions and command path."""
-    outputs = {output.name: output.settings for output in load_profile(find_profile(RIG)).outputs}
-    servos = [outputs[name] for name in TENDONS]
-    return with_gears(
-        _RIG.replace(
-            most_tension=tuple(servo["most_tension_n"] for servo in servos),
-            least_tension=max(servo["pretension_n"] for servo in servos),
-        )
-    )
+    return with_gears(_RIG.replace(most_tension=_RIG_MOST_N, least_tension=_RIG_LEAST_N))
 
 
 def geared_around(found: FingerParameters) -> Gap:

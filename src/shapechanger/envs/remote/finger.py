@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS, CommandPath, FingerParameters
 from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
 from shapechanger.envs.finger.env import FingerEnv, check_posture
-from shapechanger.envs.finger.gap import GAPS, RIG, with_gears
+from shapechanger.envs.finger.gap import GAPS, with_gears
 from shapechanger.envs.finger.plant import CONTROL_DT
 from shapechanger.envs.finger.postures import draw_start
 from shapechanger.envs.finger.reach import FingerReachEnv
@@ -32,6 +32,7 @@ from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 NOMINAL_TWIN: Final = "nominal"
 """Name of the twin with the parameters of the nominal finger."""
 
+_RIG: Final = "finger"  # Name of the shipped profile.
 _WITHOUT_A_RIG: Final = (
     'Without a rig, give twin="real-like": the env then serves a simulated one itself.'
 )
@@ -457,5 +458,5 @@ def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
     )
     drawn = ("--gap", twin, "--finger-seed", str(chosen))
     return run_robot(
-        find_profile(RIG), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
+        find_profile(_RIG), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
     )

@@ -18,7 +18,7 @@ from shapechanger.link.messages import Observation, Pace, Role, Welcome
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.inbox import Received
 from shapechanger.remote.known_robots import KnownRobot, known_names, recall
-from shapechanger.remote.observations import BUMP, RobotSpaces, StepScorer, View
+from shapechanger.remote.observations import BUMP, RobotSpaces, StepMeter, View
 from shapechanger.tasks.drive import DriveReward
 
 OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], object]
@@ -152,8 +152,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             welcome = self._client.welcome
             wide, high = size or welcome.image_size or (160, 120)
             self._spaces = RobotSpaces(welcome, (int(wide), int(high)), image, state)
-            weights = DriveReward.from_weights({**welcome.reward, **(reward or {})})
-            self._scorer = StepScorer(self._spaces, weights)
+            self._reward = DriveReward.from_weights({**welcome.reward, **(reward or {})})
+            self._meter = StepMeter(self._spaces)
             if pace == "realtime" and welcome.clock == "twin":
                 raise RobotRefused(
                     f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so "
@@ -235,7 +235,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         received = ready.first(robot, self._spaces.rest, self._is_after)
         view = self._spaces.view(received)
         self._last, self._last_view = received, view
-        self._scorer.start(received.message)
+        self._meter.start(received.message)
         self._takeover.start()
         self._missed, self._has_stepped = 0, False
         robot.events()  # Drop events from before the episode.
@@ -268,7 +268,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         self._missed += late and self._pace == "realtime"
         events = robot.events()
         bumped = any(event.name == BUMP for event in events)
-        terminated, terms = self._scorer.judge(last.message, received.message, bumped)
+        measured = self._meter.measure(last.message, received.message, bumped)
+        terms = self._reward.terms(*measured)
         info = self._info(received, view)
         info |= terms
         info["reward_terms"] = terms
@@ -279,6 +280,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         is_lent = self._takeover.goes_on(received.message)
         info["truncated_because"] = "" if is_lent else interruption(received.message)
         self._last, self._last_view = received, view
+        terminated = self._reward.ends(measured.collided)
         truncated = not terminated and bool(info["truncated_because"])
         return view.observation, sum(terms.values()), terminated, truncated, info
 
@@ -355,7 +357,8 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
         """Return the end of an episode after a lost link."""
         view = self._spaces.view(last)
         info = self._info(last, view)
-        terms = dict.fromkeys(self._scorer.judge(last.message, last.message, False)[1], 0.0)
+        measured = self._meter.measure(last.message, last.message, False)
+        terms = dict.fromkeys(self._reward.terms(*measured), 0.0)
         info |= terms
         info |= {
             "reward_terms": terms,
@@ -376,7 +379,7 @@ class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
             "armed": message.armed,
             "emergency": message.emergency,
             "absent": view.absent,
-            "reward_sources": self._scorer.sources(message),
+            "reward_sources": self._meter.sources(message),
             "deadline_missed": self._missed,
             "captured_ns": message.captured_ns,
             "decided_ns": message.command_ns,

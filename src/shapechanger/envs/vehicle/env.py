@@ -26,7 +26,7 @@ from shapechanger.errors import MissingExtra, RenderError, UnknownName
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation, Welcome
 from shapechanger.remote.inbox import Received
-from shapechanger.remote.observations import RobotSpaces, StepScorer, View
+from shapechanger.remote.observations import RobotSpaces, StepMeter, View
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.worlds.simulation import MujocoWorld
@@ -143,8 +143,8 @@ class VehicleEnv(DrivingEnv):
         self._senses = RobotSpaces(welcome, camera.size, image, state)
         self._puts_back = put_back
         ends = {"collision_ends_episode": 0.0} if put_back else {}
-        weights = DriveReward.from_weights({**welcome.reward, **(reward or {}), **ends})
-        self._judge = StepScorer(self._senses, weights)
+        self._reward = DriveReward.from_weights({**welcome.reward, **(reward or {}), **ends})
+        self._meter = StepMeter(self._senses)
         self.observation_space = self._senses.observation_space
         self.action_space = self._senses.action_space
         self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
@@ -190,7 +190,7 @@ class VehicleEnv(DrivingEnv):
         self._world.zero_odometer()  # So that no episode depends on earlier ones.
         last = self._robot.start(lambda: self._world.place(drawn.start))
         self._require_free(drawn)
-        self._judge.start(last)
+        self._meter.start(last)
         self._last = last
         view = self._view(last)
         return view.observation, self._info(last, view)
@@ -207,7 +207,9 @@ class VehicleEnv(DrivingEnv):
             raise gym.error.ResetNeeded("Call reset() before the first step.")
         values, collisions = self._senses.values(action), self._world.collisions
         seen, bumped = self._robot.step(values)
-        terminated, terms = self._judge.judge(before, seen, bumped)
+        measured = self._meter.measure(before, seen, bumped)
+        terms = self._reward.terms(*measured)
+        terminated = self._reward.ends(measured.collided)
         self._last = seen
         view = self._view(seen)
         info = self._info(seen, view) | terms
@@ -263,7 +265,7 @@ class VehicleEnv(DrivingEnv):
             "armed": seen.armed,
             "emergency": seen.emergency,
             "absent": view.absent,
-            "reward_sources": self._judge.sources(seen),
+            "reward_sources": self._meter.sources(seen),
             "progress": self._world.progress_m,
             "collisions": self._world.collisions,
             "pose": (pose.x, pose.y, pose.heading),

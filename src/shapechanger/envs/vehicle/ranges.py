@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
+from shapechanger.contract.world import STANDING_MPS
 from shapechanger.envs.vehicle.base import Courses, CourseSampler, DrivingEnv, resolve_profile
 from shapechanger.envs.vehicle.drivers import BEARINGS_DEG, FARTHEST_M, observe_ranges
 from shapechanger.errors import SpaceMismatch
@@ -19,7 +20,6 @@ from shapechanger.robot.guard.plan import GuardPlan, output_values
 from shapechanger.robot.guard.rules import aimed, slewed
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.worlds.simulation import MujocoWorld
-from shapechanger.worlds.world import STANDING_MPS
 
 COLLISION_REWARD: Final = -3.0
 """Reward of a collision: it costs three metres."""

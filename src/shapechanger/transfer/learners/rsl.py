@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from typing import Any, Final, cast
 
 import numpy as np
@@ -239,7 +240,7 @@ class RslLearner(Sb3Learner):
                 settings,
                 done,
                 seed,
-                shapechanger.__version__,
+                version("shapechanger"),
                 identity,
                 start_log_std=explores,
             )

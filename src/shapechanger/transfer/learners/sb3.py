@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
 
-import shapechanger
 from shapechanger.contract.env_ref import (
     EnvRef,
     EnvTraits,
@@ -189,7 +189,7 @@ class Sb3Learner:
                 settings,
                 int(cast("Any", model).num_timesteps),
                 seed,
-                shapechanger.__version__,
+                version("shapechanger"),
                 identity,
                 start_log_std=explores,
             )

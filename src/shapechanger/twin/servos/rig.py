@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
+from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.twin.servos.bus import SimulatedBus
 from shapechanger.twin.servos.motor import Load, Tendon
 from shapechanger.twin.servos.servo import COUNTS_PER_RAD, ServoPlan, SimulatedServo
-from shapechanger.worlds.world import World
 
 ServoFault = Literal["", "mute", "deaf", "hot", "overload", "snapped", "power"]
 """Faults of a servo.

@@ -18,8 +18,8 @@ from shapechanger.bodies.finger import (
 )
 from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST
 from shapechanger.bodies.finger.model import FINGERTIP
+from shapechanger.contract.world import RESTING_V, Pose, Readings
 from shapechanger.errors import RobotError
-from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
 if TYPE_CHECKING:
     from shapechanger.twin.servos.rig import Rig

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from shapechanger.contract.world import World
 from shapechanger.errors import MissingExtra
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.twin.world.vehicle import DrivingWorld
-from shapechanger.worlds.world import World
 
 _ROOM = (160, 120)
 """Width and height of the pictures of a room without a camera, in pixels."""

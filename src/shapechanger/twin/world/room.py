@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.worlds.world import Pose
+from shapechanger.contract.world import Pose
 
 ROOM_LENGTH: Final = 6.0  # m, along x
 ROOM_WIDTH: Final = 4.0  # m, along y

@@ -13,9 +13,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.world import RESTING_V, Pose, Readings
 from shapechanger.errors import RobotError
 from shapechanger.twin.world.room import FrontCamera, find_start, lay_out
-from shapechanger.worlds.world import RESTING_V, Pose, Readings
 
 Outputs = Mapping[str, float | None]
 

@@ -16,10 +16,10 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.world import Pose
 from shapechanger.worlds.course import Course
 from shapechanger.worlds.expert.path import ClearanceField, CoursePath, plan_path_for, speed_profile
 from shapechanger.worlds.expert.traits import PERIOD_S, Traits, traits_of
-from shapechanger.worlds.world import Pose
 
 
 def _wrap_angle(angle: float) -> float:

@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.worlds.course import FLOODED, Course
 from shapechanger.worlds.layout.channel import HARBOUR, YARD, open_course
 from shapechanger.worlds.layout.corridor import corridor
 from shapechanger.worlds.layout.geometry import distances_from_obstacle, turn_angles
-from shapechanger.worlds.world import Pose
 
 _MAKERS: Final[Mapping[str, Callable[[np.random.Generator, int], Course | None]]] = (
     MappingProxyType(
