@@ -23,7 +23,7 @@ from benchmarks.row import Row
 from shapechanger.cli.suite import RunSuite, load_suite, suite_tasks
 from shapechanger.errors import StudyError
 from shapechanger.files import read_json, write_json
-from shapechanger.reports.charts import sweep_chart
+from shapechanger.reports.curves import sweep_chart
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.reports.suite import gain_over_scratch
 from shapechanger.reports.verdict import direction, finals

@@ -171,7 +171,7 @@ def _driven_on_board(vehicle: str, file: Path, course: int) -> tuple[DriveResult
     ):
         while person.ask().message.holder != file.stem:
             time.sleep(0.05)
-        words = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "robot.pilot"]
+        words = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "remote.pilot"]
         pilot = int(subprocess.check_output(words).split()[0])
         os.sched_setaffinity(pilot, {min(os.sched_getaffinity(0))})
         operator.place(course)

@@ -80,6 +80,18 @@ def test_exported_names_exist_once(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert wrong == []
 
 
+def test_no_program_is_started_from_the_command_line_package() -> None:
+    """No string names a module of `cli`, which `lint-imports` would not see."""
+    found = [
+        f"{module}: {node.value!r}"
+        for module, path in _MODULES.items()
+        if not module.startswith("shapechanger.cli")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Constant) and "shapechanger.cli" in str(node.value)
+    ]
+    assert found == []
+
+
 def test_every_folder_is_a_package() -> None:
     """Every folder has an `__init__.py`; others would escape these checks."""
     folders = {path.parent for path in _MODULES.values()}

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from shapechanger.reports.charts import Counting, learning_curves
+from shapechanger.reports.curves import Counting, learning_curves
 from shapechanger.transfer.study import Study
 from tests.reports.studies import make_study, rising
 

@@ -246,7 +246,8 @@ def test_without_matplotlib_the_extra_is_named(
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.delitem(sys.modules, "shapechanger.reports.charts", raising=False)
+    for name in ("charts", "curves"):
+        monkeypatch.delitem(sys.modules, f"shapechanger.reports.{name}", raising=False)
     assert measure_rows(study)
     assert verdict(study)
     with pytest.raises(MissingExtra, match=r"shapechanger\[report\]"):

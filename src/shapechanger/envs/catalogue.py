@@ -63,12 +63,14 @@ class TaskEntry(msgspec.Struct, frozen=True):
         summary: One-line description.
         learner: Name of the learner settings tuned on it.
         episode_steps: Steps after which an episode is truncated.
+        device: Module that registers its batched functions for a device; empty if it has none.
     """
 
     entry_point: str
     summary: str
     learner: str
     episode_steps: int
+    device: str = ""
 
 
 FINGER_ENVS: Final[Mapping[str, TaskEntry]] = MappingProxyType(
@@ -78,12 +80,14 @@ FINGER_ENVS: Final[Mapping[str, TaskEntry]] = MappingProxyType(
             "finger of seven tendons: reach a point",
             "ppo-finger",
             100,
+            "shapechanger.envs.warp.finger_reader",
         ),
         "shapechanger/FingerTrack-v1": TaskEntry(
             "shapechanger.envs.finger:FingerTrackEnv",
             "finger of seven tendons: follow a path",
             "ppo-finger",
             250,
+            "shapechanger.envs.warp.finger_reader",
         ),
     }
 )

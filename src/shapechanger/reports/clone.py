@@ -65,7 +65,7 @@ def clone_html(
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
     """
-    from shapechanger.reports.charts import calibration_chart, scatter_chart, training_chart
+    from shapechanger.reports.clone_charts import calibration_chart, scatter_chart, training_chart
 
     card = policy.card
     by_class = judgement.head == "class"

@@ -45,7 +45,7 @@ def finger_html(found: IdentifiedFinger, name: str) -> str:
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
     """
-    from shapechanger.reports.charts import arms_chart, joint_chart
+    from shapechanger.reports.finger_charts import arms_chart, joint_chart
 
     return render(
         "finger.html",

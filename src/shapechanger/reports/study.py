@@ -52,7 +52,7 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
     """
-    from shapechanger.reports.charts import learning_curves
+    from shapechanger.reports.curves import learning_curves
 
     plan = study.plan
     measures = measure_rows(study)

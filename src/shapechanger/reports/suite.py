@@ -81,7 +81,7 @@ def suite_html(
     """
     if not studies:
         raise StudyError(f"The suite {name} has no finished study to make a page of.")
-    from shapechanger.reports.charts import learning_curves, sweep_chart
+    from shapechanger.reports.curves import learning_curves, sweep_chart
 
     first = next(iter(studies.values()))
     arm, plan = first.headline_arm, first.plan

@@ -321,8 +321,8 @@ def run_robot(
     temporary = folder is None
     folder = folder or Path(tempfile.mkdtemp(prefix="shapechanger-robot-"))
     make_credentials(folder / "credentials", profile.name)
-    command = [sys.executable, "-c", "from shapechanger.cli import main; main()"]
-    command += ["robot", "serve", str(profile.path), "--port", "0", "--no-announce"]
+    command = [sys.executable, "-m", "shapechanger", "robot", "serve", str(profile.path)]
+    command += ["--port", "0", "--no-announce"]
     command += ["--credentials", str(folder / "credentials")]
     command += ["--host", "127.0.0.1", "--ready-file", str(folder / "ready.json")]
     command += ["--recordings", str(folder / "recordings"), *arguments]

@@ -23,7 +23,7 @@ from shapechanger.remote.known_robots import KnownRobot, recall
 from shapechanger.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
 
 if TYPE_CHECKING:
-    from shapechanger.cli.robot.pilot import DrivingPolicy, PolicyDriver
+    from shapechanger.envs.remote.pilot import DrivingPolicy, PolicyDriver
     from shapechanger.remote.client import RobotClient
 
 _LOOK_EVERY_S: Final = 0.2
@@ -301,7 +301,7 @@ class Driving:
 
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
-    from shapechanger.cli.robot.pilot import Origin, PolicyDriver, RobotFacts, require_fit
+    from shapechanger.envs.remote.pilot import Origin, PolicyDriver, RobotFacts, require_fit
     from shapechanger.remote.client import RobotClient
 
     policy: DrivingPolicy

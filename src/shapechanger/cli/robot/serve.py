@@ -54,6 +54,7 @@ _HERE: Final = "127.0.0.1"
 _LOOK_EVERY_S: Final = 0.1
 _EVERYWHERE: Final = "0.0.0.0"
 _ROOM: Final = "room"
+_PILOT: Final = "shapechanger.envs.remote.pilot"
 # A twin's clock is paused while it renders, and a guard that waits for it is alive.
 _TWIN_PATIENCE_MS: Final = 10_000
 
@@ -247,6 +248,7 @@ class Serve:
             turning=profile.turning,
             policies=policies,
             policy=policy,
+            pilot=_PILOT if policies else "",
         )
         guard = profile.guard_plan()
         if board is None:
@@ -267,8 +269,8 @@ class Serve:
         """Refuse a policy that does not fit the robot, before anything moves."""
         if self.policy is None:
             return
-        from shapechanger.cli.robot.pilot import Origin, RobotFacts, require_fit
         from shapechanger.demos.cloning.onnx_policy import OnnxClone
+        from shapechanger.envs.remote.pilot import Origin, RobotFacts, require_fit
 
         files = [self.policy]
         if self.policy.is_dir():

@@ -141,9 +141,9 @@ def _drive_by_policy(robot: KnownRobot) -> None:
     """Drive as the process on board does, with a policy that fails at a signal."""
     import numpy as np
 
-    from shapechanger.cli.robot.pilot import PolicyDriver
     from shapechanger.demos.cloning.card import CloneCard
     from shapechanger.demos.cloning.pictures import Framing
+    from shapechanger.envs.remote.pilot import PolicyDriver
 
     with RobotClient.connect(robot, frames=False) as client:
         actions = Layout.from_json(client.welcome.action_layout)

@@ -18,7 +18,6 @@ from shapechanger.errors import UnknownName, VectorEnvError
 
 if TYPE_CHECKING:
     from shapechanger.bodies.families import BodyLike
-    from shapechanger.envs.finger.env import FingerLike
     from shapechanger.envs.warp.env import WarpVectorEnv
 
 _BACKENDS: Final = ("threads", "warp")
@@ -45,8 +44,8 @@ def make_vec(
     *,
     backend: Literal["warp"],
     device: str | None = None,
-    bodies: Sequence[BodyLike | FingerLike] | None = None,
-    pool: Sequence[BodyLike | FingerLike] | None = None,
+    bodies: Sequence[Any] | None = None,
+    pool: Sequence[Any] | None = None,
     nconmax: int | None = None,
     njmax: int | None = None,
     task_infos: bool = True,
@@ -62,8 +61,8 @@ def make_vec(
     backend: str = "threads",
     threads: int | None = None,
     device: str | None = None,
-    bodies: Sequence[BodyLike | FingerLike] | None = None,
-    pool: Sequence[BodyLike | FingerLike] | None = None,
+    bodies: Sequence[Any] | None = None,
+    pool: Sequence[Any] | None = None,
     nconmax: int | None = None,
     njmax: int | None = None,
     task_infos: bool = True,

@@ -14,8 +14,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
-from shapechanger.bodies.families import BodyLike
-from shapechanger.envs.finger.env import FingerLike
 from shapechanger.envs.vector.checks import masked_options, one_seed_each
 from shapechanger.envs.warp.batch import BatchKind, WarpBatch, require_fitting
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
@@ -83,7 +81,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
     def __init__(
         self,
         reader: Reader,
-        bodies: Sequence[BodyLike | FingerLike | None],
+        bodies: Sequence[Any],
         num_envs: int,
         *,
         device: str,
@@ -213,7 +211,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         self._begun = True
         return self._out(observations), _masked(infos, mask)
 
-    def _change_bodies(self, numbers: list[int], bodies: Sequence[BodyLike | FingerLike]) -> None:
+    def _change_bodies(self, numbers: list[int], bodies: Sequence[Any]) -> None:
         """Give worlds other bodies, after all of them have been compiled and found to fit."""
         if len(bodies) != len(numbers):
             raise VectorEnvError(

@@ -18,6 +18,7 @@ from shapechanger.envs.finger.track import FingerTrackEnv
 from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
 from shapechanger.envs.warp.finger import FINGERS
+from shapechanger.envs.warp.reader import register_reader
 from shapechanger.errors import VectorEnvError
 
 # A delay this close to a whole number of simulation steps takes one more at some of them.
@@ -166,3 +167,7 @@ def _described(parameters: FingerParameters) -> str:
     text = ", ".join(own)
     shortened = f"{text[:_LONGEST_NAME]}..." if len(text) > _LONGEST_NAME else text
     return f"the finger with {shortened}" if own else "the nominal finger"
+
+
+for _env_class in FINGERS:
+    register_reader(_env_class, FingerReader)

@@ -7,8 +7,6 @@ from typing import Any, Final
 
 import gymnasium as gym
 
-from shapechanger.bodies.families import BodyLike
-from shapechanger.envs.finger.env import FingerLike
 from shapechanger.envs.warp.devices import find_device
 from shapechanger.envs.warp.env import WarpVectorEnv
 from shapechanger.envs.warp.reader import make_reader
@@ -27,8 +25,8 @@ def make_warp(
     num_envs: int,
     *,
     device: str | None,
-    bodies: Sequence[BodyLike | FingerLike] | None,
-    pool: Sequence[BodyLike | FingerLike] | None,
+    bodies: Sequence[Any] | None,
+    pool: Sequence[Any] | None,
     limits: dict[str, int],
     task_infos: bool,
     arguments: dict[str, Any],
@@ -55,7 +53,7 @@ def make_warp(
             raise VectorEnvError(f"backend='warp' takes no {name}: {reason}.")
     place = find_device(device)
     reader = make_reader(env_id, make, arguments)
-    given: Sequence[BodyLike | FingerLike | None] = pool or bodies or [None]
+    given: Sequence[Any] = pool or bodies or [None]
     return WarpVectorEnv(
         reader,
         given,

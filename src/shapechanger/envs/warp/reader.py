@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, cast
+from importlib import import_module
+from typing import Any, Final, Protocol, cast
 
 import gymnasium as gym
 
 from shapechanger.bodies.families import BodyLike
+from shapechanger.envs.catalogue import FINGER_ENVS
 from shapechanger.envs.vector.checks import describe_body
 from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
-from shapechanger.envs.warp.finger import FINGERS
-from shapechanger.envs.warp.finger_reader import FingerReader
 from shapechanger.envs.warp.tasks import DeviceTask, find_device_task
 from shapechanger.errors import SpaceMismatch
 from shapechanger.morphology import Body
@@ -40,6 +40,19 @@ class Reader(Protocol):
         ...
 
 
+_READERS: Final[dict[type, Callable[[gym.Env[Any, Any]], Reader]]] = {}
+
+
+def register_reader(env_class: type, reader: Callable[[gym.Env[Any, Any]], Reader]) -> None:
+    """Let a device read the bodies of an env in another way than by their edits.
+
+    Args:
+        env_class: Class of the CPU env. Its subclasses do not count: they may change the task.
+        reader: Makes the reader from a CPU env.
+    """
+    _READERS[env_class] = reader
+
+
 def make_reader(
     env_id: str, make: Callable[[dict[str, Any]], gym.Env[Any, Any]], arguments: dict[str, Any]
 ) -> Reader:
@@ -54,8 +67,11 @@ def make_reader(
         VectorEnvError: If the task has no batched functions.
     """
     first = make(arguments)
-    if type(first.unwrapped) in FINGERS:
-        return FingerReader(first)
+    for module in {task.device for task in FINGER_ENVS.values()} - {""}:
+        import_module(module)
+    reader = _READERS.get(type(first.unwrapped))
+    if reader is not None:
+        return reader(first)
     return BodyReader(first, find_device_task(first, env_id), make, arguments)
 
 

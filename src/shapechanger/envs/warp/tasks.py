@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from shapechanger.envs.ant import AntEnv, ExtendedAntEnv, is_upright
-from shapechanger.envs.catalogue import CATALOGUE
+from shapechanger.envs.catalogue import CATALOGUE, FINGER_ENVS, NAMESPACE
 from shapechanger.envs.pendulum import (
     CLIPPED_AT,
     FALLEN_M,
@@ -453,18 +453,23 @@ def find_device_task(env: gym.Env[Any, Any], env_id: str) -> type[DeviceTask]:
     Raises:
         VectorEnvError: If the task has no batched functions.
     """
-    task = _TASKS.get(type(env.unwrapped))
-    if task is None:
+    found = _TASKS.get(type(env.unwrapped))
+    if found is None:
         known = [
             entry.name
             for entry in CATALOGUE.values()
             if entry.entry_point.rpartition(":")[2] in {kind.__name__ for kind in _TASKS}
         ]
+        *own, last = (
+            name.removeprefix(f"{NAMESPACE}/").removesuffix("-v1")
+            for name, task in FINGER_ENVS.items()
+            if task.device
+        )
         raise VectorEnvError(
             f"{env_id} has no batched functions, which backend='warp' needs: there are those of "
-            f"{', '.join(known)}, Finger and FingerTrack."
+            f"{', '.join((*known, *own))} and {last}."
         )
-    return task
+    return found
 
 
 def _base(env: Any) -> Any:

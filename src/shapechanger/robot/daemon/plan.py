@@ -44,6 +44,7 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         recordings: Folder of the recorded episodes; "" for none.
         policies: Folder of the policies that may drive on board; "" for none.
         policy: Name of the one that starts with the robot; "" for none.
+        pilot: Module of the program that runs one of them; "" for none.
         turning: Turn at full steering, rad for each metre and for each second; None if not
             measured.
     """
@@ -74,6 +75,7 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     recordings: str = ""
     policies: str = ""
     policy: str = ""
+    pilot: str = ""
     turning: tuple[float, float] | None = None
 
     def to_dict(self) -> dict[str, Any]:

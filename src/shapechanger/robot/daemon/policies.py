@@ -33,7 +33,6 @@ _EVERYWHERE: Final = frozenset({"", "0.0.0.0", "::"})
 _END_S: Final = 2.0  # For a policy to release the robot and exit.
 _MOST_NAMES: Final = 256
 _LONGEST: Final = 1024  # Of a line that a policy's process writes, characters.
-_MODULE: Final = "shapechanger.cli.robot.pilot"
 
 
 def policies_in(folder: Path) -> list[str]:
@@ -51,18 +50,18 @@ class PolicyRunner:
     Args:
         plan: Settings of the daemon.
         post: Sends a message to all clients.
-        command: Command line of a policy's process.
+        command: Command line of a policy's process; empty for the plan's program.
     """
 
     def __init__(
         self,
         plan: DaemonPlan,
         post: Callable[[PolicyState], None],
-        command: Sequence[str] = (sys.executable, "-P", "-m", _MODULE),
+        command: Sequence[str] = (),
     ) -> None:
         self._plan = plan
         self._post = post
-        self._command = command
+        self._command = command or (sys.executable, "-P", "-m", plan.pilot)
         self._robot: dict[str, str] = {}
         self._running = ""
         self._text = ""

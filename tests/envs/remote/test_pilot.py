@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.robot.pilot import Origin, RobotFacts, require_fit
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.onnx_policy import export_clone
 from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.envs.remote.pilot import Origin, RobotFacts, require_fit
 from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.envs.waypoints import ACTION_LAYOUT
 from shapechanger.errors import RobotRefused
@@ -139,7 +139,7 @@ def _served(policy: Path, clock: str) -> Generator[tuple[RunningRobot, RobotClie
 
 def _pilot(robot: RunningRobot) -> int:
     """Return the process id of the policy."""
-    words = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "robot.pilot"]
+    words = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "remote.pilot"]
     return int(subprocess.check_output(words).split()[0])
 
 

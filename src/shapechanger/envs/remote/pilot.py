@@ -1,6 +1,6 @@
 """A policy that drives a robot, from a workstation or in a process on board.
 
-`python -m shapechanger.cli.robot.pilot` is the process on board. It reads one line of JSON, its
+`python -m shapechanger.envs.remote.pilot` is the process on board. It reads one line of JSON, its
 task, and writes lines of JSON: what it does, and why it ends. The end of its input ends it.
 """
 

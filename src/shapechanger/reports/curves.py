@@ -1,0 +1,233 @@
+"""Charts of studies: learning curves and sweeps."""
+
+# Matplotlib's stubs leave the type of its keyword arguments open.
+# pyright: reportUnknownMemberType=false
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.reports.charts import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PANEL,
+    PINK,
+    PURPLE,
+    SKY,
+    WIDE,
+    YELLOW,
+    svg_chart,
+)
+from shapechanger.reports.numbers import t_interval
+from shapechanger.transfer.methods import load_method
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from shapechanger.transfer.study import Study
+
+
+# An interval of two seeds may reach ten times as far as they lie apart.
+_BAND_SEEDS: Final = 3
+
+Counting = Literal["target", "total"]
+
+
+class _LineStyle(NamedTuple):
+    """Style of the curves of one kind; no two kinds differ by colour alone."""
+
+    colour: str
+    line: str | tuple[int, tuple[int, ...]]
+    marker: str
+
+
+_LINE_STYLES: Final[dict[str, _LineStyle]] = {
+    "scratch": _LineStyle(BLUE, "-", "o"),
+    "fine-tune": _LineStyle(ORANGE, "-", "s"),
+    "zero-shot": _LineStyle(GREEN, "--", ""),
+    "randomised": _LineStyle(PINK, "-.", ""),
+    "identified": _LineStyle(PURPLE, (0, (6, 2)), ""),
+    "frozen-trunk": _LineStyle(SKY, "-.", "^"),
+    "rehearsal": _LineStyle(SKY, "-", "P"),
+    "kickstart": _LineStyle(YELLOW, "-", "v"),
+    "evolution": _LineStyle(BLACK, "-", "d"),
+    "generalist": _LineStyle(PURPLE, "-", "*"),
+    "random": _LineStyle(GREY, ":", ""),
+}
+
+
+# Those of methods that are not shipped, in their order in the study.
+_OTHER_STYLES: Final = (
+    _LineStyle(YELLOW, (0, (1, 1)), "D"),
+    _LineStyle(BLACK, (0, (4, 1, 1, 1)), "P"),
+    _LineStyle(SKY, (0, (3, 1)), "X"),
+)
+
+
+def _line_style(study: Study, kind: str) -> _LineStyle:
+    """Return the style of a kind of run."""
+    if kind in _LINE_STYLES:
+        return _LINE_STYLES[kind]
+    others = [arm for arm in study.plan.arms if arm not in _LINE_STYLES]
+    return _OTHER_STYLES[others.index(kind) % len(_OTHER_STYLES)]
+
+
+def learning_curves(study: Study, counting: Counting) -> str:
+    """Plot the learning curves of a study.
+
+    A thin line is one seed, a thick one the mean over seeds, a band its 95 % t-interval over seeds;
+    of fewer than three seeds each evaluation is a point, because an interval of two says nothing. A
+    horizontal level is a policy that is not trained on the target. Both ways of counting share the
+    limits of the y axis.
+
+    Args:
+        study: The study.
+        counting: "target" counts target steps; "total" shifts the arms that start from the source
+            to the right by its source steps.
+    """
+    # Here, because `charts` says which extra is missing.
+    from matplotlib.ticker import EngFormatter, FuncFormatter, MaxNLocator
+
+    def draw(figure: Figure, axes: Axes) -> None:
+        _draw_arms(axes, study, float(study.plan.source_steps) if counting == "total" else 0.0)
+        axes.set_xlabel("Target steps" if counting == "target" else "Source and target steps")
+        axes.set_ylabel(_axis_label(study))
+        axes.set_ylim(*_return_limits(study))
+        axes.xaxis.set_major_formatter(EngFormatter(sep="\N{THIN SPACE}"))
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.yaxis.set_major_formatter(FuncFormatter(_tick_label))
+        figure.legend(loc="outside lower center", ncols=2, handlelength=2.5)
+
+    return svg_chart(PANEL, draw)
+
+
+def _draw_arms(axes: Axes, study: Study, source_steps: float) -> None:
+    """Draw all arms; those that start from the source begin at `source_steps`."""
+    last = float(study.plan.steps)
+    reference = next(iter(study.summaries.values())).reference
+    style = _LINE_STYLES["random"]
+    axes.axhline(
+        reference.zero,
+        color=style.colour,
+        linestyle=style.line,
+        label=f"no skill: {reference.zero_of}",
+    )
+    if source_steps:
+        axes.axvline(source_steps, color="#999999", linewidth=0.8)
+        axes.text(
+            source_steps,
+            0.99,
+            " source ends ",
+            color="#555555",
+            fontsize=9.0,
+            va="top",
+            ha="left" if source_steps < last else "right",
+            transform=axes.get_xaxis_transform(),
+        )
+    for arm in study.plan.arms:
+        _draw_arm(axes, study, arm, source_steps)
+
+
+def _draw_arm(axes: Axes, study: Study, arm: str, source_steps: float) -> None:
+    """Draw an arm as curves, or as a level if it is not trained on the target."""
+    method, style, curves = load_method(arm), _line_style(study, arm), study.curves(arm)
+    start = source_steps if method.uses_source else 0.0
+    is_level = not method.learns_on_target
+    steps, returns = curves.steps + start, curves.returns
+    if is_level:
+        steps = np.array([start, start + study.plan.steps])
+        returns = np.repeat(returns[:, :1], 2, axis=1)
+    else:
+        axes.plot(steps, returns.T, color=style.colour, linewidth=0.7, alpha=0.45)
+    spread = t_interval(returns)
+    if curves.n_seeds >= _BAND_SEEDS:
+        shade = 0.12 if is_level else 0.18
+        axes.fill_between(
+            steps, spread.low, spread.high, color=style.colour, alpha=shade, linewidth=0.0
+        )
+    elif is_level:
+        axes.plot([start] * curves.n_seeds, returns[:, 0], "o", color=style.colour, markersize=3.5)
+    else:
+        axes.plot(steps, returns.T, style.marker, color=style.colour, markersize=2.5)
+    axes.plot(
+        steps,
+        spread.mean,
+        color=style.colour,
+        linestyle=style.line,
+        linewidth=1.8 if is_level else 2.2,
+        marker="" if is_level else style.marker,
+        markersize=4.5,
+        markevery=max(1, curves.n_evals // 8),
+        label=f"{arm}, {curves.n_seeds} seeds",
+    )
+
+
+def _axis_label(study: Study) -> str:
+    """Return the name of the measure with its unit."""
+    unit = "" if study.plan.unit == "1" else f", {study.plan.unit}"
+    return f"{study.plan.measure.capitalize()} on the target{unit}"
+
+
+def _return_limits(study: Study) -> tuple[float, float]:
+    """Return limits of the y axis that contain every run; intervals are clipped."""
+    returns: NDArray[np.float64] = np.concatenate(
+        [study.curves(arm).returns.ravel() for arm in study.plan.arms]
+        + [np.array([next(iter(study.summaries.values())).reference.zero])]
+    )
+    low, high = float(returns.min()), float(returns.max())
+    margin = 0.15 * (high - low) or 0.1 * max(1.0, abs(high))
+    return low - margin, high + margin
+
+
+def _tick_label(value: float, place: int | None) -> str:
+    """Format a tick; `place` is matplotlib's."""
+    return f"{value:,.10g}".replace("e+", "e")
+
+
+def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
+    """Plot the end of each arm over a number in which the targets of several studies differ.
+
+    A point is one seed; a line joins the means over seeds.
+
+    Args:
+        studies: The studies by that number.
+        xlabel: What the number is.
+    """
+    first = next(iter(studies.values()))
+
+    def draw(figure: Figure, axes: Axes) -> None:
+        values = sorted(studies)
+        for arm in first.plan.arms:
+            style = _line_style(first, arm)
+            ends = [_ends(studies[value], arm) for value in values]
+            for value, end in zip(values, ends, strict=True):
+                axes.plot([value] * end.size, end, ".", color=style.colour, alpha=0.4, markersize=4)
+            axes.plot(
+                values,
+                [float(end.mean()) for end in ends],
+                color=style.colour,
+                linestyle=style.line,
+                marker=style.marker or "o",
+                markersize=4.5,
+                linewidth=2.0,
+                label=arm,
+            )
+        axes.set_xlabel(xlabel)
+        axes.set_ylabel(_axis_label(first))
+        figure.legend(loc="outside lower center", ncols=3, handlelength=2.5)
+
+    return svg_chart(WIDE, draw)
+
+
+def _ends(study: Study, arm: str) -> NDArray[np.float64]:
+    """Return the mean of the last evaluations of each run of an arm."""
+    returns = study.curves(arm).returns
+    return returns[:, -min(study.plan.last_k, returns.shape[1]) :].mean(axis=1)
