@@ -9,7 +9,6 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import pytest
 
@@ -23,20 +22,17 @@ MARGIN_MS = 5.0
 """Margin on the promised time of a stop, which has the guard's tick of 10 ms in it.
 
 The ledger and the times of faults have the same clock, CLOCK_MONOTONIC. A fault is dated before it
-is made, and a level when it reaches the board: one system call or message each, far below 1 ms.
+is made, and a level when its process sends it to the board: one system call or message each, far
+below 1 ms. The board dates what it makes itself, when it tells the guard.
 """
-ORDINARY: Final = 2
-"""Processes of normal priority that a fault passes before it reaches the guard: this one, which
-makes it, and the twin's board. Each may wait for a time slice."""
 
 TRIALS = 2
 
-# Sleeps for 1 ms at a time, at the guard's priority if asked. A line asks for its longest delay.
+# Runs at the guard's priority and sleeps for 1 ms at a time. A line asks it for its longest delay.
 _WITNESS = """
 import select, sys, time
 from shapechanger.robot.guard.priority import GUARD, run_promptly
-if sys.argv[1:] == ["promptly"]:
-    run_promptly(GUARD)
+run_promptly(GUARD)
 longest_s, before_s = 0.0, time.monotonic()
 while True:
     asked = select.select([sys.stdin], [], [], 1e-3)[0]
@@ -51,18 +47,15 @@ while True:
 
 
 class Witness:
-    """A process that tells how long this machine kept a process of some priority waiting.
+    """A process that tells how long this machine kept a process of the guard's priority waiting.
 
     Nothing can stop in time while its machine runs nothing. The promise is about the robot, so this
     time is added to it, instead of a factor for the worst machine.
-
-    Args:
-        priority: "promptly" for the guard's priority; "" for the normal one.
     """
 
-    def __init__(self, priority: str) -> None:
+    def __init__(self) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _WITNESS, priority],
+            [sys.executable, "-c", _WITNESS],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -83,13 +76,10 @@ class Witness:
 
 
 @pytest.fixture(scope="module")
-def witnesses() -> Iterator[tuple[Witness, Witness]]:
-    """Witnesses of this machine's delays, at the guard's priority and at the normal one."""
-    with (
-        contextlib.closing(Witness("promptly")) as prompt,
-        contextlib.closing(Witness("")) as ordinary,
-    ):
-        yield prompt, ordinary
+def witness() -> Iterator[Witness]:
+    """A witness of this machine's delays."""
+    with contextlib.closing(Witness()) as made:
+        yield made
 
 
 @pytest.fixture(scope="module")
@@ -100,19 +90,17 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_the_robot_stops(trial: Trial, witnesses: tuple[Witness, Witness], name: str) -> None:
+def test_the_robot_stops(trial: Trial, witness: Witness, name: str) -> None:
     """The stop is within the promised time, and the robot never drives without a fresh command."""
     fault = FAULTS[name]
     drove = 0
     # Repeat trials in which the robot had stopped before the fault.
     for _ in range(2 * TRIALS):
-        for witness in witnesses:
-            witness.longest_ms()
+        witness.longest_ms()
         result = trial.run(fault)
-        prompt_ms, ordinary_ms = (witness.longest_ms() for witness in witnesses)
-        margin_ms = MARGIN_MS + prompt_ms
+        margin_ms = MARGIN_MS + witness.longest_ms()
         drove += result.drove
-        assert result.stopped_ms <= result.limit_ms + margin_ms + ORDINARY * ordinary_ms, result
+        assert result.stopped_ms <= result.limit_ms + margin_ms, result
         # Beyond the deadline of the last command an output may be as late as a stop may.
         late_ms = [(i.end_ns - i.start_ns) / 1e6 for i in result.unauthorised]
         assert sum(late_ms) <= margin_ms, result

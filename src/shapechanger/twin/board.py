@@ -177,7 +177,7 @@ class Board:
                 self._pins.sensors.hold_bumpers(down)
                 return f"bumper {'down' if down else 'up'}"
             case "stop", bool(down):
-                self._pins.sensors.press_stop(down, self._time.now_ns())
+                self._pins.sensors.press_stop(down)
                 return f"stop {'down' if down else 'up'}"
             case "battery", (float() | None) as volts:
                 self.world.resting_v = RESTING_V if volts is None else volts

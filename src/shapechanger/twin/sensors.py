@@ -126,6 +126,7 @@ class PinSensors:
             self.levels.update(sensor.levels())
         if self._stop_pin is not None:
             self.levels[self._stop_pin] = 1  # A button to ground, with a pull-up.
+        self._stop_held = False
 
     @property
     def next_ns(self) -> int | None:
@@ -145,6 +146,9 @@ class PinSensors:
             found += sensor.edges(start_ns, end_ns, seen)
         while self._due and self._due[0].t <= end_ns:
             found.append(heapq.heappop(self._due))
+        stop_level = int(not self._stop_held)
+        if self._stop_pin is not None and self.levels[self._stop_pin] != stop_level:
+            found.append(Edge(end_ns, self._stop_pin, stop_level))
         found.sort()
         for edge in found:
             self.levels[edge.pin] = edge.level
@@ -163,18 +167,12 @@ class PinSensors:
                 for edge in sensor.ping(t):
                     heapq.heappush(self._due, edge)
 
-    def press_stop(self, down: bool, t: int) -> None:
-        """Press or release the stop button.
-
-        Args:
-            down: Whether to press it.
-            t: Time, ns.
-        """
-        if self._stop_pin is not None:
-            heapq.heappush(self._due, Edge(t, self._stop_pin, int(not down)))
+    def press_stop(self, down: bool) -> None:
+        """Press or release the stop button; its level changes at the end of the next `advance`."""
+        self._stop_held = down
 
     def hold_bumpers(self, down: bool) -> None:
-        """Press or release all bumpers from outside the world."""
+        """Press or release all bumpers from outside the world, likewise."""
         for bumper in self._bumpers:
             bumper.held = down
 

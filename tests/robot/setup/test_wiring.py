@@ -77,7 +77,7 @@ def test_without_the_supply_off_no_output_is_touched(car: GuardPlan) -> None:
 def test_pressed_switches(car: GuardPlan) -> None:
     """A switch that is pressed now, or whose wire touches ground, is reported."""
     board = _board(car)
-    board.pins.sensors.press_stop(down=True, t=board.now_ns())
+    board.pins.sensors.press_stop(down=True)
     board.pins.sensors.hold_bumpers(down=True)
     board.advance(board.now_ns() + 100_000_000)
     found = _found(car, board)

@@ -8,7 +8,7 @@ import os
 import signal
 import socket
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -33,7 +33,7 @@ from shapechanger.twin.oracle import (
     unauthorised,
 )
 from shapechanger.twin.robot import Operator, RunningRobot, run_robot
-from shapechanger.twin.signals import read_ledger
+from shapechanger.twin.signals import Transition, read_ledger
 from shapechanger.twin.start import start_board
 from shapechanger.twin.wiring import TwinWiring
 
@@ -76,7 +76,8 @@ class Fault:
         after: How the robot can notice it: at once, by its deadline, or by the age of a frame.
         undo: Reverts it.
         then: The robot afterwards: it continues, its processes restart, or it is gone.
-        needs: Required part of the profile: "", "camera", "bumper", "button" or "one-shot".
+        needs: Required part of the profile: "", "camera", "bumper", "button" or "one-shot". The
+            board makes the faults of the first three, and its ledger dates them.
         harms: Whether it stops the driving. Otherwise the driver is killed, to measure a stop.
         silences: Whether later commands of the driver do not count.
         guards_late: Whether the guard itself fails, which adds its own promised time.
@@ -548,6 +549,7 @@ class Trial:
         self, fault: Fault, began_ns: int, at_ns: int, limit_ms: float, sent: list[int]
     ) -> TrialResult:
         ledger = read_ledger(self.ledger_path)
+        at_ns = self._made_ns(fault, ledger, at_ns)
         moved = [i for i in propelled(ledger, self._wiring) if i.end_ns > began_ns]
         deadline_ms = self._plan.limits.deadline_ms
         commands = [
@@ -565,6 +567,31 @@ class Trial:
             drove=any(i.start_ns < at_ns < i.end_ns for i in moved),
             unauthorised=tuple(i for i in strangers if i.end_ns > began_ns),
         )
+
+    def _made_ns(self, fault: Fault, ledger: Sequence[Transition], at_ns: int) -> int:
+        """Return the time of a fault, ns.
+
+        What the board makes begins with its line of the ledger: the edge of the button or bumper,
+        or the failure of the camera. Until then the request waits for this process and the board,
+        neither of which is part of a robot.
+
+        Args:
+            fault: The fault.
+            ledger: Transitions, ordered by time.
+            at_ns: When this process made it, or asked the board to make it.
+        """
+        plan = self._plan
+        switches = (one for one in plan.sensors if one.driver == "switch")
+        pins: dict[str, Sequence[int | None]] = {
+            "bumper": [pin for one in switches for pin in one.settings["pins"]],
+            "button": [plan.stop_pin],
+        }
+        if fault.needs == "camera":
+            made = (line.t for line in ledger if line.kind == "fault")
+        else:
+            edges = (line for line in ledger if line.kind == "input")
+            made = (line.t for line in edges if line.pin in pins.get(fault.needs, ()))
+        return next((t for t in made if t >= at_ns), at_ns)
 
     @property
     def ledger_path(self) -> Path:
