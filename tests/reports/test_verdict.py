@@ -14,6 +14,7 @@ from shapechanger.reports.verdict import (
     machine_text,
     other_arms,
     verdict,
+    weak_individuals,
 )
 from shapechanger.transfer.metrics import Estimate
 from shapechanger.transfer.study import Study
@@ -129,3 +130,30 @@ def test_runs_on_different_devices_are_a_caveat() -> None:
     assert machine_text([study, mixed]).endswith("; learned on CPU, NVIDIA H100")
     one = tuple(msgspec.structs.replace(run, device="CPU") for run in study.runs)
     assert caveats(msgspec.structs.replace(study, runs=one)) == ()
+
+
+def test_individuals_where_an_arm_is_weak_are_named() -> None:
+    """Each arm counts the individuals with at least 80 % success, and names the others."""
+    shares = {"scratch": (0.0, 0.6, 0.8), "fine-tune": (0.8, 1.0, 0.9)}
+    study = make_study(scratch=SCRATCH[:3], fine_tune=SCRATCH[:3], arms=tuple(shares))
+    assert weak_individuals(study) == []
+
+    fingers = msgspec.structs.replace(study.plan, individual="finger_seed")
+    study = msgspec.structs.replace(study, plan=fingers)
+    assert weak_individuals(study) == []
+
+    runs = [
+        msgspec.structs.replace(
+            result,
+            curve=tuple(
+                msgspec.structs.replace(each, success=shares[result.run.kind][result.run.index])
+                for each in result.curve
+            ),
+        )
+        for result in study.runs
+        if result.run.kind in shares
+    ]
+    assert weak_individuals(msgspec.structs.replace(study, runs=tuple(runs))) == [
+        "scratch reaches 80% on 1 of 3 fingers, not on finger 0 (0%), finger 1 (60%).",
+        "fine-tune reaches 80% on 3 of 3 fingers.",
+    ]

@@ -307,7 +307,12 @@ def _way_on(plan: Plan, out: Path) -> str:
 
 def _print(study: Study) -> None:
     """Print the table of measures and the verdict."""
-    from shapechanger.reports.verdict import measure_rows, other_arms, verdict
+    from shapechanger.reports.verdict import (
+        measure_rows,
+        other_arms,
+        verdict,
+        weak_individuals,
+    )
 
     table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
     # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
@@ -317,3 +322,5 @@ def _print(study: Study) -> None:
     say(f"\n{verdict(study)}")
     if others := other_arms(study):
         say(others)
+    for sentence in weak_individuals(study):
+        say(sentence)

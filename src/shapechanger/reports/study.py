@@ -26,6 +26,7 @@ from shapechanger.reports.verdict import (
     measure_rows,
     other_arms,
     verdict,
+    weak_individuals,
 )
 from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
 from shapechanger.transfer.body_map.rules import SAME_NAME
@@ -64,6 +65,7 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
         plan=plan,
         verdict=verdict(study),
         other_arms=other_arms(study),
+        weak=weak_individuals(study),
         headline_arm=study.headline_arm,
         cards=_cards(study, measures),
         bodies=_bodies(study, pictures) if pictures is not None else [],

@@ -177,6 +177,9 @@ def _seeds(reach: ReachTimes, n_seeds: int) -> str:
 GOOD: Final = 0.9
 """Share of the way from what takes no skill to the best run that counts as having learnt."""
 
+STRONG: Final = 0.8
+"""Share of success from which an arm counts as good on one individual, such as a finger."""
+
 
 class ArmRow(NamedTuple):
     """Summary of the runs of one kind.
@@ -231,6 +234,31 @@ def successes(study: Study, kind: str) -> NDArray[np.float64]:
     if any(share is None for end in ends for share in end):
         return np.empty(0)
     return np.array([float(np.mean(np.array(end, np.float64))) for end in ends])
+
+
+def weak_individuals(study: Study) -> list[str]:
+    """Return a sentence for each arm on the individuals, such as fingers, where it rarely succeeds.
+
+    A mean over individuals hides the weak ones. Empty where all seeds share one body, or the env
+    does not report success.
+
+    Args:
+        study: The study.
+    """
+    sentences: list[str] = []
+    if not study.plan.individual:
+        return sentences
+    noun = study.plan.individual.removesuffix("_seed")
+    for arm in study.plan.arms:
+        shares = successes(study, arm)
+        indices = [result.run.index for result in study.of(arm)]
+        # Not strict, as `shares` is empty where the env does not report success.
+        ends = sorted(zip(shares.tolist(), indices, strict=False))
+        weak = [f"{noun} {index} ({share:.0%})" for share, index in ends if share < STRONG]
+        if ends:
+            strong = f"{arm} reaches {STRONG:.0%} on {len(ends) - len(weak)} of {len(ends)} {noun}s"
+            sentences.append(f"{strong}{', not on ' if weak else ''}{', '.join(weak)}.")
+    return sentences
 
 
 def finals(study: Study, kind: str) -> NDArray[np.float64]:
