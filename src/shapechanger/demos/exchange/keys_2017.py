@@ -108,11 +108,11 @@ def write_2017(episodes: Iterable[ExchangeEpisode], folder: Path) -> int:
     """Write episodes into an existing folder; imported pictures get their former names.
 
     Args:
-        episodes: The episodes.
-        folder: Where to write.
+        episodes: The episodes, one after another in one table.
+        folder: Folder of the pictures and `labels.csv`.
 
     Returns:
-        Number of steps written.
+        Number of lines.
 
     Raises:
         DemosError: If the actions are not four keys of which at most one is held, or a step has no

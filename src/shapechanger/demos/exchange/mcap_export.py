@@ -60,11 +60,11 @@ def write_mcap(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
     """Write episodes into an existing folder, each to a file of its own.
 
     Args:
-        episodes: The episodes.
-        folder: Where to write.
+        episodes: The episodes, in the order in which their files are numbered.
+        folder: Folder of the files.
 
     Returns:
-        Number of steps written.
+        Number of steps in all files.
 
     Raises:
         MissingExtra: If mcap is not installed.

@@ -39,11 +39,11 @@ def write_tub(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
     simulation ran; steps without a time follow the one before at the rate of the episode.
 
     Args:
-        episodes: The episodes.
-        folder: Where to write.
+        episodes: The episodes, which become the sessions.
+        folder: The tub.
 
     Returns:
-        Number of steps written.
+        Number of records.
 
     Raises:
         DemosError: If the actions are not steering and throttle, or a step has no picture.
