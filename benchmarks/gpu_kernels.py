@@ -15,9 +15,9 @@ from typing import Any, Final
 import torch
 
 from benchmarks import gpu
+from shapechanger.contract.env_ref import each_body
 from shapechanger.envs.warp.devices import wp
 from shapechanger.morphology import Stretch
-from shapechanger.contract.env_ref import each_body
 from shapechanger.transfer.limbs.envs import together
 
 # Compute capability 9.0: H100 and H200.
