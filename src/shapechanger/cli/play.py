@@ -52,7 +52,7 @@ class Watching:
             MapError: If the policy's layouts do not fit the env.
             ForeignStudy: If the env has changed since the policy's training.
         """
-        from shapechanger.cli.policies import acting_in
+        from shapechanger.cli.acting import acting_in
         from shapechanger.transfer.learners.evaluation import random_actions
 
         require_seed(self.seed)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-import gymnasium as gym
 import msgspec
 import tyro
 from rich.table import Table
 
+from shapechanger.cli.acting import acting_in, load_any_policy
 from shapechanger.cli.console import command_line, print_table, say
 from shapechanger.cli.env_arguments import (
     Body,
@@ -29,7 +29,6 @@ from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
 from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError, no_policy_file
 from shapechanger.identity import identify_env
 from shapechanger.own_modules import texts_in
-from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.learners.settings import (
     LimbSettings,
@@ -37,16 +36,13 @@ from shapechanger.transfer.learners.settings import (
     PpoSettings,
     Sb3Settings,
 )
-from shapechanger.transfer.policies import load_policy
 from shapechanger.transfer.references import load_references
-from shapechanger.transfer.versions import ENV, known, require_same_env, single_body
+from shapechanger.transfer.versions import ENV, known, single_body
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
-    from shapechanger.transfer.learners.evaluation import Act
     from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
     from shapechanger.transfer.onnx_policy import OnnxCard
-    from shapechanger.transfer.policies import AnyPolicy
 
 _FILE_WIDTH: Final = 160
 
@@ -243,70 +239,6 @@ def _trained_in(file: Path, learner: str) -> EnvRef:
     if env is None:
         raise StudyError(f"{file} learned from recordings of no env: name one with --env.")
     return env_ref(str(env))
-
-
-def acting_in(
-    env: gym.Env[Any, Any], file: Path, learner: str = "", trained_in: EnvRef | None = None
-) -> tuple[gym.Env[Any, Any], Act]:
-    """Return an env as a policy senses it, and the policy.
-
-    Args:
-        env: The env.
-        file: A policy, a clone, or a policy that was exported as ONNX.
-        learner: An algorithm of the user's own that the file may name, as `module:name`.
-        trained_in: The env of the policy's training, if this is meant to be that env.
-
-    Raises:
-        CorruptStudy: If the file cannot be read.
-        ForeignStudy: If the env has changed since the training, and is meant to be the same.
-        MapError: If there is no body map of same names between the layouts.
-        PolicyError: If the clone's layouts are not those of the env.
-    """
-    policy = load_any_policy(file, learner)
-    card: Any = policy.card
-    if trained_in is not None and ENV in card.identity:
-        remedy = (
-            "Train it again, or give the present one with --env, as another env that the policy "
-            "is tried in."
-        )
-        now = identify_env(env, trained_in.id).identity
-        require_same_env(card.identity, trained_in, now, file, remedy)
-    if hasattr(card, "observation"):
-        return _fitting(env, card), policy.act
-    if (layout := getattr(env.unwrapped, "action_layout", None)) is not None:
-        card.require_layouts(layout, card.state_layout)
-    return env, policy.act
-
-
-def load_any_policy(file: Path, learner: str = "") -> AnyPolicy:
-    """Load a policy of any kind, which may name a learner of the user's own.
-
-    Args:
-        file: The file.
-        learner: An algorithm of the user's own that the file may name, as `module:name`.
-
-    Raises:
-        CorruptStudy: If it cannot be read.
-    """
-    allow_own_modules(learner)
-    return load_policy(file, learner)
-
-
-def _fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any, Any]:
-    """Return an env with a policy's layouts, through the body map of same names if needed."""
-    if isinstance(settings := getattr(card, "settings", None), LimbSettings):
-        from shapechanger.transfer.limbs.envs import fitted
-
-        return fitted(env, card.observation, settings.room)
-    observation, action = layouts_of(env)
-    if (observation, action) == (card.observation, card.action):
-        return env
-    body_map = BodyMap.between(card.observation, observation, card.action, action)
-    entries = (*body_map.observation, *body_map.action)
-    filled = [entry.feature for entry in entries if not isinstance(entry.rule, Copy)]
-    if filled:
-        say(f"Without a counterpart in the other body, and so constant: {', '.join(filled)}.")
-    return MappedEnv(env, body_map)
 
 
 @dataclass(frozen=True)

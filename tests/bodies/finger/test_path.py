@@ -15,8 +15,8 @@ from shapechanger.bodies.finger import NOMINAL, CommandPath, FingerParameters, d
 from shapechanger.bodies.finger.path import slewed
 from shapechanger.envs.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.errors import FingerError, UnknownName
+from shapechanger.robot.guard.limits import slewed as slewed_by_guard
 from shapechanger.robot.guard.plan import ActionPlan
-from shapechanger.robot.guard.rules import slewed as slewed_by_guard
 
 _RIG = NOMINAL.replace(tendon_stiffness=10e3, motor_kg=1.4, motor_lag=0.001)
 _MOST = np.array(NOMINAL.most_tension)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.selftest import SelftestResult, check_robot
+from shapechanger.cli.robot.checks import SelftestResult, check_robot
 from shapechanger.twin.robot import run_robot
 from tests.robots import BLIND_CAR, CAR, IN_A_ROOM, changed, write_profile
 

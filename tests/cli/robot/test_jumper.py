@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from gpiozero.pins.mock import MockConnectedPin, MockFactory
 
-from shapechanger.cli.robot.selftest import check_jumper
+from shapechanger.cli.robot.checks import check_jumper
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.robot.hardware import RealHardware

@@ -15,6 +15,7 @@ from gpiozero.pins.mock import MockFactory, MockPWMPin
 
 from shapechanger.cli import main
 from shapechanger.cli.robot import leds
+from shapechanger.cli.robot.checks import SelftestResult
 from shapechanger.cli.robot.leds import (
     Bench,
     ProbeJudge,
@@ -25,7 +26,6 @@ from shapechanger.cli.robot.leds import (
     walk,
 )
 from shapechanger.cli.robot.leds_report import anonymous, facts, run_leds
-from shapechanger.cli.robot.selftest import SelftestResult
 from shapechanger.errors import LinkError, OutputError, RobotError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import RealHardware

@@ -124,7 +124,7 @@ def hold_controls(
 def slewed(
     path: CommandPath, now: NDArray[np.float64], aim: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the tensions of the next tick, as `shapechanger.robot.guard.rules.slewed` does.
+    """Return the tensions of the next tick, as `shapechanger.robot.guard.limits.slewed` does.
 
     Args:
         path: The path.

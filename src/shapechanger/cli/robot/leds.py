@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol
 
 from shapechanger.cli.console import say
-from shapechanger.cli.robot.selftest import SelftestResult, check_robot, require_free_pin
+from shapechanger.cli.robot.checks import SelftestResult, check_robot, require_free_pin
 from shapechanger.cli.robot.trial import FAULTS, calm, has
 from shapechanger.cli.robot.trial_driver import Driver
 from shapechanger.errors import RobotError, ShapechangerError

@@ -16,8 +16,14 @@ from shapechanger.envs.vehicle.base import Courses, CourseSampler, DrivingEnv, r
 from shapechanger.envs.vehicle.drivers import BEARINGS_DEG, FARTHEST_M, observe_ranges
 from shapechanger.errors import SpaceMismatch
 from shapechanger.layout import Feature, Layout
+from shapechanger.robot.guard.limits import (
+    aimed,
+    bump_blocks,
+    bump_ends_ns,
+    forward_actions,
+    slewed,
+)
 from shapechanger.robot.guard.plan import GuardPlan, output_values
-from shapechanger.robot.guard.rules import aimed, slewed
 from shapechanger.tasks.drive import DriveReward
 from shapechanger.worlds.simulation import MujocoWorld
 
@@ -48,13 +54,15 @@ class OutputShaper:
     def __init__(self, plan: GuardPlan) -> None:
         self._plan = plan
         self.tick_s = 1.0 / plan.tick_hz
-        self._forward = [i for i, action in enumerate(plan.actions) if action.name == "throttle"]
+        self._tick_ns = round(1e9 / plan.tick_hz)
+        self._forward = forward_actions(plan.actions)
         self.reset()
 
     def reset(self) -> None:
         """Bring all actions to rest."""
         self.applied = tuple(action.rest for action in self._plan.actions)
-        self._blocked_s = 0.0
+        self._now_ns = 0
+        self._block_ends_ns: int | None = None
 
     def outputs(
         self, values: tuple[float, ...], bumped: bool, ticks: int
@@ -66,14 +74,14 @@ class OutputShaper:
             bumped: Whether the bumper is pressed.
             ticks: Ticks of the guard in the period.
         """
-        if bumped:
-            self._blocked_s = self._plan.limits.bump_hold_ms / 1000.0
+        hold_ms = self._plan.limits.bump_hold_ms
+        self._block_ends_ns = bump_ends_ns(bumped, self._now_ns, self._block_ends_ns, hold_ms)
         actions = self._plan.actions
         aims = [aimed(action, value) for action, value in zip(actions, values, strict=True)]
-        if self._blocked_s > 0.0:
-            self._blocked_s -= ticks * self.tick_s
+        if bump_blocks(bumped, self._now_ns, self._block_ends_ns):
             for i in self._forward:
                 aims[i] = min(aims[i], actions[i].rest)
+        self._now_ns += ticks * self._tick_ns
         target = tuple(aims)
         total = [0.0] * len(self._plan.outputs)
         left = ticks

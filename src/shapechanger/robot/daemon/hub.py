@@ -7,7 +7,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
@@ -21,9 +21,6 @@ from shapechanger.robot.daemon.policies import PolicyRunner
 from shapechanger.robot.daemon.recorder import Recorder
 from shapechanger.robot.guard.messages import GuardState, Order
 
-if TYPE_CHECKING:
-    from shapechanger.robot.daemon.session import Session
-
 _MAX_CLIENTS: Final = 8
 """Most clients connected at the same time."""
 
@@ -32,6 +29,26 @@ _MAX_PROGRAMS: Final = 6
 
 _NS_PER_MS: Final = 1_000_000
 _ARRIVALS: Final = 64  # Arrival times to remember; more than commands can be under way.
+
+
+class HubClient(Protocol):
+    """A connected client, as the hub reaches it.
+
+    Attributes:
+        client: Its identity.
+        updated: Set when an observation may be due.
+    """
+
+    client: ClientIdentity
+    updated: asyncio.Event
+
+    def post(self, message: RobotMessage) -> None:
+        """Send a message."""
+        ...
+
+    def expel(self, reason: str) -> None:
+        """End the connection, for a reason that is a sentence."""
+        ...
 
 
 class SessionHub:
@@ -76,7 +93,7 @@ class SessionHub:
         self.unsettled = False
         self.now_ns = now_ns
         self._order = order
-        self._clients: dict[int, Session] = {}
+        self._clients: dict[int, HubClient] = {}
         self._arrivals: OrderedDict[tuple[int, int], int] = OrderedDict()
         self._command: PendingCommand | None = None
         self._suggestion: PendingCommand | None = None
@@ -84,7 +101,7 @@ class SessionHub:
         self.library = RecordingLibrary(Path(plan.recordings) if plan.recordings else None, call)
         self.policies = PolicyRunner(plan, self._broadcast)
 
-    def join(self, member: Session) -> None:
+    def join(self, member: HubClient) -> None:
         """Add the session of an authenticated client.
 
         A person always fits: where the limit is reached, the oldest client without control leaves.

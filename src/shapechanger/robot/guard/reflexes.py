@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from shapechanger.robot.guard.limits import bump_blocks, bump_ends_ns, forward_actions
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.sensors import Sensing
 
@@ -47,7 +48,7 @@ class Bump:
     """
 
     def __init__(self, hold_ms: int) -> None:
-        self._hold_ns = hold_ms * 1_000_000
+        self._hold_ms = hold_ms
         self._touches = False
         self.count = 0
         self.until_ns: int | None = None
@@ -60,14 +61,13 @@ class Bump:
             now_ns: Robot's time, ns.
         """
         touches = quantities.get("bump", 0.0) > 0.0
-        if touches:
-            self.count += not self._touches
-            self.until_ns = now_ns + self._hold_ns
+        self.count += touches and not self._touches
+        self.until_ns = bump_ends_ns(touches, now_ns, self.until_ns, self._hold_ms)
         self._touches = touches
 
     def blocks(self, now_ns: int) -> bool:
         """Return whether forward motion is blocked."""
-        return self._touches or (self.until_ns is not None and now_ns < self.until_ns)
+        return bump_blocks(self._touches, now_ns, self.until_ns)
 
 
 class Stall:
@@ -178,10 +178,6 @@ class RobotHealth:
             self._battery = ""
 
 
-STEERING = "steering"
-"""Name of the turning action. It may propel, as a tank's does, but never forward."""
-
-
 class Propulsion:
     """Forward component of the actions; positive is forward.
 
@@ -191,7 +187,7 @@ class Propulsion:
 
     def __init__(self, actions: Sequence[ActionPlan]) -> None:
         self._actions = actions
-        self.forward = tuple(i for i, a in enumerate(actions) if a.propels and a.name != STEERING)
+        self.forward = forward_actions(actions)
         # Actions whose profile gives a speed.
         self._known = tuple(i for i in self.forward if actions[i].unit == "m/s")
 

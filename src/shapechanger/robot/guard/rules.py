@@ -7,11 +7,11 @@ No pins, sockets or clocks, so that every rule can be tested at any time. The gu
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.guard.limits import aimed, clipped, slewed
 from shapechanger.robot.guard.log import shortened
 from shapechanger.robot.guard.messages import Order
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, StopPlan
@@ -19,7 +19,6 @@ from shapechanger.robot.guard.reflexes import Bump, Propulsion, RobotHealth, Sta
 from shapechanger.robot.guard.sensors import SensedState, Sensing
 
 _NS_PER_MS = 1_000_000
-_SAME = 1e-6  # A cap that was stored as a 32-bit float is still the cap.
 _CLIPPED = "Clipped by the robot's caps."
 
 # Quantities of the sensors whose failure disarms the robot.
@@ -178,54 +177,6 @@ class Freshness:
         """
         start_ns = min(order.issued_ns, arrived_ns)
         return start_ns + min(self._deadline_ms, order.ttl_ms) * _NS_PER_MS
-
-
-def aimed(action: ActionPlan, value: float) -> float:
-    """Return the target of a command's value: clipped to the caps and rounded to a level.
-
-    Args:
-        action: The action.
-        value: Value in the command, dimensionless.
-    """
-    if action.levels == "three":
-        if value >= action.threshold:
-            return action.high
-        return action.low if value <= -action.threshold else action.rest
-    return max(action.low, min(action.high, value))
-
-
-def clipped(action: ActionPlan, value: float) -> bool:
-    """Return whether a command's value lies outside the caps.
-
-    Args:
-        action: The action; with three levels no value is clipped.
-        value: Value in the command, dimensionless.
-    """
-    is_inside = action.low - _SAME <= value <= action.high + _SAME
-    return action.levels == "any" and not is_inside
-
-
-def slewed(action: ActionPlan, now: float, aim: float, elapsed_s: float) -> float:
-    """Return the next value on the way to the target.
-
-    The slew limits it away from rest and towards rest, and it pauses at rest for one step when it
-    changes sides. A three-level motor has no slew.
-
-    Args:
-        action: The action.
-        now: Current value.
-        aim: Target value.
-        elapsed_s: Time since the current value was set, s.
-    """
-    is_away, will_be_away = now - action.rest, aim - action.rest
-    if is_away < 0.0 < will_be_away or will_be_away < 0.0 < is_away:
-        aim = action.rest
-    falls = abs(aim - action.rest) <= abs(is_away)
-    slew_per_s = action.slew_down_per_s if falls else action.slew_per_s
-    if action.levels == "three" or math.isinf(slew_per_s):
-        return aim
-    step = slew_per_s * elapsed_s
-    return aim if abs(aim - now) <= step else now + math.copysign(step, aim - now)
 
 
 @dataclass(frozen=True, slots=True)
