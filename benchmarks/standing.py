@@ -39,6 +39,7 @@ TURNED_RAD: Final = 1.2
 STEPS: Final = 160
 # A vehicle that has stood for this long at the end stands for good.
 FOR_GOOD: Final = 80
+PROGRESS_M: Final = 0.5
 
 
 class Starts(NamedTuple):
@@ -46,12 +47,15 @@ class Starts(NamedTuple):
 
     Attributes:
         stood: Number of starts at which it stood for good.
+        stayed: Number of starts at which it came less than 0.5 m far in the last 4 s, standing or
+            not.
         share: Share of all steps in which it stood.
         metres: Total progress, m.
         collisions: Number of collisions.
     """
 
     stood: int
+    stayed: int
     share: float
     metres: float
     collisions: int
@@ -71,8 +75,9 @@ def _row(seed: int, found: Starts) -> Row:
         f"teacher of the car, seed {seed}: starts beside the lane at which it stands for good",
         f"{found.stood} of {STARTS}",
         f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %, 95 % (Clopper-Pearson); it "
-        f"stood in {100 * found.share:.1f} % of the steps; {found.collisions} collisions in "
-        f"{found.metres:.0f} m",
+        f"stood in {100 * found.share:.1f} % of the steps, and came less than {PROGRESS_M} m far "
+        f"in the last {FOR_GOOD / 20:.0f} s at {found.stayed} starts; {found.collisions} "
+        f"collisions in {found.metres:.0f} m",
         "0",
         found.stood == 0,
     )
@@ -81,20 +86,23 @@ def _row(seed: int, found: Starts) -> Row:
 def _judged(seed: int) -> Starts:
     use_one_thread()
     act = _taught(seed).act
-    stood = steps = collisions = 0
+    stood = stayed = steps = collisions = 0
     metres = 0.0
     with closing(RangesEnv("car", courses=HELD_OUT[:50], put_back=True)) as env:
         for _ in _starts(env):
-            stands = 0
-            for _ in range(STEPS):
+            stands, passed_m = 0, 0.0
+            for step in range(STEPS):
                 command = act(observe_ranges(env.world)[None])[0]
                 *_, info = env.step(command)
                 stands = stands + 1 if info["standing"] else 0
                 steps += info["standing"]
+                if step == STEPS - FOR_GOOD:
+                    passed_m = info["progress"]
             stood += stands >= FOR_GOOD
+            stayed += info["progress"] - passed_m < PROGRESS_M
             metres += info["progress"]
             collisions += info["collisions"]
-    return Starts(stood, steps / (STARTS * STEPS), metres, collisions)
+    return Starts(stood, stayed, steps / (STARTS * STEPS), metres, collisions)
 
 
 def _starts(env: RangesEnv) -> Iterator[None]:

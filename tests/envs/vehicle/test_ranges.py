@@ -11,7 +11,12 @@ import numpy as np
 import pytest
 
 from shapechanger.envs.vehicle import RangesEnv, VehicleEnv
-from shapechanger.envs.vehicle.drivers import BEARINGS_DEG, FARTHEST_M
+from shapechanger.envs.vehicle.drivers import (
+    BEARINGS_DEG,
+    FARTHEST_M,
+    LEAST_THROTTLE,
+    leave_rest,
+)
 from shapechanger.envs.vehicle.ranges import OutputShaper
 from shapechanger.errors import SpaceMismatch, UnknownName, WorldError
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
@@ -153,3 +158,24 @@ def test_invalid_use_is_refused() -> None:
             env.step(np.array([np.nan, 0.0], np.float32))
         with pytest.raises(WorldError, match="has no camera"):
             env.world.picture()
+
+
+def test_a_vehicle_that_stands_is_moved() -> None:
+    """At rest a small throttle acts with the least size, in its direction, and 0 stays 0."""
+    for throttle, least_m, most_m in ((0.05, 0.03, 1.0), (-0.05, -1.0, -0.03), (0.0, -0.01, 0.01)):
+        with closing(RangesEnv("car")) as env:
+            env.reset(options=_COURSE)
+            for _ in range(20):
+                *_, info = env.step(np.array([1.0, throttle], np.float32))
+            assert least_m <= info["progress"] <= most_m, throttle
+
+
+def test_a_teacher_leaves_rest_alike() -> None:
+    """What it demonstrates, and what its student learns, is what moved it in its own env."""
+    action = np.array([1.0, -0.02], np.float32)
+    with closing(VehicleEnv("car", image=False)) as env:
+        env.reset(options=_COURSE)
+        driver = env.taught_by(lambda seen: action[np.newaxis], seed=0)
+        meant, _ = driver.act()
+    assert meant.tolist() == [1.0, -LEAST_THROTTLE]
+    assert leave_rest(action, stands=False) is action

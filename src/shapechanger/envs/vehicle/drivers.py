@@ -23,6 +23,12 @@ BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
 FARTHEST_M: Final = 6.0
 """Distance that it sees where nothing is nearer, m."""
 
+LEAST_THROTTLE: Final = 0.25
+"""Least throttle of a teacher's vehicle that stands, in size; it overcomes the friction at rest.
+
+`shapechanger.transfer.learners.student` holds its students to the same.
+"""
+
 _BEARINGS: Final = np.radians(BEARINGS_DEG)
 
 _FOLDER: Final = Path(__file__).parent / "clones"
@@ -101,6 +107,23 @@ def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
     return np.array((*distances, seen.speed, seen.yaw_rate), np.float32)
 
 
+def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
+    """Return an action that moves a vehicle which stands, unless its throttle is exactly 0.
+
+    A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest.
+    The vehicle then sees the same for ever, and stands for good. The exploration of the training
+    moved it, so that the training hardly saw this.
+
+    Args:
+        action: Steering and throttle, shape (2,).
+        stands: Whether the vehicle stands.
+    """
+    steering, throttle = action
+    if not stands or throttle == 0.0 or abs(throttle) >= LEAST_THROTTLE:
+        return action
+    return np.array((steering, np.copysign(LEAST_THROTTLE, throttle)), action.dtype)
+
+
 class TeacherDemonstrator(Demonstrator):
     """A policy that sees distances, as a demonstrator; see `observe_ranges`.
 
@@ -117,7 +140,8 @@ class TeacherDemonstrator(Demonstrator):
         self._policy = act
 
     def _action(self) -> NDArray[np.float32]:
-        return self._policy(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)
+        action = self._policy(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)
+        return leave_rest(action, self._world.inputs().stands)
 
 
 class ExpertDriver:

@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.world import STANDING_MPS
 from shapechanger.envs.vehicle.base import Courses, CourseSampler, DrivingEnv, resolve_profile
-from shapechanger.envs.vehicle.drivers import BEARINGS_DEG, FARTHEST_M, observe_ranges
+from shapechanger.envs.vehicle.drivers import (
+    BEARINGS_DEG,
+    FARTHEST_M,
+    leave_rest,
+    observe_ranges,
+)
 from shapechanger.errors import SpaceMismatch
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.guard.limits import (
@@ -110,7 +115,8 @@ class RangesEnv(DrivingEnv):
 
     ## Action space
     That of `VehicleEnv`: `Box(-1, 1, (2,), float32)`, `[steering, throttle]`, for one control
-    period of the profile, 1/20 s.
+    period of the profile, 1/20 s. Where the vehicle stands, a throttle other than 0 acts with a
+    size of at least 0.25, which moves it.
 
     ## Observation space
     `Box((11,), float32)`: distances from the middle of the front bumper to walls and obstacles at
@@ -247,7 +253,7 @@ class RangesEnv(DrivingEnv):
             )
         world, shaper = self._world, self._shaper
         progress, collisions = self._progress_m, world.collisions
-        command = tuple(values.tolist())
+        command = tuple(leave_rest(values, world.inputs().stands).tolist())
         world.advance(self._period_s, shaper.outputs(command, self._bumped, self._ticks))
         collided = world.collisions > collisions
         self._bumped = world.bumped  # Before it is put back: a robot's reflex outlasts the contact.
