@@ -73,7 +73,7 @@ test-lerobot: $(INSTALLED_LEROBOT)  ## test our robots in LeRobot; installs 6 GB
 	$(RUN) -m pyright -p $(LEROBOT)
 	$(LEROBOT_VENV)/bin/python -m pytest -c $(LEROBOT)/pyproject.toml --rootdir . $(LEROBOT)/tests
 
-test-robots: $(INSTALLED_ROBOTS)  ## test robot files of other projects' packages; installs 1 GB
+test-robots: $(INSTALLED_ROBOTS)  ## test robot files of other projects' packages for 20 minutes; installs 1 GB
 	$(RUN) -m pytest tests/envs/test_real_robots.py
 
 check: $(INSTALLED_DEV)  ## check format, lint, imports and types
