@@ -20,7 +20,8 @@ import numpy as np
 
 import shapechanger
 from benchmarks.row import Row, asked
-from shapechanger.cli.robot.trial import FAULTS, Fault, Trial
+from shapechanger.cli.robot.faults import FAULTS, Fault
+from shapechanger.cli.robot.trial import Trial
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile
 from tests.robots import CAR

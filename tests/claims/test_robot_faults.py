@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.trial import FAULTS, Trial
+from shapechanger.cli.robot.faults import FAULTS
+from shapechanger.cli.robot.trial import Trial
 from shapechanger.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 

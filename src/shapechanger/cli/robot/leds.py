@@ -18,7 +18,8 @@ from typing import Any, Final, NamedTuple, Protocol
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.checks import SelftestResult, check_robot, require_free_pin
-from shapechanger.cli.robot.trial import FAULTS, calm, has
+from shapechanger.cli.robot.faults import FAULTS
+from shapechanger.cli.robot.trial import calm, has
 from shapechanger.cli.robot.trial_driver import Driver
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.remote.client import RobotClient

@@ -22,7 +22,8 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:
-    from shapechanger.cli.robot.trial import Fault, Trial, TrialResult
+    from shapechanger.cli.robot.faults import Fault
+    from shapechanger.cli.robot.trial import Trial, TrialResult
 
 # Retries of a trial in which the robot was not moving before the fault.
 _MORE_TRIES = 2
@@ -121,7 +122,8 @@ class Selftest:
         return run_leds(bench, profile, report, twin=self.twin)
 
     def _on_twin(self, profile: Profile) -> bool:
-        from shapechanger.cli.robot.trial import FAULTS, Trial, has
+        from shapechanger.cli.robot.faults import FAULTS
+        from shapechanger.cli.robot.trial import Trial, has
 
         if self.trials < 1:
             raise RobotError(f"At least one trial is needed, got {self.trials}.")
