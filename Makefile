@@ -30,8 +30,9 @@ PYTEST := $(RUN) -m pytest -n $(JOBS) --dist worksteal
 SITE := NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
 # Tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml). Tracing
 # slows the others down by a third, and they add nothing to it.
-COVERING := test_architecture.py test_errors.py test_layout.py envs/stepping envs/vector identify laws \
-	link morphology robot/guard robot/profile tasks transfer/body_map transfer/metrics
+COVERING := test_architecture.py test_errors.py test_layout.py envs/stepping envs/vector \
+	finger/identify finger/paths finger/task \
+	laws link morphology robot/guard robot/profile tasks transfer/body_map transfer/metrics
 COVERING := $(addprefix tests/,$(COVERING))
 
 VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \

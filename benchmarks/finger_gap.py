@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from benchmarks.finger_learned import CIRCLE, TRACKS, played, trained
 from benchmarks.finger_reach import FINGERS, TARGETS, Statics, held_by_controller
 from benchmarks.row import Row, asked
-from shapechanger.bodies.finger import FingerParameters
 from shapechanger.cli import main
 from shapechanger.cli.transfer import write_study_report
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.finger.env import SMOOTHNESS
-from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.files import read_json
+from shapechanger.finger.env import SMOOTHNESS
+from shapechanger.finger.parameters import FingerParameters
+from shapechanger.finger.policies import POLICIES
 from shapechanger.reports.numbers import share_text
 from shapechanger.transfer.executor import Processes
 from shapechanger.transfer.learners.evaluation import evaluation_seed

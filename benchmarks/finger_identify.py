@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 import shapechanger  # noqa: F401 - Registers the ids.
 from benchmarks.row import Row
-from shapechanger.bodies.finger import JOINTS, FingerParameters
-from shapechanger.envs.finger.identification import record_babble
-from shapechanger.identify import FingerLog, IdentifiedFinger, identify
+from shapechanger.finger.anatomy import JOINTS
+from shapechanger.finger.identify import FingerLog, IdentifiedFinger, identify
+from shapechanger.finger.identify.babble import record_babble
+from shapechanger.finger.parameters import FingerParameters
 
 _SECONDS = 10.0
 _SMALL_M = 2e-3

@@ -21,8 +21,8 @@ import numpy as np
 from benchmarks.finger_oracle import FIRST_SEED, tracked_mm
 from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.finger.gap import GAPS
 from shapechanger.files import write_atomic
+from shapechanger.finger.gap import GAPS
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.presets import learner_settings

@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 
 from benchmarks.row import Row
-from shapechanger.bodies.finger import DRIVES
-from shapechanger.envs.finger.oracle import FingerOracle
+from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.tensions import DRIVES
 
 TARGETS: Final = 1000
 # Beyond all seeds used for tuning.

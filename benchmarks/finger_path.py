@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 import shapechanger  # noqa: F401 - Registers the ids.
 from benchmarks.row import Row
-from shapechanger.bodies.finger import FingerParameters
-from shapechanger.envs.finger.identification import record_babble
-from shapechanger.envs.finger.plant import CONTROL_DT
-from shapechanger.envs.finger.policies import POLICIES
-from shapechanger.identify import FingerLog, identify
-from shapechanger.identify.motion import Window
-from shapechanger.identify.result import replay
+from shapechanger.finger.identify import FingerLog, identify
+from shapechanger.finger.identify.babble import record_babble
+from shapechanger.finger.identify.motion import Window
+from shapechanger.finger.identify.result import replay
+from shapechanger.finger.parameters import FingerParameters
+from shapechanger.finger.plant import CONTROL_DT
+from shapechanger.finger.policies import POLICIES
 from shapechanger.transfer.learners.policy_file import load_policy
 
 _SECONDS = 10.0

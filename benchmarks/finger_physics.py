@@ -9,15 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.row import Row
-from shapechanger.bodies.finger import JOINTS, NOMINAL, FingerParameters, build_finger, drive_of
-from shapechanger.bodies.finger.anatomy import (
+from shapechanger.finger.anatomy import (
     DIP_BAND,
     DIP_BY_PIP,
     JOINT_REST,
+    JOINTS,
     MOMENT_ARMS,
 )
-from shapechanger.bodies.finger.tensions import co_contraction
-from shapechanger.envs.finger.gap import GAPS
+from shapechanger.finger.gap import GAPS
+from shapechanger.finger.model import build_finger
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.tensions import co_contraction, drive_of
 
 _COMMANDS: Final = 100
 _N: Final = len(JOINTS)

@@ -13,14 +13,15 @@ from scipy.optimize import minimize
 
 import shapechanger  # noqa: F401 - Registers the ids.
 from benchmarks.row import Row
-from shapechanger.bodies.finger import NOMINAL, FingerParameters, build_finger, drive_of
-from shapechanger.bodies.finger.anatomy import JOINT_RANGE, JOINT_REST, PHALANX_LENGTH_M
-from shapechanger.bodies.finger.tensions import tensions_for_torque
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.finger.gap import GAPS
-from shapechanger.envs.finger.oracle import FingerOracle
-from shapechanger.envs.finger.postures import angles_for, joint_torque
-from shapechanger.tasks.finger import fingertip, fingertip_jacobian
+from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.gap import GAPS
+from shapechanger.finger.model import build_finger
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.postures import angles_for, joint_torque
+from shapechanger.finger.task import fingertip, fingertip_jacobian
+from shapechanger.finger.tensions import drive_of, tensions_for_torque
 from shapechanger.transfer.learners.evaluation import evaluation_seed
 
 # With a larger gain, 1/s, a finger on a rig's path of commands oscillates; a smaller one, 6, leaves

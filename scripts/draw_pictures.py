@@ -29,10 +29,10 @@ from shapechanger.cli.pictures import write_film
 from shapechanger.cli.transfer import Transfer
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.finger.oracle import FingerOracle
-from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.files import read_json
+from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.policies import POLICIES
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import STUDY_FILE, Study

@@ -15,8 +15,8 @@ import msgspec
 
 import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.files import write_atomic
+from shapechanger.finger.policies import POLICIES
 from shapechanger.tensor_file import read_tensors, tensor_bytes
 from shapechanger.transfer.references import FOLDER
 from shapechanger.transfer.versions import ENV, identify, known

@@ -396,7 +396,7 @@ MODULES: Final = (
     "shapechanger.envs.pendulum",
     "shapechanger.envs.reshapable",
     "shapechanger.envs.runners",
-    "shapechanger.envs.remote.finger",
+    "shapechanger.finger.remote",
     "shapechanger.envs.remote.vehicle",
     "shapechanger.envs.remote.waypoints",
     "shapechanger.remote.client",

@@ -14,9 +14,9 @@ from benchmarks import run
 from benchmarks.finger_gap import rows_of
 from benchmarks.finger_reach import Statics
 from benchmarks.row import Row, asked
-from shapechanger.bodies.finger import NOMINAL
-from shapechanger.bodies.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
-from shapechanger.tasks.finger import fingertip
+from shapechanger.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.finger.parameters import NOMINAL
+from shapechanger.finger.task import fingertip
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.plan import Run
 from shapechanger.transfer.runs import RunResult

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from shapechanger.demos.dataset import Dataset, load_dataset
     from shapechanger.envs.own import from_mjcf
     from shapechanger.envs.vector.make import make_vec
-    from shapechanger.identify import load_log
+    from shapechanger.finger.identify import load_log
     from shapechanger.morphology import (
         AddFloor,
         AddFreeJoint,

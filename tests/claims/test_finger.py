@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import shapechanger  # noqa: F401 - Registers the ids.
-from shapechanger.bodies.finger import DRIVES
-from shapechanger.envs.finger.oracle import FingerOracle
-from shapechanger.envs.finger.policies import POLICIES
+from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.policies import POLICIES
+from shapechanger.finger.tensions import DRIVES
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
 
 FINGER = "shapechanger/Finger-v1"

@@ -12,13 +12,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import NOMINAL, FingerParameters
-from shapechanger.envs.finger.gap import GAPS, resolve_gap
-from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.errors import BadAction, FingerError, PathError, UnknownName
-from shapechanger.identify.result import PATH_DELAY_ERROR_S
+from shapechanger.finger.gap import GAPS, resolve_gap
+from shapechanger.finger.identify.result import PATH_DELAY_ERROR_S
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.paths import as_path
+from shapechanger.finger.policies import POLICIES
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.tasks.paths import as_path
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.twin.robot import RunningRobot, run_robot
 from tests.twin.robots import until

@@ -17,8 +17,8 @@ from safetensors import numpy as safetensors
 
 import shapechanger
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.finger.policies import POLICIES
 from shapechanger.errors import CorruptStudy
+from shapechanger.finger.policies import POLICIES
 from shapechanger.tensor_file import tensor_bytes
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy

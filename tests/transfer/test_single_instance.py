@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.finger.reach import FingerReachEnv
+from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Evaluation
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from tests.transfer.studies import TINY

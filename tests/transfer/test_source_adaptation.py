@@ -9,11 +9,11 @@ from typing import Any
 import gymnasium as gym
 import pytest
 
-from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.finger import identification
-from shapechanger.envs.finger.reach import FingerReachEnv
 from shapechanger.errors import RobotError, StudyError
+from shapechanger.finger.identify import babble
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.reports.verdict import arm_rows, caveats
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.sb3 import Sb3Learner
@@ -41,7 +41,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[A
     out = tmp_path_factory.mktemp("gap") / "study"
     task = TransferTask(FINGER, REAL_LIKE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(identification, "identify_env", identified)
+        patch.setattr(babble, "identify_env", identified)
         plan = tiny_plan(task=task, arms=_EVERY, source_steps=64)
         return run_study(plan, out, executor=Serial()), out, moved
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.bodies.finger import NOMINAL
 from shapechanger.errors import RobotError
+from shapechanger.finger.parameters import NOMINAL
 from shapechanger.robot.guard.outputs import OutputBank, make_safe
 from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.profile.load import find_profile, load_profile

@@ -7,15 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
+from shapechanger.finger.anatomy import JOINTS
+from shapechanger.finger.parameters import NOMINAL
+from shapechanger.finger.twin import FingerWorld
 from shapechanger.robot.drivers.as5600 import connect_encoders, open_driver
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.twin.chips import ChannelsBehind, SimulatedAs5600, Tca9548a
 from shapechanger.twin.in_process import LocalBoard
 from shapechanger.twin.wiring import TwinWiring
-from shapechanger.twin.world.finger import FingerWorld
 from shapechanger.twin.world.vehicle import DrivingWorld
 
 _TURN = 2.0 * math.pi

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS
-from shapechanger.bodies.finger.anatomy import JOINT_REST, MOMENT_ARMS
 from shapechanger.errors import RobotError, UnknownName
+from shapechanger.finger.anatomy import JOINT_REST, JOINTS, MOMENT_ARMS, TENDONS
+from shapechanger.finger.parameters import NOMINAL
+from shapechanger.finger.twin import FingerWorld
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.twin.servos.rig import Rig, ServoFault
-from shapechanger.twin.world.finger import FingerWorld
 
 _REST = (0.0,) * 7
 _FLEX = (0.65, 0.65, 0.0, 0.0, 0.0, 0.0, 0.0)

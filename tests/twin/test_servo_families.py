@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import JOINTS, NOMINAL, TENDONS
-from shapechanger.bodies.finger.anatomy import MOMENT_ARMS
 from shapechanger.errors import ProfileError, RobotError
+from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
+from shapechanger.finger.parameters import NOMINAL
+from shapechanger.finger.twin import FingerWorld
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.robot.guard import start
@@ -29,7 +30,6 @@ from shapechanger.twin.robot import Operator
 from shapechanger.twin.servos.rig import Rig
 from shapechanger.twin.start import start_board
 from shapechanger.twin.wiring import TwinWiring
-from shapechanger.twin.world.finger import FingerWorld
 from shapechanger.twin.world.place import Place
 from tests.robot.profile.texts import finger_text, read
 from tests.twin.robots import until

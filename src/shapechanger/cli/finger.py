@@ -18,8 +18,8 @@ from shapechanger.errors import FingerError, OutputError, UnknownName
 from shapechanger.files import write_atomic
 
 if TYPE_CHECKING:
-    from shapechanger.bodies.finger import FingerParameters
-    from shapechanger.identify import IdentifiedFinger
+    from shapechanger.finger.identify import IdentifiedFinger
+    from shapechanger.finger.parameters import FingerParameters
 
 # Largest file of parameters, which have some kilobytes.
 _MOST_BYTES: Final = 1 << 20
@@ -42,8 +42,8 @@ class Identify:
 
     def run(self) -> None:
         """Print the parameters, and write them and the report."""
-        from shapechanger.identify import identify, load_log
-        from shapechanger.reports.finger import finger_html, summary_line, unknown
+        from shapechanger.finger.identify import identify, load_log
+        from shapechanger.finger.report import finger_html, summary_line, unknown
 
         page = self.report or self.log.with_name(f"{self.log.stem}.html")
         files = [path for path in (self.out, page) if path is not None]
@@ -52,7 +52,7 @@ class Identify:
                 raise OutputError(f"Cannot write {path}: it is the log.")
         log = load_log(self.log)
         if self.geared and log.motors is None:
-            from shapechanger.envs.finger.gap import shipped_rig
+            from shapechanger.finger.gap import shipped_rig
 
             log = dataclasses.replace(log, motors=shipped_rig())
         for path in files:
@@ -74,8 +74,8 @@ class Identify:
 
 def _arms_table(found: IdentifiedFinger) -> Table:
     """Moment arms, tendon by joint."""
-    from shapechanger.bodies.finger import JOINTS, TENDONS
-    from shapechanger.reports.finger import arm_cell
+    from shapechanger.finger.anatomy import JOINTS, TENDONS
+    from shapechanger.finger.report import arm_cell
 
     cells = {e.name: arm_cell(e) for e in found.arms}
     table = Table("moment arm [mm]", *JOINTS, box=None, pad_edge=False)
@@ -87,7 +87,7 @@ def _arms_table(found: IdentifiedFinger) -> Table:
 
 def _table(found: IdentifiedFinger) -> Table:
     """Parameters other than the moment arms."""
-    from shapechanger.reports.finger import interval, label, number
+    from shapechanger.finger.report import interval, label, number
 
     table = Table("parameter", "identified", "95 % interval", "nominal", box=None, pad_edge=False)
     for e in found.estimates:
@@ -120,8 +120,8 @@ class RecordFinger:
 
     def run(self) -> None:
         """Record and print a summary."""
-        from shapechanger.envs.finger.identification import record_babble
-        from shapechanger.identify import save_log
+        from shapechanger.finger.identify import save_log
+        from shapechanger.finger.identify.babble import record_babble
 
         require_seed(self.seed)
         require_seed(self.finger_seed)
@@ -169,9 +169,10 @@ class ExportFinger:
         """Write the file."""
         import numpy as np
 
-        from shapechanger.bodies.finger import NOMINAL, drive_of
-        from shapechanger.bodies.finger.export import finger_mjcf
-        from shapechanger.envs.finger.gap import resolve_gap
+        from shapechanger.finger.export import finger_mjcf
+        from shapechanger.finger.gap import resolve_gap
+        from shapechanger.finger.parameters import NOMINAL
+        from shapechanger.finger.tensions import drive_of
 
         require_seed(self.finger_seed)
         require_file(self.out)
@@ -189,8 +190,8 @@ class ExportFinger:
 
 def _parameters(given: str) -> FingerParameters:
     """Return a set of parameters by name, or from a file."""
-    from shapechanger.bodies.finger.parameters import PARAMETER_SETS, FingerParameters
     from shapechanger.demos.episodes.files import read_file
+    from shapechanger.finger.parameters import PARAMETER_SETS, FingerParameters
 
     if given in PARAMETER_SETS:
         return PARAMETER_SETS[given]

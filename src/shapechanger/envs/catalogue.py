@@ -76,18 +76,18 @@ class TaskEntry(msgspec.Struct, frozen=True):
 FINGER_ENVS: Final[Mapping[str, TaskEntry]] = MappingProxyType(
     {
         "shapechanger/Finger-v1": TaskEntry(
-            "shapechanger.envs.finger:FingerReachEnv",
+            "shapechanger.finger.reach:FingerReachEnv",
             "finger of seven tendons: reach a point",
             "ppo-finger",
             100,
-            "shapechanger.envs.warp.finger_reader",
+            "shapechanger.finger.gpu_reader",
         ),
         "shapechanger/FingerTrack-v1": TaskEntry(
-            "shapechanger.envs.finger:FingerTrackEnv",
+            "shapechanger.finger.track:FingerTrackEnv",
             "finger of seven tendons: follow a path",
             "ppo-finger",
             250,
-            "shapechanger.envs.warp.finger_reader",
+            "shapechanger.finger.gpu_reader",
         ),
     }
 )

@@ -11,11 +11,15 @@ from typing import Any, Final, cast
 
 import mujoco
 import numpy as np
-from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer, WindowViewer
 from numpy.typing import NDArray
 
-from shapechanger.errors import RenderError
+from shapechanger.errors import MissingExtra, RenderError
 from shapechanger.rendering import choose_gl, require_context
+
+try:
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer, WindowViewer
+except ModuleNotFoundError as error:
+    raise MissingExtra(error.name or "mujoco", "sim") from error
 
 # Frames of at most this many pixels are camera observations rather than films.
 _MOST_CAMERA_PIXELS: Final = 256 * 256

@@ -9,15 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import NOMINAL, TENDONS, FingerParameters, drive_of
-from shapechanger.bodies.finger.export import finger_mjcf
-from shapechanger.bodies.finger.parameters import PARAMETER_SETS
 from shapechanger.cli import main
-from shapechanger.envs.finger.gap import GAPS, shipped_rig
 from shapechanger.errors import FingerError
-from shapechanger.identify import FingerLog, load_log
-from shapechanger.identify.log import save_log
-from tests.identify.logs import recorded
+from shapechanger.finger.anatomy import TENDONS
+from shapechanger.finger.export import finger_mjcf
+from shapechanger.finger.gap import GAPS, shipped_rig
+from shapechanger.finger.identify import FingerLog, load_log
+from shapechanger.finger.identify.log import save_log
+from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters
+from shapechanger.finger.tensions import drive_of
+from tests.finger.identify.logs import recorded
 
 
 def output_of(capsys: pytest.CaptureFixture[str], *words: object) -> str:
@@ -83,7 +84,7 @@ def test_motors_are_taken_for_geared_where_the_log_says_nothing(
         taken.append(log.motors)
         raise FingerError("That is enough.")
 
-    monkeypatch.setattr("shapechanger.identify.identify", identify)
+    monkeypatch.setattr("shapechanger.finger.identify.identify", identify)
     for option in ((), ("--geared",)):
         assert "That is enough." in refused(capsys, "identify", tmp_path / "log.npz", *option)
     assert taken == ([own, own] if says else [None, shipped_rig()])

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.bodies.finger import NOMINAL, FingerParameters
 from shapechanger.cli.robot import serve as serving
 from shapechanger.cli.robot.serve import finger_of, place_of
-from shapechanger.envs.finger.gap import GAPS
 from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
+from shapechanger.finger.gap import GAPS
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.robot import Operator

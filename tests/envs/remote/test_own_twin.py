@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import shapechanger  # noqa: F401 - Registers the ids.
-from shapechanger.bodies.finger import NOMINAL, TENDONS
-from shapechanger.envs.finger.gap import GAPS, shipped_rig, with_gears
 from shapechanger.errors import FingerError, UnknownName
+from shapechanger.finger.anatomy import TENDONS
+from shapechanger.finger.gap import GAPS, shipped_rig, with_gears
+from shapechanger.finger.parameters import NOMINAL
 from shapechanger.robot.profile.load import find_profile, load_profile
 
 RIG = "shapechanger/RemoteFinger-v1"

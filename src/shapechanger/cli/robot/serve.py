@@ -372,7 +372,8 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
         if gap:
             raise MissingExtra("mujoco", "sim")
         return None
-    from shapechanger.bodies.finger import NOMINAL, TENDONS
+    from shapechanger.finger.anatomy import TENDONS
+    from shapechanger.finger.parameters import NOMINAL
 
     if tendons != set(TENDONS):
         if gap:
@@ -385,7 +386,7 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
         return Place(finger=NOMINAL.to_json())
     import numpy as np
 
-    from shapechanger.envs.finger.gap import resolve_gap
+    from shapechanger.finger.gap import resolve_gap
 
     return Place(finger=resolve_gap(gap).draw(np.random.default_rng(seed or 0)).to_json())
 

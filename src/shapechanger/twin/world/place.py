@@ -49,11 +49,9 @@ def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, 
         FingerError: If the parameters of the finger are invalid.
     """
     if place.finger:
-        try:
-            from shapechanger.bodies.finger import FingerParameters
-            from shapechanger.twin.world.finger import FingerWorld
-        except ModuleNotFoundError as error:
-            raise MissingExtra(error.name or "mujoco", "sim") from error
+        from shapechanger.finger.parameters import FingerParameters
+        from shapechanger.finger.twin import FingerWorld
+
         return FingerWorld(FingerParameters.from_json(place.finger), seed)
     size, pitch_deg, fovy_deg = (
         (None, None, None) if camera is None else (camera.size, camera.pitch_deg, camera.fovy_deg)

@@ -1,0 +1,382 @@
+"""Base class of the finger envs: the plant, the spaces and rendering."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.contract.measure import Measure
+from shapechanger.envs.actions import check_action
+from shapechanger.envs.renderer import Renderer, body_reach, draw
+from shapechanger.errors import FingerError, UnknownName, check_seed
+from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, MOST_TENSION_N, TENDONS
+from shapechanger.finger.drawing import tendon_legend
+from shapechanger.finger.gap import (
+    Gap,
+    geared_around,
+    require_balance,
+    resolve_gap,
+    with_gears,
+)
+from shapechanger.finger.model import FingerFigure
+from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters
+from shapechanger.finger.plant import CONTROL_DT, FingerPlant
+from shapechanger.finger.postures import draw_start
+from shapechanger.finger.task import FingerSenses, FingertipReward, features_of_senses
+from shapechanger.finger.tensions import drive_of
+from shapechanger.layout import Element, Feature, Layout
+from shapechanger.rendering import choose_gl, require_screen
+
+if TYPE_CHECKING:
+    from gymnasium.envs.registration import EnvSpec
+
+_MODES: Final = ("human", "rgb_array", "depth_array")
+# From the thumb's side, with the workspace and the end of the hand in view.
+_CAMERA: Final[Mapping[str, Any]] = {
+    "lookat": np.array([0.017, 0.0, -0.024]),
+    "distance": 0.18,
+    "azimuth": -125.0,
+    "elevation": -15.0,
+}
+_PICTURE: Final = 480
+
+# Weight of the reward in a source for a rig: what changes fast costs, because a rig cannot follow.
+_CALM: Final = {"change": 5.0}
+
+SMOOTHNESS: Final = Measure("smoothness", "1", "smoothness", "episode")
+"""1 minus the mean change of a tendon's command per step, over its range of 2."""
+
+
+class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
+    """An index finger moved by seven tendons; derived classes define the task.
+
+    Args:
+        actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
+        parameters: Parameters of the finger, as `FingerParameters`, their JSON, some by name, or
+            the name of a set, "an-1983"; by default the nominal finger.
+        gap: Distribution, or its name, that the finger is drawn from instead of `parameters`; see
+            `shapechanger.finger.gap`.
+        finger_seed: Seed of the finger drawn from the gap; None draws another finger at each reset
+            (domain randomisation).
+        reward: Weights that replace the default ones, by name.
+        render_mode: "human", "rgb_array" or "depth_array".
+        width: Width of frames, pixels.
+        height: Height of frames, pixels.
+
+    Attributes:
+        plant: The simulated finger, with its ground truth.
+        observation_layout: Name, unit and range of each number of the observation.
+        action_layout: Name, unit and range of each number of the action.
+
+    Raises:
+        UnknownName: If there is no such mode of action, gap, parameter, weight or render mode.
+        FingerError: If the parameters contradict themselves, come with a gap, or have moment arms
+            with which the tendons cannot balance a joint.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it without ClassVar.
+        "render_modes": [*_MODES],
+        "render_fps": round(1.0 / CONTROL_DT),
+    }
+    observation_layout: Layout
+    _spec: EnvSpec | None = None
+
+    def __init__(
+        self,
+        *,
+        actions: str = "impedance",
+        parameters: FingerParameters | Mapping[str, Any] | str | None = None,
+        gap: str | Gap | Mapping[str, Any] | None = None,
+        finger_seed: int | None = None,
+        reward: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        width: int = _PICTURE,
+        height: int = _PICTURE,
+    ) -> None:
+        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
+        EzPickle.__init__(self, **arguments)
+        if render_mode is not None and render_mode not in _MODES:
+            raise UnknownName("render mode", render_mode, _MODES)
+        if render_mode == "human":
+            require_screen()
+        elif render_mode is not None:
+            choose_gl()
+        if gap is not None and parameters is not None:
+            raise FingerError("Give either parameters or a gap to draw them from, not both.")
+        if gap is None and finger_seed is not None:
+            raise FingerError("finger_seed selects a finger of a gap, so it needs a gap.")
+        self.render_mode = render_mode
+        self.width, self.height = width, height
+        self._actions = actions
+        self._gap = None if gap is None else resolve_gap(gap)
+        self._is_drawn_anew = gap is not None and finger_seed is None
+        self._reward = FingertipReward.from_weights(reward or {})
+        self._figure: FingerFigure | None = None
+        self._renderer: Renderer | None = None
+        if self._gap is None:
+            self._use(as_finger(parameters))
+        else:
+            chosen = check_seed(
+                0 if finger_seed is None else finger_seed,
+                FingerError,
+                "finger_seed must be",
+                largest=None,
+            )
+            self._use(self._gap.draw(np.random.default_rng(chosen)))
+        self._senses: FingerSenses | None = None
+        self._change = np.zeros(len(TENDONS))  # Of the command, in the newest step.
+        self.action_layout = Layout(
+            tuple(
+                Feature(f"{name}/command", "1", -1.0, 1.0, Element("tendon", name))
+                for name in TENDONS
+            )
+        )
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (len(TENDONS),), np.float32)
+
+    def _use(self, parameters: FingerParameters) -> None:
+        """Simulate a finger with these parameters from here on."""
+        self.parameters = parameters
+        self.drive = drive_of(self._actions, NOMINAL)
+        self.plant = FingerPlant(parameters, self.drive, CONTROL_DT)
+        self._most = np.array(parameters.most_tension)
+        self.plant.place(JOINT_REST, np.random.default_rng(0))  # Until the first reset.
+
+    def _place(self, options: dict[str, Any] | None) -> FingerSenses:
+        """Draw the finger if each episode has another, and put it at a start."""
+        known = self._options
+        for name in options or {}:
+            if name not in known:
+                raise UnknownName("option of reset", name, known)
+        if self._is_drawn_anew and self._gap is not None:
+            self._use(self._gap.draw(self.np_random))
+        given = (options or {}).get("posture")
+        angles = draw_start(self.np_random) if given is None else check_posture(given)
+        self._senses = self.plant.place(angles, self.np_random)
+        return self._senses
+
+    _options: tuple[str, ...] = ("posture",)
+
+    def _act(self, action: Any) -> FingerSenses:
+        """Apply an action, and return the measurements after it."""
+        if self._senses is None:
+            raise gym.error.ResetNeeded("Call reset() before the first step.")
+        checked = check_action(self, action)
+        before = self._senses.commands
+        self._senses = self._move(np.clip(np.asarray(checked, np.float64), -1.0, 1.0))
+        self._change = self._senses.commands - before
+        return self._senses
+
+    def _move(self, command: NDArray[np.float64]) -> FingerSenses:
+        """Apply a command, -1 to 1, (7,), for one control period."""
+        return self.plant.act(command, self.np_random)
+
+    def _terms(self, place: NDArray[np.float64]) -> tuple[float, dict[str, float]]:
+        """Return the distance of the fingertip from its target, m, and the terms of the reward."""
+        distance = float(np.linalg.norm(self.plant.fingertip - place))
+        effort, change = float(np.mean(self._pulled**2)), float(np.mean(self._change**2))
+        return distance, self._reward.terms(distance, effort, change, CONTROL_DT)
+
+    def _stepped(
+        self, observation: Any, info: dict[str, Any], terms: dict[str, float]
+    ) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Return the result of a step, whose reward is the sum of `terms`."""
+        more: dict[str, Any] = {SMOOTHNESS.key: 1.0 - 0.5 * float(np.abs(self._change).mean())}
+        if self.plant.diverged:
+            more["diverged"] = True
+        return observation, sum(terms.values()), False, False, {**info, **terms, **more}
+
+    def render(self) -> Any:
+        """Return a frame of `render_mode`; None without one.
+
+        Raises:
+            RenderError: If nothing can be drawn here.
+        """
+        if self.render_mode is None:
+            return None
+        figure = self._shown()
+        if self._renderer is None:
+            self._renderer = Renderer(
+                figure.model, figure.data, dict(_CAMERA), self.width, self.height
+            )
+        if self.render_mode == "depth_array":
+            return self._renderer.render(self.render_mode)
+        frame = self._renderer.render(self.render_mode, self._markers())
+        return frame if frame is None else tendon_legend(frame, self._pulled)
+
+    def _markers(self) -> list[dict[str, Any]]:
+        """Return what frames show besides the finger."""
+        return []
+
+    @property
+    def _pulled(self) -> NDArray[np.float64]:
+        """Tensions over the largest, (7,)."""
+        return np.abs(self.plant.data.actuator_force) / self._most
+
+    def _shown(self) -> FingerFigure:
+        """Return a figure of the present finger; the simulated model has no visible geoms."""
+        if self._figure is None:
+            self._figure = FingerFigure()
+        self._figure.show(self.plant.angles, self._pulled, self.plant.data.mocap_pos[0])
+        return self._figure
+
+    def close(self) -> None:
+        """Free the renderer."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    # `gym.make`, Minari and vector envs build the env again from its spec, which is stored as JSON.
+
+    @property
+    def spec(self) -> EnvSpec | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The registered spec, with parameters and gap as JSON has them."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        self._spec = copy.deepcopy(spec)
+        kwargs: dict[str, Any] = {} if self._spec is None else self._spec.kwargs
+        for name in ("parameters", "gap"):
+            if isinstance(kwargs.get(name), msgspec.Struct):
+                kwargs[name] = msgspec.to_builtins(kwargs[name])
+
+    @property
+    def motors(self) -> FingerParameters | None:
+        """Motors and path that a rig's profile states; None where there is no path."""
+        own = self.parameters
+        if own.path is None:
+            return None
+        known = {"most_tension": own.most_tension, "least_tension": own.least_tension}
+        return with_gears(NOMINAL.replace(**known, path=own.path))
+
+    # Interface of transfer studies; see `shapechanger.transfer`.
+
+    @property
+    def reach(self) -> float:
+        """Distance from the middle of the finger to its farthest point, m."""
+        figure = self._shown()
+        return body_reach(figure.model, figure.data.qpos)
+
+    def picture(
+        self, width: int = 480, height: int = 360, reach: float | None = None
+    ) -> NDArray[np.uint8]:
+        """Return an image of the present finger, shape (height, width, 3).
+
+        Args:
+            width: Width in pixels.
+            height: Height in pixels.
+            reach: Metres in view around the middle of the finger; None for its own reach.
+
+        Raises:
+            RenderError: If nothing can be drawn here.
+        """
+        figure = self._shown()
+        return draw(figure.without_target(), figure.data.qpos, width, height, reach or self.reach)
+
+    @property
+    def individual(self) -> str:
+        """The argument that says which finger this is, where the gap has many; else empty."""
+        return "finger_seed" if self._is_drawn_anew else ""
+
+    def randomised_source(self) -> dict[str, Any]:
+        """Arguments with which an env of the finger has other fingers that this one may be."""
+        return {"gap": "wide", "reward": _CALM}
+
+    def identified_source(self, seed: int) -> dict[str, Any]:
+        """Identify this finger, and return arguments of `Finger-v1` that reproduce it.
+
+        On a rig's path, parameters of the motors, which a log hardly reveals, are drawn for each
+        episode as in the gap "wide".
+
+        Args:
+            seed: Seed of the motions, which take ten seconds.
+
+        Raises:
+            FingerError: If the motions do not suffice, or observations are not a vector.
+            MissingExtra: If `mujoco.sysid` is not installed.
+        """
+        # An optimiser, which an env that only steps does not need.
+        from shapechanger.finger.identify.babble import identify_env
+
+        found = identify_env(self, self._actions, seed)
+        if found.path is None:
+            return {"parameters": msgspec.to_builtins(found)}
+        return {"gap": msgspec.to_builtins(geared_around(found)), "reward": _CALM}
+
+    def _sense_features(self) -> list[Feature]:
+        return features_of_senses(
+            JOINTS, JOINT_RANGE, TENDONS, [float(most) for most in MOST_TENSION_N]
+        )
+
+
+FingerLike = FingerParameters | Mapping[str, Any] | str
+"""A finger as users give it: parameters, their JSON, some by name, or the name of a set."""
+
+
+def as_finger(value: FingerLike | None) -> FingerParameters:
+    """Return a finger whose tendons can hold it; the nominal one for None.
+
+    Raises:
+        UnknownName: If there is no such set or parameter.
+        FingerError: If the parameters contradict themselves, or the tendons cannot balance a joint.
+    """
+    given = _parameters(value)
+    if given not in PARAMETER_SETS.values():
+        require_balance(given)
+    return given
+
+
+def _parameters(value: FingerLike | None) -> FingerParameters:
+    if value is None:
+        return NOMINAL
+    if isinstance(value, FingerParameters):
+        return value
+    if isinstance(value, str):
+        if value.lstrip().startswith("{"):
+            return FingerParameters.from_json(value)
+        if value not in PARAMETER_SETS:
+            raise UnknownName("set of finger parameters", value, PARAMETER_SETS)
+        return PARAMETER_SETS[value]
+    given: Any = value  # May be anything where nothing checks types.
+    if not isinstance(given, Mapping):
+        raise FingerError(f"Parameters of a finger must be numbers by name or JSON, got {given!r}.")
+    known = FingerParameters.__struct_fields__
+    for name in value:
+        if name not in known:
+            raise UnknownName("parameter of a finger", name, known)
+    return NOMINAL.replace(**value)
+
+
+def check_posture(value: Any) -> NDArray[np.float64]:
+    """Return a posture as an array, rad, (4,).
+
+    Raises:
+        FingerError: If it is not four angles within the ranges of the joints.
+    """
+    angles = as_numbers(value)
+    low, high = JOINT_RANGE.T
+    if angles.shape != (len(JOINTS),) or not ((angles >= low) & (angles <= high)).all():
+        raise FingerError(
+            f"A posture must be four angles in rad, {', '.join(JOINTS)}, within "
+            f"{_rounded(low)} and {_rounded(high)}; got {value}."
+        )
+    return angles
+
+
+def as_numbers(value: Any) -> NDArray[np.float64]:
+    """Return a value as an array of floats; an empty one if it cannot be converted."""
+    try:
+        return np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
+def _rounded(angles: NDArray[np.float64]) -> list[float]:
+    return [round(float(angle), 3) for angle in angles]

@@ -1,0 +1,285 @@
+"""Distributions of real fingers around the nominal one (the reality gap)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import FingerError, UnknownName
+from shapechanger.finger.anatomy import JOINTS
+from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
+from shapechanger.finger.tensions import spans_all_torques, tensions_for_torque
+
+# Draws before giving up; those whose tendons cannot balance one another are rejected, about one in
+# two hundred with arm errors of 25 %.
+_TRIES: Final = 1000
+
+# Parameters whose logarithm is drawn.
+_LOGARITHMIC: Final = frozenset({"joint_factor", "tendon_stiffness", "motor_kg"})
+
+# Torque that the tendons must give each joint alone, N·m.
+_BALANCE_NM: Final = 0.01
+# Relative errors of identified arms and stretch, and of joints: `benchmarks.finger_identify`.
+_FOUND: Final = 0.03
+_JOINTS_FOUND: Final = 0.2
+# Spread around an identified delay, s. Chosen: most errors are smaller (`benchmarks.finger_path`).
+_DELAY_FOUND_S: Final = 0.005
+
+Range = tuple[float, float]
+
+
+class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Ranges that the parameters of a finger are drawn from, uniformly unless noted otherwise.
+
+    Attributes:
+        arm_error: Largest relative error of each moment arm, in either direction.
+        joint_factor: Factor of the stiffness, damping and friction of each joint, drawn
+            log-uniformly.
+        strength: Factor of the largest tensions.
+        tendon_friction: N.
+        tendon_stiffness: N/m, drawn log-uniformly.
+        backlash: m.
+        motor_kg: kg, drawn log-uniformly.
+        motor_lag: s.
+        command_delay: s.
+        joint_noise: Standard deviation of measured angles, rad.
+        tension_noise: Standard deviation of measured tensions, N.
+        tendon_damping: N·s/m.
+        least_tension: N.
+        around: The finger that errors and factors refer to, whose path of commands all have.
+
+    Raises:
+        FingerError: If a range is empty, not finite or negative, begins at 0 where logarithms are
+            drawn, or `arm_error` is not in [0, 1).
+    """
+
+    arm_error: float
+    joint_factor: Range
+    strength: Range
+    tendon_friction: Range
+    tendon_stiffness: Range
+    backlash: Range
+    motor_kg: Range
+    motor_lag: Range
+    command_delay: Range
+    joint_noise: Range
+    tension_noise: Range
+    tendon_damping: Range = (NOMINAL.tendon_damping, NOMINAL.tendon_damping)
+    least_tension: Range = (NOMINAL.least_tension, NOMINAL.least_tension)
+    around: FingerParameters = NOMINAL
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.arm_error < 1.0:
+            raise FingerError(f"arm_error must be 0 to below 1, got {self.arm_error}.")
+        for name, value in msgspec.structs.asdict(self).items():
+            if name in ("arm_error", "around"):
+                continue
+            if not 0.0 <= value[0] <= value[1] < math.inf:
+                raise FingerError(f"{name}: the range {value} is empty, infinite or below zero.")
+            if name in _LOGARITHMIC and not value[0] > 0.0:
+                raise FingerError(f"{name}: the range {value} must begin above zero.")
+
+    def draw(self, rng: np.random.Generator) -> FingerParameters:
+        """Draw a finger whose tendons can hold it.
+
+        Raises:
+            FingerError: If hardly any finger of the gap qualifies.
+        """
+        arms = self._arms(rng)
+
+        def joints(values: tuple[float, ...]) -> tuple[float, ...]:
+            return tuple(value * _log_uniform(rng, self.joint_factor) for value in values)
+
+        strength = rng.uniform(*self.strength)
+        return FingerParameters(
+            moment_arms=tuple(map(tuple, arms.tolist())),  # pyright: ignore[reportArgumentType]
+            most_tension=tuple(strength * most for most in self.around.most_tension),
+            joint_stiffness=joints(self.around.joint_stiffness),
+            joint_damping=joints(self.around.joint_damping),
+            joint_friction=joints(self.around.joint_friction),
+            tendon_friction=rng.uniform(*self.tendon_friction),
+            tendon_stiffness=_log_uniform(rng, self.tendon_stiffness),
+            backlash=rng.uniform(*self.backlash),
+            motor_kg=_log_uniform(rng, self.motor_kg),
+            motor_lag=rng.uniform(*self.motor_lag),
+            command_delay=rng.uniform(*self.command_delay),
+            joint_noise=rng.uniform(*self.joint_noise),
+            tension_noise=rng.uniform(*self.tension_noise),
+            tendon_damping=rng.uniform(*self.tendon_damping),
+            least_tension=rng.uniform(*self.least_tension),
+            path=self.around.path,
+        )
+
+    def _arms(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        middle = self.around.arms
+        for _ in range(_TRIES):
+            arms = middle * (1.0 + rng.uniform(-self.arm_error, self.arm_error, middle.shape))
+            if spans_all_torques(arms):
+                return arms
+        raise FingerError(
+            f"With moment arms off by {self.arm_error:.0%}, hardly any finger's tendons can hold "
+            "it: make arm_error smaller."
+        )
+
+
+def _log_uniform(rng: np.random.Generator, bounds: Range) -> float:
+    low, high = (math.log(bound) for bound in bounds)
+    return math.exp(rng.uniform(low, high))
+
+
+_DEGREE: Final = math.radians(1.0)
+
+# Rates, slew and tensions of the shipped profile; a test compares them.
+_RIG: Final = NOMINAL.replace(
+    path=CommandPath(control_hz=50.0, tick_hz=100.0, slew_per_s=20.0, slew_down_per_s=20.0)
+)
+_RIG_MOST_N: Final = (15.0, 15.0, 7.0, 15.0, 6.4, 15.0, 15.0)  # As `TENDONS`.
+_RIG_LEAST_N: Final = 1.0
+
+# A finger on the shipped rig: seven XL330-M077 with spools of 1 cm.
+_REAL_LIKE: Final = Gap(
+    # Chosen; the two published sets in `anatomy` differ by two fifths in the median.
+    arm_error=0.2,
+    # Knuckles of four healthy people had 0.7 to 1.2 of the nominal stiffness (PMC7775510,
+    # table 2); the rest is chosen.
+    joint_factor=(0.7, 1.4),
+    # The rig pulls 1 to 15 N of 25 N.
+    strength=(0.55, 0.65),
+    least_tension=(1.0, 1.0),
+    # Rotors at the tendon have 1.4 kg, 4 N·s/m and 0.5 N of friction: the motor's numbers
+    # (`shapechanger.robot.drivers.servos.settings`) divided by the spool's radius.
+    motor_kg=(1.2, 1.6),
+    tendon_damping=(3.0, 5.0),
+    tendon_friction=(0.3, 0.8),
+    # The current takes 1 ms to settle, and a command waits up to 10 ms for the guard's
+    # tick, exactly so long on a twin.
+    motor_lag=(0.001, 0.005),
+    command_delay=(0.005, 0.015),
+    # Cords of some decimetres have 5 to 20 N/mm. Chosen.
+    tendon_stiffness=(5e3, 20e3),
+    backlash=(0.0, 0.5e-3),
+    # An AS5600 has 0.09 degrees per count; a magnet off its axis errs by up to a degree.
+    joint_noise=(0.1 * _DEGREE, _DEGREE),
+    tension_noise=(0.1, 0.5),
+    around=_RIG,
+)
+
+GAPS: Final[Mapping[str, Gap]] = MappingProxyType(
+    {
+        "real-like": _REAL_LIKE,
+        # For policies that must cope with all of them: slightly more than the one above. Chosen.
+        "wide": msgspec.structs.replace(
+            _REAL_LIKE,
+            arm_error=0.25,
+            joint_factor=(0.6, 1.6),
+            strength=(0.55, 0.75),
+            least_tension=(0.5, 1.5),
+            motor_kg=(1.0, 2.0),
+            tendon_damping=(3.0, 10.0),
+            tendon_friction=(0.2, 0.9),
+            tendon_stiffness=(5e3, 30e3),
+            joint_noise=(0.0, 1.5 * _DEGREE),
+            tension_noise=(0.0, 0.6),
+        ),
+    }
+)
+"""Gaps by name."""
+
+
+def with_gears(parameters: FingerParameters) -> FingerParameters:
+    """Return the same finger on geared servos.
+
+    Mass, damping, friction and lag of the motors are the middle of their ranges in "real-like".
+    """
+    rig = GAPS["real-like"]
+    return parameters.replace(
+        motor_kg=math.sqrt(rig.motor_kg[0] * rig.motor_kg[1]),
+        tendon_damping=sum(rig.tendon_damping) / 2,
+        tendon_friction=sum(rig.tendon_friction) / 2,
+        motor_lag=sum(rig.motor_lag) / 2,
+    )
+
+
+def shipped_rig() -> FingerParameters:
+    """Return the nominal finger on the shipped rig, with its motors, tensions and command path."""
+    return with_gears(_RIG.replace(most_tension=_RIG_MOST_N, least_tension=_RIG_LEAST_N))
+
+
+def geared_around(found: FingerParameters) -> Gap:
+    """Return the gap of a finger on geared servos after identification.
+
+    Path, arms, joints, stretch and delay are those identified, within their errors; parameters of
+    the motors, which a log hardly reveals, keep their ranges in "wide".
+
+    Args:
+        found: The identified parameters.
+    """
+    late = found.command_delay + _DELAY_FOUND_S
+    stiffness = found.tendon_stiffness or GAPS["wide"].tendon_stiffness[1]
+    return msgspec.structs.replace(
+        GAPS["wide"],
+        around=found,
+        arm_error=_FOUND,
+        joint_factor=(1.0 - _JOINTS_FOUND, 1.0 + _JOINTS_FOUND),
+        strength=(1.0, 1.0),
+        command_delay=(max(0.0, found.command_delay - _DELAY_FOUND_S), late),
+        tendon_stiffness=((1.0 - _FOUND) * stiffness, (1.0 + _FOUND) * stiffness),
+        joint_noise=(found.joint_noise, found.joint_noise),
+        tension_noise=(found.tension_noise, found.tension_noise),
+        least_tension=(found.least_tension, found.least_tension),
+    )
+
+
+def require_balance(parameters: FingerParameters) -> None:
+    """Require tendons that can pull against one another at every joint.
+
+    Args:
+        parameters: The finger.
+
+    Raises:
+        FingerError: If there is a torque that no tensions give; the message names the joint.
+    """
+    arms = parameters.arms
+    if spans_all_torques(arms):
+        return
+    for joint, own in zip(JOINTS, arms.T, strict=True):
+        for arm, way in ((own.max(), "positive"), (-own.min(), "negative")):
+            if arm <= 0.0:
+                raise FingerError(
+                    f"The tendons cannot balance {joint}: no moment arm there is {way}."
+                )
+    for j, joint in enumerate(JOINTS):
+        for sign, way in ((1.0, "positive"), (-1.0, "negative")):
+            torque = sign * _BALANCE_NM * np.eye(len(JOINTS))[j]
+            if not tensions_for_torque(arms, torque, 0.0, np.inf)[1]:
+                raise FingerError(
+                    f"The tendons cannot balance {joint}: no tensions give it a {way} torque "
+                    "without one at another joint."
+                )
+    raise FingerError("The tendons cannot balance the joints: change the moment arms.")
+
+
+def resolve_gap(value: str | Gap | Mapping[str, object]) -> Gap:
+    """Return a gap, given itself, its name or its ranges.
+
+    Raises:
+        UnknownName: If there is no gap of this name.
+        FingerError: If the ranges are malformed.
+    """
+    if isinstance(value, Gap):
+        return value
+    if isinstance(value, str):
+        if value not in GAPS:
+            raise UnknownName("gap", value, GAPS)
+        return GAPS[value]
+    try:
+        return msgspec.convert(value, Gap)
+    except msgspec.ValidationError as error:
+        said = str(error).rstrip(".")
+        raise FingerError(f"The ranges of a gap are malformed: {said}.") from error

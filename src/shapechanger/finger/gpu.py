@@ -1,0 +1,343 @@
+"""The finger on a device: its command path, its senses and its tasks as functions of tensors.
+
+All but the physics is computed in double precision, so that tensions are rounded down to the same
+step, and a slow slew adds up to the same tension, as on a CPU.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import abstractmethod
+from functools import partial
+from typing import Any, Final, cast
+
+import mujoco
+import numpy as np
+import torch
+from torch import Tensor
+
+from shapechanger.envs.warp.noise import normals, uniforms
+from shapechanger.envs.warp.starts import length
+from shapechanger.envs.warp.tasks import Constants, DeviceOutcome, DeviceTask
+from shapechanger.envs.warp.worlds import Worlds
+from shapechanger.finger.anatomy import DIP_BAND, JOINT_REST, JOINTS, PHALANX_LENGTH_M, TENDONS
+from shapechanger.finger.env import SMOOTHNESS
+from shapechanger.finger.plant import CONTROL_DT, FingerPlant, smoothed
+from shapechanger.finger.postures import START_SPREAD, coupled, inner_range
+from shapechanger.finger.reach import HELD_STEPS, TOLERANCE_M, FingerReachEnv
+from shapechanger.finger.task import directions, tip_at
+from shapechanger.finger.track import FOLLOWS_M, SEEN_S, SETTLING_STEPS, FingerTrackEnv
+
+_J: Final = len(JOINTS)
+_T: Final = len(TENDONS)
+# Streams of random numbers; those from the last one on are of the measurements of each step.
+_STARTS: Final = 0
+_TARGETS: Final = 1
+_SENSES: Final = 2
+
+
+class DeviceFinger(DeviceTask):
+    """Fingers with any parameters, whose fingertip has a target.
+
+    Args:
+        env: A CPU env of the task.
+        plant: The simulation of a finger of the batch.
+    """
+
+    precision = torch.float64
+
+    def __init__(self, env: Any, plant: FingerPlant) -> None:
+        super().__init__(env)
+        parameters = plant.parameters
+        self._gives = parameters.gives
+        self._noisy = parameters.joint_noise > 0.0, parameters.tension_noise > 0.0
+        self._held = plant.held
+        # Where the former controls of each actuator are: after two settings and their times.
+        samples = int(plant.model.actuator_history[0, 0])
+        first = np.asarray(plant.model.actuator_historyadr) + 2 + samples
+        self._former_places = first[:, None] + np.arange(samples)
+
+    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+        """See `DeviceTask`."""
+        count, device = worlds.count, worlds.device
+        zeros = partial(torch.zeros, dtype=self.precision, device=device)
+        whole = partial(torch.zeros, count, dtype=torch.int64, device=device)
+        self._former = torch.as_tensor(self._former_places, dtype=torch.int64, device=device)
+        drive = self._env.drive
+        arrays = {
+            name: torch.as_tensor(getattr(drive, name)) for name in ("offset", "gain", "rest")
+        }
+        moved = {name: cast("Any", array.to(device)) for name, array in arrays.items()}
+        self._drive: Any = dataclasses.replace(drive, **moved)
+        self._commands, self._change = zeros(count, _T), zeros(count, _T)
+        self._shares = zeros(count, _T)  # Tensions on the path, of their ranges.
+        self._angles, self._velocities = zeros(count, _J), zeros(count, _J)
+        self._senses = zeros(count, 2 * _J + 3 * _T)
+        self._seen_tip, self._tip, self._target = zeros(count, 3), zeros(count, 3), zeros(count, 3)
+        self._seeds, self._episodes, self._steps = whole(), whole(), whole()
+
+    def start(
+        self, worlds: Worlds, constants: Constants, mask: Tensor, seeds: Tensor, episodes: Tensor
+    ) -> None:
+        """See `DeviceTask`."""
+        _put(self._seeds, mask, seeds)
+        _put(self._episodes, mask, episodes)
+        self._steps.masked_fill_(mask, 0)
+        angles = self._begin(mask)
+        lengths = -_turned(constants["arms"], angles)
+        qpos = torch.cat([angles, constants["taut"] - lengths], dim=1) if self._gives else angles
+        command = self._drive.command(constants["least"], lengths, torch.zeros_like(lengths))
+        command = command.clip(-1.0, 1.0)
+        self._shares.masked_fill_(mask[:, None], 0.0)
+        controls = command if self._held is None else self._controls(constants)
+        held = controls.to(worlds.ctrl.dtype)
+        _put(worlds.qpos, mask, qpos)
+        _put(worlds.ctrl, mask, held)
+        _put(worlds.act, mask, held)
+        if constants["history"].numel():
+            history = constants["history"].to(held.dtype, copy=True)
+            history[:, self._former] = held[:, :, None]
+            _put(worlds.history, mask, history)
+        _put(self._commands, mask, command)
+        self._change.masked_fill_(mask[:, None], 0.0)
+        worlds.forward()
+        self._measure(worlds, constants, mask)
+
+    @abstractmethod
+    def _begin(self, mask: Tensor) -> Tensor:
+        """Set new targets of some worlds, and return start angles of all, rad, shape (n, 4)."""
+
+    @abstractmethod
+    def _follow(self) -> None:
+        """Note a step: `_steps` and the fingertips are new."""
+
+    @property
+    @abstractmethod
+    def _succeeds(self) -> Tensor:
+        """Whether each finger does its task, shape (n,)."""
+
+    def act(self, worlds: Worlds, constants: Constants, actions: Tensor) -> None:
+        """See `DeviceTask`."""
+        before = self._commands
+        self._commands = actions.to(self.precision).clip(-1.0, 1.0)
+        self._change = self._commands - before
+        if self._held is None:
+            worlds.ctrl[:] = self._commands
+            worlds.step()
+        else:
+            for _ in range(self._held.computations):
+                lengths, speeds = self._lengths(worlds, constants)
+                tensions = self._drive.tension(self._commands, lengths, speeds)
+                aim = _share(constants, tensions)
+                for _ in range(self._held.ticks):
+                    lowest, highest = (
+                        self._shares - constants["fall"],
+                        self._shares + constants["rise"],
+                    )
+                    self._shares = aim.clip(lowest, highest)
+                    worlds.ctrl[:] = self._controls(constants)
+                    worlds.step()
+        self._steps += 1
+        self._measure(worlds, constants, None)
+        self._follow()
+
+    def _controls(self, constants: Constants) -> Tensor:
+        """Return the controls of the present tensions on the path, as `HeldTensions` does."""
+        least, step = constants["least"], constants["step"]
+        tensions = least + self._shares * (constants["most"] - least)
+        rounded = _share(constants, torch.floor(tensions / step) * step)
+        return 2.0 * torch.where(step > 0.0, rounded, self._shares) - 1.0
+
+    def _lengths(self, worlds: Worlds, constants: Constants) -> tuple[Tensor, Tensor]:
+        """Return lengths at the motors, m, and their rates, m/s, shape (n, 7) each."""
+        state = worlds.qpos.to(self.precision), worlds.qvel.to(self.precision)
+        if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
+            return -state[0][:, _J:], -state[1][:, _J:]
+        return -_turned(constants["arms"], state[0]), -_turned(constants["arms"], state[1])
+
+    def _measure(self, worlds: Worlds, constants: Constants, mask: Tensor | None) -> None:
+        """Measure after a step, or where a mask is given after a start in some worlds."""
+        angles = true = worlds.qpos[:, :_J].to(self.precision)
+        tensions = worlds.actuator_force.abs().to(self.precision)
+        if any(self._noisy):
+            stream = _SENSES + self._steps
+            noise = normals(self._seeds, self._episodes, stream, _J + _T)
+            angles = angles + constants["joint_noise"] * noise[:, :_J]
+            tensions = (tensions + constants["tension_noise"] * noise[:, _J:]).clip(0.0)
+        velocities = worlds.qvel[:, :_J].to(self.precision)
+        if mask is not None:
+            velocities = torch.zeros_like(velocities)
+        elif self._noisy[0]:
+            velocities = smoothed(self._velocities, self._angles, angles, CONTROL_DT)
+        lengths, _ = self._lengths(worlds, constants)
+        senses = torch.cat([angles, velocities, tensions, lengths, self._commands], dim=1)
+
+        def kept(former: Tensor, new: Tensor) -> Tensor:
+            return new if mask is None else torch.where(mask[:, None], new, former)
+
+        self._angles = kept(self._angles, angles)
+        self._velocities = kept(self._velocities, velocities)
+        self._senses = kept(self._senses, senses)
+        self._seen_tip = kept(self._seen_tip, _fingertip(angles))
+        self._tip = kept(self._tip, _fingertip(true))
+
+    @property
+    def _points(self) -> Tensor:
+        """Points in the observation, of which the first is the target, m, shape (n, k, 3)."""
+        return self._target[:, None]
+
+    def observations(self, worlds: Worlds) -> Tensor:
+        """See `DeviceTask`."""
+        tip, points = self._seen_tip, self._points
+        offsets = (points - tip[:, None]).flatten(1)
+        return torch.cat([self._senses, tip, points[:, 0], offsets], dim=1).to(worlds.qpos.dtype)
+
+    def outcome(
+        self, worlds: Worlds, before: Tensor, actions: Tensor, constants: Constants
+    ) -> DeviceOutcome:
+        """See `DeviceTask`."""
+        pulled = worlds.actuator_force / constants["most"]
+        terms: dict[str, Tensor] = self._env._reward.terms(
+            length(self._tip - self._target),
+            pulled.square().mean(dim=1),
+            self._change.square().mean(dim=1),
+            CONTROL_DT,
+        )
+        terms[SMOOTHNESS.key] = 1.0 - 0.5 * self._change.abs().mean(dim=1)
+        plain = {name: term.to(worlds.qpos.dtype) for name, term in terms.items()}
+        rewards = sum(term for name, term in terms.items() if name != SMOOTHNESS.key)
+        never = torch.zeros_like(self._steps, dtype=torch.bool)
+        infos = {**self.start_infos(worlds, constants), **plain}
+        return DeviceOutcome(cast("Tensor", rewards).to(worlds.qpos.dtype), never, infos)
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        return {
+            "is_success": self._succeeds,
+            "distance": length(self._tip - self._target).to(worlds.qpos.dtype),
+            "target": self._target.to(worlds.qpos.dtype),
+        }
+
+
+class DeviceReach(DeviceFinger):
+    """Fingers that reach for a point."""
+
+    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+        """See `DeviceTask`."""
+        super().attach(model, worlds)
+        self._near = torch.zeros_like(self._steps)
+        self._low, self._high, self._rest = (
+            torch.as_tensor(angles, dtype=self.precision, device=worlds.device)
+            for angles in (*inner_range(), JOINT_REST)
+        )
+
+    def _begin(self, mask: Tensor) -> Tensor:
+        low, high, rest = self._low, self._high, self._rest
+        drawn = uniforms(self._seeds, self._episodes, _TARGETS, _J)
+        free = low[:3] + (high - low)[:3] * drawn[:, :3]
+        off = DIP_BAND * (2.0 * drawn[:, 3] - 1.0)
+        posture = torch.stack(coupled(free[:, 0], free[:, 1], free[:, 2], off), dim=1)
+        _put(self._target, mask, _fingertip(posture.clip(low, high)))
+        self._near.masked_fill_(mask, 0)
+        moved = 2.0 * uniforms(self._seeds, self._episodes, _STARTS, _J) - 1.0
+        return (rest + START_SPREAD * moved).clip(low, high)
+
+    def _follow(self) -> None:
+        near = length(self._tip - self._target) <= TOLERANCE_M
+        self._near = torch.where(near, self._near + 1, 0)
+
+    @property
+    def _succeeds(self) -> Tensor:
+        return self._near >= HELD_STEPS
+
+
+class DeviceTrack(DeviceFinger):
+    """Fingers that follow a path.
+
+    Paths are functions of NumPy: their points, and the first angles at them, are computed on the
+    CPU from times that are known there. So a step asks the device which worlds have started, and
+    copies points to it.
+    """
+
+    def attach(self, model: mujoco.MjModel, worlds: Worlds) -> None:
+        """See `DeviceTask`."""
+        super().attach(model, worlds)
+        self._path, self._angles_there = self._env.path, self._env.start_angles
+        self._times = np.zeros(worlds.count)
+        self._ahead = self._target[:, None].expand(-1, len(SEEN_S) - 1, -1).clone()
+        self._squares = torch.zeros_like(self._target[:, 0])
+
+    def _begin(self, mask: Tensor) -> Tensor:
+        chosen = mask.cpu().numpy()
+        if not chosen.any():
+            return self._angles
+        if self._path.closed:
+            drawn = uniforms(self._seeds, self._episodes, _STARTS, 1)[:, 0].cpu().numpy()
+            self._times[chosen] = self._path.duration_s * drawn[chosen]
+        else:
+            self._times[chosen] = 0.0
+        angles = np.tile(JOINT_REST, (len(chosen), 1))
+        for i in np.flatnonzero(chosen):
+            angles[i] = self._angles_there(self._times[i])
+        self._squares.masked_fill_(mask, 0.0)
+        self._look()
+        return torch.as_tensor(angles, dtype=self.precision, device=mask.device)
+
+    def _follow(self) -> None:
+        self._times += CONTROL_DT
+        self._look()
+        squares = (self._tip - self._target).square().sum(dim=1)
+        self._squares += torch.where(self._steps > SETTLING_STEPS, squares, 0.0)
+
+    def _look(self) -> None:
+        """Compute the present and coming points of the path."""
+        places = self._path.at(self._times[:, None] + SEEN_S)
+        points = torch.as_tensor(places, dtype=self.precision, device=self._target.device)
+        self._target, self._ahead = points[:, 0], points[:, 1:]
+
+    @property
+    def _points(self) -> Tensor:
+        return self._ahead
+
+    @property
+    def _rms(self) -> Tensor:
+        """Root mean square of the distances so far, m, infinite before the first, shape (n,)."""
+        counted = (self._steps - SETTLING_STEPS).clip(0)
+        return torch.where(counted > 0, (self._squares / counted).sqrt(), torch.inf)
+
+    @property
+    def _succeeds(self) -> Tensor:
+        return self._rms < FOLLOWS_M
+
+    def start_infos(self, worlds: Worlds, constants: Constants) -> dict[str, Tensor]:
+        """See `DeviceTask`."""
+        rms = self._rms.to(worlds.qpos.dtype)
+        return {**super().start_infos(worlds, constants), "rms": rms}
+
+
+FINGERS: Final = {FingerReachEnv: DeviceReach, FingerTrackEnv: DeviceTrack}
+"""Batched functions of fingers by the class of their CPU env."""
+
+
+def _put(target: Tensor, mask: Tensor, values: Tensor) -> None:
+    """Write rows of values, shape (n, ...), into the worlds of a mask, shape (n,)."""
+    chosen = mask.view(-1, *[1] * (target.dim() - 1))
+    target.copy_(torch.where(chosen, values.to(target.dtype), target))
+
+
+def _turned(arms: Tensor, angles: Tensor) -> Tensor:
+    """Return what joint angles wind up of the tendons, m, shape (n, 7)."""
+    return torch.einsum("ntj,nj->nt", arms, angles[:, :_J])
+
+
+def _share(constants: Constants, tensions: Tensor) -> Tensor:
+    """Return tensions as shares of their ranges, 0 to 1, shape (n, 7)."""
+    least = constants["least"]
+    return ((tensions - least) / (constants["most"] - least)).clip(0.0, 1.0)
+
+
+def _fingertip(angles: Tensor) -> Tensor:
+    """Return the fingertips of angles, rad, shape (n, 4), as m, shape (n, 3)."""
+    turned = directions(angles)
+    cos, sin = [angle.cos() for angle in turned], [angle.sin() for angle in turned]
+    return torch.stack(tip_at(cos, sin, PHALANX_LENGTH_M), dim=1)

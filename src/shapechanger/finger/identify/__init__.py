@@ -1,0 +1,15 @@
+"""Identification of a finger's parameters from a log of its motion."""
+
+from __future__ import annotations
+
+from shapechanger.finger.identify.log import FingerLog, load_log, save_log
+from shapechanger.finger.identify.result import IdentifiedFinger, ParameterEstimate, identify
+
+__all__ = [
+    "FingerLog",
+    "IdentifiedFinger",
+    "ParameterEstimate",
+    "identify",
+    "load_log",
+    "save_log",
+]

@@ -1,0 +1,273 @@
+"""Moment arms and tendon stretch, from a regression of lengths on angles and tensions.
+
+A motor winds up the tendon that the joints release, and the tendon's stretch:
+
+    length = zero - arms · angles - (tension + friction + damping) / stiffness.
+
+Angles are noisy and lengths nearly exact, so a plain regression of lengths on angles would
+underestimate the arms. Here the errors of both are weighted, at each time, by their covariance:
+errors of angles pass through the arms themselves, `V = R S R' + D`, and the estimated arms maximize
+the likelihood (the structural relation of Fuller 1987, "Measurement error models", section 2.3).
+The search starts from a regression on the part of the angles that the other tendons' lengths
+explain (instrumental variables).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+from scipy.optimize import least_squares
+
+from shapechanger.finger.anatomy import MOMENT_ARMS, TENDONS
+from shapechanger.finger.identify.log import FingerLog
+
+ARMS: Final[NDArray[np.bool_]] = MOMENT_ARMS != 0.0
+"""Mask of the tendons that pass each joint, (7, 4)."""
+
+_N_ARMS: Final = int(ARMS.sum())
+_N_TENDONS: Final = len(TENDONS)
+# Time over which errors of friction and of velocities are correlated, s.
+_MEMORY_S: Final = 0.5
+# Speed at which friction has changed its sign, m/s; tendons move at 10 to 100 mm/s.
+_SLIDES_AT: Final = 0.020
+# Start of the log that is left out, s: the finger still moves from its initial pose.
+_SETTLES_S: Final = 0.2
+# Iterations of reweighting.
+_ROUNDS: Final = 4
+# Smallest noise that can be told from rounding, rad and m.
+_LEAST_NOISE: Final = 1e-6
+# Beyond this many standard deviations a length belongs to a slack tendon; its variance is
+# multiplied.
+_OUTLIER: Final = 5.0
+_OUTLIER_VARIANCE: Final = 1e4
+# Scales of the solver's parameters: mm of arms and zeros; 0.1 mm/N of compliance; 0.1 mm of
+# friction over stiffness; 1 ms of damping over stiffness.
+_UNITS: Final = np.array([1e-3] * (_N_ARMS + _N_TENDONS) + [1e-4, 1e-4, 1e-3])
+
+
+@dataclass(frozen=True, slots=True)
+class Kinematics:
+    """Moment arms and stretch of a finger, with their standard errors.
+
+    Attributes:
+        arms: Moment arms, m, (7, 4).
+        arms_covariance: Covariance of the 25 arms that are not zero, row by row, m², (25, 25).
+        compliance: Stretch per newton, m/N; near 0 for stiff tendons.
+        compliance_sd: Standard error of `compliance`, m/N.
+        joint_noise: Standard deviation of measured angles, rad, (4,).
+        length_noise: Standard deviation of the lengths' residuals, m.
+        angles: Estimates of the true angles, rad, (n, 4).
+    """
+
+    arms: NDArray[np.float64]
+    arms_covariance: NDArray[np.float64]
+    compliance: float
+    compliance_sd: float
+    joint_noise: NDArray[np.float64]
+    length_noise: float
+    angles: NDArray[np.float64]
+
+    @property
+    def arms_sd(self) -> NDArray[np.float64]:
+        """Standard errors of the arms, m, (7, 4); 0 where a tendon passes no joint."""
+        sd = np.zeros(ARMS.shape)
+        sd[ARMS] = np.sqrt(np.diag(self.arms_covariance))
+        return sd
+
+
+def fit_kinematics(log: FingerLog) -> Kinematics:
+    """Fit moment arms and stretch to a log in which every joint moves."""
+    data = _Regression.of(log)
+    settled = data.from_row(round(_SETTLES_S / log.control_dt))
+    noise = settled.joint_noise()
+    x = settled.start()
+    solved: Any = None
+    length_noise = _LEAST_NOISE
+    for _ in range(_ROUNDS):
+        length_noise = settled.length_noise(x)
+        variance = settled.variance(x, noise, length_noise)
+
+        def residual(
+            x: NDArray[np.float64], variance: NDArray[np.float64] = variance
+        ) -> NDArray[np.float64]:
+            factor = np.linalg.cholesky(_total(x, noise, variance))
+            whitened: Any = np.linalg.solve(factor, settled.residuals(x)[..., None])
+            return np.asarray(whitened[..., 0].ravel(), np.float64)
+
+        solved = cast("Any", least_squares(residual, x, x_scale="jac", max_nfev=8))
+        x = np.asarray(solved.x, np.float64)
+    times = len(settled.lengths)
+    jacobian = np.asarray(solved.jac).reshape(times, _N_TENDONS, -1)
+    spread = robust_covariance(jacobian, np.asarray(solved.fun).reshape(times, -1), log.control_dt)
+    # The residuals' own covariance is uncertain, so no interval is narrower than noise alone
+    # makes it.
+    bread = np.asarray(np.linalg.pinv(solved.jac.T @ solved.jac, hermitian=True), np.float64)
+    by_noise = np.sqrt(np.diag(bread))
+    wider = np.maximum(1.0, by_noise / np.sqrt(np.diag(spread)))
+    spread *= np.outer(wider * _UNITS, wider * _UNITS)
+    everywhere = data.variance(x, noise, length_noise)
+    return Kinematics(
+        arms=_arms(x),
+        arms_covariance=spread[:_N_ARMS, :_N_ARMS],
+        compliance=float(x[-3] * _UNITS[-3]),
+        compliance_sd=float(np.sqrt(spread[-3, -3])),
+        joint_noise=noise,
+        length_noise=length_noise,
+        angles=data.angles - data.angle_errors(x, noise, everywhere),
+    )
+
+
+def robust_covariance(
+    jacobian: NDArray[np.float64], residual: NDArray[np.float64], control_dt: float
+) -> NDArray[np.float64]:
+    """Sandwich estimate of a least-squares fit's covariance under correlated residuals.
+
+    Residuals may be correlated with those of the same time and of times within half a second; the
+    weights are those of Newey & West 1987 (Econometrica 55:703).
+
+    Args:
+        jacobian: Jacobian of the residuals, (times, residuals per time, p).
+        residual: Residuals at the optimum, (times, residuals per time).
+        control_dt: Time between rows, s.
+
+    Returns:
+        Covariance of the parameters, (p, p).
+    """
+    squares = np.einsum("tip,tiq->pq", jacobian, jacobian)
+    bread = np.asarray(np.linalg.pinv(squares, hermitian=True), np.float64)
+    scores = np.asarray(np.einsum("tip,ti->tp", jacobian, residual), np.float64)
+    lags = _lags(control_dt)
+    filling = scores.T @ scores
+    for lag in range(1, lags + 1):
+        with_later = scores[lag:].T @ scores[:-lag]
+        filling += (1.0 - lag / (lags + 1)) * (with_later + with_later.T)
+    return np.asarray(bread @ filling @ bread, np.float64)
+
+
+def interval_quantile(times: int, control_dt: float) -> float:
+    """Half width of a 95 % interval, in standard errors of `robust_covariance`.
+
+    It is above 1.96, because the covariance is itself estimated from few stretches of half a
+    second: the cubic of Kiefer & Vogelsang 2005 (Econometric Theory 21:1130, table 1, Bartlett's
+    weights).
+
+    Args:
+        times: Number of rows.
+        control_dt: Time between rows, s.
+    """
+    b = min(1.0, _lags(control_dt) / times)
+    return float(np.polyval([-0.5324, 0.4160, 2.9694, 1.9600], b))
+
+
+@dataclass(frozen=True, slots=True)
+class _Regression:
+    """Columns of the regression, one row per time.
+
+    Attributes:
+        lengths: Tendon lengths, m, (n, 7).
+        angles: Joint angles, rad, (n, 4).
+        tensions: Tendon tensions, N, (n, 7).
+        speeds: Rates of the lengths, m/s, (n, 7).
+        directions: Smoothed signs of the speeds, -1 to 1, (n, 7).
+    """
+
+    lengths: NDArray[np.float64]
+    angles: NDArray[np.float64]
+    tensions: NDArray[np.float64]
+    speeds: NDArray[np.float64]
+    directions: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, log: FingerLog) -> _Regression:
+        speeds = np.gradient(log.lengths, log.control_dt, axis=0)
+        return cls(log.lengths, log.angles, log.tensions, speeds, np.tanh(speeds / _SLIDES_AT))
+
+    def from_row(self, first: int) -> _Regression:
+        """Rows from `first` on."""
+        columns = (self.lengths, self.angles, self.tensions, self.speeds, self.directions)
+        return _Regression(*(column[first:] for column in columns))
+
+    def joint_noise(self) -> NDArray[np.float64]:
+        """Standard deviation of each angle given all other columns, rad, (4,)."""
+        known = np.column_stack([self._forces(), self.lengths, np.ones(len(self.lengths))])
+        left: Any = self.angles - known @ np.linalg.lstsq(known, self.angles)[0]
+        freedom = max(1, len(known) - known.shape[1])
+        noise = np.maximum(np.sqrt((left**2).sum(axis=0) / freedom), _LEAST_NOISE)
+        return np.asarray(noise, np.float64)
+
+    def start(self) -> NDArray[np.float64]:
+        """Initial parameters by instrumental variables, in `_UNITS`."""
+        arms, own = np.zeros(ARMS.shape), np.empty((_N_TENDONS, 3))
+        ones = np.ones((len(self.lengths), 1))
+        for i in range(_N_TENDONS):
+            mine = [v[:, i : i + 1] for v in (self.tensions, self.directions, self.speeds)]
+            others = np.delete(self.lengths, i, axis=1)
+            known = np.column_stack([others, self._forces(), ones])
+            explained = known @ np.linalg.lstsq(known, self.angles)[0]
+            passed = np.flatnonzero(ARMS[i])
+            columns = np.column_stack([explained[:, passed], *mine, ones])
+            solved = np.linalg.lstsq(columns, self.lengths[:, i])[0]
+            arms[i, passed] = -solved[: len(passed)]
+            own[i] = -solved[len(passed) : -1]
+        shared = np.median(own, axis=0)
+        x = np.concatenate([arms[ARMS], np.zeros(_N_TENDONS), shared]) / _UNITS
+        x[_N_ARMS : _N_ARMS + _N_TENDONS] = self.residuals(x).mean(axis=0) / 1e-3
+        return x
+
+    def residuals(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Measured lengths minus the model's at the measured angles, m, (n, 7)."""
+        zeros = x[_N_ARMS : _N_ARMS + _N_TENDONS] * 1e-3
+        compliance, friction, damping = x[-3:] * _UNITS[-3:]
+        stretch = compliance * self.tensions + friction * self.directions + damping * self.speeds
+        return self.lengths - (zeros - self.angles @ _arms(x).T - stretch)
+
+    def length_noise(self, x: NDArray[np.float64]) -> float:
+        """Standard deviation, m, of the three combinations of lengths that no angle affects."""
+        free = self.residuals(x) @ null_space(_arms(x).T)
+        return max(_LEAST_NOISE, float(np.median(1.4826 * np.median(np.abs(free), axis=0))))
+
+    def variance(
+        self, x: NDArray[np.float64], noise: NDArray[np.float64], length_noise: float
+    ) -> NDArray[np.float64]:
+        """Variance of each length, m², (n, 7).
+
+        It is large while friction changes its sign, and where a tendon hung slack.
+        """
+        friction = x[-2] * _UNITS[-2]
+        plain = length_noise**2 + 0.5 * friction**2 * (1.0 - self.directions**2)
+        weighted = np.linalg.solve(_total(x, noise, plain), self.residuals(x)[..., None])[..., 0]
+        far = np.abs(plain * weighted) > _OUTLIER * np.sqrt(plain)
+        return np.asarray(np.where(far, _OUTLIER_VARIANCE * plain, plain), np.float64)
+
+    def angle_errors(
+        self, x: NDArray[np.float64], noise: NDArray[np.float64], variance: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Estimated errors of the measured angles, rad, (n, 4)."""
+        weighted = np.linalg.solve(_total(x, noise, variance), self.residuals(x)[..., None])
+        return weighted[..., 0] @ _arms(x) * noise**2
+
+    def _forces(self) -> NDArray[np.float64]:
+        return np.column_stack([self.tensions, self.directions, self.speeds])
+
+
+def _lags(control_dt: float) -> int:
+    return max(1, round(_MEMORY_S / control_dt))
+
+
+def _arms(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    arms = np.zeros(ARMS.shape)
+    arms[ARMS] = x[:_N_ARMS] * 1e-3
+    return arms
+
+
+def _total(
+    x: NDArray[np.float64], noise: NDArray[np.float64], variance: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Covariance of the lengths' errors at each time, m², (n, 7, 7)."""
+    arms = _arms(x)
+    through_angles = (arms * noise**2) @ arms.T
+    return through_angles + variance[..., None] * np.eye(_N_TENDONS)

@@ -1,0 +1,285 @@
+"""Motion logs of a finger: one row per control period, kept in an `.npz` file."""
+
+from __future__ import annotations
+
+import math
+import os
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, cast
+
+import msgspec
+import numpy as np
+from numpy.lib.npyio import NpzFile
+from numpy.typing import NDArray
+
+from shapechanger.errors import FingerError, OutputError, UnknownName
+from shapechanger.finger.anatomy import JOINTS, TENDONS
+from shapechanger.finger.parameters import FingerParameters
+from shapechanger.finger.tensions import DRIVES
+
+SIGNALS: Final = {
+    "t": 0,
+    "commands": len(TENDONS),
+    "angles": len(JOINTS),
+    "tensions": len(TENDONS),
+    "lengths": len(TENDONS),
+}
+"""Arrays of a log and their numbers of columns; 0 marks a one-dimensional array."""
+
+# Longest step between two rows, in control periods. Clocks jitter; a missing row is a gap.
+_LONGEST_STEP: Final = 1.5
+# Tolerance of a ratio that must be whole.
+_WHOLE: Final = 1e-6
+_FORMAT: Final = "shapechanger finger log"
+_VERSION: Final = 1
+_MAX_BYTES: Final = 256 << 20  # An hour at 50 Hz has about 30 MB.
+# Shortest log, s. The intervals rest on how errors repeat within half a second.
+_SHORTEST_S: Final = 4.0
+# Smallest range of each joint, rad, from the 5th to the 95th percentile. An arm of 9 mm winds
+# 1.5 mm over it.
+_LEAST_RANGE: Final = math.radians(10.0)
+# Smallest standard deviation, rad, of the part of a joint's motion that the other joints do not
+# explain.
+_LEAST_OWN: Final = math.radians(2.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FingerLog:
+    """Commands and measurements of a finger, one row per control period.
+
+    Attributes:
+        t: Time of each measurement, s, (n,), increasing.
+        commands: Commands that acted in the period ending at `t`, -1 to 1, (n, 7).
+        angles: Joint angles, rad, (n, 4); flexion and radial abduction are positive.
+        tensions: Tendon tensions, N, (n, 7).
+        lengths: Tendon lengths as wound by their motors, m, (n, 7); winding up shortens them.
+        actions: Meaning of a command; see `shapechanger.finger.tensions.DRIVES`.
+        control_dt: Control period, s.
+        source: Recorded env or robot, such as an env id.
+        motors: A finger with the motors, the range of tensions and the command path of the rig;
+            None if nothing is known about them. A log says little about geared motors.
+
+    Raises:
+        FingerError: If the arrays differ in length, hold a number that is not finite, run backwards
+            in time or have gaps.
+        UnknownName: If `actions` is not a known mode.
+    """
+
+    t: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    angles: NDArray[np.float64]
+    tensions: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+    actions: str
+    control_dt: float
+    source: str = ""
+    motors: FingerParameters | None = None
+
+    def __post_init__(self) -> None:
+        if self.actions not in DRIVES:
+            raise UnknownName("mode of action", self.actions, DRIVES)
+        if not 0.0 < self.control_dt < float("inf"):
+            raise FingerError(f"control_dt must be above 0 s and finite, got {self.control_dt}.")
+        for name, columns in SIGNALS.items():
+            given = getattr(self, name)
+            shape = (len(self.t), columns) if columns else (len(self.t),)
+            if given.shape != shape:
+                raise FingerError(f"{name} must have the shape {shape}, got {given.shape}.")
+            rows = ~np.isfinite(given).all(axis=tuple(range(1, given.ndim)))
+            if rows.any():
+                raise FingerError(f"{name} is not finite in row {int(rows.argmax())} of the log.")
+        steps = np.diff(self.t)
+        if (steps <= 0.0).any():
+            row = int((steps <= 0.0).argmax()) + 1
+            raise FingerError(
+                f"Time runs backwards in row {row} of the log: {self.t[row]:.3f} s comes after "
+                f"{self.t[row - 1]:.3f} s."
+            )
+        gaps = steps > _LONGEST_STEP * self.control_dt
+        if gaps.any():
+            row = int(gaps.argmax())
+            raise FingerError(
+                f"The log has a gap: rows are due every {1e3 * self.control_dt:g} ms, but there is "
+                f"none between {self.t[row]:.3f} s and {self.t[row + 1]:.3f} s."
+            )
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.t)
+
+    @property
+    def seconds(self) -> float:
+        """Time from the first row to the last, s."""
+        return float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
+
+
+def require_informative(log: FingerLog) -> None:
+    """Check that every joint moves far enough and independently of the others.
+
+    Raises:
+        FingerError: If the log is too short, a joint hardly moves or only along with others, or its
+            rows do not fit the path of its rig.
+    """
+    path = None if log.motors is None else log.motors.path
+    if path is not None:
+        computations = log.control_dt * path.control_hz
+        if round(computations) < 1 or abs(computations - round(computations)) > _WHOLE:
+            raise FingerError(
+                f"The rig's path computes tensions at control_hz={path.control_hz:g}, but the log "
+                f"has {1.0 / log.control_dt:g} commands per second (control_dt={log.control_dt:g} "
+                "s), and the first must be a multiple of the second."
+            )
+    if log.seconds < _SHORTEST_S - 0.5 * log.control_dt:
+        raise FingerError(
+            f"The log is {log.seconds:.1f} s long; identification needs at least "
+            f"{_SHORTEST_S:g} s, and works well with 10 s."
+        )
+    low, high = np.percentile(log.angles, [5.0, 95.0], axis=0)
+    for joint, moved in zip(JOINTS, high - low, strict=True):
+        if moved < _LEAST_RANGE:
+            raise FingerError(
+                f"{joint} moved by {math.degrees(moved):.1f} degrees only; its moment arms need at "
+                f"least {math.degrees(_LEAST_RANGE):.0f}."
+            )
+    centred = log.angles - log.angles.mean(axis=0)
+    for j, joint in enumerate(JOINTS):
+        others = np.delete(centred, j, axis=1)
+        shares = np.asarray(np.linalg.lstsq(others, centred[:, j])[0], np.float64)
+        own = float(np.std(centred[:, j] - others @ shares))
+        if own < _LEAST_OWN:
+            raise FingerError(
+                f"{joint} moved only along with the other joints, so their moment arms cannot be "
+                "separated; move each joint on its own."
+            )
+
+
+class _Header(msgspec.Struct, frozen=True, kw_only=True):
+    """Fields of a log that are not arrays, stored as JSON."""
+
+    format: str
+    version: int
+    actions: str
+    control_dt: float
+    joints: tuple[str, ...]
+    tendons: tuple[str, ...]
+    source: str = ""
+    motors: FingerParameters | None = None
+
+
+def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
+    """Write a log to a file, replacing an existing one.
+
+    Args:
+        log: The log.
+        path: File to write, as it is: no ending is added.
+
+    Raises:
+        OutputError: If the file cannot be written.
+    """
+    header = _Header(
+        format=_FORMAT,
+        version=_VERSION,
+        actions=log.actions,
+        control_dt=log.control_dt,
+        joints=JOINTS,
+        tendons=TENDONS,
+        source=log.source,
+        motors=log.motors,
+    )
+    arrays = {name: getattr(log, name) for name in SIGNALS}
+    encoded = np.frombuffer(msgspec.json.encode(header), np.uint8)
+    try:
+        with Path(path).open("wb") as file:  # NumPy adds an ending to a path.
+            np.savez_compressed(file, header=encoded, **arrays)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}.") from error
+
+
+def load_log(path: str | os.PathLike[str]) -> FingerLog:
+    """Read a log written by `save_log`.
+
+    Raises:
+        FingerError: If the file is not a log, is damaged, has a later version, or holds a log that
+            `FingerLog` rejects.
+        UnknownName: If its mode of action is unknown.
+    """
+    place = Path(path)
+    name = place.name
+    # Opening a pipe waits for a writer, and a device may never end.
+    if place.exists() and not (place.is_file() or place.is_dir()):
+        raise FingerError(f"{name} cannot be read: it is not a regular file.")
+    try:
+        with place.open("rb") as raw:  # NumPy leaves a damaged file open.
+            loaded: Any = np.load(raw, allow_pickle=False)
+            if not isinstance(loaded, NpzFile):
+                raise ValueError("one array, not an archive of arrays")
+            archive = cast("zipfile.ZipFile", loaded.zip)
+            claimed = sum(info.file_size for info in archive.infolist())
+            if claimed > _MAX_BYTES:  # A few bytes of an archive can unpack to any size.
+                raise FingerError(
+                    f"{name} unpacks to {claimed} bytes, more than the limit of {_MAX_BYTES}."
+                )
+            read: dict[str, Any] = {key: loaded[key] for key in loaded.files}
+    except FileNotFoundError as error:
+        raise FingerError(f"There is no file {path}.") from error
+    except FingerError:  # A ValueError, too.
+        raise
+    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
+        raise FingerError(_unreadable(place)) from error
+    header = _read_header(name, read)
+    missing = [key for key in SIGNALS if key not in read]
+    if missing:
+        raise FingerError(f"{name} is not a complete log: it lacks {', '.join(missing)}.")
+    try:
+        arrays = {key: np.asarray(read[key], np.float64) for key in SIGNALS}
+    except ValueError as error:
+        raise FingerError(f"{name} is not a finger log: its arrays must hold numbers.") from error
+    if arrays["t"].ndim != 1:
+        raise FingerError(f"{name} is not a finger log: t must have one dimension.")
+    return FingerLog(
+        **arrays,
+        actions=header.actions,
+        control_dt=header.control_dt,
+        source=header.source,
+        motors=header.motors,
+    )
+
+
+def _unreadable(path: Path) -> str:
+    """Reason why NumPy could not read a file."""
+    try:
+        with path.open("rb") as file:
+            is_archive = file.read(2) == b"PK"
+    except OSError as error:
+        return f"{path.name} cannot be read: {error.strerror}."
+    if is_archive:
+        return f"{path.name} is cut short or damaged; record it again."
+    return f"{path.name} is not a finger log; `shapechanger finger record` writes one."
+
+
+def _read_header(name: str, read: dict[str, Any]) -> _Header:
+    if "header" not in read:
+        raise FingerError(f"{name} is not a finger log: it has no header.")
+    try:
+        header = msgspec.json.decode(bytes(read["header"]), type=_Header)
+    except (msgspec.MsgspecError, TypeError, ValueError) as error:
+        raise FingerError(f"{name} is not a finger log: its header is invalid: {error}.") from error
+    if header.format != _FORMAT:
+        raise FingerError(f"{name} is not a finger log: its format is {header.format!r}.")
+    if header.version > _VERSION:
+        raise FingerError(
+            f"{name} has version {header.version}; this Shapechanger reads up to {_VERSION}."
+        )
+    for kind, given, known in (
+        ("joints", header.joints, JOINTS),
+        ("tendons", header.tendons, TENDONS),
+    ):
+        if given != known:
+            raise FingerError(
+                f"{name} has the {kind} {', '.join(given) or 'none'}, "
+                f"but the finger has {', '.join(known)}."
+            )
+    return header

@@ -1,0 +1,354 @@
+"""Joint and friction parameters, from a fit of simulated motion with `mujoco.sysid`.
+
+The simulated finger gets the log's commands, one second at a time, and its parameters are changed
+until it reaches the measured angles. Its tendons do not stretch, which allows a longer time step:
+its motors act on the joints directly, with the lag and delay found from the tensions.
+"""
+
+from __future__ import annotations
+
+import copy
+import importlib
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+from scipy.signal import savgol_filter
+
+from shapechanger.errors import MissingExtra
+from shapechanger.finger.anatomy import JOINTS
+from shapechanger.finger.identify.kinematics import Kinematics
+from shapechanger.finger.identify.log import FingerLog
+from shapechanger.finger.identify.motors import FINE_S, CommandSignal, Motors
+from shapechanger.finger.model import build_finger
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.tensions import drive_of
+
+MOTOR_KG: Final = 0.02
+"""Assumed mass of a motor at the tendon, kg, between a bare spool and a motor with gears. Chosen:
+fitted values were two to eight times too large, because they absorb the stretch."""
+
+_N: Final = len(JOINTS)
+FACTORS: Final[Mapping[str, float]] = {
+    **{f"joint_stiffness/{j}": v for j, v in zip(JOINTS, NOMINAL.joint_stiffness, strict=True)},
+    **{f"joint_damping/{j}": v for j, v in zip(JOINTS, NOMINAL.joint_damping, strict=True)},
+    # N. The nominal finger has no friction, but the fit needs a logarithm. Chosen.
+    "tendon_friction": 0.5,
+}
+"""Fitted parameters and their initial values, in SI units. The fit changes the logarithms of
+factors over these values, so that no parameter can change its sign."""
+
+# Length of a window, s: longer than a joint takes to come to rest, and short enough that errors of
+# its start and of the model do not add up.
+_WINDOW_S: Final = 1.0
+# Start of the log that is left out, s: the finger still moves from its initial pose.
+_SETTLES_S: Final = 0.3
+# Rows of the third-degree polynomial that velocities are taken from.
+_ROWS: Final = 7
+# Prior standard deviation of a factor's logarithm; parameters that the motion does not determine
+# stay at their initial values.
+_PRIOR_SD: Final = math.log(3.0)
+_MAX_LOG_FACTOR: Final = math.log(30.0)
+# Standard deviation of simulated minus measured angles under the best model, rad.
+_ANGLE_SD: Final = math.radians(1.0)
+# Lag of a motor whose tensions are known, s.
+_INSTANT_S: Final = 1e-4
+_ITERATIONS: Final = 12
+# Step of finite differences, and the step that ends the search, in logarithms.
+_STEP: Final = 1e-3
+_TOLERANCE: Final = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Part of a log, with the state that it begins in.
+
+    Attributes:
+        start: Time of its first row, s.
+        angles: Angles at its start and at the end of each of its periods, rad, (m + 1, 4).
+        velocities: Angular velocities at its start, rad/s, (4,).
+        activations: Activations of the motors at its start, -1 to 1, (7,).
+    """
+
+    start: float
+    angles: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    activations: NDArray[np.float64]
+
+
+def cut_windows(
+    log: FingerLog,
+    kinematics: Kinematics,
+    motors: Motors,
+    last: int | None = None,
+    length_s: float = _WINDOW_S,
+    first_s: float = _SETTLES_S,
+) -> list[Window]:
+    """Cut a log into windows that follow one another.
+
+    Args:
+        log: The log.
+        kinematics: Fit of its lengths, for the angles.
+        motors: Fit of its tensions, for the state of the motors.
+        last: Row before which the last window ends; None for the end of the log.
+        length_s: Length of a window, s.
+        first_s: Start of the first window, s after the start of the log.
+    """
+    dt = log.control_dt
+    velocities = savgol_filter(kinematics.angles, _ROWS, 3, deriv=1, delta=dt, axis=0)
+    steps = int(np.ceil(log.seconds / FINE_S)) + 1
+    activations = CommandSignal(log).activations(
+        float(log.t[0]), FINE_S, steps, motors.delay, motors.lag
+    )
+    rows = round(length_s / dt)
+    last = len(log) if last is None else last
+    windows: list[Window] = []
+    for row in range(round(first_s / dt), last - rows, rows):
+        step = min(steps - 1, round((log.t[row] - log.t[0]) / FINE_S) - 1)
+        windows.append(
+            Window(
+                start=float(log.t[row]),
+                angles=kinematics.angles[row : row + rows + 1],
+                velocities=np.asarray(velocities[row], np.float64),
+                activations=np.clip(activations[max(step, 0)], -1.0, 1.0),
+            )
+        )
+    return windows
+
+
+def steps_per_period(control_dt: float, timestep: float) -> int:
+    """Whole number of simulation steps per control period, each no longer than `timestep`.
+
+    Args:
+        control_dt: Control period, s.
+        timestep: Longest step, s.
+    """
+    return math.ceil(control_dt / timestep - 1e-6)
+
+
+def with_motors(motors: Motors, known: FingerParameters | None) -> FingerParameters:
+    """The nominal finger with the motors of a known finger, or else with the fitted ones.
+
+    Args:
+        motors: Fit of the tensions.
+        known: Finger with known motors; None if nothing is known about them.
+    """
+    nominal = NOMINAL.replace(motor_lag=motors.lag)
+    if known is None:
+        most = motors.strength * np.array(NOMINAL.most_tension)
+        return nominal.replace(most_tension=tuple(most.tolist()), motor_kg=MOTOR_KG)
+    return nominal.replace(
+        most_tension=known.most_tension,
+        least_tension=known.least_tension,
+        motor_kg=known.motor_kg,
+        tendon_damping=known.tendon_damping,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """Joint and friction parameters of a finger, with their standard errors.
+
+    Attributes:
+        values: Parameters by the names of `FACTORS`, in SI units.
+        sd: Standard errors of their logarithms, by name, if the model is right.
+    """
+
+    values: dict[str, float]
+    sd: dict[str, float]
+
+
+def fit_dynamics(
+    log: FingerLog,
+    kinematics: Kinematics,
+    motors: Motors,
+    last: int | None = None,
+) -> Dynamics:
+    """Fit joint and friction parameters to a log.
+
+    Args:
+        log: The log.
+        kinematics: Fit of its lengths.
+        motors: Fit of its tensions.
+        last: Row before which the fit ends, to leave the rest for validation; None for the end of
+            the log.
+
+    Raises:
+        MissingExtra: If the dependencies of `mujoco.sysid` are not installed.
+    """
+    sysid = _load_sysid()
+    fit = _MotionFit(sysid, log, kinematics, motors, last)
+    found, result = sysid.optimize(
+        fit.parameters(),
+        fit.residual,
+        optimizer="mujoco",
+        verbose=False,
+        output=io.StringIO(),  # It prints each iteration even if not verbose.
+        max_iters=_ITERATIONS,
+        eps=_STEP,
+        xtol=_TOLERANCE,
+    )
+    x = np.asarray(found.as_vector(), np.float64)
+    sd = np.sqrt(np.diag(fit.covariance(x, np.asarray(result.jac, np.float64))))
+    return Dynamics(
+        values={name: begin * math.exp(x[i]) for i, (name, begin) in enumerate(FACTORS.items())},
+        sd={name: float(sd[i]) for i, name in enumerate(FACTORS)},
+    )
+
+
+def _load_sysid() -> Any:
+    """The module `mujoco.sysid`, which has no type annotations."""
+    module = importlib.import_module("mujoco.sysid")
+    # Without its dependencies it can be imported all the same, but is empty.
+    if not hasattr(module, "build_residual_fn"):
+        raise MissingExtra("mujoco[sysid]", "identify")
+    return module
+
+
+class _MotionFit:
+    """Residuals of the simulated motion.
+
+    The parameters are the logarithms of the factors over `FACTORS`, (9,). See `fit_dynamics` for
+    the arguments.
+    """
+
+    def __init__(
+        self,
+        sysid: Any,
+        log: FingerLog,
+        kinematics: Kinematics,
+        motors: Motors,
+        last: int | None,
+    ) -> None:
+        self._sysid = sysid
+        self._arms = kinematics.arms
+        moved = with_motors(motors, log.motors)
+        self._path = None if log.motors is None else log.motors.path
+        if self._path is not None:
+            # The measured tensions act, which the path has delayed already.
+            moved = moved.replace(path=self._path, motor_lag=_INSTANT_S)
+        self._least, most = moved.least_tension, np.array(moved.most_tension)
+        self._range = most - self._least
+        spec = build_finger(moved, drive_of(log.actions, NOMINAL))
+        for name in JOINTS:
+            spec.add_sensor(
+                name=name,
+                type=mujoco.mjtSensor.mjSENS_JOINTPOS,
+                objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                objname=name,
+            )
+        self._skip = steps_per_period(log.control_dt, spec.option.timestep)
+        spec.option.timestep = log.control_dt / self._skip
+        self._model: mujoco.MjModel = spec.compile()
+        windows = cut_windows(log, kinematics, motors, last)
+        self._residual = sysid.build_residual_fn(
+            models_sequences=[self._sequences(spec, windows, log, motors.delay)],
+            build_model=self._build,
+            modify_residual=self._compare,
+            resample_true=False,
+            n_threads=1,
+        )
+
+    def parameters(self) -> Any:
+        """Initial parameters and their bounds, as `mujoco.sysid` takes them."""
+        found = self._sysid.ParameterDict()
+        zero = np.zeros(len(FACTORS))
+        bounds = zero - _MAX_LOG_FACTOR, zero + _MAX_LOG_FACTOR
+        found.add(self._sysid.Parameter("factors", zero, *bounds))
+        return found
+
+    def residual(self, x: NDArray[np.float64], parameters: Any, **more: Any) -> Any:
+        """Errors of the angles, window by window, then those of the prior, each over its sd."""
+        errors, predicted, measured = self._residual(x, parameters, **more)
+        priors = x / _PRIOR_SD
+        return [*errors, priors], predicted, measured
+
+    def covariance(
+        self, x: NDArray[np.float64], jacobian: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Sandwich estimate of the parameters' covariance, with windows as independent clusters.
+
+        Args:
+            x: Parameters at the optimum.
+            jacobian: Jacobian of the residuals there.
+        """
+        parts, _, _ = self.residual(x, self.parameters())
+        bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+        filling = np.eye(len(x)) / _PRIOR_SD**2
+        row = 0
+        for part in parts[:-1]:
+            score = jacobian[row : row + np.size(part)].T @ np.ravel(part)
+            filling += np.outer(score, score)
+            row += np.size(part)
+        windows = len(parts) - 1
+        spread = bread @ filling @ bread * (windows / max(1, windows - 1))
+        # A few windows may agree by chance, so no interval is narrower than noise alone makes it.
+        wider = np.sqrt(np.maximum(1.0, np.diag(bread) / np.diag(spread)))
+        return spread * np.outer(wider, wider)
+
+    def _build(self, parameters: Any, spec: mujoco.MjSpec) -> mujoco.MjModel:
+        del spec  # Compiling it for each candidate would take most of the time.
+        x = parameters.as_vector()
+        values = np.array(list(FACTORS.values())) * np.exp(x)
+        model = copy.copy(self._model)
+        # The stiffness at the ends of the ranges keeps its ratio.
+        model.jnt_stiffnesspoly[:_N] *= (values[:_N] / model.jnt_stiffness[:_N])[:, None]
+        model.jnt_stiffness[:_N] = values[:_N]
+        model.dof_damping[:_N] = values[_N : 2 * _N]
+        n = len(self._arms)
+        model.tendon_frictionloss[:n] = values[2 * _N]
+        # The coefficients of fixed tendons: minus the arms, tendon by tendon.
+        model.wrap_prm[: n * _N] = -self._arms.ravel()
+        return model
+
+    def _sequences(
+        self, spec: mujoco.MjSpec, windows: list[Window], log: FingerLog, delay: float
+    ) -> Any:
+        step = self._model.opt.timestep
+        commands = CommandSignal(log)
+        tensions = 2.0 * (log.tensions - self._least) / self._range - 1.0
+        measured_at = make_interp_spline(log.t, np.clip(tensions, -1.0, 1.0), k=1)
+        sensor = self._sysid.SignalType.MjSensor
+        columns = {name: (sensor, np.array([j])) for j, name in enumerate(JOINTS)}
+        series = self._sysid.TimeSeries
+        starts: list[Any] = []
+        controls: list[Any] = []
+        measured: list[Any] = []
+        for window in windows:
+            begun = window.activations if self._path is None else measured_at(window.start)
+            state = (window.angles[0], window.velocities, begun)
+            starts.append(self._sysid.create_initial_state(self._model, *state))
+            # One more than there are steps: the last one is not simulated.
+            steps = (len(window.angles) - 1) * self._skip + 1
+            at = window.start + step * np.arange(steps)
+            if self._path is None:
+                acting = commands.delayed(window.start, step, steps, delay)
+            else:
+                acting = measured_at(at)
+            controls.append(series(at, acting))
+            times = window.start + log.control_dt * np.arange(len(window.angles))
+            measured.append(series(times, window.angles, columns))
+        names = [f"{window.start:.1f} s" for window in windows]
+        return self._sysid.ModelSequences("finger", spec, names, starts, controls, measured)
+
+    def _compare(
+        self,
+        parameters: Any,
+        predicted: Any,
+        measured: Any,
+        model: mujoco.MjModel,
+        return_all: bool,
+        *,
+        state: NDArray[np.float64],
+        **more: Any,
+    ) -> Any:
+        del parameters, predicted, model, return_all, more
+        # A row of the state begins with the time; the first row is one step after the start.
+        ends = state[self._skip - 1 :: self._skip, 1 : 1 + _N]
+        return (ends - measured.data[1:]) / _ANGLE_SD, measured, measured

@@ -1,0 +1,288 @@
+"""The finger as a MuJoCo model: four hinges, and tendons that carry the physics."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.finger.anatomy import (
+    DIP_BAND,
+    DIP_BY_PIP,
+    DIP_COUPLING,
+    END_STIFFNESS,
+    JOINT_RANGE,
+    JOINT_REST,
+    JOINTS,
+    PHALANGES,
+    PHALANX_LENGTH_M,
+    PHALANX_RADIUS_M,
+    TENDONS,
+    TISSUE_DENSITY,
+)
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.tensions import TendonDrive, drive_of
+from shapechanger.finger.visuals import (
+    METACARPAL,
+    THICKEST_M,
+    THINNEST_M,
+    add_anatomy,
+    route_names,
+)
+
+SIM_DT: Final = 0.002
+"""Simulation step, s, that is stable under any command."""
+_SIM_DT_STRETCHED: Final = 0.0005
+"""Simulation step with tendons that stretch, s: a light spool on a stiff spring oscillates at 100
+Hz and more."""
+_SIM_DT_GEARED: Final = 0.001
+_GEARED_KG: Final = 0.5
+"""Simulation step with heavier motors than this, s: with gears they oscillate at some 20 Hz. The
+error of each step is a row of `python -m benchmarks.run finger-physics`."""
+
+# Former commands that a motor with a delay has at least, s, so that fingers with other delays have
+# arrays of the same shapes.
+_KEPT_S: Final = 0.020
+
+FINGERTIP: Final = "fingertip"
+"""Name of the site at the end of the distal phalanx."""
+HOOD: Final = "extensor_hood"
+"""Name of the tendon that couples the end joint with the middle one."""
+TARGET: Final = "target"
+"""Name of the body that marks the target of the fingertip, for pictures."""
+
+# Damping ratio of a stretched tendon: cords and tissue oscillate only briefly.
+_CABLE_DAMPING_RATIO: Final = 0.3
+_SKIN: Final = (0.87, 0.68, 0.58, 1.0)
+_HAND: Final = (0.75, 0.57, 0.48, 1.0)
+# As large as the tolerance of a reached target.
+_MARK: Final = (0.10, 0.55, 0.25, 0.45)
+_MARK_RADIUS_M: Final = 0.005
+# Length of the metacarpal, two thirds of a palm, for pictures only.
+_METACARPAL_M: Final = 0.060
+_FLEX: Final = (0.0, 1.0, 0.0)
+_ABDUCT: Final = (0.0, 0.0, 1.0)
+# Phalanx that each joint moves, and its axis.
+_HINGES: Final = ((0, _FLEX), (0, _ABDUCT), (1, _FLEX), (2, _FLEX))
+# Joint limits: the smallest stable time constant, s, and a damping ratio; and an impedance that
+# hardly yields under full tension.
+_LIMIT: Final = (2.0 * SIM_DT, 1.0)
+_LIMIT_IMPEDANCE: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
+
+
+def build_finger(
+    parameters: FingerParameters, drive: TendonDrive, *, anatomy: bool = False
+) -> mujoco.MjSpec:
+    """Build the MuJoCo model of a finger.
+
+    Controls are the commands of the drive, -1 to 1, in the order of `TENDONS`; with a path, they
+    are the tensions from the least, -1, to the most, 1, see `HeldTensions`. Tendons have the names
+    of `TENDONS`, and lengths relative to the straight finger, m. A tendon that stretches has a
+    motor: a slide joint such as `FDP/motor`, whose travel winds it up.
+
+    Args:
+        parameters: Parameters of the finger.
+        drive: Drive of its tendons.
+        anatomy: Whether to add bones and tendon routes for pictures; the motion is the same.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = "finger"
+    geared = parameters.motor_kg > _GEARED_KG
+    stretched = _SIM_DT_GEARED if geared else _SIM_DT_STRETCHED
+    spec.option.timestep = stretched if parameters.gives else SIM_DT
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    spec.visual.headlight.ambient[:] = (0.4, 0.4, 0.4)
+    spec.visual.headlight.diffuse[:] = (0.5, 0.5, 0.5)
+    spec.stat.center[:] = (0.02, 0.0, -0.02)
+    spec.stat.extent = 0.15
+    _add_bones(spec, parameters)
+    if parameters.path is not None:
+        half = 0.5 * (np.array(parameters.most_tension) - parameters.least_tension)
+        drive = TendonDrive(parameters.least_tension + half, half)
+    for i in range(len(TENDONS)):
+        _add_tendon(spec, i, parameters, drive)
+    _add_hood(spec)
+    mark = spec.worldbody.add_body(name=TARGET, mocap=True)
+    mark.add_geom(
+        name=TARGET, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_MARK_RADIUS_M, 0, 0], rgba=_MARK
+    )
+    if anatomy:
+        add_anatomy(spec)
+    return spec
+
+
+def _add_bones(spec: mujoco.MjSpec, parameters: FingerParameters) -> None:
+    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+    spec.worldbody.add_geom(
+        name=METACARPAL,
+        type=capsule,
+        size=[1.1 * PHALANX_RADIUS_M[0], 0, 0],
+        fromto=[-_METACARPAL_M, 0, 0, 0, 0, 0],
+        rgba=_HAND,
+    )
+    parent, at = spec.worldbody, 0.0
+    for k, name in enumerate(PHALANGES):
+        length, radius = PHALANX_LENGTH_M[k], PHALANX_RADIUS_M[k]
+        body = parent.add_body(name=name, pos=[at, 0, 0])
+        # As long as the bone with its caps, which overlap at the joints.
+        body.add_geom(
+            name=name,
+            type=capsule,
+            size=[radius, 0, 0],
+            fromto=[0, 0, 0, length - (radius if k == len(PHALANGES) - 1 else 0.0), 0, 0],
+            density=TISSUE_DENSITY,
+            rgba=_SKIN,
+        )
+        for j, (moved, axis) in enumerate(_HINGES):
+            if moved == k:
+                _add_hinge(body, j, axis, parameters)
+        parent, at = body, length
+    parent.add_site(name=FINGERTIP, pos=[at, 0, 0], size=[0.001, 0, 0])
+
+
+def _add_hinge(
+    body: mujoco.MjsBody, j: int, axis: tuple[float, float, float], parameters: FingerParameters
+) -> None:
+    stiffness = parameters.joint_stiffness[j]
+    farther = max(abs(JOINT_RANGE[j] - JOINT_REST[j]))
+    # The torque k x + c x³ is END_STIFFNESS times as stiff at the end as at rest.
+    rise = (END_STIFFNESS - 1.0) / (3.0 * farther**2)
+    body.add_joint(
+        name=JOINTS[j],
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=axis,
+        range=np.degrees(JOINT_RANGE[j]),
+        stiffness=[stiffness, 0.0, stiffness * rise],
+        springref=math.degrees(JOINT_REST[j]),
+        damping=[parameters.joint_damping[j], 0.0, 0.0],
+        frictionloss=parameters.joint_friction[j],
+        solref_limit=_LIMIT,
+        solimp_limit=_LIMIT_IMPEDANCE,
+    )
+
+
+def _add_path(
+    spec: mujoco.MjSpec, name: str, arms: tuple[float, float, float, float]
+) -> mujoco.MjsTendon:
+    """Add a tendon as a weighted sum of angles: flexion shortens a flexor by its moment arm."""
+    path = spec.add_tendon(name=name)
+    for joint, arm in zip(JOINTS, arms, strict=True):
+        path.wrap_joint(joint, -arm)
+    return path
+
+
+def _add_hood(spec: mujoco.MjSpec) -> None:
+    """Add the extensor hood: a spring that the end joint feels beyond its band."""
+    hood = spec.add_tendon(name=HOOD)
+    hood.wrap_joint(JOINTS[2], -DIP_BY_PIP)
+    hood.wrap_joint(JOINTS[3], 1.0)
+    hood.stiffness = [DIP_COUPLING, 0.0, 0.0]
+    hood.springlength = [-DIP_BAND, DIP_BAND]
+
+
+def _add_tendon(
+    spec: mujoco.MjSpec, i: int, parameters: FingerParameters, drive: TendonDrive
+) -> None:
+    """Add a tendon with its motor, which pulls it directly or, if it stretches, by a spring."""
+    name, arms = TENDONS[i], parameters.moment_arms[i]
+    path = _add_path(spec, name, arms)
+    if parameters.tendon_stiffness is None:
+        path.armature = parameters.motor_kg
+        path.damping = [parameters.tendon_damping, 0.0, 0.0]
+        path.frictionloss = parameters.tendon_friction
+        transmission, target, sign = mujoco.mjtTrn.mjTRN_TENDON, name, -1.0
+    else:
+        # The motor is a sliding mass.
+        transmission, target, sign = mujoco.mjtTrn.mjTRN_JOINT, f"{name}/motor", 1.0
+        spool = spec.worldbody.add_body(
+            name=target,
+            mass=parameters.motor_kg,
+            inertia=[1e-9] * 3,
+            gravcomp=1.0,
+            explicitinertial=True,
+        )
+        spool.add_joint(
+            name=target,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=[1, 0, 0],
+            damping=[parameters.tendon_damping, 0.0, 0.0],
+            frictionloss=parameters.tendon_friction,
+        )
+        # The spring between motor and finger, whose length is the stretch.
+        cable = _add_path(spec, f"{name}/stretch", arms)
+        cable.wrap_joint(target, 1.0)
+        cable.stiffness = [parameters.tendon_stiffness, 0.0, 0.0]
+        # It only pulls; below the backlash it is slack.
+        cable.springlength = [-1e3, parameters.backlash]
+        critical = 2.0 * math.sqrt(parameters.tendon_stiffness * parameters.motor_kg)
+        cable.damping = [_CABLE_DAMPING_RATIO * critical, 0.0, 0.0]
+    motor = spec.add_actuator(
+        name=name,
+        trntype=transmission,
+        target=target,
+        ctrllimited=True,
+        ctrlrange=[-1.0, 1.0],
+        forcelimited=True,
+        # `sign` is that of a pulling force.
+        forcerange=sorted((sign * parameters.least_tension, sign * parameters.most_tension[i])),
+        dyntype=mujoco.mjtDyn.mjDYN_FILTEREXACT,
+        gaintype=mujoco.mjtGain.mjGAIN_AFFINE,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+    )
+    motor.dynprm[0] = parameters.motor_lag
+    # Travel shortens the tendon, so length and speed have the opposite sign.
+    rest = 1.0 - drive.muscle_stiffness * drive.rest[i]
+    muscle = np.array([sign * rest, -drive.muscle_stiffness, -drive.muscle_damping])
+    motor.gainprm[:3] = drive.gain[i] * muscle
+    motor.biasprm[:3] = drive.offset[i] * muscle - (0.0, drive.stiffness, drive.damping)
+    if parameters.command_delay > 0.0:
+        motor.delay = parameters.command_delay
+        kept = max(parameters.command_delay, _KEPT_S)
+        motor.nsample = 1 + math.ceil(kept / spec.option.timestep)
+
+
+class FingerFigure:
+    """Visual model of a finger with its anatomy, posed from outside and never simulated.
+
+    It serves for every finger, because their differences are invisible.
+
+    Attributes:
+        model: The model.
+        data: Its state.
+    """
+
+    def __init__(self) -> None:
+        spec = build_finger(NOMINAL, drive_of("tension", NOMINAL), anatomy=True)
+        self.model: mujoco.MjModel = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self._mark = self.model.body(TARGET).mocapid[0]
+        self._courses = [
+            [self.model.tendon(course).id for course in route_names(name)] for name in TENDONS
+        ]
+
+    def show(
+        self, angles: NDArray[np.float64], pulled: NDArray[np.float64], target: NDArray[np.float64]
+    ) -> None:
+        """Set the posture.
+
+        Args:
+            angles: Joint angles, rad, (4,).
+            pulled: Tension of each tendon over its largest, 0 to 1, (7,), shown as its thickness.
+            target: Target of the fingertip, m, (3,).
+        """
+        widths = THINNEST_M + (THICKEST_M - THINNEST_M) * pulled.clip(0.0, 1.0)
+        for courses, width in zip(self._courses, widths, strict=True):
+            self.model.tendon_width[courses] = width
+        self.data.qpos[:] = angles
+        self.data.mocap_pos[self._mark] = target
+        mujoco.mj_forward(self.model, self.data)
+
+    def without_target(self) -> mujoco.MjModel:
+        """A copy of the model with an invisible target."""
+        model = self.model.__copy__()
+        model.geom_rgba[model.geom(TARGET).id, 3] = 0.0
+        return model

@@ -1,0 +1,231 @@
+"""Parameters that differ between fingers: tendons, joints, motors and sensor noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final, cast
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import FingerError, UnknownName
+from shapechanger.finger.anatomy import (
+    AN_1983_ARMS,
+    JOINT_DAMPING,
+    JOINT_FRICTION,
+    JOINT_STIFFNESS,
+    JOINTS,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    MOST_TENSION_N,
+    TENDONS,
+)
+
+# Time constant between a command and its force. Chosen.
+_MOTOR_LAG_S: Final = 0.020
+# Mass of a motor without gears and its spool, at the tendon. Chosen. That of geared servos is a
+# hundred times as large and more.
+_MOTOR_KG: Final = 0.010
+# N·s/m. Chosen.
+_TENDON_DAMPING: Final = 2.0
+# Tolerance of a ratio that must be whole.
+_WHOLE: Final = 1e-6
+
+Arms = tuple[tuple[float, float, float, float], ...]
+
+
+def _plain(numbers: NDArray[np.float64]) -> tuple[Any, ...]:
+    """Nested tuples of an array."""
+    if numbers.ndim > 1:
+        return tuple(_plain(row) for row in numbers)
+    return tuple(float(number) for number in numbers)
+
+
+class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the commands of a rig become tensions; names and units are those of its profile.
+
+    Without a path, the tensions follow commands, lengths and speeds in each simulation step. Lag
+    and delay are `motor_lag` and `command_delay` of `FingerParameters`, with a path or without.
+
+    Attributes:
+        control_hz: Rate at which tensions are computed from commands, lengths and speeds, and then
+            held, 1/s.
+        tick_hz: Rate at which the guard sends tensions to the servos, 1/s; a multiple of
+            `control_hz`.
+        slew_per_s: Fastest rise of a tension, in ranges from the least to the most tension per
+            second; None for no limit.
+        slew_down_per_s: Fastest fall of a tension, likewise.
+        tension_step: Resolution of the tensions, N, which are rounded down; 0 for none.
+
+    Raises:
+        FingerError: If a rate or a slew is not above zero and finite, the step is negative, or
+            `tick_hz` is not a multiple of `control_hz`.
+    """
+
+    control_hz: float = 50.0
+    tick_hz: float = 100.0
+    slew_per_s: float | None = None
+    slew_down_per_s: float | None = None
+    tension_step: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("control_hz", "tick_hz", "slew_per_s", "slew_down_per_s"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
+                raise FingerError(f"{name} of a path must be above zero and finite, got {value}.")
+        if not 0.0 <= self.tension_step < math.inf:
+            raise FingerError(
+                f"tension_step of a path must be zero or above and finite, got {self.tension_step}."
+            )
+        ticks = self.tick_hz / self.control_hz
+        if abs(ticks - round(ticks)) > _WHOLE * ticks:
+            raise FingerError(
+                f"tick_hz of a path must be a multiple of control_hz, got {self.tick_hz:g} and "
+                f"{self.control_hz:g}."
+            )
+
+    @classmethod
+    def from_mapping(cls, given: Mapping[str, Any]) -> CommandPath:
+        """Create a path from values by name.
+
+        Raises:
+            UnknownName: If there is no such name.
+            FingerError: If a value is malformed.
+        """
+        for name in given:
+            if name not in cls.__struct_fields__:
+                raise UnknownName("parameter of a command path", str(name), cls.__struct_fields__)
+        try:
+            return msgspec.convert(given, cls)
+        except msgspec.ValidationError as error:
+            raise FingerError(f"A command path is malformed: {str(error).rstrip('.')}.") from error
+
+
+class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Mechanics of a finger, and errors of its drives and sensors; the defaults are nominal.
+
+    Attributes:
+        moment_arms: Torque about each joint per newton of each tendon, m, 7 x 4.
+        most_tension: Largest tension of each tendon, N.
+        least_tension: Smallest tension of each tendon, which keeps it from hanging slack, N.
+        joint_stiffness: Passive stiffness of the joints, N·m/rad.
+        joint_damping: Passive damping of the joints, N·m·s/rad.
+        joint_friction: Coulomb friction of the joints, N·m.
+        tendon_damping: Damping of the tendons, N·s/m.
+        tendon_friction: Coulomb friction between motor and finger, N.
+        tendon_stiffness: Stiffness between motor and finger, N/m; None for stiff tendons.
+        backlash: Travel of a motor before its tendon pulls, m; only with a stiffness.
+        motor_kg: Mass of motor and spool at the tendon, kg.
+        motor_lag: Time constant between a command and its force, s.
+        command_delay: Delay of the commands, s.
+        joint_noise: Standard deviation of a measured angle, rad.
+        tension_noise: Standard deviation of a measured tension, N.
+        path: Path of the commands on a rig, or its values by name; None if the motors follow
+            commands, lengths and speeds without one.
+
+    Raises:
+        FingerError: If a number is not finite or has the wrong sign, an array has the wrong shape,
+            or a backlash is given without a stiffness.
+        UnknownName: If the path has no such value.
+    """
+
+    moment_arms: Arms = tuple(map(tuple, MOMENT_ARMS.tolist()))  # pyright: ignore[reportAssignmentType]
+    most_tension: tuple[float, ...] = tuple(MOST_TENSION_N.tolist())
+    least_tension: float = LEAST_TENSION_N
+    joint_stiffness: tuple[float, ...] = tuple(JOINT_STIFFNESS.tolist())
+    joint_damping: tuple[float, ...] = tuple(JOINT_DAMPING.tolist())
+    joint_friction: tuple[float, ...] = tuple(JOINT_FRICTION.tolist())
+    tendon_damping: float = _TENDON_DAMPING
+    tendon_friction: float = 0.0
+    tendon_stiffness: float | None = None
+    backlash: float = 0.0
+    motor_kg: float = _MOTOR_KG
+    motor_lag: float = _MOTOR_LAG_S
+    command_delay: float = 0.0
+    joint_noise: float = 0.0
+    tension_noise: float = 0.0
+    path: CommandPath | None = None
+
+    def __post_init__(self) -> None:
+        numbers = msgspec.structs.asdict(self)
+        path: Any = numbers.pop("path")
+        if isinstance(path, Mapping):
+            named = cast("Mapping[str, Any]", path)
+            msgspec.structs.force_setattr(self, "path", CommandPath.from_mapping(named))
+        if self.tendon_stiffness is None:
+            if self.backlash:
+                raise FingerError("backlash needs a tendon_stiffness: a stiff tendon has none.")
+            numbers["tendon_stiffness"] = 1.0
+        sizes = {"moment_arms": (len(TENDONS), len(JOINTS)), "most_tension": (len(TENDONS),)}
+        for name, value in numbers.items():
+            try:
+                given = np.asarray(value, np.float64)
+            except (TypeError, ValueError) as error:
+                raise FingerError(f"{name} must hold numbers, got {value!r}.") from error
+            shape = sizes.get(name, (len(JOINTS),) if name.startswith("joint_") else ())
+            if name == "joint_noise":
+                shape = ()
+            if given.shape != shape:
+                raise FingerError(f"{name}: the shape must be {shape}, got {given.shape}.")
+            if not np.isfinite(given).all():
+                raise FingerError(f"{name}: the numbers must be finite, got {value}.")
+            if name != "moment_arms" and given.min() < 0.0:
+                raise FingerError(f"{name}: the numbers must not be below zero, got {value}.")
+            if shape:  # Tuples compare, and become JSON.
+                msgspec.structs.force_setattr(self, name, _plain(given))
+        for name in ("motor_kg", "motor_lag"):
+            if not numbers[name] > 0.0:
+                raise FingerError(f"{name} must be above zero, got {numbers[name]}.")
+        if not (min(self.most_tension) > self.least_tension and numbers["tendon_stiffness"] > 0.0):
+            raise FingerError(
+                f"most_tension must be above least_tension, {self.least_tension} N, which keeps a "
+                "tendon from hanging slack, and tendon_stiffness above zero."
+            )
+
+    @property
+    def arms(self) -> NDArray[np.float64]:
+        """Moment arms, m, (7, 4)."""
+        return np.array(self.moment_arms)
+
+    @property
+    def gives(self) -> bool:
+        """Return whether the tendons stretch."""
+        return self.tendon_stiffness is not None
+
+    def replace(self, **changes: Any) -> FingerParameters:
+        """A copy with some parameters replaced.
+
+        Raises:
+            FingerError: See the class.
+        """
+        return msgspec.structs.replace(self, **changes)
+
+    def to_json(self) -> str:
+        """Encode as JSON."""
+        return msgspec.json.encode(self).decode()
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> FingerParameters:
+        """Decode the result of `to_json`.
+
+        Raises:
+            FingerError: If the text is not a valid finger.
+        """
+        try:
+            return msgspec.json.decode(text, type=cls)
+        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+            reason = str(error).rstrip(".")
+            raise FingerError(f"Invalid finger parameters: {reason}.") from error
+
+
+NOMINAL: Final = FingerParameters()
+"""Finger of the anatomy, with stiff tendons without friction, delay and noise."""
+
+PARAMETER_SETS: Final[Mapping[str, FingerParameters]] = MappingProxyType(
+    {"an-1983": NOMINAL.replace(moment_arms=AN_1983_ARMS)}
+)
+"""Other sets of parameters, by name. No tensions balance the moment arms of "an-1983"; see
+`anatomy.AN_1983_ARMS`."""

@@ -1,0 +1,175 @@
+"""`Finger-v1`: bring the fingertip to a point and keep it there."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.contract.measure import RETURN, SUCCESS
+from shapechanger.errors import FingerError
+from shapechanger.finger.anatomy import PHALANX_LENGTH_M
+from shapechanger.finger.env import SMOOTHNESS, FingerEnv, as_numbers
+from shapechanger.finger.postures import draw_posture
+from shapechanger.finger.task import FingerSenses, fingertip, place_features
+from shapechanger.layout import Element, Feature, Layout
+
+_TARGET: Final = Element("task", "target")
+TOLERANCE_M: Final = 0.005
+"""Distance from the target within which the fingertip must stay, m."""
+HELD_STEPS: Final = 10
+"""Steps for which it must stay there without a break: 0.2 s."""
+
+
+class FingerReachEnv(FingerEnv):
+    """Bring the fingertip to a random point that the nominal finger can reach, and keep it there.
+
+    ## Action space
+    `Box(-1, 1, (7,), float32)`, one number per tendon: FDP, FDS, EIP, EDC, LUM, DI, PI. The
+    argument `actions` sets what they command: "impedance", a muscle whose pull grows with its
+    length; "tension"; or "length". An action lasts 0.02 s.
+
+    ## Observation space
+    `Box(-inf, inf, (38,), float64)`: angles (4), rad, and velocities (4), rad/s, of the joints;
+    tensions (7), N, lengths (7), m, and newest commands (7) of the tendons; fingertip (3) by those
+    angles, target (3), and the vector from fingertip to target (3), m. `observation_layout` names
+    each. With `goal=True` a Dict of `observation` (32, the same without the target),
+    `achieved_goal` (3) and `desired_goal` (3), for learners with hindsight.
+
+    ## Reward
+    `FingertipReward`: nearness to the target minus effort, and minus the change of the commands
+    where `reward={"change": 5.0}` or so gives it a weight. With `goal=True` it is -1 where the
+    measured fingertip is farther than 5 mm from the target and 0 elsewhere, as in
+    `compute_reward`.
+
+    ## Start
+    At rest, near the posture of a hand at rest. The target is the fingertip of a random posture
+    that the nominal finger can hold, at least a tenth of its range away from each limit. A weaker
+    finger of a gap may not come to all of them.
+
+    ## End
+    Never terminated; truncated after 100 steps, 2 s.
+
+    ## Info
+    `is_success`, whether the fingertip has been within 5 mm for the last 0.2 s; `distance`, m, of
+    the true fingertip; `target`, m; `smoothness`, 1 minus the mean change of the commands over
+    their range; `reward_nearness`, `reward_effort` and `reward_change` (with `goal=True`
+    `reward_goal`); `diverged` where the simulation diverged.
+
+    Args:
+        goal: Whether observations are Dicts with goals.
+        **arguments: Arguments of `FingerEnv`.
+    """
+
+    measures = (SUCCESS, RETURN, SMOOTHNESS)
+    _options = ("posture", "target")
+
+    def __init__(self, *, goal: bool = False, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        EzPickle.__init__(self, goal=goal, **arguments)
+        self._has_goal = goal
+        self._target = np.zeros(3)
+        self._steps_near = 0
+        senses = self._sense_features()
+        target = place_features("target", _TARGET)
+        if goal:
+            achieved = [Feature(f"achieved/{axis}", "m", element=_TARGET) for axis in "xyz"]
+            # In the order in which Gymnasium flattens a Dict.
+            features = [*achieved, *target, *senses]
+            self.observation_space = gym.spaces.Dict(
+                {
+                    "observation": _unbounded(len(senses)),
+                    "achieved_goal": _unbounded(3),
+                    "desired_goal": _unbounded(3),
+                }
+            )
+        else:
+            offset = [Feature(f"target/d{axis}", "m", element=_TARGET) for axis in "xyz"]
+            features = [*senses, *target, *offset]
+            self.observation_space = _unbounded(len(features))
+        self.observation_layout = Layout(tuple(features))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: Seed of all randomness from here on; None keeps the present generator.
+            options: `posture`, four angles, rad, to start at; `target`, m, (3,), or four angles
+                whose fingertip it is. Omitted ones are drawn.
+
+        Raises:
+            UnknownName: If there is no such option.
+            FingerError: If a posture or a target is malformed or out of range.
+        """
+        super().reset(seed=seed)
+        given = (options or {}).get("target")
+        target = fingertip(draw_posture(self.np_random), PHALANX_LENGTH_M)
+        self._target = target if given is None else _target(given)
+        senses = self._place(options)
+        self.plant.mark(self._target)
+        self._steps_near = 0
+        distance = float(np.linalg.norm(self.plant.fingertip - self._target))
+        return self._observation(senses), self._info(distance)
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take one step.
+
+        Raises:
+            BadAction: If the action has another shape or is not finite; nothing has moved then.
+            ResetNeeded: If `reset` was never called.
+        """
+        senses = self._act(action)
+        distance, terms = self._terms(self._target)
+        self._steps_near = self._steps_near + 1 if distance <= TOLERANCE_M else 0
+        info = self._info(distance)
+        if self._has_goal:
+            reached = self.compute_reward(senses.fingertip, self._target, info)
+            terms = {"reward_goal": float(reached)}
+        return self._stepped(self._observation(senses), info, terms)
+
+    def compute_reward(
+        self, achieved_goal: NDArray[np.float64], desired_goal: NDArray[np.float64], info: object
+    ) -> NDArray[np.float64]:
+        """Return the reward of `goal=True`: 0 within 5 mm, -1 elsewhere; shape (...).
+
+        Args:
+            achieved_goal: Fingertips, m, (..., 3).
+            desired_goal: Targets, m, (..., 3).
+            info: Ignored.
+        """
+        distance = np.linalg.norm(np.asarray(achieved_goal) - np.asarray(desired_goal), axis=-1)
+        return -(distance > TOLERANCE_M).astype(np.float64)
+
+    def _observation(self, senses: FingerSenses) -> Any:
+        if self._has_goal:
+            return {
+                "observation": senses.numbers(),
+                "achieved_goal": senses.fingertip.copy(),
+                "desired_goal": self._target.copy(),
+            }
+        return np.concatenate([senses.numbers(), self._target, self._target - senses.fingertip])
+
+    def _info(self, distance: float) -> dict[str, Any]:
+        return {
+            "is_success": self._steps_near >= HELD_STEPS,
+            "distance": distance,
+            "target": self._target.copy(),
+        }
+
+
+def _unbounded(size: int) -> gym.spaces.Box:
+    return gym.spaces.Box(-np.inf, np.inf, (size,), np.float64)
+
+
+def _target(value: Any) -> NDArray[np.float64]:
+    given = as_numbers(value)
+    if given.shape == (4,):
+        given = fingertip(given, PHALANX_LENGTH_M)
+    if given.shape != (3,) or not np.isfinite(given).all():
+        raise FingerError(f"A target must be three finite numbers, m, or four angles; got {value}.")
+    return given

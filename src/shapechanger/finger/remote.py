@@ -1,0 +1,462 @@
+"""The tasks of the finger on a rig of servos, or on its twin."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Final, cast
+
+import mujoco
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.envs.remote.vehicle import KNOWN_ROBOT, OnReset, RemoteVehicleEnv
+from shapechanger.errors import FingerError, RobotRefused, UnknownName, check_seed
+from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
+from shapechanger.finger.env import FingerEnv, check_posture
+from shapechanger.finger.gap import GAPS, with_gears
+from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
+from shapechanger.finger.paths import PathSource
+from shapechanger.finger.plant import CONTROL_DT
+from shapechanger.finger.postures import draw_start
+from shapechanger.finger.reach import FingerReachEnv
+from shapechanger.finger.rig import LengthApproach, RigSenses, StartApproach
+from shapechanger.finger.task import FingerSenses
+from shapechanger.finger.track import FingerTrackEnv
+from shapechanger.link.messages import Pace
+from shapechanger.robot.profile.load import find_profile
+from shapechanger.twin.robot import Operator, RunningRobot, run_robot
+
+NOMINAL_TWIN: Final = "nominal"
+"""Name of the twin with the parameters of the nominal finger."""
+
+_RIG: Final = "finger"  # Name of the shipped profile.
+_WITHOUT_A_RIG: Final = (
+    'Without a rig, give twin="real-like": the env then serves a simulated one itself.'
+)
+
+
+# Tolerance of the start posture, rad, and time limit, s. If gears stick, the episode begins where
+# the finger is.
+_START_OFF_RAD: Final = 0.03
+_START_S: Final = 1.0
+# Time for the pretension to wind in slack, s.
+_SLACK_S: Final = 0.6
+_TIMEOUT_S: Final = 2.0
+_OWN_TIMEOUT_S: Final = 30.0
+# Prefixes of infos that concern driving only.
+_DRIVING: Final = ("reward", "frame", "captured_ns")
+
+
+class OnRig(FingerEnv):
+    """Perform a task of the finger on a rig; mixed into the env of the task.
+
+    The simulation is never stepped: it mirrors the rig, for rendering and rewards.
+
+    Args:
+        robot: Name of a known rig, or its address as HOST or HOST:PORT. A twin of the profile
+            "finger" that is served on this machine is known under that name.
+        task: Arguments of the task's own env.
+        key: The rig's key, for an address.
+        fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
+        pace: As for `RemoteVehicleEnv`; None for "lockstep" with a twin's own clock, else
+            "realtime".
+        twin: A twin that this env serves itself instead of connecting to `robot`: "nominal", or the
+            name of the gap that its finger is drawn from; "" for none.
+        finger_seed: Seed of the finger drawn from that gap; 0 if not given.
+        tendon_stiffness: Stiffness of the rig's tendons, N/m, to correct lengths for their stretch.
+            The default is the twin's.
+        twin_folder: Folder of a twin on this machine, for its true state; "" for none.
+        on_reset: As for `RemoteVehicleEnv`.
+        on_waiting: As for `RemoteVehicleEnv`.
+        reset_timeout_s: Time limit of a reset, s.
+        timeout_s: Silence of the rig after which the link is lost, s; None for 2 s, or 30 s with
+            its own twin, whose clock waits for a busy machine.
+        actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
+        reward: Weights that replace the default ones, by name.
+        render_mode: "human", "rgb_array" or "depth_array": the finger as measured.
+        width: Width of frames, pixels.
+        height: Height of frames, pixels.
+
+    Raises:
+        UnknownName: If no rig of this name is known, or there is no such mode of action or weight.
+        LinkError: If the rig cannot be reached, or is not trusted.
+        RobotRefused: If it refuses the connection, or is not a finger rig.
+    """
+
+    side_by_side: ClassVar[bool] = False
+    """Whether several can run at once: there is one rig, and a twin needs many processes."""
+
+    def __init__(
+        self,
+        robot: str,
+        task: Mapping[str, Any],
+        *,
+        key: str = "",
+        fingerprint: str = "",
+        pace: Pace | None = None,
+        twin: str = "",
+        finger_seed: int | None = None,
+        tendon_stiffness: float = 20e3,
+        twin_folder: str = "",
+        on_reset: OnReset = "operator",
+        on_waiting: Callable[[str], object] | None = None,
+        reset_timeout_s: float = 60.0,
+        timeout_s: float | None = None,
+        actions: str = "impedance",
+        reward: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        width: int = 480,
+        height: int = 480,
+    ) -> None:
+        super().__init__(
+            **task,
+            actions=actions,
+            reward=reward,
+            render_mode=render_mode,
+            width=width,
+            height=height,
+        )
+        self._twin, self._finger_seed = twin, finger_seed
+        self._true_tip: NDArray[np.float64] | None = None
+        self._true_angles: NDArray[np.float64] | None = None
+        self._own: RunningRobot | None = None
+        if twin or finger_seed is not None:
+            self._own = serve_twin(twin, finger_seed)
+            known = self._own.known
+            robot, key, fingerprint = known.address, known.key, known.fingerprint
+            twin_folder = str(self._own.folder)
+        access: dict[str, Any] = {
+            "robot": robot,
+            "key": key,
+            "fingerprint": fingerprint,
+            "state": True,
+            "image": False,
+            "on_reset": on_reset,
+            "on_waiting": on_waiting,
+            "reset_timeout_s": reset_timeout_s,
+            "timeout_s": timeout_s or (_TIMEOUT_S if self._own is None else _OWN_TIMEOUT_S),
+        }
+        self._operator: Operator | None = None
+        try:
+            self._rig = _connected(access, pace)
+        except BaseException as error:
+            self._end_twin()
+            if isinstance(error, UnknownName) and error.kind == KNOWN_ROBOT:
+                raise UnknownName(error.kind, error.name, error.known, _WITHOUT_A_RIG) from None
+            raise
+        try:
+            welcome = self._rig.welcome
+            self._rig_senses = RigSenses(
+                welcome.robot,
+                self._rig.action_layout,
+                self._rig.observation_layout,
+                tendon_stiffness,
+                CONTROL_DT,
+            )
+            if self._rig_senses.controls_length and actions != "length":
+                raise FingerError(
+                    f'{welcome.robot} controls lengths, so actions must be "length", not '
+                    f'{actions!r}; control = "tension" in its profile allows all modes.'
+                )
+            if twin_folder:
+                self._operator = Operator(str(Path(twin_folder) / "board.socket"))
+        except BaseException:
+            self.close()
+            raise
+        self._rig_info: dict[str, Any] = {}
+        self._command = np.zeros(len(MOMENT_ARMS))
+        self._seed: int | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode; the options are those of the task in simulation.
+
+        Raises:
+            UnknownName: If there is no such option.
+            FingerError: If a posture or a target is malformed or out of range.
+            PathError: If a path is none, or the finger cannot follow it.
+            RobotRefused: If the rig was not armed in time, refuses the connection, stops on the way
+                to the start, or its lengths fit no posture.
+            LinkError: If it cannot be reached in time.
+        """
+        self._seed = seed
+        self._rest()
+        observation, info = super().reset(seed=seed, options=options)
+        return observation, self._finger_info() | info | self._truth(info)
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take one step.
+
+        Raises:
+            BadAction: If the action has another shape or is not finite; nothing was sent then.
+            ResetNeeded: If `reset` was never called, or the link was lost.
+        """
+        observation, reward, terminated, _, info = super().step(action)
+        info = self._finger_info() | info | self._truth(info)
+        return observation, float(reward), terminated, bool(info["truncated_because"]), info
+
+    def _rest(self) -> None:
+        """Cool the servos of its own twin; those of a rig cool in pauses."""
+        if self._own is not None and self._operator is not None:
+            for name in TENDONS:
+                self._operator.break_servo(name, "")
+
+    def close(self) -> None:
+        """Stop and release the rig, and free the renderer."""
+        super().close()
+        self._rig.close()
+        if self._operator is not None:
+            self._operator.close()
+            self._operator = None
+        self._end_twin()
+
+    def _end_twin(self) -> None:
+        if self._own is not None:
+            self._own.close()
+            self._own = None
+
+    @property
+    def exclusive(self) -> bool:
+        """Return whether it blocks others from using the same robot; its own twin does not."""
+        return self._own is None
+
+    @property
+    def individual(self) -> str:
+        """Name of the argument that selects one finger of a gap; empty if there is only one."""
+        many = bool(self._twin) and self._twin != NOMINAL_TWIN
+        return "finger_seed" if many and self._finger_seed is None else ""
+
+    @property
+    def motors(self) -> FingerParameters:
+        """The nominal finger with the rig's range of tensions and path, on geared servos."""
+        rig, welcome = self._rig_senses, self._rig.welcome
+        # The slowest of its servos stands for all.
+        slews = [
+            min((slew for slew in given if slew > 0.0), default=None)
+            for given in (welcome.slew_per_s, welcome.slew_down_per_s)
+        ]
+        return with_gears(
+            NOMINAL.replace(
+                most_tension=tuple(rig.most.tolist()),
+                least_tension=float(rig.least.max()),
+                path=CommandPath(
+                    control_hz=welcome.control_hz,
+                    tick_hz=welcome.tick_hz,
+                    slew_per_s=slews[0],
+                    slew_down_per_s=slews[1],
+                ),
+            )
+        )
+
+    def _place(self, options: dict[str, Any] | None) -> FingerSenses:
+        """Arm the rig, and bring the finger to its start."""
+        for name in options or {}:
+            if name not in self._options:
+                raise UnknownName("option of reset", name, self._options)
+        given = (options or {}).get("posture")
+        start = draw_start(self.np_random) if given is None else check_posture(given)
+        state, self._rig_info = self._rig.reset(seed=self._seed)
+        self._command = np.zeros(len(MOMENT_ARMS))
+        self._rig_senses.forget()
+        senses = self._sense(state)
+        for _ in range(round(_SLACK_S / CONTROL_DT)):
+            if self._rig_senses.fits(senses):
+                break
+            senses = self._pull_on_the_way(self._rig_senses.least)
+        self._rig_senses.require_fit(senses)
+        way = StartApproach(start, self._rig_senses.least, self._rig_senses.most)
+        by_length = LengthApproach(start)
+        for _ in range(round(_START_S / CONTROL_DT)):
+            if way.off(senses) < _START_OFF_RAD:
+                break
+            if self._rig_senses.controls_length:
+                senses = self._on_the_way(self._rig_senses.length_values(by_length.lengths(senses)))
+            else:
+                senses = self._pull_on_the_way(way.tensions(senses))
+        # The command for the present tensions, as in simulation.
+        least = np.clip(senses.tensions, self._rig_senses.least, self._rig_senses.most)
+        command = self.drive.command(least, senses.lengths, self._rig_senses.speeds)
+        self._command = np.clip(command, -1.0, 1.0)
+        self._senses = dataclasses.replace(senses, commands=self._command)
+        return self._senses
+
+    def _move(self, command: NDArray[np.float64]) -> FingerSenses:
+        """Convert a command to tensions or lengths, and pull for one control period."""
+        self._command = command
+        if self._rig_senses.controls_length:
+            # The length at which the drive pulls with nothing but the least tension.
+            still = self.drive.tension(command, np.zeros(len(command)), np.zeros(len(command)))
+            lengths = (self._rig_senses.least - still) / self.drive.stiffness
+            return self._send(self._rig_senses.length_values(lengths))
+        lengths = cast("FingerSenses", self._senses).lengths
+        return self._pull(self.drive.tension(command, lengths, self._rig_senses.speeds))
+
+    def _pull(self, tensions: NDArray[np.float64]) -> FingerSenses:
+        """Command tensions, N, (7,), for one control period."""
+        return self._send(self._rig_senses.values(tensions))
+
+    def _send(self, values: NDArray[np.float32]) -> FingerSenses:
+        """Send a command of the rig for one control period."""
+        state, _, _, _, self._rig_info = self._rig.step(values)
+        return self._sense(state)
+
+    def _pull_on_the_way(self, tensions: NDArray[np.float64]) -> FingerSenses:
+        """Command tensions before an episode; see `_on_the_way`."""
+        return self._on_the_way(self._rig_senses.values(tensions))
+
+    def _on_the_way(self, values: NDArray[np.float32]) -> FingerSenses:
+        """Send a command of the rig before an episode.
+
+        Raises:
+            RobotRefused: If the rig stops.
+        """
+        senses = self._send(values)
+        if because := self._rig_info["truncated_because"]:
+            raise RobotRefused(f"The finger did not come to its start: {because}")
+        return senses
+
+    def _sense(self, state: NDArray[Any]) -> FingerSenses:
+        absent: tuple[str, ...] = self._rig_info["absent"]
+        senses = self._rig_senses.read(state, absent, self._command)
+        data = self.plant.data
+        self._read_truth()
+        judged = self._own is not None and self._true_angles is not None
+        data.qpos[:] = self._true_angles if judged else senses.angles
+        data.qvel[:] = senses.velocities
+        mujoco.mj_kinematics(self.plant.model, data)
+        data.actuator_force[:] = -senses.tensions
+        return senses
+
+    def _finger_info(self) -> dict[str, Any]:
+        """Return the entries of the rig's info that concern a finger."""
+        info = {n: v for n, v in self._rig_info.items() if not n.startswith(_DRIVING)}
+        return {"truncated_because": ""} | info
+
+    def _read_truth(self) -> None:
+        """Read the true state from the twin."""
+        if self._operator is None:
+            return
+        truth = self._operator.where().truth
+        self._true_tip = np.array([truth[f"fingertip/{axis}"] for axis in "xyz"])
+        self._true_angles = np.array([truth[f"{name}/angle"] for name in JOINTS])
+
+    def _truth(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Return the info of the true state, next to the target in the info of the task."""
+        if self._true_tip is None or self._true_angles is None:
+            return {}
+        return {
+            "true_distance": float(np.linalg.norm(self._true_tip - info["target"])),
+            "true_angles": self._true_angles.copy(),
+        }
+
+
+class RemoteFingerEnv(OnRig, FingerReachEnv):
+    """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
+
+    ## Action and observation space, reward
+    Those of `Finger-v1`, with the same layouts, so a script runs on both by changing the id.
+    Actions are converted to tensions here, by the newest lengths and speeds of the tendons at the
+    servos. On a rig with encoders at its joints, as the shipped one, the angles are theirs, noise
+    included, and velocities are their differences over 20 ms, smoothed over 40 ms. Otherwise angles
+    and velocities follow from lengths and speeds with the nominal moment arms, and are as accurate
+    as these. The fingertip follows from the angles; so do the distance, the reward and
+    `info["is_success"]`. With its own twin (`twin`) these three use the true state, as in
+    `Finger-v1`, while observations remain measurements.
+
+    ## Start
+    The operator arms a rig; the env arms a twin. The finger is then brought close to the start of
+    `Finger-v1` for the same seed, which takes up to 1 s and ends within some hundredths of a radian
+    as measured, or farther off where gears stick; the target is the same. The servos of its own
+    twin are cool at the start; those of a rig need pauses, or switch off by themselves.
+
+    ## End
+    Truncated after 100 steps, and when the rig stops: a servo that fails, an emergency stop, a lost
+    link. `info["truncated_because"]` says why.
+
+    ## Info
+    As `Finger-v1`, and from `RemoteVehicleEnv`: `action_applied`, `stop_reason`,
+    `refused`, `events`, `latency`, `armed`, `emergency`, `absent`, `truncated_because`. With
+    `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), of the twin.
+
+    Args:
+        robot: Name of a known rig, or its address; see `OnRig`.
+        goal: Whether observations are Dicts with goals.
+        **rig: Arguments of `OnRig`.
+
+    Raises:
+        UnknownName, LinkError, RobotRefused: As `OnRig`.
+    """
+
+    def __init__(self, robot: str = "finger", *, goal: bool = False, **rig: Any) -> None:
+        super().__init__(robot, {"goal": goal}, **rig)
+        EzPickle.__init__(self, robot, goal=goal, **rig)
+
+
+class RemoteFingerTrackEnv(OnRig, FingerTrackEnv):
+    """Follow a point that moves along a known path with a real finger, or its twin.
+
+    ## Action and observation space, reward
+    Those of `FingerTrack-v1`, with the same layouts; they are converted and measured as in
+    `RemoteFinger-v1`.
+
+    ## Start
+    The finger is brought to the point of the path where `FingerTrack-v1` starts for the same seed,
+    as in `RemoteFinger-v1`; then the point moves.
+
+    ## End
+    Truncated after 250 steps, 5 s, and when the rig stops; `info["truncated_because"]` says why.
+
+    ## Info
+    As `FingerTrack-v1`, and the entries of a rig as in `RemoteFinger-v1`.
+
+    Args:
+        robot: Name of a known rig, or its address; see `OnRig`.
+        path: As for `FingerTrack-v1`.
+        **rig: Arguments of `OnRig`.
+
+    Raises:
+        PathError: If it is not a path, or the nominal finger cannot follow it.
+        UnknownName, LinkError, RobotRefused: As `OnRig`.
+    """
+
+    def __init__(self, robot: str = "finger", *, path: PathSource = "circle", **rig: Any) -> None:
+        super().__init__(robot, {"path": path}, **rig)
+        EzPickle.__init__(self, robot, path=path, **rig)
+
+
+def _connected(access: dict[str, Any], pace: Pace | None) -> RemoteVehicleEnv:
+    """Connect to the rig, by default at the pace of its clock."""
+    rig = RemoteVehicleEnv(**access, pace=pace or "lockstep")
+    if pace is None and rig.welcome.clock == "real":
+        rig.close()
+        rig = RemoteVehicleEnv(**access, pace="realtime")
+    return rig
+
+
+def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:
+    """Serve the shipped profile of a rig on a twin with its own clock.
+
+    Args:
+        twin: "nominal", or the name of the gap that its finger is drawn from.
+        finger_seed: Seed of the finger drawn from the gap; 0 if not given.
+
+    Raises:
+        UnknownName: If there is no such gap.
+        FingerError: If a seed is given without a gap, or is not a whole number from 0 to 2^32 - 1.
+        RobotError: If the twin does not start.
+    """
+    if twin not in ("", NOMINAL_TWIN, *GAPS):
+        raise UnknownName("twin of a finger", twin, (NOMINAL_TWIN, *GAPS))
+    if twin not in GAPS and finger_seed is not None:
+        raise FingerError("finger_seed selects a finger of a gap, so `twin` must name a gap.")
+    chosen = check_seed(
+        0 if finger_seed is None else finger_seed, FingerError, "finger_seed must be"
+    )
+    drawn = ("--gap", twin, "--finger-seed", str(chosen))
+    return run_robot(
+        find_profile(_RIG), clock="twin", arguments=() if twin == NOMINAL_TWIN else drawn
+    )

@@ -1,0 +1,142 @@
+"""The report of an identified finger, and its numbers in readable units."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from shapechanger.finger.anatomy import JOINTS
+from shapechanger.finger.identify.result import IdentifiedFinger, ParameterEstimate
+from shapechanger.reports.page import render, svg_uri
+
+# For each SI unit the unit that is shown, and the factor between them.
+_SHOWN: Final = {
+    "m": ("mm", 1e3),
+    "s": ("ms", 1e3),
+    "N/m": ("N/mm", 1e-3),
+    "N·m/rad": ("mN·m/rad", 1e3),
+    "N·m·s/rad": ("mN·m·s/rad", 1e3),
+    "N": ("N", 1.0),
+    "1": ("of nominal", 1.0),
+}
+# Widest interval that says something, in SI units. Chosen: arms a finger's thickness; the others
+# about twice the range of the gap "wide".
+_WIDEST: Final = {
+    "moment_arms": 0.015,
+    "tendon_friction": 3.0,
+    "tendon_stiffness": 60e3,
+    "motor_lag": 0.05,
+    "command_delay": 0.1,
+    "strength": 0.6,
+}
+# The same for stiffness and damping of the joints, over the nominal value.
+_WIDEST_OF_NOMINAL: Final = 3.0
+# m. The relative error of a shorter moment arm hardly matters.
+_SMALL_ARM_M: Final = 2e-3
+
+
+def finger_html(found: IdentifiedFinger, name: str) -> str:
+    """Render the report.
+
+    Args:
+        found: The result of the identification.
+        name: Name of the log.
+
+    Raises:
+        MissingExtra: If matplotlib or Jinja2 is not installed.
+    """
+    from shapechanger.finger.report_charts import arms_chart, joint_chart
+
+    return render(
+        "finger.html",
+        title=name,
+        verdict=f"{summary_line(found).capitalize()}.",
+        log=f"{found.seconds:.1f} s" + (f" of {found.source}" if found.source else ""),
+        charts=[(joint, svg_uri(joint_chart(found, i))) for i, joint in enumerate(JOINTS)],
+        arms=svg_uri(arms_chart(found)),
+        arm_count=len(found.arms),
+        rows=[
+            {
+                "label": label(e),
+                "value": number(e, e.value),
+                "interval": interval(e),
+                "differs": e.differs,
+                "nominal": number(e, e.nominal),
+            }
+            for e in found.estimates
+            if e not in found.arms
+        ],
+        unknown=unknown(found),
+        undetermined=found.undetermined,
+    )
+
+
+def label(estimate: ParameterEstimate) -> str:
+    """Name of a parameter with its unit, as in `moment arm FDP, MCP_flexion [mm]`."""
+    name, *of = estimate.name.split("/")
+    words = {"moment_arms": "moment arm"}.get(name, name.replace("_", " "))
+    return f"{words} {', '.join(of)}".strip() + f" [{_SHOWN[estimate.unit][0]}]"
+
+
+def number(estimate: ParameterEstimate, value: float) -> str:
+    """Format a value of a parameter.
+
+    Args:
+        estimate: The parameter.
+        value: In its SI unit; shown in the unit of its label.
+    """
+    if math.isinf(value):
+        return "stiff"
+    return f"{_SHOWN[estimate.unit][1] * value:.3g}"
+
+
+def interval(estimate: ParameterEstimate) -> str:
+    """Format the 95 % interval of a parameter; one that the log does not bound is unknown."""
+    if unbounded(estimate):
+        return "unknown"
+    return f"{number(estimate, estimate.low)} to {number(estimate, estimate.high)}"
+
+
+def arm_cell(estimate: ParameterEstimate) -> str:
+    """Format a moment arm with half its interval, mm; a star if the nominal arm is outside."""
+    half = 0.5e3 * (estimate.high - estimate.low)
+    if unbounded(estimate):
+        return "unknown"
+    return f"{1e3 * estimate.value:.2f} ±{half:.2f}{'*' if estimate.differs else ''}"
+
+
+def unbounded(estimate: ParameterEstimate) -> str:
+    """Reason why the log does not bound a parameter; empty if it does."""
+    unit, factor = _SHOWN[estimate.unit]
+    low, high = (f"{factor * end:.3g}" for end in (estimate.low, estimate.high))
+    if math.isinf(estimate.low):
+        return "no stretch is visible, so every large value fits."
+    if math.isinf(estimate.high):
+        return f"the stretch is hardly visible, so every value above {low} {unit} fits."
+    kind = estimate.name.split("/")[0]
+    widest = _WIDEST.get(kind, _WIDEST_OF_NOMINAL * estimate.nominal)
+    if estimate.high - estimate.low <= widest:
+        return ""
+    return (
+        f"every value from {low} to {high} {unit} fits, a wider range than the "
+        f"{factor * widest:.3g} {unit} by which fingers differ."
+    )
+
+
+def unknown(found: IdentifiedFinger) -> list[tuple[str, str]]:
+    """Names of the parameters that the log does not bound, each with the reason."""
+    pairs = ((e.name, unbounded(e)) for e in found.estimates)
+    return [(name, why) for name, why in pairs if why]
+
+
+def summary_line(found: IdentifiedFinger) -> str:
+    """Summarise the result in one line."""
+    large = [e for e in found.arms if abs(e.value) > _SMALL_ARM_M]
+    widest = max((0.5 * (e.high - e.low) / abs(e.value) for e in large), default=0.0)
+    other = sum(e.differs for e in found.arms)
+    off, nominal = (math.degrees(rms) for rms in found.held_out.off)
+    return (
+        f"arms: {len(found.arms)} intervals, the widest of those above 2 mm ±{widest:.1%}, "
+        f"{other} exclude the nominal arm; held-out angles are off by "
+        f"{off:.1f} degrees, in the nominal finger by {nominal:.1f}"
+    )

@@ -1,0 +1,255 @@
+"""Convert measurements and commands of a finger rig to those of `Finger-v1`."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import RobotRefused
+from shapechanger.finger.anatomy import (
+    JOINT_RANGE,
+    JOINTS,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    PHALANX_LENGTH_M,
+    TENDONS,
+)
+from shapechanger.finger.plant import CONTROL_DT, JointVelocities
+from shapechanger.finger.postures import moving_torque
+from shapechanger.finger.task import FingerSenses, fingertip
+from shapechanger.finger.tensions import tensions_for_torque
+from shapechanger.layout import Layout
+
+# Length errors above this, m, come from a lost turn (30 mm on a small spool), not from arms.
+_MISFIT_M: Final = 0.012
+_ABOVE_REST: Final = 1e-3
+_QUANTITIES: Final = ("length", "speed", "tension")
+
+
+class RigSenses:
+    """Reads the state of a rig, and converts tensions to its commands.
+
+    With encoders at the joints, angles are theirs, and velocities are differences over one control
+    period, smoothed as in `FingerPlant` with noisy joints. Otherwise angles are the least-squares
+    fit of the seven lengths, corrected for the stretch of the tendons, with the nominal moment arms
+    and within the joints' ranges, and velocities follow from the speeds of the tendons.
+
+    Args:
+        robot: Name of the rig.
+        action_layout: Layout of the rig's commands.
+        state_layout: Layout of its state.
+        tendon_stiffness: Stiffness of its tendons, N/m.
+        control_dt: Time between two readings, s.
+
+    Attributes:
+        has_encoders: Whether it has encoders at all four joints.
+        most: Largest tension of each tendon, N, (7,).
+        least: Tension of each tendon at command 0, N, (7,).
+        controls_length: Whether its commands are lengths, held with at most `most`.
+
+    Raises:
+        RobotRefused: If it has other tendons, or does not measure them.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        action_layout: Layout,
+        state_layout: Layout,
+        tendon_stiffness: float,
+        control_dt: float,
+    ) -> None:
+        actions = {feature.name: feature for feature in action_layout}
+        lacks = [name for name in TENDONS if name not in actions]
+        lacks += [
+            f"{name}/{what}"
+            for what in _QUANTITIES
+            for name in TENDONS
+            if f"{name}/{what}" not in state_layout
+        ]
+        if lacks or len(actions) != len(TENDONS):
+            raise RobotRefused(
+                f"{robot} is not a finger rig, which has the commands {', '.join(TENDONS)} and "
+                "measures the length, speed and tension of each"
+                + (f"; this one lacks {', '.join(lacks[:3])}." if lacks else ".")
+            )
+        slices = state_layout.slices
+        self._starts = {name: place.start for name, place in slices.items()}
+        self._order = [TENDONS.index(name) for name in actions]
+        self._places = {
+            what: [self._starts[f"{name}/{what}"] for name in TENDONS] for what in _QUANTITIES
+        }
+        self.most = np.array([state_layout[f"{name}/tension"].high for name in TENDONS])
+        spans = [(actions[name].gain, actions[name].gain_unit) for name in TENDONS]
+        units = {unit for _, unit in spans}
+        self.controls_length = units == {"m"}
+        if not (self.controls_length or units == {"N"}) or not np.isfinite(self.most).all():
+            raise RobotRefused(
+                f"The profile of {robot} does not define the tension of its commands: each action "
+                "must pull a single tendon, with a weight of 1, and all have the same control."
+            )
+        self._span = np.array([span for span, _ in spans])
+        self._longest = np.array([state_layout[f"{name}/length"].high for name in TENDONS])
+        least = np.full(len(TENDONS), LEAST_TENSION_N)
+        self.least = least if self.controls_length else self.most - self._span
+        self._compliance = 1.0 / tendon_stiffness
+        # Least squares; positive arms shorten the tendons.
+        self._angles_of = np.linalg.pinv(-MOMENT_ARMS)
+        self._state = np.zeros(state_layout.size)
+        encoders = [f"{name}/angle" for name in JOINTS]
+        self.has_encoders = all(name in state_layout for name in encoders)
+        self._encoders = [self._starts[name] for name in encoders] if self.has_encoders else []
+        self._differences = JointVelocities(control_dt)
+
+    def forget(self) -> None:
+        """Start over at rest, without earlier measurements."""
+        self._differences.forget()
+
+    def fits(self, senses: FingerSenses) -> bool:
+        """Return whether the lengths fit a posture; with slack tendons they do not."""
+        return bool(np.abs(self._misfit(senses)).max() <= _MISFIT_M)
+
+    def require_fit(self, senses: FingerSenses) -> None:
+        """Refuse lengths that fit no posture, as after a servo has lost power and its turns.
+
+        Raises:
+            RobotRefused: If they fit no posture; the message names the worst tendon.
+        """
+        off = self._misfit(senses)
+        worst = int(np.argmax(np.abs(off)))
+        if not self.fits(senses):
+            raise RobotRefused(
+                f"The lengths of the tendons fit no posture of a finger; {TENDONS[worst]} is off "
+                f"by {1e3 * abs(off[worst]):.0f} mm. Servos lose count of their turns without "
+                "power: find the zeros with `shapechanger robot home`."
+            )
+
+    def _misfit(self, senses: FingerSenses) -> NDArray[np.float64]:
+        """Return how much longer each tendon is than its angles require, m, (7,)."""
+        wound = -MOMENT_ARMS @ senses.angles
+        return senses.lengths + self._compliance * senses.tensions - wound
+
+    def length_values(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return the command of a rig that controls lengths, clipped to their range.
+
+        Args:
+            lengths: Length of each tendon beyond that of the straight finger, m, (7,).
+        """
+        # 0 is the pretension, not the longest length.
+        shares = np.clip((self._longest - lengths) / self._span, _ABOVE_REST, 1.0)
+        return shares[self._order].astype(np.float32)
+
+    def values(self, tensions: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return the rig's command for tensions, N, (7,), clipped to their range."""
+        kept = np.clip(tensions, self.least, self.most)
+        shares = (kept - self.least) / (self.most - self.least)
+        return shares[self._order].astype(np.float32)
+
+    def read(
+        self, state: NDArray[Any], absent: tuple[str, ...], commands: NDArray[np.float64]
+    ) -> FingerSenses:
+        """Convert one state of the rig.
+
+        Args:
+            state: The rig's state, in the order of its layout.
+            absent: Names of the numbers that were not measured now; they keep their last value.
+            commands: The newest command, -1 to 1, (7,).
+        """
+        fresh = np.asarray(state, np.float64)
+        missing = {self._starts[name] for name in absent if name in self._starts}
+        keep = [i for i in range(len(fresh)) if i not in missing]
+        self._state[keep] = fresh[keep]
+        lengths, speeds, tensions = (self._state[self._places[what]] for what in _QUANTITIES)
+        self.speeds: NDArray[np.float64] = speeds
+        if self.has_encoders:
+            angles = self._state[self._encoders]
+            velocities = self._differences.of(angles)
+        else:
+            low, high = JOINT_RANGE.T
+            angles = np.clip(self._angles_of @ (lengths + self._compliance * tensions), low, high)
+            velocities = self._angles_of @ speeds
+        return FingerSenses(
+            angles=angles,
+            velocities=velocities,
+            tensions=tensions,
+            lengths=lengths,
+            commands=commands,
+            fingertip=fingertip(angles, PHALANX_LENGTH_M),
+        )
+
+
+class LengthApproach:
+    """Controller that brings a finger whose lengths are controlled to a start posture.
+
+    Args:
+        posture: The posture, rad, (4,).
+    """
+
+    def __init__(self, posture: NDArray[np.float64]) -> None:
+        self._posture = posture
+        self._aim = posture.copy()
+
+    def lengths(self, senses: FingerSenses) -> NDArray[np.float64]:
+        """Return the lengths for the next control period, m, (7,)."""
+        low, high = JOINT_RANGE.T
+        lag = np.clip(self._posture - senses.angles, -_MOST_LAG_RAD, _MOST_LAG_RAD)
+        self._aim = np.clip(self._aim + _AIM_RATE * CONTROL_DT * lag, low - 0.2, high + 0.2)
+        return -MOMENT_ARMS @ self._aim - _TAUT_M
+
+
+# Tuned on the twin of the shipped rig. Rate at which the aim corrects an error of the posture, 1/s,
+# the largest error that counts, rad, and the length that is wound in further to keep taut, m.
+_AIM_RATE: Final = 2.0
+_MOST_LAG_RAD: Final = 0.2
+_TAUT_M: Final = 0.5e-3
+
+# Tuned on a twin with geared servos, XL330-M077 on spools of 10 mm. Approach rate, 1/s, and speed
+# limit, rad/s; and gain of the speed controller, 1/s.
+_RATE: Final = 8.0
+_MOST_SPEED: Final = 3.0
+_GAIN: Final = 30.0
+# Mass of rotor and gears at the tendon, kg: with spools of 10 mm tens of times the finger's.
+_GEARED_KG: Final = 1.44
+# Friction of the gears, N, and the tendon speed below which it is compensated partly, m/s.
+_GEAR_FRICTION_N: Final = 0.55
+_CREEP_M_PER_S: Final = 0.004
+# Integral gain, N·m per rad of lag, because friction and arms differ; and limit of the lag, rad/s.
+_MORE_NM: Final = 0.08
+_MOST_LAG: Final = 0.8
+
+
+class StartApproach:
+    """Controller that brings the finger to a start posture.
+
+    Args:
+        posture: The posture, rad, (4,).
+        least: Smallest tension of each tendon, N, (7,).
+        most: Largest tension of each tendon, N, (7,).
+    """
+
+    def __init__(
+        self, posture: NDArray[np.float64], least: NDArray[np.float64], most: NDArray[np.float64]
+    ) -> None:
+        self._posture = posture
+        self._least, self._most = least, most
+        self._held = moving_torque(posture, np.zeros(4), np.zeros(4))
+        self._more = np.zeros(4)
+        self._inertia = _GEARED_KG * MOMENT_ARMS.T @ MOMENT_ARMS
+
+    def off(self, senses: FingerSenses) -> float:
+        """Return the largest joint error, rad."""
+        return float(np.abs(senses.angles - self._posture).max())
+
+    def tensions(self, senses: FingerSenses) -> NDArray[np.float64]:
+        """Return the tensions for the next control period, N, (7,)."""
+        left = self._posture - senses.angles
+        speed = np.clip(_RATE * left, -_MOST_SPEED, _MOST_SPEED)
+        lag = speed - senses.velocities
+        self._more += _MORE_NM * CONTROL_DT * np.clip(lag, -_MOST_LAG, _MOST_LAG)
+        torque = self._held + self._inertia @ (_GAIN * lag) + self._more
+        # Gears resist winding in and hold when letting out: leave room for both.
+        least, most = self._least + _GEAR_FRICTION_N, self._most - _GEAR_FRICTION_N
+        pull, _ = tensions_for_torque(MOMENT_ARMS, torque, least, most)
+        return pull + _GEAR_FRICTION_N * np.tanh(MOMENT_ARMS @ speed / _CREEP_M_PER_S)

@@ -1,0 +1,227 @@
+"""Tendon tensions: the drives that commands act through, and the tensions that hold a torque."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, Final, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog, lsq_linear, nnls
+
+from shapechanger.errors import UnknownName
+from shapechanger.finger.anatomy import (
+    JOINT_RANGE,
+    JOINT_REST,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    TENDONS,
+)
+from shapechanger.finger.parameters import FingerParameters
+
+# Stiffness and damping of an active muscle over its tension, 1/m and s/m. Both grow with tension,
+# as Cui, Perreault, Maas & Sandercock 2008 measured (J. Biomechanics 41:1945, PMC2488157). The size
+# is that of a slow stretch rather than of the first millimetres, which are ten times as stiff: at
+# full flexion, 18 mm shorter than at rest, a flexor with fibres of 65 mm has about half of its
+# force left, as on the ascending limb of the force-length curve. The damping is chosen.
+_MUSCLE_STIFFNESS: Final = 25.0
+_MUSCLE_DAMPING: Final = 1.0
+# Smallest share of its tension that a muscle is taken to have left.
+_WEAKEST: Final = 0.05
+# Gains of a servo that holds its spool. Chosen: 20 N, nearly its largest force, per centimetre.
+_SERVO_STIFFNESS: Final = 2000.0
+_SERVO_DAMPING: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class TendonDrive:
+    """Map from commands to tensions, which are clipped to the tendons' range.
+
+    tension = (`offset` + `gain` u) (1 + `muscle_stiffness` (l - `rest`) + `muscle_damping` dl/dt)
+    + `stiffness` l + `damping` dl/dt, with the command u, -1 to 1, and the tendon's length l beyond
+    that of the straight finger, m. A drive of tensors instead of arrays maps tensors.
+
+    Attributes:
+        offset: Tension at rest, N, (7,).
+        gain: Tension per command, N, (7,), > 0.
+        stiffness: Stiffness, N/m.
+        damping: Damping, N·s/m.
+        muscle_stiffness: Stiffness over tension, 1/m.
+        muscle_damping: Damping over tension, s/m.
+        rest: Length of each tendon at which a muscle has the tension of its command, m, (7,).
+    """
+
+    offset: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    stiffness: float = 0.0
+    damping: float = 0.0
+    muscle_stiffness: float = 0.0
+    muscle_damping: float = 0.0
+    rest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(TENDONS)))
+
+    def tension(
+        self,
+        command: NDArray[np.float64],
+        length: NDArray[np.float64],
+        speed: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Tensions of a command, N, (7,), before clipping.
+
+        Args:
+            command: Command, -1 to 1, (7,).
+            length: Lengths, m, (7,).
+            speed: Rates of the lengths, m/s, (7,).
+        """
+        pulled = self.stiffness * length + self.damping * speed
+        return (self.offset + self.gain * command) * self._strength(length, speed) + pulled
+
+    def command(
+        self,
+        tension: NDArray[np.float64],
+        length: NDArray[np.float64],
+        speed: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Command that gives a tension, (7,); it may lie outside -1 to 1.
+
+        Args:
+            tension: Tensions, N, (7,).
+            length: Lengths, m, (7,).
+            speed: Rates of the lengths, m/s, (7,).
+        """
+        pulled = self.stiffness * length + self.damping * speed
+        # A muscle too short to pull has no such command; the largest is the nearest.
+        strength = self._strength(length, speed).clip(_WEAKEST)
+        return ((tension - pulled) / strength - self.offset) / self.gain
+
+    def _strength(
+        self, length: NDArray[np.float64], speed: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Tension of a muscle over that of its command at rest, (7,)."""
+        stretch = length - self.rest
+        return 1.0 + self.muscle_stiffness * stretch + self.muscle_damping * speed
+
+
+def _tension(most: NDArray[np.float64]) -> TendonDrive:
+    half = 0.5 * (most - LEAST_TENSION_N)
+    return TendonDrive(LEAST_TENSION_N + half, half)
+
+
+def _impedance(most: NDArray[np.float64]) -> TendonDrive:
+    return replace(
+        _tension(most),
+        muscle_stiffness=_MUSCLE_STIFFNESS,
+        muscle_damping=_MUSCLE_DAMPING,
+        rest=-MOMENT_ARMS @ JOINT_REST,
+    )
+
+
+def _length(most: NDArray[np.float64]) -> TendonDrive:
+    # The largest and smallest length of each tendon, from the ends of the joints' ranges.
+    ends = -MOMENT_ARMS[:, :, None] * JOINT_RANGE[None]
+    shortest, longest = ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)
+    # The servo winds up below the shortest length, to have its full tension there.
+    shortest = shortest - most / _SERVO_STIFFNESS
+    half, middle = 0.5 * (longest - shortest), 0.5 * (longest + shortest)
+    offset = LEAST_TENSION_N - _SERVO_STIFFNESS * middle
+    return TendonDrive(offset, _SERVO_STIFFNESS * half, _SERVO_STIFFNESS, _SERVO_DAMPING)
+
+
+DRIVES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "impedance": "a muscle: the command pulls, and the more it pulls the stiffer it is",
+        "tension": "a tension: -1 is the least, 1 the most",
+        "length": "a length: -1 is the longest, 1 the shortest, held as a servo holds it",
+    }
+)
+"""Modes of action, and the meaning of a command in each."""
+
+_MAKERS: Final = {"impedance": _impedance, "tension": _tension, "length": _length}
+
+
+def drive_of(mode: str, parameters: FingerParameters) -> TendonDrive:
+    """Make the drive of a mode of action.
+
+    A drive is part of the controller, so it uses the nominal moment arms, whatever those of the
+    finger are.
+
+    Args:
+        mode: One of `DRIVES`.
+        parameters: Finger with the range of tensions.
+
+    Raises:
+        UnknownName: If the mode is unknown.
+    """
+    if mode not in _MAKERS:
+        raise UnknownName("mode of action", str(mode), _MAKERS)
+    return _MAKERS[mode](np.array(parameters.most_tension))
+
+
+# Tolerance of a torque, N·m: a hundredth of that of a fingertip of 4 g about its joint.
+_TOLERANCE_NM: Final = 1e-6
+_LITTLE: Final = 1e-3
+# Smallest distance between bounds that the solver accepts, N.
+_NOTHING: Final = 1e-9
+
+
+def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
+    """Smallest tensions, each at least 1, without torque about any joint; None if there are none.
+
+    With such tensions and moment arms of full rank, every torque is possible: a negative tension is
+    made positive by adding a multiple of them.
+
+    Args:
+        arms: Torque about each joint per newton of each tendon, m, (tendons, joints).
+
+    Returns:
+        Tensions in multiples of the smallest, (tendons,).
+    """
+    r = np.asarray(arms, np.float64)
+    # Scaled to make the solver's tolerance a millionth of a typical arm.
+    scale = np.abs(r).max()
+    if not scale > 0.0:
+        return None
+    found = cast(
+        "Any",
+        linprog(np.ones(len(r)), A_eq=r.T / scale, b_eq=np.zeros(r.shape[1]), bounds=(1.0, None)),
+    )
+    return np.asarray(found.x) if found.success else None
+
+
+def spans_all_torques(arms: ArrayLike) -> bool:
+    """Return whether non-negative tensions can give every torque.
+
+    Args:
+        arms: Moment arms, m, (tendons, joints).
+    """
+    r = np.asarray(arms, np.float64)
+    return bool(np.linalg.matrix_rank(r) == r.shape[1]) and co_contraction(r) is not None
+
+
+def tensions_for_torque(
+    arms: ArrayLike, torque: ArrayLike, least: ArrayLike, most: ArrayLike
+) -> tuple[NDArray[np.float64], bool]:
+    """Tensions that give a torque, or the nearest possible one, with the least co-contraction.
+
+    Args:
+        arms: Moment arms, m, (tendons, joints).
+        torque: Torque, N·m, (joints,).
+        least: Smallest tensions, N, a number or (tendons,).
+        most: Largest tensions, N, a number or (tendons,).
+
+    Returns:
+        Tensions, N, (tendons,), and whether they give the torque to within 1 µN·m.
+    """
+    r = np.asarray(arms, np.float64)
+    low, high = (np.broadcast_to(np.asarray(b, np.float64), len(r)) for b in (least, most))
+    wanted = np.asarray(torque, np.float64)
+    # In mN·m; the small weight of the tensions only chooses among those that give the torque.
+    matrix = np.concatenate([r.T * 1e3, _LITTLE * np.eye(len(r))])
+    goal = np.concatenate([(wanted - r.T @ low) * 1e3, np.zeros(len(r))])
+    above = np.asarray(cast("Any", nnls(matrix, goal))[0])
+    if (above > high - low).any():
+        bounds = (np.zeros(len(r)), np.maximum(high - low, _NOTHING))
+        above = np.asarray(cast("Any", lsq_linear(matrix, goal, bounds=bounds, method="bvls")).x)
+    tensions = low + above
+    return tensions, bool(np.abs(r.T @ tensions - wanted).max() <= _TOLERANCE_NM)

@@ -1,0 +1,326 @@
+"""`FingerTrack-v1`: follow a path with the fingertip."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.errors import PathError
+from shapechanger.finger.anatomy import (
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    MOST_TENSION_N,
+    PHALANX_LENGTH_M,
+)
+from shapechanger.finger.drawing import polyline
+from shapechanger.finger.env import FingerEnv
+from shapechanger.finger.paths import (
+    FingertipPath,
+    PathSource,
+    as_path,
+    circle,
+    figure_eight,
+    line,
+    sample,
+)
+from shapechanger.finger.plant import CONTROL_DT
+from shapechanger.finger.postures import angles_for, draw_posture, moving_torque
+from shapechanger.finger.task import FingerSenses, fingertip, place_features
+from shapechanger.finger.tensions import tensions_for_torque
+from shapechanger.layout import Element, Feature, Layout
+
+_CHECK_HZ: Final = 50.0
+# Checked time of an endless path, s.
+_LOOK_S: Final = 60.0
+# Largest error of a reachable point, m: a sixth of the tolerance of the task.
+_OFF_M: Final = 0.0005
+_LOOKS: Final = 20
+
+
+def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
+    """Require that the nominal finger can follow a path.
+
+    Args:
+        path: The path in the finger's frame, m.
+
+    Returns:
+        Its first angles, rad, (4,).
+
+    Raises:
+        PathError: If a point is out of reach, or the tendons are too weak for the motion; the
+            message names the time and what is missing.
+    """
+    times, points = sample(path, _CHECK_HZ, min(path.duration_s, _LOOK_S))
+    angles, left = _angles_along(points)
+    if left is not None:
+        # The farthest point says more than the first one out of reach.
+        later = range(left, len(points), max(1, len(points) // _LOOKS))
+        worst, k = max((angles_for(points[k])[1], k) for k in later)
+        raise PathError(
+            f"The path leaves the finger's reach: at {times[k]:.2f} s it is at "
+            f"{_in_mm(points[k])} mm, {worst * 1e3:.1f} mm beyond. "
+            "The knuckle is at (0, 0, 0); x points to the tip, y to the thumb, z to the back."
+        )
+    if weakness := _weakness(times, angles):
+        t, missing = weakness
+        raise PathError(
+            f"The tendons are too weak for the path: at {t:.2f} s a joint lacks "
+            f"{missing * 1e3:.1f} mN·m. Make it slower."
+        )
+    return angles[0]
+
+
+def _angles_along(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], int | None]:
+    """Return angles for each point, rad, (n, 4), and the index of the first one out of reach."""
+    angles = np.empty((len(points), 4))
+    near: NDArray[np.float64] | None = None
+    for i, point in enumerate(points):
+        near, off = angles_for(point, near)
+        angles[i] = near
+        if off > _OFF_M:
+            return angles, i
+    return angles, None
+
+
+def _weakness(
+    times: NDArray[np.float64], angles: NDArray[np.float64]
+) -> tuple[float, float] | None:
+    """Return when the tendons are too weak, s, and the missing torque, N·m; None if never."""
+    speeds: NDArray[np.float64] = np.asarray(np.gradient(angles, times, axis=0))
+    accelerations: NDArray[np.float64] = np.asarray(np.gradient(speeds, times, axis=0))
+    for t, q, speed, acceleration in zip(times, angles, speeds, accelerations, strict=True):
+        torque = moving_torque(q, speed, acceleration)
+        tensions, is_enough = tensions_for_torque(
+            MOMENT_ARMS, torque, LEAST_TENSION_N, MOST_TENSION_N
+        )
+        if not is_enough:
+            return float(t), float(np.abs(torque - MOMENT_ARMS.T @ tensions).max())
+    return None
+
+
+def _in_mm(point: NDArray[np.float64]) -> str:
+    return "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * point))
+
+
+# Ranges of random paths: radius, m, and speed, m/s, up to a circle of 12 mm once a second.
+_SIZE: Final = (0.003, 0.015)
+_SPEED: Final = (0.01, 0.08)
+_SLOWEST_HZ: Final = 0.1
+_FASTEST_HZ: Final = 2.0
+# Number of points at which a random path is checked.
+_RANDOM_PATHS_LOOKS: Final = 32
+
+
+def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float64]]:
+    """Sample a circle, figure eight or line in the finger's reach, and its first angles, rad."""
+    while True:
+        centre = fingertip(draw_posture(rng), PHALANX_LENGTH_M)
+        size = rng.uniform(*_SIZE)
+        hz = rng.uniform(*_SPEED) / (2.0 * math.pi * size)
+        hz = min(max(hz, _SLOWEST_HZ), _FASTEST_HZ)
+        normal = rng.standard_normal(3)
+        normal /= np.linalg.norm(normal)
+        kind = rng.integers(3)
+        if kind == 0:
+            path = circle(size, tuple(centre), hz, tuple(normal))
+        elif kind == 1:
+            path = figure_eight(size, tuple(centre), hz, tuple(normal))
+        else:
+            path = line(tuple(centre - size * normal), tuple(centre + size * normal), hz)
+        # The number of points does not depend on the speed: paths are smooth, and each reset
+        # draws one.
+        times, points = sample(path, _RANDOM_PATHS_LOOKS / path.duration_s)
+        angles, left = _angles_along(points)
+        if left is None and _weakness(times, angles) is None:
+            return path, angles[0]
+
+
+PREVIEW_S: Final = (0.06, 0.12, 0.20)
+"""Lookahead of the observation besides the end of the next step, s."""
+RANDOM: Final = "random"
+"""Value of `path` for another path at each reset."""
+
+_TARGET: Final = Element("task", "target")
+SETTLING_STEPS: Final = 25
+"""Steps in which the fingertip reaches the path's speed, not counted in the error: 0.5 s."""
+FOLLOWS_M: Final = 0.003
+"""Largest root mean square of the error of a finger that follows its path, m."""
+# Frames show this much of a path that does not end, s, and the trail of one second.
+_DRAWN_S: Final = 5.0
+_DRAWN_POINTS: Final = 97
+_TRAIL_STEPS: Final = 50
+_LINE_M: Final = 0.0005
+_TRAIL_M: Final = 0.0007
+_PATH_COLOUR: Final = (0.10, 0.55, 0.25, 1.0)
+_TRAIL_COLOUR: Final = (0.35, 0.20, 0.60, 1.0)
+SEEN_S: Final = np.array([0.0, CONTROL_DT, *PREVIEW_S])
+"""Times of the points that a step needs, s from now: the target, and those observed."""
+
+
+class FingerTrackEnv(FingerEnv):
+    """Follow a point that moves along a known path.
+
+    ## Action space
+    As in `Finger-v1`: `Box(-1, 1, (7,), float32)`.
+
+    ## Observation space
+    `Box(-inf, inf, (47,), float64)`: the measurements of `Finger-v1` (32); the place of the point
+    at the end of the step (3) and the vector from the fingertip to it (3), m; and the vectors from
+    the fingertip to its places 0.06, 0.12 and 0.20 s from now (9), m.
+
+    ## Reward
+    As in `Finger-v1`, with the moving point as target.
+
+    ## Start
+    At rest, with the fingertip at a point of the path: a random one of a closed path, else its
+    beginning.
+
+    ## End
+    Never terminated; truncated after 250 steps, 5 s.
+
+    ## Info
+    `distance`, m, of the true fingertip from the point; `rms`, m, its root mean square since 0.5 s
+    after the start; `is_success`, whether that is below 3 mm; `target`, m;
+    `smoothness`, `reward_nearness`, `reward_effort` and `reward_change`; `diverged` where the
+    simulation diverged.
+
+    Args:
+        path: A path of `shapechanger.finger.paths`; its name, "circle", "figure-eight", "line" or
+            "curve", optionally with settings; a function of time; a CSV file of t, x, y and z; or
+            "random" for another one at each reset.
+        **arguments: Arguments of `FingerEnv`.
+
+    Raises:
+        PathError: If it is not a path, or the nominal finger cannot follow it; the message names
+            the place and the distance.
+        UnknownName: If there is no such path, or as in `FingerEnv`.
+    """
+
+    _options = ("posture", "path")
+
+    def __init__(self, *, path: PathSource = "circle", **arguments: Any) -> None:
+        super().__init__(**arguments)
+        EzPickle.__init__(self, path=path, **arguments)
+        self._is_random = path == RANDOM
+        self._path: FingertipPath = as_path("circle" if self._is_random else path)
+        self._begin = require_reachable(self._path)
+        self._t = 0.0
+        self._look()
+        # Places of the fingertip, m, for frames.
+        self._trail = deque([self.plant.fingertip], _TRAIL_STEPS)
+        self._squares = 0.0
+        self._counted = 0
+        self._steps = 0
+        ahead = [
+            Feature(f"ahead_{round(1e3 * s)}ms/d{axis}", "m", element=_TARGET)
+            for s in PREVIEW_S
+            for axis in "xyz"
+        ]
+        features = [
+            *self._sense_features(),
+            *place_features("target", _TARGET),
+            *(Feature(f"target/d{axis}", "m", element=_TARGET) for axis in "xyz"),
+            *ahead,
+        ]
+        self.observation_layout = Layout(tuple(features))
+        self.observation_space = gym.spaces.Box(-np.inf, np.inf, (len(features),), np.float64)
+
+    @property
+    def path(self) -> FingertipPath:
+        """The present path."""
+        return self._path
+
+    @property
+    def path_is_random(self) -> bool:
+        """Whether each reset draws another path."""
+        return self._is_random
+
+    def start_angles(self, t: float) -> NDArray[np.float64]:
+        """Return the angles at which an episode starts at a time of the path, s; rad, (4,)."""
+        return angles_for(self._path.at(t), self._begin)[0]
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: Seed of all randomness from here on; None keeps the present generator.
+            options: `path`, the path from here on; `posture`, four angles, rad, to start at
+                instead of those at the path.
+
+        Raises:
+            UnknownName: If there is no such option or path.
+            PathError: If it is not a path, or the finger cannot follow it; the present one stays.
+            FingerError: If the posture is malformed or out of range.
+        """
+        super().reset(seed=seed)
+        given = (options or {}).get("path")
+        if given is not None and not (isinstance(given, str) and given == RANDOM):
+            path = as_path(given)
+            self._path, self._begin = path, require_reachable(path)
+            self._is_random = False
+        elif given is not None or self._is_random:
+            self._is_random = True
+            self._path, self._begin = draw_path(self.np_random)
+        # An open path is followed from its beginning.
+        self._t = self.np_random.uniform(0.0, self._path.duration_s) if self._path.closed else 0.0
+        senses = self._place({"posture": self.start_angles(self._t), **(options or {})})
+        self._squares, self._counted, self._steps = 0.0, 0, 0
+        self._look()
+        self.plant.mark(self._points[0])
+        self._trail.clear()
+        self._trail.append(self.plant.fingertip)
+        distance = float(np.linalg.norm(self.plant.fingertip - self._points[0]))
+        return self._observation(senses), self._info(distance)
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+        """Take one step.
+
+        Raises:
+            BadAction: If the action has another shape or is not finite; nothing has moved then.
+            ResetNeeded: If `reset` was never called.
+        """
+        senses = self._act(action)
+        self._t += CONTROL_DT
+        self._steps += 1
+        self._look()
+        point = self._points[0]
+        distance, terms = self._terms(point)
+        if self._steps > SETTLING_STEPS:
+            self._squares += distance**2
+            self._counted += 1
+        self.plant.mark(point)
+        self._trail.append(self.plant.fingertip)
+        return self._stepped(self._observation(senses), self._info(distance), terms)
+
+    def _markers(self) -> list[dict[str, Any]]:
+        """Return the path and the trail of the fingertip."""
+        times = np.linspace(0.0, min(self._path.duration_s, _DRAWN_S), _DRAWN_POINTS)
+        path = polyline(self._path.at(times), _LINE_M, _PATH_COLOUR)
+        return path + polyline(np.array([*self._trail]), _TRAIL_M, _TRAIL_COLOUR)
+
+    def _look(self) -> None:
+        """Compute the present and coming points of the path."""
+        self._points = self._path.at(self._t + SEEN_S)
+
+    def _observation(self, senses: FingerSenses) -> NDArray[np.float64]:
+        offsets = (self._points[1:] - senses.fingertip).ravel()
+        return np.concatenate([senses.numbers(), self._points[1], offsets])
+
+    def _info(self, distance: float) -> dict[str, Any]:
+        rms = math.sqrt(self._squares / self._counted) if self._counted else math.inf
+        return {
+            "is_success": rms < FOLLOWS_M,
+            "distance": distance,
+            "rms": rms,
+            "target": self._points[0].copy(),
+        }

@@ -1,0 +1,146 @@
+"""World of a finger on a rig, the load of its servos' tendons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.contract.world import RESTING_V, Pose, Readings
+from shapechanger.errors import RobotError
+from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
+from shapechanger.finger.model import FINGERTIP, build_finger
+from shapechanger.finger.parameters import FingerParameters
+from shapechanger.finger.tensions import drive_of
+
+if TYPE_CHECKING:
+    from shapechanger.twin.servos.rig import Rig
+
+# N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
+_CABLE_STIFFNESS: Final = 20e3
+# kg, mass of the end of a cable: enough for steps of 1 ms to follow the cable's spring.
+_CABLE_KG: Final = 0.010
+_MAX_STEP_S: Final = 0.001
+# Distance of starts from the rest posture, rad, as in simulation.
+_START_SPREAD: Final = 0.1
+
+
+class FingerWorld:
+    """Bones and joints of a finger; see `World`, `TendonWorld` and `JointWorld`.
+
+    The simulated servos bring motors, spools, gears and their friction. So friction, mass, lag and
+    delay of the parameters' drive are left out here, and the tendons stretch as the servos' cables.
+    The noise of the joints is that of their encoders.
+
+    Args:
+        parameters: Parameters of the finger.
+        seed: Seed of the first start.
+
+    Attributes:
+        resting_v: Voltage of the battery of every world, V; a finger has none.
+    """
+
+    def __init__(self, parameters: FingerParameters, seed: int) -> None:
+        bare = parameters.replace(
+            tendon_stiffness=None,
+            backlash=0.0,
+            tendon_friction=0.0,
+            motor_kg=_CABLE_KG,
+            command_delay=0.0,
+        )
+        spec = build_finger(bare, drive_of("tension", bare))
+        spec.option.timestep = _MAX_STEP_S
+        for actuator in list(spec.actuators):
+            spec.delete(actuator)
+        self._model: mujoco.MjModel = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        self._arms = parameters.arms
+        self._stiffness = parameters.tendon_stiffness or _CABLE_STIFFNESS
+        self._tip = self._data.site_xpos[self._model.site(FINGERTIP).id]
+        self._joint_noise = parameters.joint_noise
+        self._order = np.arange(len(TENDONS))
+        self._rig: Rig | None = None
+        self.resting_v = RESTING_V
+        self.place(seed)
+
+    @property
+    def cable_stiffness(self) -> float:
+        """Stiffness of the tendons, N/m."""
+        return self._stiffness
+
+    def connect(self, tendons: Sequence[str], rig: Rig) -> None:
+        """Attach the tendons of a rig; see `TendonWorld.connect`."""
+        if sorted(tendons) != sorted(TENDONS):
+            raise RobotError(
+                f"A finger has the tendons {', '.join(TENDONS)}; this robot has "
+                f"{', '.join(tendons)}."
+            )
+        self._order = np.array([TENDONS.index(name) for name in tendons])
+        self._rig = rig
+
+    def travels(self) -> Sequence[float]:
+        """Return how far each tendon's end is towards its spool, m; 0 for the straight finger."""
+        return (self._arms @ self._data.qpos)[self._order].tolist()
+
+    def pull(self, tensions_n: Sequence[float], dt_s: float) -> Sequence[float]:
+        """Move under these tensions; see `Load.pull`."""
+        tensions = np.empty(len(TENDONS))
+        tensions[self._order] = tensions_n
+        self._data.qfrc_applied[:] = self._arms.T @ tensions
+        if dt_s > 0.0:
+            self._model.opt.timestep = dt_s
+            mujoco.mj_step(self._model, self._data)
+        return self.travels()
+
+    def measured_angle(self, joint: str) -> float:
+        """Return one reading of a joint's angle, rad; see `JointWorld`."""
+        if joint not in JOINTS:
+            raise RobotError(f"A finger has the joints {', '.join(JOINTS)}, and no {joint}.")
+        angle = float(self._data.qpos[JOINTS.index(joint)])
+        return angle + self._joint_noise * float(self._noise.standard_normal())
+
+    def lay_out(self, seed: int) -> None:
+        """Place the finger at a start, as it has no surroundings."""
+        self.place(seed)
+
+    def truth(self) -> dict[str, float]:
+        """Return the position of the fingertip, m, and the angles of the joints, rad."""
+        mujoco.mj_kinematics(self._model, self._data)
+        tip = {f"fingertip/{axis}": float(x) for axis, x in zip("xyz", self._tip, strict=True)}
+        angles = zip(JOINTS, self._data.qpos, strict=True)
+        return tip | {f"{name}/angle": float(angle) for name, angle in angles}
+
+    def place(self, seed: int) -> None:
+        """Place the finger near its rest posture, at rest, with all tendons just taut."""
+        rng = np.random.default_rng(seed)
+        low, high = JOINT_RANGE.T
+        posture = JOINT_REST + rng.uniform(-_START_SPREAD, _START_SPREAD, len(JOINTS))
+        mujoco.mj_resetData(self._model, self._data)
+        # A generator of its own, so that the number of readings does not change the starts.
+        self._noise = np.random.default_rng([seed, 1])
+        self._data.qpos[:] = np.clip(posture, low, high)
+        mujoco.mj_forward(self._model, self._data)
+        if self._rig is not None:
+            self._rig.settle()
+
+    def put_back(self) -> None:
+        """Place the finger at a start, as it cannot collide."""
+        self.place(0)
+
+    def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
+        """Do nothing: the servo bus moves the finger, by `pull`."""
+
+    def inputs(self) -> Readings:
+        """Return the default readings: a finger has none of these sensors."""
+        return Readings(Pose(0.0, 0.0, 0.0), battery_v=self.resting_v)
+
+    def distance_m(self) -> float:
+        """Return 0."""
+        return 0.0
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return a black picture, shape (120, 160, 3)."""
+        return np.zeros((120, 160, 3), np.uint8)

@@ -1,0 +1,290 @@
+"""Visual anatomy of the finger: bones, skin, and tendons on their anatomical routes.
+
+It has no mass, collisions or forces; the finger is moved by the fixed tendons of
+`shapechanger.finger.model`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+import mujoco
+
+from shapechanger.finger.anatomy import PHALANGES, PHALANX_LENGTH_M, TENDONS
+
+_HAND: Final = "hand"
+"""Name of the hand's body; its axes are those of the finger, at the knuckle."""
+
+
+class Through(NamedTuple):
+    """A point of a bone that a tendon passes.
+
+    Attributes:
+        body: Name of the bone; x runs along it from its own joint, y is radial, z dorsal.
+        x: Position, mm.
+        y: Position, mm.
+        z: Position, mm.
+    """
+
+    body: str
+    x: float
+    y: float
+    z: float
+
+
+class Over(NamedTuple):
+    """The back of a joint, which a tendon wraps around when it bends.
+
+    Attributes:
+        joint: "MCP", "PIP" or "DIP".
+    """
+
+    joint: str
+
+
+TendonRoute = tuple[Through | Over, ...]
+
+
+def _on(body: str, *points: tuple[float, float, float]) -> TendonRoute:
+    return tuple(Through(body, *point) for point in points)
+
+
+_P, _M, _D = "proximal", "middle", "distal"
+
+
+def _extensor(y: float) -> TendonRoute:
+    """Route over the knuckle and the middle of the hood to the base of the distal phalanx."""
+    return (
+        *_on(_HAND, (-58.0, 1.8 * y, 7.0), (-12.0, y, 7.0)),
+        Over("MCP"),
+        *_on(_P, (12.0, y, 6.2), (36.0, 0.7 * y, 5.8)),
+        Over("PIP"),
+        *_on(_M, (8.0, 0.7 * y, 5.2), (20.0, 0.5 * y, 4.6)),
+        Over("DIP"),
+        *_on(_D, (4.5, 0.4 * y, 3.8)),
+    )
+
+
+def _to_the_hood(side: float) -> TendonRoute:
+    """Route from the side of the proximal phalanx into the hood, and on as its lateral band."""
+    return (
+        *_on(_P, (9.0, 7.0 * side, -3.5), (30.0, 5.0 * side, 3.6)),
+        Over("PIP"),
+        *_on(_M, (7.0, 3.2 * side, 4.7), (20.0, 1.6 * side, 4.4)),
+        Over("DIP"),
+        *_on(_D, (4.5, 1.2 * side, 3.6)),
+    )
+
+
+# Sides and order follow anatomical atlases; the positions are chosen for visibility.
+_TENDON_ROUTES: Final[Mapping[str, tuple[TendonRoute, ...]]] = MappingProxyType(
+    {
+        # Below FDS up to the knuckle, then through its slips, to the base of the distal phalanx.
+        "FDP": (
+            (
+                *_on(_HAND, (-58.0, 0.6, -6.6), (-11.0, 0.0, -7.0)),
+                *_on(_P, (11.0, 0.0, -6.6), (24.0, 0.0, -7.0), (36.0, 0.0, -6.6)),
+                *_on(_M, (9.0, 0.0, -5.8), (19.0, 0.0, -5.4)),
+                *_on(_D, (6.0, 0.0, -3.4)),
+            ),
+        ),
+        # Nearest to the palm; it splits around FDP, and each slip ends at a side of the middle
+        # phalanx.
+        "FDS": tuple(
+            (
+                *_on(_HAND, (-58.0, -0.6, -8.8), (-11.0, 0.0, -9.2)),
+                *_on(_P, (11.0, 0.0, -8.6), (24.0, 2.2 * side, -7.0), (36.0, 2.8 * side, -6.0)),
+                *_on(_M, (10.0, 2.8 * side, -3.6)),
+            )
+            for side in (1.0, -1.0)
+        ),
+        # On the ulnar side of EDC.
+        "EIP": (_extensor(-1.5),),
+        "EDC": (_extensor(1.5),),
+        # From the tendon of FDP in the palm, radially and palmar of the knuckle's axis.
+        "LUM": ((*_on(_HAND, (-40.0, 1.6, -6.6), (-10.0, 6.2, -6.0)), *_to_the_hood(1.0)),),
+        # From the back of the web between thumb and finger to the base of the proximal phalanx.
+        "DI": (
+            (
+                *_on(_HAND, (-42.0, 5.0, 1.5), (-9.0, 7.6, -1.0)),
+                *_on(_P, (4.0, 7.6, -1.2), (10.0, 4.6, -0.8)),
+            ),
+        ),
+        "PI": ((*_on(_HAND, (-42.0, -5.0, -1.5), (-9.0, -7.2, -3.6)), *_to_the_hood(-1.0)),),
+    }
+)
+"""Routes of each tendon from the wrist on: one, or one for each slip that it splits into."""
+
+
+METACARPAL: Final = "metacarpal"
+"""Name of the hand's geom."""
+
+# The colour-blind safe palette of Okabe and Ito 2008 ("Color Universal Design"), without its
+# yellow, which is hardly visible on skin.
+TENDON_COLOURS: Final = {
+    "FDP": (0.835, 0.369, 0.000),
+    "FDS": (0.902, 0.624, 0.000),
+    "EIP": (0.337, 0.706, 0.914),
+    "EDC": (0.000, 0.447, 0.698),
+    "LUM": (0.000, 0.620, 0.451),
+    "DI": (0.150, 0.150, 0.150),
+    "PI": (0.800, 0.475, 0.655),
+}
+"""Red, green and blue of each tendon, 0 to 1."""
+
+THINNEST_M: Final = 0.0007
+"""Radius of a tendon without tension, m; chosen, like all numbers here."""
+THICKEST_M: Final = 0.0016
+"""Radius of a tendon at its largest tension, m."""
+
+_BONE: Final = (0.94, 0.91, 0.83, 1.0)
+_NAIL: Final = (0.98, 0.86, 0.84, 0.9)
+_SKIN: Final = (0.90, 0.66, 0.55, 0.20)
+_SKY: Final = ((0.98, 0.985, 0.99), (0.82, 0.86, 0.91))
+# Group of geoms and sites that are hidden by default.
+_HIDDEN: Final = 4
+# Radii of each bone's shaft and of the head at its end, m.
+_SHAFTS: Final = (0.0040, 0.0034, 0.0029, 0.0026)
+_HEADS: Final = (0.0060, 0.0048, 0.0039, 0.0034)
+# Gap between a bone and the head of the previous one, m.
+_CARTILAGE: Final = 0.0015
+_JOINTS: Final = ("MCP", "PIP", "DIP")
+
+
+def route_names(tendon: str) -> list[str]:
+    """Names of the spatial tendons that show a tendon, such as `FDS/course` and `FDS/course_2`."""
+    more = [f"{tendon}/course_{i}" for i in range(2, len(_TENDON_ROUTES[tendon]) + 1)]
+    return [f"{tendon}/course", *more]
+
+
+def add_anatomy(spec: mujoco.MjSpec) -> None:
+    """Add bones, tendons, a nail and a light background to a finger of `build_finger`.
+
+    Args:
+        spec: Model to extend.
+    """
+    _add_scene(spec)
+    hand = _add_hand(spec)
+    bodies = {_HAND: hand} | {name: spec.body(name) for name in PHALANGES}
+    for name in PHALANGES:
+        spec.geom(name).rgba = _SKIN
+    # Each bone spans from its joint to the next; the last one ends below the flesh of the
+    # fingertip.
+    metacarpal = spec.geom(METACARPAL)
+    begin = float(metacarpal.fromto[0])
+    spans = [(begin, 0.0)]
+    for length, head in zip(PHALANX_LENGTH_M, _HEADS, strict=False):
+        spans.append((head + _CARTILAGE, length))
+    spans[-1] = (spans[-1][0], PHALANX_LENGTH_M[-1] - 1.5 * _HEADS[-1])
+    for i, (name, (start, end)) in enumerate(zip(bodies, spans, strict=True)):
+        _add_bone(bodies[name], name, start, end, i)
+    for i, joint in enumerate(_JOINTS):
+        _add_back(bodies[list(bodies)[i]], joint, spans[i][1], _HEADS[i])
+    _add_nail(bodies[PHALANGES[-1]])
+    for tendon in TENDONS:
+        for name, course in zip(route_names(tendon), _TENDON_ROUTES[tendon], strict=True):
+            _add_course(spec, bodies, name, course, TENDON_COLOURS[tendon])
+
+
+def _add_scene(spec: mujoco.MjSpec) -> None:
+    top, bottom = _SKY
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=top,
+        rgb2=bottom,
+        width=256,
+        height=1536,
+    )
+    spec.visual.headlight.ambient[:] = (0.45, 0.45, 0.45)
+    spec.visual.headlight.diffuse[:] = (0.35, 0.35, 0.35)
+    spec.visual.headlight.specular[:] = (0.1, 0.1, 0.1)
+    # From above and in front of the finger, so that it has a bright and a dark side.
+    spec.worldbody.add_light(
+        name="lamp",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=[0.1, 0.0, 0.3],
+        dir=[-0.3, 0.2, -1.0],
+        diffuse=[0.4, 0.4, 0.4],
+        specular=[0.1, 0.1, 0.1],
+        castshadow=False,
+    )
+
+
+def _add_hand(spec: mujoco.MjSpec) -> mujoco.MjsBody:
+    """Replace the geom of the hand by a body, which cameras can follow."""
+    plain = spec.geom(METACARPAL)
+    fromto, size = plain.fromto.copy(), plain.size.copy()
+    spec.delete(plain)
+    hand = spec.worldbody.add_body(name=_HAND)
+    hand.add_geom(
+        name=METACARPAL,
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=fromto,
+        size=size,
+        mass=0.0,
+        rgba=_SKIN,
+    )
+    return hand
+
+
+def _add_bone(body: mujoco.MjsBody, name: str, start: float, end: float, i: int) -> None:
+    shaft, head = _SHAFTS[i], _HEADS[i]
+    shapes = {
+        "shaft": (mujoco.mjtGeom.mjGEOM_CAPSULE, [shaft, 0.0, 0.0], [start, 0, 0, end, 0, 0]),
+        "head": (mujoco.mjtGeom.mjGEOM_SPHERE, [head, 0.0, 0.0], None),
+        "base": (mujoco.mjtGeom.mjGEOM_ELLIPSOID, [shaft, 1.45 * shaft, 1.35 * shaft], None),
+    }
+    places = {"head": end, "base": start + 0.5 * shaft}
+    for part, (kind, size, fromto) in shapes.items():
+        geom = body.add_geom(name=f"{name}/{part}", type=kind, size=size, mass=0.0, rgba=_BONE)
+        if fromto is None:
+            geom.pos = [places[part], 0.0, 0.0]
+        else:
+            geom.fromto = fromto
+
+
+def _add_nail(body: mujoco.MjsBody) -> None:
+    body.add_geom(
+        name="nail",
+        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        size=[0.0050, 0.0046, 0.0012],
+        pos=[PHALANX_LENGTH_M[-1] - 0.0062, 0.0, 0.0060],
+        euler=[0.0, 8.0, 0.0],
+        mass=0.0,
+        rgba=_NAIL,
+    )
+
+
+def _add_back(body: mujoco.MjsBody, joint: str, x: float, radius: float) -> None:
+    """Add a hidden cylinder that the tendons at the back of a joint wrap around."""
+    body.add_geom(
+        name=joint,
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius + THINNEST_M, 0.010, 0.0],
+        pos=[x, 0.0, 0.0],
+        quat=[1.0, 1.0, 0.0, 0.0],  # Its axis from z to y.
+        mass=0.0,
+        group=_HIDDEN,
+    )
+    body.add_site(name=f"{joint}/back", pos=[x, 0.0, 3.0 * radius], group=_HIDDEN)
+
+
+def _add_course(
+    spec: mujoco.MjSpec,
+    bodies: dict[str, mujoco.MjsBody],
+    name: str,
+    course: TendonRoute,
+    colour: tuple[float, float, float],
+) -> None:
+    tendon = spec.add_tendon(name=name, rgba=[*colour, 1.0], width=THINNEST_M)
+    for i, stop in enumerate(course):
+        if isinstance(stop, Through):
+            place = [1e-3 * stop.x, 1e-3 * stop.y, 1e-3 * stop.z]
+            site = bodies[stop.body].add_site(name=f"{name}/{i}", pos=place, group=_HIDDEN)
+            tendon.wrap_site(site.name)
+        else:
+            tendon.wrap_geom(stop.joint, f"{stop.joint}/back")

@@ -1,0 +1,54 @@
+"""Fingers and commands shared by tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from shapechanger.finger.anatomy import JOINT_REST, JOINTS
+from shapechanger.finger.model import build_finger
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.tensions import DRIVES, drive_of
+
+# With every imperfection of the model.
+STRETCHED = NOMINAL.replace(
+    tendon_stiffness=10e3, tendon_friction=1.0, backlash=0.5e-3, command_delay=0.03
+)
+
+
+def modes() -> list[str]:
+    """Return every action mode."""
+    return list(DRIVES)
+
+
+def made(
+    parameters: FingerParameters = NOMINAL, mode: str = "tension", *, anatomy: bool = False
+) -> mujoco.MjModel:
+    """Return the compiled finger."""
+    return build_finger(parameters, drive_of(mode, NOMINAL), anatomy=anatomy).compile()
+
+
+def at_rest(model: mujoco.MjModel, parameters: FingerParameters = NOMINAL) -> mujoco.MjData:
+    """Return a state in the resting posture with taut tendons."""
+    data = mujoco.MjData(model)
+    data.qpos[: len(JOINTS)] = JOINT_REST
+    if parameters.gives:
+        data.qpos[len(JOINTS) :] = parameters.arms @ JOINT_REST + parameters.backlash
+    data.ctrl[:] = data.act[:] = -1.0
+    return data
+
+
+def harsh_commands(rng: np.random.Generator) -> Iterator[tuple[str, np.ndarray]]:
+    """Return extreme commands by name, each (n, 7) for steps of 20 ms."""
+    yield "random", rng.uniform(-1.0, 1.0, (50, 7))
+    yield "bang-bang", rng.choice([-1.0, 1.0], (50, 7))
+    yield "bang-bang, slower", np.repeat(rng.choice([-1.0, 1.0], (5, 7)), 10, axis=0)
+    yield "all on and off", np.where(np.arange(40)[:, None] % 2, 1.0, -1.0) * np.ones(7)
+    yield "all on", np.ones((20, 7))
+    yield "all off", -np.ones((10, 7))
+    for i in range(7):
+        alone = -np.ones((15, 7))
+        alone[:, i] = 1.0
+        yield f"tendon {i} alone", alone

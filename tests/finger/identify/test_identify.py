@@ -1,0 +1,377 @@
+"""Identification of a finger from a log."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from html import unescape
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.finger.anatomy import JOINTS, TENDONS
+from shapechanger.finger.gap import GAPS, with_gears
+from shapechanger.finger.identify import (
+    FingerLog,
+    IdentifiedFinger,
+    ParameterEstimate,
+    identify,
+    result,
+)
+from shapechanger.finger.identify.kinematics import ARMS, Kinematics, interval_quantile
+from shapechanger.finger.identify.motion import FACTORS, Dynamics, Window, cut_windows
+from shapechanger.finger.identify.motors import Motors
+from shapechanger.finger.identify.result import HeldOut, replay
+from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
+from shapechanger.finger.report import (
+    arm_cell,
+    finger_html,
+    interval,
+    label,
+    number,
+    summary_line,
+    unbounded,
+    unknown,
+)
+from tests.finger.identify.logs import made_up, recorded
+
+
+@functools.cache
+def quick() -> tuple[FingerLog, FingerParameters, IdentifiedFinger, tuple[str, ...]]:
+    """Return a log of four seconds, the true and the identified finger, and the progress."""
+    parameters = NOMINAL.replace(
+        moment_arms=tuple(tuple(1.08 * arm for arm in row) for row in NOMINAL.moment_arms),
+        joint_stiffness=tuple(1.3 * v for v in NOMINAL.joint_stiffness),
+        joint_damping=tuple(0.8 * v for v in NOMINAL.joint_damping),
+        tendon_friction=0.3,
+        command_delay=0.02,
+    )
+    log, truth = recorded(4.2, parameters=parameters)
+    steps: list[str] = []
+    return log, truth, identify(log, steps.append), tuple(steps)
+
+
+def test_a_finger_is_identified() -> None:
+    """Arms, joints, friction, motors and motion of a finger without noise are found."""
+    log, truth, found, steps = quick()
+    np.testing.assert_allclose(found.parameters.arms, truth.arms, rtol=0.01)
+    assert found.parameters.tendon_stiffness is None
+    np.testing.assert_allclose(found.parameters.joint_stiffness, truth.joint_stiffness, rtol=0.1)
+    np.testing.assert_allclose(found.parameters.joint_damping, truth.joint_damping, rtol=0.15)
+    assert found.parameters.tendon_friction == pytest.approx(0.3, rel=0.2)
+    assert found.parameters.command_delay == pytest.approx(0.02, abs=0.005)
+    assert found.parameters.motor_lag == pytest.approx(truth.motor_lag, abs=0.002)
+    assert found.parameters.joint_noise == 0.0
+    off, nominal_off = found.held_out.off
+    assert off < np.radians(0.6)
+    assert nominal_off > 5.0 * off
+    assert len(found.held_out.t) == len(found.held_out.measured) == round(0.2 * len(log))
+    assert found.held_out.t[-1] == pytest.approx(found.seconds)
+    assert (found.source, found.seconds) == (log.source, log.seconds)
+    assert steps == (
+        "arms and stretch, from lengths",
+        "motors, from tensions",
+        "joints and friction, from motion",
+        "the last fifth, simulated",
+    )
+
+
+def test_intervals_contain_the_truth() -> None:
+    """Intervals contain the true values; those of arms exclude the nominal ones."""
+    _, truth, found, _ = quick()
+    by_name = {e.name: e for e in found.estimates}
+    for j, joint in enumerate(JOINTS):
+        for name in ("joint_stiffness", "joint_damping"):
+            e = by_name[f"{name}/{joint}"]
+            assert e.low < getattr(truth, name)[j] < e.high
+            assert e.nominal == getattr(NOMINAL, name)[j]
+    assert by_name["tendon_friction"].low < 0.3 < by_name["tendon_friction"].high
+    assert by_name["command_delay"].low < 0.02 + 0.005
+    assert len(found.arms) == int(ARMS.sum())
+    assert all(e.differs for e in found.arms)
+    ends = found.arm_intervals
+    assert (ends[~ARMS] == 0.0).all()
+    np.testing.assert_allclose(ends.mean(axis=2), found.parameters.arms, atol=1e-12)
+
+
+def kinematics(compliance: float, compliance_sd: float, noise: float = 1e-6) -> Kinematics:
+    """Return kinematics with nominal arms and a standard error of 0.1 mm."""
+    return Kinematics(
+        arms=NOMINAL.arms,
+        arms_covariance=1e-8 * np.eye(int(ARMS.sum())),
+        compliance=compliance,
+        compliance_sd=compliance_sd,
+        joint_noise=np.full(4, noise),
+        length_noise=1e-5,
+        angles=np.zeros((1, 4)),
+    )
+
+
+MOTORS = Motors(0.03, 0.001, 0.9, (0.001, 0.002, 0.01), saturates=True, tension_noise=0.1)
+DYNAMICS = Dynamics(
+    values={name: 2.0 * value for name, value in FACTORS.items()},
+    sd={name: 0.1 for name in FACTORS},
+)
+
+
+def estimates(
+    compliance: float = 1e-4,
+    compliance_sd: float = 1e-5,
+    motors: Motors = MOTORS,
+    rig: FingerParameters | None = None,
+) -> dict[str, ParameterEstimate]:
+    """Return the estimates of a synthetic fit over a log of 300 rows, by name."""
+    log = dataclasses.replace(made_up(), motors=rig)
+    found = result._estimates(kinematics(compliance, compliance_sd), motors, DYNAMICS, log)
+    return {e.name: e for e in found}
+
+
+def half(e: ParameterEstimate) -> float:
+    """Return half the width of an interval."""
+    return 0.5 * (e.high - e.low)
+
+
+def test_intervals_follow_from_standard_errors() -> None:
+    """Half-widths are the standard errors, model and clock errors included, times the quantile."""
+    found, reach = estimates(), interval_quantile(300, 0.02)
+    for i, j in np.argwhere(ARMS):
+        e = found[f"moment_arms/{TENDONS[i]}/{JOINTS[j]}"]
+        assert (e.value, e.nominal, e.unit) == (NOMINAL.arms[i, j], NOMINAL.arms[i, j], "m")
+        assert half(e) == pytest.approx(reach * 1e-4)
+    for name, unit, error in (
+        ("joint_stiffness/PIP_flexion", "N·m/rad", 0.15),
+        ("joint_damping/PIP_flexion", "N·m·s/rad", 0.20),
+        ("tendon_friction", "N", 1.15),
+    ):
+        e, by = found[name], math.exp(1.96 * math.hypot(0.1, error))
+        assert (e.value, e.unit) == (2.0 * FACTORS[name], unit)
+        assert (e.low, e.high) == pytest.approx((e.value / by, e.value * by))
+    assert half(found["motor_lag"]) == pytest.approx(reach * math.hypot(0.001, 0.0005))
+    delay = found["command_delay"]
+    assert (delay.low, delay.value) == (0.0, 0.001)  # Clipped at zero.
+    assert delay.high == pytest.approx(0.001 + reach * math.hypot(0.002, 0.002))
+    assert half(found["strength"]) == pytest.approx(reach * 0.01)
+    assert found["strength"].nominal == 1.0
+    still = dataclasses.replace(MOTORS, saturates=False)
+    assert "strength" not in estimates(motors=still)
+
+
+def test_stiffness_has_the_interval_of_its_inverse() -> None:
+    """The upper end is infinite where the compliance is not clearly above zero."""
+    reach = interval_quantile(300, 0.02)
+    e = estimates()["tendon_stiffness"]
+    assert e.value == pytest.approx(1e4)
+    half = reach * math.hypot(1e-5, 0.02 * 1e-4)  # With 2 % for what the fit lacks.
+    assert e.low == pytest.approx(1.0 / (1e-4 + half))
+    assert e.high == pytest.approx(1.0 / (1e-4 - half))
+    assert e.differs
+    unclear = estimates(1e-5, 1e-5)["tendon_stiffness"]
+    assert (unclear.value, unclear.high) == (math.inf, math.inf)
+    assert not unclear.differs
+    assert estimates(-1e-4, 1e-6)["tendon_stiffness"].low == math.inf
+
+
+@pytest.mark.parametrize(
+    ("compliance", "sd", "stiffness"),
+    [
+        (1e-4, 0.5e-4, 1e4),  # Two standard errors.
+        (1e-4, 0.52e-4, None),  # 1.92 standard errors.
+        (4.1e-6, 1e-9, 1.0 / 4.1e-6),
+        (3.9e-6, 1e-9, None),  # Stiffer than 250 kN/m.
+        (-1e-4, 1e-6, None),
+    ],
+)
+def test_compliance_counts_only_if_significant(
+    compliance: float, sd: float, stiffness: float | None
+) -> None:
+    """Stiffness is finite if the compliance exceeds its error and the least relevant stretch."""
+    found = result._parameters(kinematics(compliance, sd), MOTORS, DYNAMICS, None)
+    assert found.tendon_stiffness == pytest.approx(stiffness)
+
+
+def test_fitted_values_become_parameters() -> None:
+    """Joints, friction, motors and noise are set; other parameters stay nominal or as known."""
+    found = result._parameters(kinematics(0.0, 1e-6, 0.02), MOTORS, DYNAMICS, None)
+    assert found.moment_arms == NOMINAL.moment_arms
+    assert found.joint_stiffness == tuple(2.0 * v for v in NOMINAL.joint_stiffness)
+    assert found.joint_damping == tuple(2.0 * v for v in NOMINAL.joint_damping)
+    assert found.tendon_friction == 1.0
+    assert (found.motor_lag, found.command_delay) == (0.03, 0.001)
+    assert found.joint_noise == pytest.approx(0.02)
+    assert found.tension_noise == 0.1
+    assert found.joint_friction == NOMINAL.joint_friction
+    assert result._parameters(kinematics(0.0, 1e-6), MOTORS, DYNAMICS, None).joint_noise == 0.0
+
+
+def test_undetermined_parameters_are_listed() -> None:
+    """Undetermined parameters are listed with their assumed values."""
+    still = dataclasses.replace(MOTORS, saturates=False)
+    always = ["joint_friction", "tendon_damping", "motor_kg", "backlash"]
+    assert [name for name, _ in result._undetermined(still, None)] == [*always, "most_tension"]
+    assert [name for name, _ in result._undetermined(MOTORS, None)] == always
+    assert "assumed 20 g" in dict(result._undetermined(MOTORS, None))["motor_kg"]
+    known = dict(result._undetermined(still, NOMINAL.replace(motor_kg=1.5, tendon_damping=70.0)))
+    assert list(known) == always
+    assert "assumed 1500 g" in known["motor_kg"]
+    assert "assumed 70 N·s/m" in known["tendon_damping"]
+    rig = NOMINAL.replace(path=CommandPath(), motor_lag=0.003)
+    assert "assumed 3 ms" in dict(result._undetermined(still, rig))["motor_lag"]
+
+
+def window_of(log: FingerLog, parameters: FingerParameters) -> Window:
+    """Return the first second of a log after 0.3 s, with exact angles."""
+    exact = dataclasses.replace(kinematics(0.0, 1e-6), angles=log.angles)
+    motors = Motors(
+        parameters.motor_lag, parameters.command_delay, 1.0, (0.0, 0.0, 0.0), False, 0.0
+    )  # fmt: skip
+    return cut_windows(log, exact, motors)[0]
+
+
+@pytest.mark.parametrize("stiffness", [None, 2e4])
+def test_replay_of_the_true_finger_repeats_its_motion(stiffness: float | None) -> None:
+    """A replay of one second stays within a degree, with stiff and with elastic tendons."""
+    true = NOMINAL.replace(tendon_stiffness=stiffness, command_delay=0.02)
+    log, _ = recorded(2.0, parameters=true)
+    window = window_of(log, true)
+    angles = replay(log, true, window)
+    assert angles.shape == window.angles.shape
+    np.testing.assert_array_equal(angles[0], window.angles[0])
+    assert np.sqrt(np.mean((angles - window.angles) ** 2)) < np.radians(1.0)
+    weak = true.replace(joint_damping=tuple(3.0 * v for v in true.joint_damping))
+    other = replay(log, weak, window)
+    assert np.sqrt(np.mean((other - window.angles) ** 2)) > np.radians(5.0)
+
+
+def test_a_rig_changes_what_the_model_lacks() -> None:
+    """Its tensions reveal friction; play and sticking of its gears add to the errors of arms."""
+    plain, rig = estimates(), estimates(rig=NOMINAL.replace(path=CommandPath()))
+    reach = interval_quantile(300, 0.02)
+    arm = "moment_arms/FDP/MCP_flexion"
+    assert half(rig[arm]) == pytest.approx(reach * math.hypot(1e-4, 0.04e-3))
+    assert half(rig[arm]) > half(plain[arm])
+    found, wide = (np.log(one["tendon_friction"].high) for one in (rig, plain))
+    assert found < wide
+    by = 1.96 * math.hypot(DYNAMICS.sd["tendon_friction"], 0.15)
+    assert found == pytest.approx(math.log(DYNAMICS.values["tendon_friction"]) + by)
+
+
+def test_errors_are_root_mean_squares() -> None:
+    """`off` holds the errors of the identified and of the nominal finger, in this order."""
+    zero, t = np.zeros((4, 4)), np.arange(4.0)
+    found = HeldOut(t, measured=zero + 1.0, identified=zero + 1.5, nominal=zero)
+    assert found.off == (0.5, 1.0)
+
+
+def test_unbounded_intervals_are_unknown() -> None:
+    """An open side, or more than the range of fingers, reads "unknown" with the reason."""
+    found = estimates(1e-5, 1e-5)
+    assert interval(found["tendon_stiffness"]) == "unknown"
+    assert "above 31.1 N/mm" in unbounded(found["tendon_stiffness"])
+    assert "no stretch" in unbounded(estimates(-1e-4, 1e-6)["tendon_stiffness"])
+    assert interval(estimates()["tendon_stiffness"]) == "8.16 to 12.9"
+    assert interval(found["tendon_friction"]) == "unknown"
+    assert "the 3 N by which fingers differ" in unbounded(found["tendon_friction"])
+    stiffness = found["joint_stiffness/PIP_flexion"]
+    assert unbounded(stiffness) == ""
+    assert "60 mN·m/rad" in unbounded(dataclasses.replace(stiffness, high=1.0))
+    arm = found["moment_arms/FDP/MCP_flexion"]
+    assert arm_cell(arm) == "8.60 ±0.22"
+    assert arm_cell(dataclasses.replace(arm, nominal=0.0)) == "8.60 ±0.22*"
+    assert arm_cell(dataclasses.replace(arm, high=0.03)) == "unknown"
+
+
+def test_the_page_names_what_is_unknown() -> None:
+    """A chart of the arms, the joints in a table, and unknown intervals with their reasons."""
+    _, _, found, _ = quick()
+    page = unescape(finger_html(found, "finger.npz"))
+    assert page.count("<img") == 5
+    assert dict(unknown(found)).keys() == {"tendon_stiffness"}
+    assert all(why in page for _, why in unknown(found))
+
+
+@pytest.mark.slow
+def test_without_noise_all_parameters_are_found() -> None:
+    """Arms to 1 %, joints and motors are found, and the motion is repeated."""
+    changes = {"joint_stiffness": 1.3, "joint_damping": 0.8}
+    parameters = NOMINAL.replace(
+        moment_arms=tuple(tuple(1.08 * arm for arm in row) for row in NOMINAL.moment_arms),
+        command_delay=0.02,
+        **{k: tuple(f * v for v in getattr(NOMINAL, k)) for k, f in changes.items()},
+    )
+    log, truth = recorded(8.0, parameters=parameters)
+    found = identify(log)
+    np.testing.assert_allclose(found.parameters.arms, truth.arms, rtol=0.01)
+    assert found.parameters.tendon_stiffness is None
+    np.testing.assert_allclose(found.parameters.joint_stiffness, truth.joint_stiffness, rtol=0.1)
+    np.testing.assert_allclose(found.parameters.joint_damping, truth.joint_damping, rtol=0.15)
+    assert found.parameters.command_delay == pytest.approx(0.02, abs=0.005)
+    off, nominal_off = found.held_out.off
+    assert off < np.radians(2.0)
+    assert nominal_off > 2.0 * off
+
+
+@pytest.mark.slow
+def test_a_noisy_finger_becomes_an_env_and_a_page() -> None:
+    """An env takes the identified finger, and the page shows every number."""
+    log, truth = recorded(10.0, seed=2, gap="real-like", finger_seed=5)
+    found = identify(log)
+    ends = found.arm_intervals
+    passed = truth.arms != 0.0
+    held = (ends[..., 0] <= truth.arms) & (truth.arms <= ends[..., 1])
+    assert held[passed].mean() >= 0.9
+    assert (ends[~passed] == 0.0).all()
+    off, nominal_off = found.held_out.off
+    assert off < 0.5 * nominal_off
+    intervals = {e.name: (e.low, e.high) for e in found.estimates}
+    for j, joint in enumerate(JOINTS):
+        low, high = intervals[f"joint_stiffness/{joint}"]
+        assert low < truth.joint_stiffness[j] < high
+    page = finger_html(found, "finger.npz")
+    for e in found.estimates:
+        if e in found.arms:  # They are in the chart.
+            continue
+        assert label(e) in page
+        assert interval(e) in page
+        assert number(e, e.value) in page
+    for name, why in found.undetermined:
+        assert name in page
+        assert why in unescape(page)
+    assert page.count("<img") == 5
+    assert summary_line(found).startswith("arms: 25 intervals, the widest of those above 2 mm ±")
+    with gym.make("shapechanger/Finger-v1", parameters=found.parameters.to_json()) as env:
+        env.reset(seed=0)
+        observation, *_ = env.step(np.zeros(7, np.float32))
+        assert np.isfinite(observation).all()
+
+
+def test_a_delay_on_a_path_follows_from_the_motion() -> None:
+    """Tensions hide it within a period; the log says by itself that it is a rig's."""
+    path = CommandPath(slew_per_s=20.0, slew_down_per_s=20.0)
+    drawn = with_gears(GAPS["real-like"].draw(np.random.default_rng(1)))
+    late = drawn.replace(path=path, command_delay=0.008, joint_noise=0.0)
+    log, truth = recorded(8.0, parameters=late)
+    known = {"most_tension": truth.most_tension, "least_tension": truth.least_tension}
+    assert log.motors == with_gears(NOMINAL.replace(path=path, **known))
+    found = identify(log)
+    assert found.parameters.path == path
+    assert found.parameters.command_delay == pytest.approx(0.008, abs=0.007)
+    names = [e.name for e in found.estimates]
+    assert "command_delay" in names
+    assert "motor_lag" not in names
+    assert "motor_lag" in dict(found.undetermined)
+
+
+@pytest.mark.slow
+def test_known_motors_do_not_bias_the_joints() -> None:
+    """Joints are found with geared motors and individual current limits."""
+    weak = (15.0, 15.0, 7.0, 15.0, 6.4, 15.0, 15.0)
+    drawn = GAPS["real-like"].draw(np.random.default_rng(3))
+    log, truth = recorded(8.0, parameters=with_gears(drawn.replace(most_tension=weak)))
+    found = identify(log)
+    assert found.parameters.most_tension == weak
+    assert found.parameters.motor_kg == truth.motor_kg
+    assert "most_tension" not in dict(found.undetermined)
+    np.testing.assert_allclose(found.parameters.joint_stiffness, truth.joint_stiffness, rtol=0.3)
+    np.testing.assert_allclose(found.parameters.joint_damping, truth.joint_damping, rtol=0.3)

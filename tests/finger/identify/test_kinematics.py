@@ -1,0 +1,124 @@
+"""Moment arms and compliance from lengths, angles and tensions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.finger.identify.kinematics import (
+    ARMS,
+    _Regression,
+    fit_kinematics,
+    interval_quantile,
+    robust_covariance,
+)
+from shapechanger.finger.identify.result import RIG_ARM_ERROR_M
+from shapechanger.finger.parameters import NOMINAL
+from tests.finger.identify.logs import changed, recorded, swings, synthetic
+
+LARGE_M = 2e-3
+
+
+def test_without_noise_the_arms_are_exact() -> None:
+    """Arms of a finger that is not nominal are found to 1 %."""
+    rng = np.random.default_rng(5)
+    arms = NOMINAL.arms * (1.0 + rng.uniform(-0.1, 0.1, NOMINAL.arms.shape))
+    parameters = NOMINAL.replace(moment_arms=tuple(map(tuple, arms.tolist())))
+    log, _ = recorded(6.0, parameters=parameters)
+    found = fit_kinematics(log)
+    np.testing.assert_allclose(found.arms, arms, rtol=0.01)
+    assert abs(found.compliance) < 1e-7
+
+
+def test_synthetic_logs_give_their_parameters() -> None:
+    """Arms, compliance and noise are found, and noise of the angles does not bias the arms."""
+    arms, noise = 1.15 * NOMINAL.arms, np.radians(1.5)
+    log = synthetic(arms, compliance=5e-5, joint_noise=noise, length_noise=2e-5)
+    found = fit_kinematics(log)
+    large = np.abs(arms) > LARGE_M
+    np.testing.assert_allclose(found.arms[large], arms[large], rtol=0.03)
+    assert (found.arms[~ARMS] == 0.0).all()
+    assert found.compliance == pytest.approx(5e-5, rel=0.05)
+    assert 1e-7 < found.compliance_sd < 2.5e-6
+    np.testing.assert_allclose(found.joint_noise, noise, rtol=0.1)
+    assert found.length_noise == pytest.approx(2e-5, rel=0.2)
+    # The lengths give the angles too, which removes most of their noise.
+    assert np.std(found.angles - swings(log.t)) < 0.5 * noise
+
+
+def test_slack_and_the_start_of_a_log_are_outliers() -> None:
+    """5 mm of slack for 0.5 s and errors in the first 0.2 s do not bias the arms.
+
+    The remaining errors agree with their standard errors to a factor of 1.5.
+    """
+    log = synthetic(NOMINAL.arms, 0.0, np.radians(1.0), 2e-5)
+    lengths = log.lengths.copy()
+    lengths[:9] += 0.02
+    lengths[100:125, 0] += 5e-3
+    found = fit_kinematics(changed(log, lengths=lengths))
+    large = np.abs(NOMINAL.arms) > LARGE_M
+    np.testing.assert_allclose(found.arms[large], NOMINAL.arms[large], rtol=0.05)
+    ratio = (found.arms - NOMINAL.arms)[ARMS] / found.arms_sd[ARMS]
+    assert 1.0 / 1.5 < np.sqrt(np.mean(ratio**2)) < 1.5
+    assert len(found.angles) == len(log)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("finger_seed", [0, 3])
+def test_noisy_fingers_are_identified(finger_seed: int) -> None:
+    """Arms above 2 mm and compliance are found to 5 %, and 90 % of the intervals hold."""
+    log, truth = recorded(10.0, seed=1, gap="real-like", finger_seed=finger_seed)
+    found = fit_kinematics(log)
+    off = np.abs(found.arms - truth.arms)
+    large = np.abs(truth.arms) > LARGE_M
+    assert (off[large] < 0.05 * np.abs(truth.arms[large])).all()
+    sd = np.hypot(found.arms_sd, RIG_ARM_ERROR_M)
+    held = off <= interval_quantile(len(log), log.control_dt) * sd
+    assert held[ARMS].mean() >= 0.9
+    assert truth.tendon_stiffness is not None
+    assert found.compliance * truth.tendon_stiffness == pytest.approx(1.0, abs=0.05)
+    np.testing.assert_allclose(found.joint_noise.min(), truth.joint_noise, rtol=0.15)
+
+
+def test_standard_errors_grow_with_correlated_errors() -> None:
+    """Errors that repeat ten times count as a tenth as many samples."""
+    rng = np.random.default_rng(0)
+    ones = np.ones((2000, 1, 1))
+    fresh = rng.standard_normal((2000, 1))
+    stale = np.repeat(rng.standard_normal((200, 1)), 10, axis=0)
+    known, unknown = (float(robust_covariance(ones, r, 0.02)[0, 0]) for r in (fresh, stale))
+    assert known == pytest.approx(1.0 / 2000, rel=0.5)
+    assert 4.0 < unknown / known < 16.0
+
+
+def test_the_covariance_has_newey_west_weights() -> None:
+    """Lag k of L steps has the weight 1 - k / (L + 1), with L half a second."""
+    residual = np.array([[1.0], [2.0], [-1.0], [3.0]])
+    # Two lags of 0.25 s: 1 + 4 + 1 + 9, + 2 (2/3) (2 - 2 - 3), + 2 (1/3) (-1 + 6); over 4 squared.
+    expected = (15.0 - 2.0 * (2.0 / 3.0) * 3.0 + 2.0 * (1.0 / 3.0) * 5.0) / 16.0
+    assert robust_covariance(np.ones((4, 1, 1)), residual, 0.25)[0, 0] == pytest.approx(expected)
+
+
+def test_intervals_are_wider_for_short_logs() -> None:
+    """The quantile is Kiefer and Vogelsang's cubic in the bandwidth."""
+    assert interval_quantile(10**9, 0.02) == pytest.approx(1.96, abs=1e-4)
+    assert interval_quantile(250, 0.02) == pytest.approx(1.96 + 0.29694 + 0.00416 - 0.0005324)
+    assert interval_quantile(5, 0.02) == pytest.approx(1.96 + 2.9694 + 0.4160 - 0.5324)
+
+
+def test_lengths_weigh_less_while_friction_changes_its_sign() -> None:
+    """The variance of a tendon at rest grows by half of its friction squared."""
+    directions = np.vstack([np.zeros(7), np.ones(7)])
+    friction_m, noise_m = 2e-4, 1e-4
+    rows = _Regression(
+        lengths=-friction_m * directions,
+        angles=np.zeros((2, 4)),
+        tensions=np.zeros((2, 7)),
+        speeds=np.zeros((2, 7)),
+        directions=directions,
+    )
+    x = np.zeros(int(ARMS.sum()) + 7 + 3)
+    x[-2] = friction_m / 1e-4  # In units of the fit.
+    variance = rows.variance(x, np.full(4, 1e-3), noise_m)
+    np.testing.assert_allclose(variance[0], noise_m**2 + 0.5 * friction_m**2)
+    np.testing.assert_allclose(variance[1], noise_m**2)

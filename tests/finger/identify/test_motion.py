@@ -1,0 +1,135 @@
+"""Joint and friction parameters from motion."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import MissingExtra
+from shapechanger.finger.anatomy import JOINTS
+from shapechanger.finger.identify import FingerLog, motion
+from shapechanger.finger.identify.kinematics import ARMS, Kinematics
+from shapechanger.finger.identify.motion import (
+    FACTORS,
+    MOTOR_KG,
+    _MotionFit,
+    cut_windows,
+    fit_dynamics,
+    steps_per_period,
+    with_motors,
+)
+from shapechanger.finger.identify.motors import Motors
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from tests.finger.identify.logs import recorded
+
+ARM_SD_M = 2e-4
+
+
+@functools.cache
+def short() -> tuple[FingerLog, FingerParameters]:
+    """Return a log of two windows of a stiff, lightly damped finger with friction."""
+    parameters = NOMINAL.replace(
+        joint_stiffness=tuple(1.3 * v for v in NOMINAL.joint_stiffness),
+        joint_damping=tuple(0.8 * v for v in NOMINAL.joint_damping),
+        tendon_friction=0.3,
+        command_delay=0.02,
+    )
+    return recorded(2.6, parameters=parameters)
+
+
+def exact(arms: np.ndarray = NOMINAL.arms) -> Kinematics:
+    """Return kinematics without noise, with the given arms."""
+    log, _ = short()
+    count = int(ARMS.sum())
+    return Kinematics(
+        arms=arms,
+        arms_covariance=ARM_SD_M**2 * np.eye(count),
+        compliance=0.0,
+        compliance_sd=1e-9,
+        joint_noise=np.full(4, 1e-6),
+        length_noise=1e-6,
+        angles=log.angles,
+    )
+
+
+def motors(**changes: float) -> Motors:
+    """Return motors that match the log, with changes."""
+    found = Motors(0.020, 0.022, 1.0, (1e-4, 1e-4, 0.0), saturates=False, tension_noise=0.0)
+    return dataclasses.replace(found, **changes)  # pyright: ignore[reportArgumentType]
+
+
+def test_joints_and_friction_are_found() -> None:
+    """Joint parameters are found to 5 %, friction to 15 %."""
+    log, truth = short()
+    found = fit_dynamics(log, exact(), motors())
+    for name in ("joint_stiffness", "joint_damping"):
+        values = [found.values[f"{name}/{joint}"] for joint in JOINTS]
+        np.testing.assert_allclose(values, getattr(truth, name), rtol=0.05)
+    assert found.values["tendon_friction"] == pytest.approx(0.3, rel=0.15)
+    assert set(found.sd) == set(FACTORS)
+    assert all(1e-3 < sd < 0.2 for sd in found.sd.values())
+
+
+def test_the_covariance_has_the_correction_for_few_windows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two windows with opposite errors: a sandwich, times two windows over one."""
+    fit = _MotionFit.__new__(_MotionFit)
+    monkeypatch.setattr(motion, "_PRIOR_SD", 1.0)
+    parts = [np.array([3.0]), np.array([-3.0]), np.zeros(1)]
+    monkeypatch.setattr(_MotionFit, "residual", lambda *_: (parts, None, None))
+    monkeypatch.setattr(_MotionFit, "parameters", lambda _: None)
+    found = fit.covariance(np.zeros(1), np.array([[1.0], [2.0], [1.0]]))
+    bread, filling = 1.0 / 6.0, 1.0 + 3.0**2 + 6.0**2
+    assert found[0, 0] == pytest.approx(2.0 * bread**2 * filling)
+
+
+def test_windows_begin_in_the_measured_state() -> None:
+    """Windows last 1 s from 0.3 s on, and start with measured velocities and activations."""
+    log, _ = short()
+    dt = log.control_dt
+    windows = cut_windows(log, exact(), motors())
+    assert [window.start for window in windows] == pytest.approx(log.t[0] + [0.3, 1.3])
+    for window in windows:
+        row = round((window.start - log.t[0]) / dt)
+        np.testing.assert_array_equal(window.angles, log.angles[row : row + round(1.0 / dt) + 1])
+        ahead, back = log.angles[row + 1], log.angles[row - 1]
+        np.testing.assert_allclose(window.velocities, (ahead - back) / (2 * dt), atol=0.5)
+        assert np.corrcoef(window.velocities, (ahead - back) / (2 * dt))[0, 1] > 0.99
+        # Within the recent commands, because of delay and lag.
+        acting = log.commands[max(row - 4, 0) : row + 1]
+        assert (acting.min(axis=0) - 1e-3 <= window.activations).all()
+        assert (window.activations <= acting.max(axis=0) + 1e-3).all()
+    assert len(cut_windows(log, exact(), motors(), 80)) == 1
+    assert len(cut_windows(log, exact(), motors(), None, 0.5, 0.0)) == 5
+
+
+def test_control_periods_are_whole_numbers_of_steps() -> None:
+    """The number of steps is the smallest whose step is at most the model's."""
+    assert steps_per_period(0.02, 0.002) == 10
+    assert steps_per_period(0.021, 0.002) == 11
+    assert steps_per_period(0.0005, 0.002) == 1
+
+
+def test_known_motors_take_precedence() -> None:
+    """Known motors keep tensions, mass and damping; the lag is always fitted."""
+    found = with_motors(motors(lag=0.03, strength=0.5), None)
+    assert found.motor_lag == 0.03
+    assert found.motor_kg == MOTOR_KG
+    np.testing.assert_allclose(found.most_tension, 0.5 * np.array(NOMINAL.most_tension))
+    known = NOMINAL.replace(
+        most_tension=(9.0,) * 7, least_tension=1.0, motor_kg=2.0, tendon_damping=70.0
+    )
+    assert with_motors(motors(lag=0.03, strength=0.5), known) == known.replace(motor_lag=0.03)
+
+
+def test_without_the_toolbox_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty `mujoco.sysid`, as without its dependencies, raises MissingExtra."""
+    log, kinematics = short()[0], exact()  # Their env is imported before the patch.
+    monkeypatch.setattr(importlib, "import_module", lambda name: object())
+    with pytest.raises(MissingExtra, match=r"shapechanger\[identify\]"):
+        fit_dynamics(log, kinematics, motors())

@@ -1,0 +1,154 @@
+"""The path of a rig's commands: hold, delay, slew and resolution of the tensions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from shapechanger.errors import FingerError, UnknownName
+from shapechanger.finger.command_path import slewed
+from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
+from shapechanger.finger.plant import CONTROL_DT, FingerPlant
+from shapechanger.finger.tensions import drive_of
+from shapechanger.robot.guard.limits import slewed as slewed_by_guard
+from shapechanger.robot.guard.plan import ActionPlan
+
+_RIG = NOMINAL.replace(tendon_stiffness=10e3, motor_kg=1.4, motor_lag=0.001)
+_MOST = np.array(NOMINAL.most_tension)
+
+
+def _tensions(
+    parameters: FingerParameters, commands: list[float], actions: str = "tension"
+) -> NDArray[np.float64]:
+    """Return the tensions of the first tendon, N, after each millisecond of some commands."""
+    plant = FingerPlant(parameters, drive_of(actions, NOMINAL), CONTROL_DT)
+    rng = np.random.default_rng(0)
+    plant.place(np.array([0.4, 0.0, 0.6, 0.2]), rng)
+    seen: list[float] = []
+    real: Any = mujoco.mj_step
+
+    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
+        for _ in range(nstep):
+            real(model, data)
+            seen.append(float(np.abs(data.actuator_force[0])))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mujoco, "mj_step", step)
+        for command in commands:
+            plant.act(np.full(7, command), rng)
+    return np.array(seen)
+
+
+def test_without_limits_a_tension_follows_within_the_lag() -> None:
+    """A path changes only when tensions are computed, not what they are."""
+    seen = _tensions(_RIG.replace(path=CommandPath()), [0.5, 0.5])
+    asked = NOMINAL.least_tension + 0.75 * (_MOST[0] - NOMINAL.least_tension)
+    assert seen[8] == pytest.approx(asked, rel=1e-3)
+    assert seen[-1] == pytest.approx(asked, rel=1e-6)
+
+
+def test_a_delay_postpones_the_whole_response() -> None:
+    """The response after 12 ms of delay is the prompt one, 12 ms later."""
+    rig = _RIG.replace(path=CommandPath(slew_per_s=20.0))
+    prompt, late = (
+        _tensions(rig.replace(command_delay=delay), [0.5, -0.5, 0.8]) for delay in (0.0, 0.012)
+    )
+    np.testing.assert_allclose(late[12:], prompt[:-12], atol=1e-9)
+    np.testing.assert_allclose(late[:12], NOMINAL.least_tension, atol=1e-9)
+
+
+def test_an_impedance_is_held_between_computations() -> None:
+    """A moving finger does not change the tension until the next one is computed."""
+    held = _tensions(_RIG.replace(path=CommandPath()), [0.5, -0.5, 0.5, -0.5], "impedance")
+    prompt = _tensions(_RIG, [0.5, -0.5, 0.5, -0.5], "impedance")
+    ends = np.array([19, 39, 59, 79])
+    assert np.abs(held[ends] - held[ends - 9]).max() < 0.01
+    assert np.abs(prompt[ends] - prompt[ends - 9]).max() > 0.1
+
+
+def test_tensions_have_a_resolution() -> None:
+    """They are rounded down, as a servo rounds its current."""
+    seen = _tensions(_RIG.replace(path=CommandPath(tension_step=0.4)), [0.5])
+    asked = NOMINAL.least_tension + 0.75 * (_MOST[0] - NOMINAL.least_tension)
+    assert seen[-1] == pytest.approx(0.4 * np.floor(asked / 0.4), rel=1e-6)
+
+
+def test_a_slew_on_one_side_rectifies_chatter() -> None:
+    """A fall without a limit lowers the mean tension; equal limits keep it."""
+    chatter = [0.4, -0.4] * 20
+    free, rectified, even = (
+        _tensions(_RIG.replace(path=CommandPath(slew_per_s=up, slew_down_per_s=down)), chatter)
+        for up, down in ((None, None), (20.0, None), (20.0, 20.0))
+    )
+    span = _MOST[0] - NOMINAL.least_tension
+    assert free[200:].mean() - rectified[200:].mean() > 0.03 * span
+    assert abs(free[200:].mean() - even[200:].mean()) < 0.01 * span
+
+
+_slews = st.none() | st.sampled_from([2.0, 20.0])
+_shares = st.floats(0.0, 1.0)
+
+
+@given(up=_slews, down=_slews, now=_shares, aim=_shares)
+def test_the_slew_is_the_guards(
+    up: float | None, down: float | None, now: float, aim: float
+) -> None:
+    """Training uses what the guard does to an action of the profile."""
+    action = ActionPlan(
+        "FDP",
+        0.0,
+        slew_per_s=up or float("inf"),
+        slew_down_per_s=down or float("inf"),
+        one_sided=True,
+    )
+    path = CommandPath(slew_per_s=up, slew_down_per_s=down)
+    ours = float(slewed(path, np.array([now]), np.array([aim]))[0])
+    assert ours == pytest.approx(slewed_by_guard(action, now, aim, 0.01), abs=1e-12)
+
+
+def test_a_path_survives_json() -> None:
+    """The parameters of a rig are written and read with their path, also as a mapping."""
+    rig = _RIG.replace(path={"slew_per_s": 20.0})
+    assert rig.path == CommandPath(slew_per_s=20.0)
+    assert FingerParameters.from_json(rig.to_json()) == rig
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"slew_per_s": 0.0}, "slew_per_s of a path must be above zero and finite, got 0.0"),
+        ({"control_hz": -1.0}, "control_hz of a path must be above zero"),
+        ({"tick_hz": 75.0}, "tick_hz of a path must be a multiple of control_hz, got 75 and 50"),
+        ({"tension_step": -0.1}, "tension_step of a path must be zero or above"),
+        ({"slew_per_s": "fast"}, "A command path is malformed: Expected"),
+    ],
+)
+def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:
+    """The sentence names the value."""
+    with pytest.raises(FingerError, match=words):
+        CommandPath.from_mapping(values)
+
+
+def test_an_unknown_value_is_refused() -> None:
+    """The error suggests the nearest name."""
+    with pytest.raises(UnknownName, match="Did you mean 'slew_per_s'"):
+        NOMINAL.replace(path={"slew_pr_s": 2.0})
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        (CommandPath(control_hz=25.0), "control_hz of a path must be a multiple of 50"),
+        (CommandPath(control_hz=50.0, tick_hz=300.0), "tick_hz of a path must divide 1000"),
+    ],
+)
+def test_rates_that_do_not_fit_are_refused(path: CommandPath, words: str) -> None:
+    """Computations must fit into a command, and simulation steps into a tick."""
+    with pytest.raises(FingerError, match=words):
+        FingerPlant(_RIG.replace(path=path), drive_of("tension", NOMINAL), CONTROL_DT)

@@ -1,0 +1,197 @@
+"""Random fingers: their ranges, and that they can hold every posture."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from shapechanger.errors import FingerError, UnknownName
+from shapechanger.finger.anatomy import AN_1983_ARMS
+from shapechanger.finger.gap import (
+    GAPS,
+    Gap,
+    geared_around,
+    require_balance,
+    resolve_gap,
+)
+from shapechanger.finger.identify import babble
+from shapechanger.finger.parameters import NOMINAL, CommandPath
+from shapechanger.finger.reach import FingerReachEnv
+from shapechanger.finger.tensions import spans_all_torques
+
+_REAL_LIKE = GAPS["real-like"]
+_PLAIN = ("strength", "tendon_friction", "backlash", "motor_lag", "command_delay")
+_NOISES = ("joint_noise", "tension_noise")
+_LOGARITHMIC = ("tendon_stiffness", "motor_kg")
+
+
+def _but(**changes: Any) -> Gap:
+    return msgspec.structs.replace(_REAL_LIKE, **changes)
+
+
+@pytest.mark.parametrize("name", GAPS)
+def test_parameters_are_drawn_from_their_ranges(name: str) -> None:
+    """Values stay within their ranges and cover them."""
+    gap = GAPS[name]
+    rng = np.random.default_rng(0)
+    drawn = [gap.draw(rng) for _ in range(100)]
+    for field in (*_PLAIN[1:], *_NOISES, *_LOGARITHMIC):
+        low, high = getattr(gap, field)
+        values = np.array([getattr(finger, field) for finger in drawn])
+        slack = 1e-12 * high
+        assert (values >= low - slack).all()
+        assert (values <= high + slack).all()
+        if high > low:
+            assert np.ptp(values) > 0.8 * (high - low)
+    low, high = gap.strength
+    strengths = np.array([f.most_tension for f in drawn]) / NOMINAL.most_tension
+    assert (strengths >= low).all()
+    assert (strengths <= high).all()
+    np.testing.assert_allclose(np.ptp(strengths, axis=1), 0.0, atol=1e-12)
+    for field in ("joint_stiffness", "joint_damping", "joint_friction"):
+        low, high = gap.joint_factor
+        factors = np.array([getattr(f, field) for f in drawn]) / getattr(NOMINAL, field)
+        assert (factors >= low).all()
+        assert (factors <= high).all()
+        assert abs(np.log(factors).mean()) < 0.1
+    nominal = NOMINAL.arms
+    arms = np.array([f.arms for f in drawn])
+    # A tendon crosses the same joints in every finger.
+    assert (arms[:, nominal == 0.0] == 0.0).all()
+    errors = arms[:, nominal != 0.0] / nominal[nominal != 0.0] - 1.0
+    assert (np.abs(errors) <= gap.arm_error + 1e-12).all()
+    assert np.abs(errors).max() > 0.95 * gap.arm_error
+
+
+def test_draws_span_all_torques() -> None:
+    """Draws whose arms do not span all torques are repeated."""
+    gap = _but(arm_error=0.6)
+    rng = np.random.default_rng(0)
+    assert all(spans_all_torques(gap.draw(rng).arms) for _ in range(40))
+    raw = NOMINAL.arms * (1.0 + rng.uniform(-0.6, 0.6, (200, 7, 4)))
+    assert 0.02 < np.mean([spans_all_torques(arms) for arms in raw]) < 0.9
+
+
+def test_a_gap_without_valid_fingers_raises(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After several tries the error names the setting to reduce."""
+    monkeypatch.setattr("shapechanger.finger.gap.spans_all_torques", lambda _: False)
+    with pytest.raises(FingerError, match=r"off by 90%, hardly any .* make arm_error smaller"):
+        _but(arm_error=0.9).draw(np.random.default_rng(0))
+
+
+def test_the_generator_determines_the_finger() -> None:
+    """Equal generators give equal fingers, other generators other fingers."""
+    one, two, other = (_REAL_LIKE.draw(np.random.default_rng(s)) for s in (5, 5, 6))
+    assert one == two != other
+
+
+def test_a_finger_seed_fixes_the_finger() -> None:
+    """The finger does not depend on the episode's seed; other finger seeds give other fingers."""
+    one = FingerReachEnv(gap="real-like", finger_seed=3)
+    before = one.parameters
+    one.reset(seed=1)
+    one.reset(seed=2)
+    assert one.parameters == before
+    assert FingerReachEnv(gap="real-like", finger_seed=3).parameters == before
+    assert FingerReachEnv(gap="real-like", finger_seed=4).parameters != before
+    assert before == _REAL_LIKE.draw(np.random.default_rng(3))
+
+
+def test_without_a_finger_seed_each_episode_has_another_finger() -> None:
+    """The finger follows from the seed of the episode alone."""
+    env, other = FingerReachEnv(gap="wide"), FingerReachEnv(gap="wide")
+    drawn = []
+    for seed in (1, 2, None):
+        env.reset(seed=seed)
+        drawn.append(env.parameters)
+    assert len({finger.to_json() for finger in drawn}) == 3
+    other.reset(seed=7)
+    other.reset(seed=1)
+    assert other.parameters == drawn[0]
+
+
+def test_a_gap_is_given_by_name_value_or_mapping() -> None:
+    """Names, gaps and mappings of ranges are accepted."""
+    assert resolve_gap("real-like") is _REAL_LIKE
+    assert resolve_gap(_REAL_LIKE) is _REAL_LIKE
+    assert resolve_gap(msgspec.to_builtins(_REAL_LIKE)) == _REAL_LIKE
+    assert resolve_gap(msgspec.json.decode(msgspec.json.encode(_REAL_LIKE))) == _REAL_LIKE
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"arm_error": 1.0}, "arm_error must be 0 to below 1, got 1.0."),
+        ({"arm_error": math.nan}, "arm_error must be 0 to below 1, got nan."),
+        ({"motor_lag": (0.03, 0.01)}, r"motor_lag: the range \(0.03, 0.01\) is empty"),
+        ({"joint_noise": (-0.1, 0.1)}, r"joint_noise: the range \(-0.1, 0.1\) is .* below zero"),
+        ({"backlash": (0.0, math.nan)}, "backlash: the range"),
+        ({"backlash": (0.0, math.inf)}, "backlash: the range .* infinite"),
+        ({"joint_factor": (0.0, 1.0)}, "joint_factor: the range .* must begin above zero"),
+        ({"motor_kg": (0.0, 1.0)}, "motor_kg: the range .* must begin above zero"),
+    ],
+)
+def test_invalid_ranges_are_refused(changes: dict[str, Any], sentence: str) -> None:
+    """Invalid ranges raise an error with name and value, also in mappings."""
+    with pytest.raises(FingerError, match=sentence):
+        Gap(**{**msgspec.structs.asdict(_REAL_LIKE), **changes})
+    with pytest.raises(FingerError, match=sentence):
+        resolve_gap({**msgspec.to_builtins(_REAL_LIKE), **changes})
+
+
+def test_invalid_gaps_are_refused() -> None:
+    """Unknown names, incomplete mappings and other types raise an error."""
+    with pytest.raises(UnknownName, match=r"'reallike'. Did you mean 'real-like'"):
+        resolve_gap("reallike")
+    with pytest.raises(FingerError, match="missing required field `joint_factor`"):
+        resolve_gap({"arm_error": 0.1})
+    with pytest.raises(FingerError, match="unknown field `fricton`"):
+        resolve_gap({**msgspec.to_builtins(_REAL_LIKE), "fricton": (0.0, 1.0)})
+    with pytest.raises(FingerError, match="Expected `object`, got `int`"):
+        resolve_gap(3)  # pyright: ignore[reportArgumentType]
+
+
+def test_arms_that_cannot_balance_name_the_joint() -> None:
+    """No arm of one sign, and a torque that always comes with another, are refused by name."""
+    one_way = NOMINAL.arms
+    one_way[:, 2] = abs(one_way[:, 2])
+    with pytest.raises(FingerError, match=r"balance PIP_flexion: no moment arm there is negative"):
+        FingerReachEnv(parameters={"moment_arms": one_way.tolist()})
+    coupled = NOMINAL.arms
+    coupled[:, 3] = coupled[:, 2]  # PIP and DIP only together.
+    with pytest.raises(FingerError, match=r"balance PIP_flexion: no tensions give it a positive"):
+        FingerReachEnv(parameters={"moment_arms": coupled.tolist()})
+    require_balance(NOMINAL)
+
+
+def test_the_arms_of_an_et_al_are_used_although_they_do_not_balance() -> None:
+    """By the name of their set; as numbers of one's own they are refused."""
+    env = FingerReachEnv(parameters="an-1983")
+    env.reset(seed=0)
+    assert env.step(np.zeros(7, np.float32))[4]["distance"] > 0.0
+    np.testing.assert_array_equal(env.plant.parameters.arms, AN_1983_ARMS)
+    with pytest.raises(FingerError, match="balance MCP_flexion: no tensions give it a negative"):
+        FingerReachEnv(parameters={"moment_arms": (AN_1983_ARMS * 1.0001).tolist()})
+    with pytest.raises(UnknownName, match=r"'an-1938'. Did you mean 'an-1983'"):
+        FingerReachEnv(parameters="an-1938")
+
+
+@pytest.mark.parametrize("on_rig", [False, True])
+def test_an_identified_source_has_what_was_found(
+    monkeypatch: pytest.MonkeyPatch, on_rig: bool
+) -> None:
+    """On a rig's path, motors are drawn around it; otherwise it is that finger."""
+    found = NOMINAL.replace(tendon_friction=0.25, path=CommandPath() if on_rig else None)
+    monkeypatch.setattr(babble, "identify_env", lambda env, actions, seed: found)
+    source = FingerReachEnv().identified_source(0)
+    if on_rig:
+        assert source["reward"] == {"change": 5.0}
+        assert resolve_gap(source["gap"]) == geared_around(found)
+    else:
+        assert source == {"parameters": msgspec.to_builtins(found)}

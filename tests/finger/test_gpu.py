@@ -1,0 +1,433 @@
+"""Fingers on a device do what CPU envs do, whatever their motors, tendons, delays and paths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+
+import shapechanger
+from shapechanger.envs.warp import WarpVectorEnv
+from shapechanger.envs.warp.devices import as_torch
+from shapechanger.envs.warp.noise import uniforms
+from shapechanger.errors import FingerError, UnknownName, VectorEnvError
+from shapechanger.finger.anatomy import PHALANX_LENGTH_M
+from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.gap import GAPS, Gap
+from shapechanger.finger.model import build_finger
+from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
+from shapechanger.finger.paths import from_callable
+from shapechanger.finger.plant import CONTROL_DT, JointVelocities
+from shapechanger.finger.postures import draw_posture, draw_start
+from shapechanger.finger.reach import FingerReachEnv
+from shapechanger.finger.task import fingertip
+from shapechanger.finger.tensions import drive_of
+from shapechanger.finger.track import FingerTrackEnv
+from tests.envs.warp.side_by_side import OBSERVATION_TOLERANCE, REWARD_TOLERANCE, apart, names_of
+
+ROUNDS = 3
+
+
+def sway(t: float) -> tuple[float, float, float]:
+    """Return a point of an open path, m."""
+    return 0.05, 0.01 * math.sin(3.0 * t), -0.045
+
+
+def drawn(count: int, gap: str = "wide") -> list[FingerParameters]:
+    """Return fingers of a gap with exact sensors."""
+    rng = np.random.default_rng(7)
+    fingers = [GAPS[gap].draw(rng) for _ in range(count)]
+    return [finger.replace(joint_noise=0.0, tension_noise=0.0) for finger in fingers]
+
+
+OTHER = NOMINAL.replace(
+    joint_stiffness=(0.05, 0.03, 0.03, 0.01),
+    joint_damping=(0.02, 0.01, 0.01, 0.004),
+    joint_friction=(0.002, 0.001, 0.001, 0.0005),
+    most_tension=(20.0, 25.0, 7.0, 22.0, 6.0, 20.0, 24.0),
+    least_tension=0.8,
+    motor_lag=0.03,
+    motor_kg=0.03,
+    tendon_damping=3.0,
+)
+PATH = CommandPath(slew_per_s=20.0, slew_down_per_s=5.0)
+QUANTISED = CommandPath(slew_per_s=3.0, tension_step=0.3)
+
+# Fingers of one batch each, with the arguments of their env.
+KINDS: dict[str, tuple[list[Any], dict[str, Any]]] = {
+    "plain": ([None, "an-1983", OTHER], {}),
+    "weights": ([None, OTHER], {"actions": "tension", "reward": {"change": 5.0, "effort": 2.0}}),
+    "lengths": ([None, "an-1983", OTHER], {"actions": "length"}),
+    "rubbing": ([OTHER.replace(tendon_friction=0.4), {"tendon_friction": 0.9}], {}),
+    "late": ([{"command_delay": 0.0061}, {"command_delay": 0.0129}], {}),
+    "stretched": ([{"tendon_stiffness": 8e3}, {"tendon_stiffness": 5e3, "backlash": 4e-4}], {}),
+    "path": ([{"path": PATH}, OTHER.replace(path=QUANTISED)], {}),
+    "path of lengths": ([{"path": QUANTISED}, {"path": PATH}], {"actions": "length"}),
+    "rigs": (drawn(4), {}),
+    "circles": ([None, OTHER], {"task": "FingerTrack"}),
+    "open paths": (drawn(2), {"task": "FingerTrack", "path": from_callable(sway, 1.0)}),
+}
+
+
+def many(kind: str) -> tuple[WarpVectorEnv, list[Any]]:
+    """Return fingers on the CPU device, and the CPU env of each."""
+    bodies, arguments = KINDS[kind]
+    arguments = dict(arguments)
+    task = arguments.pop("task", "Finger")
+    worlds = shapechanger.make_vec(
+        task, len(bodies), backend="warp", device="cpu", bodies=bodies, **arguments
+    )
+    alone = [
+        gym.make(f"shapechanger/{task}-v1", parameters=body, **arguments).unwrapped
+        for body in bodies
+    ]
+    return worlds, alone
+
+
+def start_alike(worlds: WarpVectorEnv, alone: list[Any], seed: int) -> list[Any]:
+    """Start episodes of worlds, and those of CPU envs with the same postures and targets.
+
+    Returns:
+        Observation and info of each CPU env.
+    """
+    _, infos = worlds.reset(seed=seed)
+    batch: Any = worlds.batches[0]
+    begun: list[Any] = []
+    for i, env in enumerate(alone):
+        options = {"posture": batch.worlds.qpos[i, :4].double().numpy()}
+        if isinstance(env, FingerReachEnv):
+            target = infos["target"][i].double().numpy()
+            begun.append(env.reset(seed=seed, options={**options, "target": target}))
+            continue
+        env.reset(seed=seed, options=options)
+        env._t = batch.kind.task._times[i]
+        env._look()
+        distance = float(np.linalg.norm(env.plant.fingertip - env._points[0]))
+        begun.append((env._observation(env._senses), env._info(distance)))
+    return begun
+
+
+def copy_states(worlds: WarpVectorEnv, alone: list[Any]) -> None:
+    """Put the worlds into the states of CPU envs, of which single precision is left."""
+    batch: Any = worlds.batches[0]
+    physics, task = batch.worlds, batch.kind.task
+    for i, env in enumerate(alone):
+        data = env.plant.data
+        for name in ("qpos", "qvel", "act", "ctrl", "history"):
+            there, here = getattr(physics, name)[i], getattr(data, name)
+            there[:] = torch.as_tensor(here)
+            here[:] = there.double().numpy()
+        physics.time[i] = data.time
+        warm = as_torch(physics._data.qacc_warmstart)
+        warm[i] = torch.as_tensor(data.qacc_warmstart)
+        task._commands[i] = torch.as_tensor(env._senses.commands)
+        if isinstance(env, FingerReachEnv):
+            task._target[i] = torch.as_tensor(env._target)
+            task._near[i] = env._steps_near
+        else:
+            task._times[i], task._steps[i] = env._t, env._steps
+            task._squares[i] = env._squares
+        if env.plant.held is not None:
+            task._shares[i] = torch.as_tensor(env.plant.held._now)
+
+
+def require_equal(results: Any, alone: list[Any], actions: Any) -> Any:
+    """Require that CPU envs have the results of worlds in a step; return the infos."""
+    observations, rewards, terminated, truncated, infos = results
+    assert not terminated.any()
+    assert not truncated.any()
+    for i, env in enumerate(alone):
+        observation, reward, ended, _, info = env.step(actions[i])
+        assert apart(observations[i], observation) < OBSERVATION_TOLERANCE
+        assert apart(rewards[i], reward) < REWARD_TOLERANCE
+        assert not ended
+        assert names_of(infos) == set(info)
+        for name, value in info.items():
+            assert apart(infos[name][i], value) < REWARD_TOLERANCE, name
+            assert infos[f"_{name}"].all()
+    return infos
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def pair(request: pytest.FixtureRequest) -> Iterator[tuple[WarpVectorEnv, list[Any]]]:
+    """Fingers that share a batch, and the CPU env of each."""
+    worlds, alone = many(request.param)
+    assert len(worlds.batches) == 1
+    yield worlds, alone
+    worlds.close()
+
+
+def test_a_step_from_the_same_state_has_the_same_results(
+    pair: tuple[WarpVectorEnv, list[Any]],
+) -> None:
+    """Observation, reward, each term of it, and success are those of the CPU env."""
+    worlds, alone = pair
+    rng = np.random.default_rng(0)
+    shape = (len(alone), 7)
+    for _ in range(ROUNDS):
+        start_alike(worlds, alone, int(rng.integers(1000)))
+        for _ in range(5):
+            for env, action in zip(alone, rng.uniform(-1.2, 1.2, shape), strict=True):
+                env.step(action.astype(np.float32))
+        if isinstance(alone[0], FingerTrackEnv):
+            alone[0]._steps, alone[0]._counted, alone[0]._squares = 40, 15, 15 * 0.002**2
+        else:  # Where it has to be, for the tenth time if it stays.
+            alone[0]._target, alone[0]._steps_near = alone[0].plant.fingertip, 9
+        copy_states(worlds, alone)
+        actions = rng.uniform(-1.2, 1.2, shape).astype(np.float32)
+        require_equal(worlds.step(actions), alone, actions)
+
+
+@pytest.mark.parametrize("kind", ["plain", "rigs", "circles", "open paths"])
+def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
+    """Nothing of the state is missing: steps that follow each other agree, too."""
+    worlds, alone = many(kind)
+    rng = np.random.default_rng(1)
+    begun = start_alike(worlds, alone, 3)
+    observations, infos = worlds.reset(seed=3)
+    for i, (observation, info) in enumerate(begun):
+        assert apart(observations[i], observation) < OBSERVATION_TOLERANCE
+        assert names_of(infos) == set(info)
+        for name, value in info.items():
+            assert apart(infos[name][i], value) < REWARD_TOLERANCE, name
+    if kind == "circles":  # Starts are spread over closed paths.
+        times = worlds.batches[0].kind.task._times  # pyright: ignore[reportAttributeAccessIssue]
+        assert 0.0 <= times.min() < times.max() < alone[0].path.duration_s
+    for _ in range(30 if kind == "circles" else 8):
+        actions = rng.uniform(-1.0, 1.0, (len(alone), 7)).astype(np.float32)
+        require_equal(worlds.step(actions), alone, actions)
+
+
+def test_success_is_ten_steps_near_the_target() -> None:
+    """A finger that comes to its target and stays succeeds in the same step as on a CPU."""
+    worlds, alone = many("plain")
+    oracle = FingerOracle(worlds.observation_layout)
+    observation, _ = start_alike(worlds, alone, 0)[0]
+    seen: list[bool] = []
+    for _ in range(40):
+        actions = np.tile(oracle(observation), (len(alone), 1))
+        results = worlds.step(actions)
+        observation = results[0][0].numpy()
+        seen.append(bool(require_equal(results, alone, actions)["is_success"][0]))
+    assert seen[-1]
+    assert not any(seen[:9])
+
+
+@pytest.mark.parametrize("kind", ["plain", "circles"])
+def test_layouts_are_those_of_the_cpu(kind: str) -> None:
+    """Each number has the CPU env's name, and the spaces fit the tensors."""
+    worlds, alone = many(kind)
+    assert worlds.observation_layout == alone[0].observation_layout
+    assert worlds.action_layout == alone[0].action_layout
+    observations, _ = worlds.reset(seed=0)
+    assert worlds.observation_space.contains(observations.numpy())
+    assert worlds.single_action_space == alone[0].action_space
+
+
+def test_starts_and_targets_have_the_distribution_of_the_cpu() -> None:
+    """Quantiles and spreads of angles and targets agree."""
+    worlds = shapechanger.make_vec("Finger", 8, backend="warp", device="cpu")
+    found: list[Any] = []
+    worlds.reset(seed=0)
+    for _ in range(60):
+        observations, infos = worlds.reset()
+        found.append(torch.cat([observations[:, :4], infos["target"]], dim=1))
+    rng = np.random.default_rng(0)
+    places = [fingertip(draw_posture(rng), PHALANX_LENGTH_M) for _ in range(4000)]
+    starts = [draw_start(rng) for _ in range(4000)]
+    expected = np.concatenate([starts, places], axis=1)
+    rows = torch.cat(found).numpy()
+    spread = expected.std(axis=0)
+    quantiles = [0.02, 0.25, 0.5, 0.75, 0.98]
+    apart_by = np.quantile(rows, quantiles, axis=0) - np.quantile(expected, quantiles, axis=0)
+    assert (np.abs(apart_by) < 0.25 * spread).all()
+    np.testing.assert_allclose(rows.std(axis=0), spread, rtol=0.12)
+
+
+def noisy(seed: int, steps: int, **noise: float) -> tuple[Any, Any]:
+    """Return observations (steps + 1, 2, 38) of two noisy fingers, and their true angles."""
+    worlds = shapechanger.make_vec(
+        "Finger", 2, backend="warp", device="cpu", parameters=noise, max_episode_steps=1000
+    )
+    seen = [worlds.reset(seed=seed)[0]]
+    true = [worlds.batches[0].worlds.qpos.clone()]
+    for _ in range(steps):
+        seen.append(worlds.step(torch.zeros(2, 7))[0])
+        true.append(worlds.batches[0].worlds.qpos.clone())
+    return torch.stack(seen).double().numpy(), torch.stack(true).double().numpy()
+
+
+def test_noisy_sensors() -> None:
+    """Noise has the size of the parameters, and velocities are estimated as on a CPU."""
+    seen, true = noisy(0, 50, joint_noise=0.02, tension_noise=0.1)
+    errors = seen[..., :4] - true
+    assert errors.std() == pytest.approx(0.02, rel=0.12)
+    assert abs(errors.mean()) < 0.004
+    assert abs(np.corrcoef(errors[1:].ravel(), errors[:-1].ravel())[0, 1]) < 0.2
+    exact, _ = noisy(0, 50, joint_noise=0.02)
+    errors = seen[..., 8:15] - exact[..., 8:15]
+    assert errors.std() == pytest.approx(0.1, rel=0.12)
+    assert seen[..., 8:15].min() >= 0.0
+    for finger in range(2):
+        velocities = JointVelocities(CONTROL_DT)
+        for step in range(len(seen)):
+            angles = seen[step, finger, :4]
+            np.testing.assert_allclose(
+                seen[step, finger, 4:8], velocities.of(angles), rtol=1e-4, atol=1e-4
+            )
+            places = fingertip(angles, PHALANX_LENGTH_M)
+            np.testing.assert_allclose(seen[step, finger, 29:32], places, atol=1e-6)
+
+
+def test_noise_depends_on_seed_episode_and_step_alone() -> None:
+    """The second world of one seed is the first world of the next."""
+    some = noisy(4, 2, joint_noise=0.02)[0]
+    again = noisy(4, 2, joint_noise=0.02)[0]
+    others = noisy(5, 2, joint_noise=0.02)[0]
+    np.testing.assert_array_equal(some, again)
+    np.testing.assert_array_equal(some[:, 1], others[:, 0])
+    assert not np.allclose(some[:, 0], some[:, 1])
+    seeds, episodes = torch.tensor([3, 3]), torch.tensor([1, 1])
+    per_world = uniforms(seeds, episodes, torch.tensor([0, 7]), 4)
+    assert torch.equal(per_world[0], uniforms(seeds, episodes, 0, 4)[0])
+    assert not torch.equal(per_world[0], per_world[1])
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [{"path": PATH}, {"command_delay": 0.0061, "joint_noise": 0.01}],
+    ids=["path", "late and noisy"],
+)
+def test_time_limits_restart_fingers_alone(parameters: Any) -> None:
+    """An episode of 100 steps ends, and its finger starts at rest with another target."""
+    worlds = shapechanger.make_vec("Finger", 2, backend="warp", device="cpu", parameters=parameters)
+    assert worlds.max_episode_steps == 100
+    _, infos = worlds.reset(seed=0)
+    targets = infos["target"].clone()
+    worlds.episode_steps[1] = 99
+    pull = torch.ones(2, 7)
+    seen, _, _, truncated, infos = worlds.step(pull)
+    assert truncated.tolist() == [False, True]
+    assert infos["final_info"]["_target"].tolist() == [False, True]
+    assert torch.equal(infos["final_info"]["target"][1], targets[1])
+    assert infos["final_obs"][1, 8:15].max() > 0.6
+    assert infos["_target"].all()
+    assert torch.equal(infos["target"][0], targets[0])
+    assert not torch.equal(infos["target"][1], targets[1])
+    assert not seen[1, 4:8].any()
+    np.testing.assert_allclose(seen[1, 8:15], 0.5, atol=0.05)
+    assert seen[0, 8:15].max() > 0.6
+    # The restarted one goes on as a new one does.
+    other = shapechanger.make_vec("Finger", 1, backend="warp", device="cpu", parameters=parameters)
+    other.reset(seed=1)
+    began, _ = other.reset()
+    assert torch.equal(began[0], seen[1])
+    assert torch.equal(other.step(pull[:1])[0][0], worlds.step(pull)[0][1])
+
+
+def test_a_finger_that_diverges_restarts_alone() -> None:
+    """Its reward is 0, and the others step as ever."""
+    pairs = [shapechanger.make_vec("Finger", 3, backend="warp", device="cpu") for _ in range(2)]
+    whole, broken = pairs
+    for worlds in pairs:
+        worlds.reset(seed=0)
+    pull = torch.zeros(3, 7)
+    broken.batches[0].worlds.qvel[1] = torch.nan
+    for step in range(3):
+        expected, found = whole.step(pull), broken.step(pull)
+        for one, other in zip(found[:4], expected[:4], strict=True):
+            assert torch.equal(one[[0, 2]], other[[0, 2]])
+        assert all(value.isfinite().all() for value in found[:2])
+        assert found[2].tolist() == [False, step == 0, False]
+        assert bool(found[-1]["diverged"][1]) == (step == 0)
+
+
+def test_a_finger_given_at_a_reset_moves_as_one_made_with_it() -> None:
+    """Its arms, motors and history are its own, whichever finger the world had before."""
+    bodies, arguments = KINDS["late"]
+    worlds, _ = many("late")
+    late: Any = {"command_delay": 0.0173, "motor_lag": 0.01}
+    mask = np.array([False, True])
+    worlds.reset(seed=0)
+    worlds.reset(options={"bodies": [late], "reset_mask": mask})
+    assert worlds.bodies[1] == NOMINAL.replace(**late)
+    alone = [
+        gym.make("shapechanger/Finger-v1", parameters=body, **arguments).unwrapped
+        for body in (bodies[0], late)
+    ]
+    rng = np.random.default_rng(2)
+    start_alike(worlds, alone, 5)
+    for _ in range(4):
+        actions = rng.uniform(-1.0, 1.0, (2, 7)).astype(np.float32)
+        require_equal(worlds.step(actions), alone, actions)
+    with pytest.raises(VectorEnvError, match=r"the finger with tendon_stiffness=.* cannot join"):
+        worlds.reset(options={"bodies": [{"tendon_stiffness": 8e3}], "reset_mask": mask})
+
+
+def test_fingers_with_other_arrays_form_batches() -> None:
+    """Stiff and stretched tendons, paths, noise and delays have a batch each, with one space."""
+    bodies: list[Any] = [
+        None,
+        {"tendon_stiffness": 8e3},
+        {"tendon_stiffness": 8e3, "motor_kg": 1.4},
+        {"path": PATH},
+        {"joint_noise": 0.01},
+        {"command_delay": 0.0061},
+        None,
+    ]
+    worlds = shapechanger.make_vec("Finger", 7, backend="warp", device="cpu", bodies=bodies)
+    assert [batch.numbers.tolist() for batch in worlds.batches] == [[0, 6], [1], [2], [3], [4], [5]]
+    observations, infos = worlds.reset(seed=0)
+    assert observations.shape == (7, 38)
+    assert infos["target"].shape == (7, 3)
+    assert worlds.step(torch.zeros(7, 7))[0].isfinite().all()
+
+
+def test_motors_keep_as_many_commands_for_any_short_delay() -> None:
+    """So that late fingers have arrays of the same shapes."""
+    sizes = {
+        build_finger(NOMINAL.replace(command_delay=delay), drive_of("tension", NOMINAL))
+        .compile()
+        .nhistory
+        for delay in (0.0031, 0.0199)
+    }
+    assert len(sizes) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"goal": True}, "takes no goal: its observations are vectors"),
+        ({"path": "random"}, "takes no path='random': a reset draws no path; name one"),
+        ({"gap": "wide"}, "takes a gap with a finger_seed only: a reset draws no finger by itself"),
+        (
+            {"parameters": {"command_delay": 0.012}},
+            r"no command_delay of 0.012 s, which is a whole number .* so take 0.0118 s",
+        ),
+    ],
+)
+def test_what_is_refused(arguments: dict[str, Any], sentence: str) -> None:
+    """The error says why, and what to do instead."""
+    task = "FingerTrack" if "path" in arguments else "Finger"
+    with pytest.raises(VectorEnvError, match=sentence):
+        shapechanger.make_vec(task, 2, backend="warp", device="cpu", **arguments)
+
+
+def test_fingers_are_checked() -> None:
+    """Errors are those of the CPU env."""
+    worlds = shapechanger.make_vec(
+        "Finger", 1, backend="warp", device="cpu", gap="wide", finger_seed=1
+    )
+    gap: Gap = GAPS["wide"]
+    assert worlds.bodies == [gap.draw(np.random.default_rng(1))]
+    for body, error, sentence in (
+        ("an-1984", UnknownName, "Did you mean 'an-1983'"),
+        ({"moment_arms": np.eye(7, 4)}, FingerError, "cannot balance MCP_flexion"),
+    ):
+        with pytest.raises(error, match=sentence):
+            worlds.reset(options={"bodies": [body]})

@@ -1,0 +1,244 @@
+"""The MuJoCo model of the finger."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.finger.anatomy import (
+    DIP_BY_PIP,
+    END_STIFFNESS,
+    JOINT_RANGE,
+    JOINT_REST,
+    JOINTS,
+    LEAST_TENSION_N,
+    MOMENT_ARMS,
+    PHALANX_LENGTH_M,
+    TENDONS,
+)
+from shapechanger.finger.gap import GAPS
+from shapechanger.finger.model import FINGERTIP, HOOD, SIM_DT
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.postures import draw_posture
+from shapechanger.finger.tensions import co_contraction, drive_of
+from tests.finger.commands import STRETCHED, at_rest, harsh_commands, made, modes
+
+# Tolerated overshoot of each joint beyond its range, degrees; measured 4.8, 1.6, 5.9 and 15.3
+# (the last phalanx weighs 3 g and hits its stop at 39 rad/s).
+_MOST_BEYOND = np.array([7.0, 3.0, 8.0, 18.0])
+# rad/s; measured 40.
+_FASTEST = 50.0
+
+# Direction in which each tendon alone moves the joints.
+_ANATOMY = {
+    "FDP": {"MCP_flexion": 1, "PIP_flexion": 1, "DIP_flexion": 1},
+    "FDS": {"MCP_flexion": 1, "PIP_flexion": 1},
+    "EIP": {"MCP_flexion": -1, "PIP_flexion": -1, "DIP_flexion": -1},
+    "EDC": {"MCP_flexion": -1, "PIP_flexion": -1, "DIP_flexion": -1},
+    "LUM": {"MCP_flexion": 1, "MCP_abduction": 1, "PIP_flexion": -1, "DIP_flexion": -1},
+    "DI": {"MCP_flexion": 1, "MCP_abduction": 1},
+    "PI": {"MCP_flexion": 1, "MCP_abduction": -1, "PIP_flexion": -1, "DIP_flexion": -1},
+}
+
+
+@pytest.mark.parametrize("tendon", TENDONS)
+@pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
+def test_each_tendon_moves_its_joints(parameters: FingerParameters, tendon: str) -> None:
+    """A tendon moves its joints in the anatomical direction."""
+    model = made(parameters)
+    model.opt.gravity[:] = 0.0
+    ends = {}
+    for pulled in (-1.0, 1.0):
+        data = at_rest(model, parameters)
+        data.ctrl[TENDONS.index(tendon)] = pulled
+        seconds = 0.08 + parameters.command_delay
+        mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
+        ends[pulled] = np.degrees(data.qpos[:4])
+    moved: dict[str, float] = dict(zip(JOINTS, ends[1.0] - ends[-1.0], strict=True))
+    for joint, sign in _ANATOMY[tendon].items():
+        assert sign * moved[joint] > 1.0, moved
+
+
+@pytest.mark.parametrize("tendon", TENDONS)
+def test_torques_follow_from_moment_arms(tendon: str) -> None:
+    """MuJoCo's torque per newton is the moment arm."""
+    model = made()
+    data = at_rest(model)
+    i = TENDONS.index(tendon)
+    data.act[i] = 1.0
+    mujoco.mj_forward(model, data)
+    tensions = -data.actuator_force
+    np.testing.assert_allclose(data.qfrc_actuator, MOMENT_ARMS.T @ tensions, atol=1e-12)
+    assert tensions[i] == pytest.approx(NOMINAL.most_tension[i])
+    np.testing.assert_allclose(np.delete(tensions, i), LEAST_TENSION_N)
+
+
+@pytest.mark.parametrize("mode", modes())
+@pytest.mark.parametrize("finger", ["nominal", "stretched", *GAPS])
+def test_extreme_commands_are_stable(finger: str, mode: str) -> None:
+    """Joints, velocities and tensions stay within their limits."""
+    parameters = {"nominal": NOMINAL, "stretched": STRETCHED}.get(finger)
+    if parameters is None:
+        parameters = GAPS[finger].draw(np.random.default_rng(3))
+    model = made(parameters, mode)
+    assert model.opt.timestep <= SIM_DT
+    if not parameters.gives:
+        assert model.opt.timestep == SIM_DT
+    steps = round(0.02 / model.opt.timestep)
+    most = np.array(parameters.most_tension)
+    low, high = JOINT_RANGE.T
+    for name, commands in harsh_commands(np.random.default_rng(0)):
+        data = at_rest(model, parameters)
+        for command in commands:
+            data.ctrl[:] = command
+            for _ in range(steps):
+                mujoco.mj_step(model, data)
+                angles = data.qpos[:4]
+                beyond = np.degrees(np.maximum(low - angles, angles - high))
+                assert (beyond < _MOST_BEYOND).all(), name
+                assert np.abs(data.qvel[:4]).max() < _FASTEST, name
+                # Actuator forces are negative for stiff tendons and positive for spools.
+                tensions = data.actuator_force * (1.0 if parameters.gives else -1.0)
+                assert (tensions >= LEAST_TENSION_N - 1e-12).all(), name
+                assert (tensions <= most + 1e-12).all(), name
+        assert not any(warning.number for warning in data.warning), name
+
+
+def test_commands_are_clipped() -> None:
+    """Commands beyond their range act like those at its end."""
+    model = made()
+    ends = []
+    for command in (1.0, 100.0):
+        data = at_rest(model)
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data, 50)
+        ends.append(data.qpos.copy())
+    np.testing.assert_array_equal(*ends)
+
+
+def test_tendons_are_slack_within_the_backlash() -> None:
+    """Within the backlash, motors do not move the finger."""
+    parameters = STRETCHED.replace(backlash=2e-3)
+    model = made(parameters)
+    data = at_rest(model, parameters)
+    data.qpos[4:] -= 1e-3
+    mujoco.mj_forward(model, data)
+    stretch = [model.tendon(f"{name}/stretch").id for name in TENDONS]
+    assert (data.ten_length[stretch] < parameters.backlash).all()
+    np.testing.assert_array_equal(data.qfrc_spring[4:], 0.0)
+    data.qpos[4:] += 2e-3
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.qfrc_spring[4:], -10e3 * 1e-3)
+
+
+def test_lengths_are_relative_to_the_straight_finger() -> None:
+    """Lengths are 0 for the straight finger, and follow from the moment arms."""
+    model = made()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.ten_length[:7], 0.0, atol=1e-15)
+    data.qpos[:] = JOINT_REST
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.ten_length[:7], -MOMENT_ARMS @ JOINT_REST, atol=1e-15)
+
+
+def test_size_and_weight_of_the_finger() -> None:
+    """The finger is about 9 cm long and weighs about 25 g."""
+    model = made()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    tip = data.site_xpos[model.site(FINGERTIP).id]
+    np.testing.assert_allclose(tip, [sum(PHALANX_LENGTH_M), 0.0, 0.0], atol=1e-12)
+    assert 0.020 < model.body_mass.sum() < 0.035
+    assert (np.diff(model.body_mass[1:4]) < 0.0).all()
+
+
+def test_a_command_acts_after_its_delay() -> None:
+    """A delayed command acts later, and otherwise equally."""
+    late = NOMINAL.replace(command_delay=0.030)
+    tensions = []
+    for parameters in (NOMINAL, late):
+        model = made(parameters)
+        data = at_rest(model)
+        for _ in range(200):  # Until earlier commands have no effect.
+            mujoco.mj_step(model, data)
+        data.ctrl[:] = 1.0
+        found = []
+        for _ in range(60):
+            mujoco.mj_step(model, data)
+            found.append(-data.actuator_force[0])
+        tensions.append(np.array(found))
+    now, later = tensions
+    np.testing.assert_allclose(later[:15], LEAST_TENSION_N, atol=1e-6)
+    np.testing.assert_allclose(later[15:], now[:45], atol=1e-6)
+
+
+@pytest.mark.parametrize("level", [1.0, 1.5, 2.0])
+def test_co_contraction_stiffens_the_joints(level: float) -> None:
+    """Active stiffness is proportional to tensions that have no torque."""
+    model = made(NOMINAL, "impedance")
+    tensions = level * np.asarray(co_contraction(MOMENT_ARMS))
+    drive = drive_of("impedance", NOMINAL)
+    rest = -MOMENT_ARMS @ JOINT_REST
+    data = at_rest(model)
+    data.ctrl[:] = data.act[:] = drive.command(tensions, rest, np.zeros(7))
+    torques = []
+    for side in (-0.01, 0.01):
+        data.qpos[:] = JOINT_REST + side
+        mujoco.mj_forward(model, data)
+        torques.append(data.qfrc_actuator.copy())
+    stiffness = (torques[0] - torques[1]) / 0.02
+    expected = 25.0 * MOMENT_ARMS.T @ np.diag(tensions) @ MOMENT_ARMS @ np.ones(4)
+    np.testing.assert_allclose(stiffness, expected, rtol=1e-9)
+
+
+def test_joints_stiffen_towards_the_ends_of_their_ranges() -> None:
+    """At the farther end, four times as stiff as at rest."""
+    model, data = made(), mujoco.MjData(made())
+    model.tendon_stiffness[model.tendon(HOOD).id] = 0.0
+    for j, (low, high) in enumerate(JOINT_RANGE):
+        farther = max((low, high), key=lambda end: abs(end - JOINT_REST[j]))
+        stiffness = []
+        for angle in (JOINT_REST[j], farther):
+            torques = []
+            for side in (-1e-4, 1e-4):
+                data.qpos[:] = JOINT_REST
+                data.qpos[j] = angle + side
+                mujoco.mj_forward(model, data)
+                torques.append(data.qfrc_spring[j])
+            stiffness.append((torques[0] - torques[1]) / 2e-4)
+        assert stiffness[0] == pytest.approx(NOMINAL.joint_stiffness[j], rel=1e-6)
+        assert stiffness[1] == pytest.approx(END_STIFFNESS * stiffness[0], rel=1e-6)
+
+
+def test_the_end_joint_follows_the_middle_one() -> None:
+    """After 2 s of any constant command, it is within 16 degrees of 0.6 times that angle."""
+    model, rng = made(NOMINAL, "impedance"), np.random.default_rng(0)
+    off = []
+    for _ in range(60):
+        data = at_rest(model)
+        data.ctrl[:] = rng.uniform(-1.0, 1.0, 7)
+        mujoco.mj_step(model, data, round(2.0 / SIM_DT))
+        off.append(abs(data.qpos[3] - DIP_BY_PIP * data.qpos[2]))
+    assert np.degrees(max(off)) < 16.0
+    assert np.degrees(np.median(off)) < 11.0
+
+
+def test_a_finger_that_is_let_go_gains_no_energy() -> None:
+    """Under constant tensions, which have a potential, energy falls in every step."""
+    model, rng = made(), np.random.default_rng(0)
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    for _ in range(5):
+        data = at_rest(model)
+        data.qpos[:] = draw_posture(rng)
+        energies = []
+        for _ in range(300):
+            mujoco.mj_step(model, data)
+            x = data.qpos - JOINT_REST
+            quartic = 0.25 * model.jnt_stiffnesspoly[:, 1] @ x**4
+            pulled = np.abs(data.actuator_force) @ (-MOMENT_ARMS @ data.qpos)
+            # MuJoCo's energy is that of the state before the step.
+            energies.append(float(data.energy.sum() + pulled + quartic))
+        assert np.diff(energies).max() < 2e-5 * np.ptp(energies)
+        assert energies[-1] < energies[0]

@@ -1,0 +1,81 @@
+"""Validation and JSON of finger parameters."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import FingerError
+from shapechanger.finger.anatomy import MOMENT_ARMS
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from tests.finger.commands import STRETCHED
+
+
+@pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["nominal", "stretched"])
+def test_parameters_round_trip_through_json(parameters: FingerParameters) -> None:
+    """JSON round trips are exact, as text and bytes."""
+    text = parameters.to_json()
+    assert FingerParameters.from_json(text) == parameters
+    assert FingerParameters.from_json(text.encode()) == parameters
+
+
+def test_omitted_parameters_are_nominal() -> None:
+    """Python and JSON have the same defaults."""
+    changed = NOMINAL.replace(tendon_friction=1.0)
+    assert changed != NOMINAL
+    assert FingerParameters(tendon_friction=1.0) == changed
+    assert FingerParameters.from_json('{"tendon_friction": 1.0}') == changed
+    np.testing.assert_array_equal(changed.arms, MOMENT_ARMS)
+    assert not changed.gives
+    assert STRETCHED.gives
+
+
+def test_arms_are_a_copy() -> None:
+    """Changing `arms` does not change the parameters."""
+    NOMINAL.arms[:] = 0.0
+    np.testing.assert_array_equal(NOMINAL.arms, MOMENT_ARMS)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"moment_arms": ((1.0,) * 4,) * 6}, r"moment_arms: the shape must be \(7, 4\), got \(6"),
+        ({"most_tension": (25.0,)}, r"most_tension: the shape must be \(7,\), got \(1,\)."),
+        ({"joint_damping": (1.0,) * 3}, r"joint_damping: the shape must be \(4,\), got \(3,\)."),
+        ({"motor_lag": (1.0,)}, r"motor_lag: the shape must be \(\), got \(1,\)."),
+        ({"joint_noise": math.nan}, "joint_noise: the numbers must be finite, got nan."),
+        ({"tendon_stiffness": math.inf}, "tendon_stiffness: the numbers must be finite, got inf."),
+        ({"tendon_friction": -1.0}, "tendon_friction: the numbers must not be below zero, got -1"),
+        ({"motor_lag": 0.0}, "motor_lag must be above zero, got 0.0."),
+        ({"motor_kg": 0.0}, "motor_kg must be above zero, got 0.0."),
+        ({"motor_kg": "x"}, "motor_kg must hold numbers, got 'x'."),
+        ({"moment_arms": ((1.0,), (1.0, 2.0))}, "moment_arms must hold numbers"),
+        ({"tendon_stiffness": 0.0}, "tendon_stiffness above zero."),
+        ({"most_tension": (0.5,) * 7}, "most_tension must be above least_tension, 0.5 N"),
+        ({"backlash": 1e-3}, "backlash needs a tendon_stiffness: a stiff tendon has none."),
+    ],
+)
+def test_invalid_numbers_are_refused(changes: dict[str, Any], sentence: str) -> None:
+    """The error names the parameter."""
+    with pytest.raises(FingerError, match=sentence):
+        NOMINAL.replace(**changes)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("{", r"Invalid finger parameters: Input data was truncated\.$"),
+        ("[]", "Invalid finger parameters: Expected `object`, got `array`"),
+        ('{"tendon_fricton": 1.0}', "unknown field `tendon_fricton`"),
+        ('{"motor_lag": "slow"}', "Expected `float`, got `str`"),
+        ('{"motor_lag": 0.0}', r"motor_lag must be above zero, got 0\.0\.$"),
+        (b"\xff", "Invalid finger parameters"),
+    ],
+)
+def test_invalid_json_is_refused(text: str | bytes, sentence: str) -> None:
+    """Invalid JSON raises FingerError."""
+    with pytest.raises(FingerError, match=sentence):
+        FingerParameters.from_json(text)

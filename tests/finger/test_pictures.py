@@ -1,0 +1,198 @@
+"""Frames and pictures of a finger."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.finger.anatomy import JOINT_REST
+from shapechanger.finger.drawing import polyline, tendon_legend
+from shapechanger.finger.visuals import TENDON_COLOURS
+
+pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
+
+_SIZE = {"width": 160, "height": 120}
+
+
+@pytest.fixture
+def finger() -> Iterator[Any]:
+    """A finger env that renders frames."""
+    with gym.make("shapechanger/Finger-v1", render_mode="rgb_array", **_SIZE) as env:
+        env.reset(seed=0, options={"posture": JOINT_REST.tolist()})
+        yield env
+
+
+def _differs(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the pixels that differ by more than rounding."""
+    return np.any(np.abs(one.astype(int) - other.astype(int)) > 4, axis=2)
+
+
+def test_a_frame_is_bright_and_shows_the_finger(finger: Any) -> None:
+    """Frames have the requested size, a light border, and a dark finger."""
+    frame = finger.render()
+    assert (frame.shape, frame.dtype) == ((120, 160, 3), np.uint8)
+    border = np.concatenate([frame[0], frame[-1], frame[:, 0], frame[:, -1]])
+    assert border.min() > 190
+    assert 0.03 < (frame.min(axis=2) < 180).mean() < 0.4
+    np.testing.assert_array_equal(finger.render(), frame)
+
+
+def test_a_frame_follows_finger_and_target(finger: Any) -> None:
+    """Frames change with the posture and with the target."""
+    frame = finger.render()
+    finger.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
+    finger.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
+    assert _differs(finger.render(), frame).mean() > 0.005
+    frames = []
+    for target in ((0.07, 0.0, -0.02), (0.03, 0.0, -0.06)):
+        options = {"posture": JOINT_REST.tolist(), "target": target}
+        finger.reset(seed=0, options=options)
+        frames.append(finger.render())
+    assert 0.001 < _differs(*frames).mean() < 0.1
+
+
+def test_a_reached_target_is_visible(finger: Any) -> None:
+    """The target is drawn larger than the fingertip and stays visible."""
+    rest = JOINT_REST.tolist()
+    finger.reset(seed=0, options={"posture": rest, "target": rest})
+    reached = finger.render().astype(int)
+    green = (reached[:, :, 1] > reached[:, :, 0] + 30) & (reached[:, :, 1] > reached[:, :, 2] + 15)
+    finger.reset(seed=0, options={"posture": rest, "target": (0.0, 0.0, -0.5)})
+    without = finger.render().astype(int)
+    still_green = (without[:, :, 1] > without[:, :, 0] + 30) & (
+        without[:, :, 1] > without[:, :, 2] + 15
+    )
+    assert green.sum() > still_green.sum() + 20
+
+
+def test_each_tendon_is_visible(finger: Any) -> None:
+    """Hiding a tendon changes the frame."""
+    finger.render()
+    env = finger.unwrapped
+    model = env._figure.model
+    frame = finger.render()
+    hidden = []
+    for name in TENDON_COLOURS:
+        course = model.tendon(f"{name}/course").id
+        model.tendon_rgba[course, 3] = 0.0
+        if _differs(finger.render(), frame).sum() < 5:
+            hidden.append(name)
+        model.tendon_rgba[course, 3] = 1.0
+    assert set(hidden) <= {"PI"}  # PI is on the far side of the finger.
+
+
+def test_tension_makes_a_tendon_thick(finger: Any) -> None:
+    """Tendons are drawn thicker under tension."""
+    env = finger.unwrapped
+    frames = []
+    for tension in (0.0, 1.0):
+        env.plant.data.actuator_force[:] = -tension * np.array(env.parameters.most_tension)
+        frames.append(finger.render())
+    assert _differs(*frames).mean() > 0.005
+
+
+def test_rendering_does_not_change_the_episode() -> None:
+    """Observations with and without rendering are equal."""
+    found = []
+    for mode in (None, "rgb_array"):
+        with gym.make("shapechanger/Finger-v1", render_mode=mode, **_SIZE) as env:
+            env.reset(seed=3)
+            rng = np.random.default_rng(0)
+            seen = []
+            for _ in range(5):
+                seen.append(env.step(rng.uniform(-1, 1, 7).astype(np.float32))[0])
+                env.render()
+                if mode:
+                    env.unwrapped.picture(64, 48)
+            found.append(np.array(seen))
+    np.testing.assert_array_equal(*found)
+
+
+def test_a_picture_shows_the_whole_finger(finger: Any) -> None:
+    """Pictures show hand and fingertip, without the target."""
+    env = finger.unwrapped
+    rest = JOINT_REST.tolist()
+    pictures = []
+    for target in ((0.07, 0.0, -0.02), (0.03, 0.0, -0.06)):
+        finger.reset(seed=0, options={"posture": rest, "target": target})
+        pictures.append(env.picture(**_SIZE))
+    np.testing.assert_array_equal(*pictures)
+    dark = pictures[0].min(axis=2) < 190
+    assert dark.mean() > 0.01
+    assert not np.concatenate([dark[0], dark[-1], dark[:, 0], dark[:, -1]]).any()
+    columns = np.flatnonzero(dark.any(axis=0))
+    assert np.ptp(columns) > 0.25 * 160
+
+
+def test_the_renderer_is_kept_across_fingers() -> None:
+    """Resets with another finger keep the renderer."""
+    arguments = {"render_mode": "rgb_array", "gap": "wide", **_SIZE}
+    with gym.make("shapechanger/Finger-v1", **arguments) as env:
+        env.reset(seed=0)
+        env.render()
+        renderer = env.unwrapped._renderer
+        env.reset(seed=1)
+        env.render()
+        assert env.unwrapped._renderer is renderer
+
+
+def test_depth_frames_show_the_finger() -> None:
+    """Depth is smaller at the finger than at the background."""
+    with gym.make("shapechanger/FingerTrack-v1", render_mode="depth_array", **_SIZE) as env:
+        env.reset(seed=0)
+        depth = env.render()
+        assert (depth.shape, depth.dtype) == ((120, 160), np.float32)
+        # OpenGL depths: 1 is infinity, and 0.995 about 30 cm.
+        assert 0.02 < (depth < 0.995).mean() < 0.5
+
+
+def test_the_legend_shows_tensions() -> None:
+    """Bars grow with the tension, in the colours of the tendons; small frames have none."""
+    frame = np.full((360, 480, 3), 230, np.uint8)
+    slack, taut = (tendon_legend(frame, np.full(7, pulled)) for pulled in (0.0, 1.0))
+    assert slack.shape == frame.shape
+    for colour in TENDON_COLOURS.values():
+        paint = np.round(255 * np.array(colour))
+        drawn = [int((one == paint).all(axis=2).sum()) for one in (slack, taut)]
+        assert drawn[1] > 20 * drawn[0]
+        assert drawn[1] > 200
+    assert (taut[45:] == 230).all()  # The finger is below it.
+    assert (frame == 230).all()
+    small = frame[:120, :160]
+    assert tendon_legend(small, np.ones(7)) is small
+
+
+def test_a_frame_of_a_path_shows_path_and_trail() -> None:
+    """The path is a green line, and the fingertip leaves a purple one; depth has neither."""
+    size = {"width": 480, "height": 360}
+    with gym.make("shapechanger/FingerTrack-v1", render_mode="rgb_array", **size) as env:
+        env.reset(seed=0)
+        env.render()
+        before = _purple(env.render())
+        for _ in range(20):
+            env.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
+        assert _purple(env.render()) > before + 50
+        env.unwrapped._trail.clear()
+        with_path = env.render()
+        env.unwrapped._markers = list
+        assert _differs(env.render(), with_path).sum() > 300
+        env.reset(seed=0)
+        assert len(env.unwrapped._trail) == 1
+
+
+def _purple(frame: np.ndarray) -> int:
+    red, green, blue = np.moveaxis(frame.astype(int), 2, 0)
+    return int(((blue > green + 30) & (red > green + 5)).sum())
+
+
+def test_a_line_joins_points() -> None:
+    """A capsule between each two points, along z of its axes; equal points have none."""
+    points = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.0, 0.0]])
+    (marker,) = polyline(points, 0.001, (1.0, 0.0, 0.0, 1.0))
+    np.testing.assert_allclose(marker["pos"], [0.1, 0.0, 0.0])
+    np.testing.assert_allclose(marker["size"], [0.001, 0.001, 0.1])
+    np.testing.assert_allclose(marker["mat"].reshape(3, 3)[:, 2], [1.0, 0.0, 0.0], atol=1e-12)

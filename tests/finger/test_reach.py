@@ -1,0 +1,286 @@
+"""`Finger-v1`: episodes, observations, rewards and errors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+
+from shapechanger.errors import BadAction, FingerError, UnknownName
+from shapechanger.finger.anatomy import (
+    JOINT_RANGE,
+    JOINT_REST,
+    PHALANX_LENGTH_M,
+    TENDONS,
+)
+from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.gap import GAPS
+from shapechanger.finger.parameters import NOMINAL
+from shapechanger.finger.postures import angles_for
+from shapechanger.finger.reach import FingerReachEnv
+from shapechanger.finger.task import fingertip
+from tests.finger.holding import can_hold
+
+_NOTHING = np.zeros(7, np.float32)
+_REST = JOINT_REST.tolist()
+
+
+def _state(env: FingerReachEnv) -> np.ndarray:
+    data = env.plant.data
+    return np.concatenate([data.qpos, data.qvel, data.act, data.ctrl, [data.time]])
+
+
+def test_targets_can_be_held_away_from_limits() -> None:
+    """Targets are fingertips of balanced postures away from the limits."""
+    env = FingerReachEnv()
+    low, high = JOINT_RANGE.T
+    margin = 0.1 * (high - low)
+    targets = []
+    for seed in range(60):
+        _, info = env.reset(seed=seed)
+        angles, off = angles_for(info["target"])
+        assert off < 1e-5
+        # A point has several postures; this one can be held.
+        assert can_hold(angles)
+        assert (angles > low + 0.3 * margin).all()
+        assert (angles < high - 0.3 * margin).all()
+        targets.append(info["target"])
+        start = env.plant.angles
+        assert (start >= low + margin - 1e-12).all()
+        assert (start <= high - margin + 1e-12).all()
+    assert (np.ptp(targets, axis=0) > 0.03).all()
+
+
+def test_success_needs_ten_steps_at_the_target() -> None:
+    """Success is ten consecutive steps within 5 mm, and ends when the fingertip leaves."""
+    env = FingerReachEnv()
+    env.reset(seed=0)
+    oracle = FingerOracle(env.observation_layout)
+    seen, info = env.reset(options={"posture": _REST, "target": _REST})
+    assert info["distance"] < 1e-9
+    assert not info["is_success"]
+    for step in range(1, 13):
+        seen, _, _, _, info = env.step(oracle(seen))
+        assert info["distance"] < 0.005
+        assert info["is_success"] == (step >= 10)
+    while info["distance"] < 0.005:
+        assert info["is_success"]
+        _, _, _, _, info = env.step(np.array([1, 1, -1, -1, -1, -1, -1], np.float32))
+    assert not info["is_success"]
+    assert not env.reset(seed=0)[1]["is_success"]
+
+
+def test_observations_match_their_names() -> None:
+    """Without noise, observations equal the simulator's state."""
+    env = FingerReachEnv()
+    env.reset(seed=1)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        seen, _, _, _, info = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
+        named = dict(zip(env.observation_layout.names, seen, strict=True))
+        data = env.plant.data
+        assert named["PIP_flexion/angle"] == data.joint("PIP_flexion").qpos[0]
+        assert named["DIP_flexion/velocity"] == data.joint("DIP_flexion").qvel[0]
+        for i, tendon in enumerate(TENDONS):
+            assert named[f"{tendon}/tension"] == -data.actuator_force[i]
+            assert named[f"{tendon}/command"] == data.ctrl[i]
+        tip = np.array([named[f"fingertip/{axis}"] for axis in "xyz"])
+        np.testing.assert_allclose(tip, env.plant.fingertip, atol=1e-12)
+        way = np.array([named[f"target/d{axis}"] for axis in "xyz"])
+        np.testing.assert_allclose(tip + way, info["target"], atol=1e-12)
+        assert info["distance"] == pytest.approx(np.linalg.norm(way))
+
+
+def test_the_reward_is_the_sum_of_its_terms() -> None:
+    """Effort is the weighted mean square of the tensions over their limits."""
+    env = FingerReachEnv(reward={"nearness": 10.0})
+    env.reset(seed=0)
+    _, reward, _, _, info = env.step(_NOTHING)
+    assert reward == sum(info[f"reward_{term}"] for term in ("nearness", "effort", "change"))
+    share = env.plant.data.actuator_force / np.array(NOMINAL.most_tension)
+    assert info["reward_effort"] == pytest.approx(-0.02 * np.mean(share**2))
+    assert 0.0 < info["reward_nearness"] <= 0.2
+    assert "diverged" not in info
+
+
+def test_goal_rewards_match_compute_reward() -> None:
+    """`step` and the batched `compute_reward` agree: 0 within 5 mm, else -1."""
+    env = FingerReachEnv(goal=True)
+    plain = FingerReachEnv()
+    plain.reset(seed=0)
+    oracle = FingerOracle(plain.observation_layout)
+    achieved, desired, rewards = [], [], []
+    for seed in range(2):
+        seen, _ = env.reset(seed=seed)
+        oracle.reset()
+        for _ in range(25):
+            flat = gym.spaces.flatten(env.observation_space, seen)
+            by_name = dict(zip(env.observation_layout.names, flat, strict=True))
+            ordered = [by_name.get(name, 0.0) for name in plain.observation_layout.names]
+            seen, reward, _, _, info = env.step(oracle(np.array(ordered)))
+            assert reward == info["reward_goal"]
+            assert reward == env.compute_reward(seen["achieved_goal"], seen["desired_goal"], info)
+            achieved.append(seen["achieved_goal"])
+            desired.append(seen["desired_goal"])
+            rewards.append(reward)
+    assert set(rewards) == {0.0, -1.0}
+    together = env.compute_reward(np.array(achieved), np.array(desired), [{}] * len(rewards))
+    np.testing.assert_array_equal(together, rewards)
+    square = env.compute_reward(np.zeros((3, 2, 3)), np.full((3, 2, 3), 0.0028), None)
+    np.testing.assert_array_equal(square, np.zeros((3, 2)))
+    assert env.compute_reward(np.zeros(3), np.array([0.0051, 0.0, 0.0]), None) == -1.0
+
+
+def test_dict_and_box_observations_agree() -> None:
+    """The parts of the Dict equal the slices of the Box."""
+    box, goal = FingerReachEnv(), FingerReachEnv(goal=True)
+    numbers, _ = box.reset(seed=4)
+    parts, _ = goal.reset(seed=4)
+    assert goal.observation_space.contains(parts)
+    np.testing.assert_array_equal(numbers[:32], parts["observation"])
+    np.testing.assert_array_equal(numbers[32:35], parts["desired_goal"])
+    np.testing.assert_array_equal(numbers[29:32], parts["achieved_goal"])
+
+
+@pytest.mark.parametrize(
+    ("action", "sentence"),
+    [
+        (np.array([0, 0, 0, np.nan, 0, 0, 0]), "takes finite actions, got nan for EDC/command"),
+        (np.array([np.inf, 0, 0, 0, 0, 0, 0]), "takes finite actions, got inf for FDP/command"),
+        (np.zeros(6), r"takes actions of shape \(7,\), got \(6,\)"),
+        (np.array(["a"] * 7), "takes numbers as actions"),
+    ],
+)
+def test_invalid_actions_are_refused(action: Any, sentence: str) -> None:
+    """The error names the tendon, and the state does not change."""
+    env = FingerReachEnv()
+    env.reset(seed=0)
+    env.step(_NOTHING)
+    before = _state(env)
+    with pytest.raises(BadAction, match=sentence):
+        env.step(action)
+    np.testing.assert_array_equal(_state(env), before)
+
+
+def test_a_step_needs_a_reset() -> None:
+    """A step before the first reset raises ResetNeeded."""
+    with pytest.raises(gym.error.ResetNeeded, match=r"Call reset\(\)"):
+        FingerReachEnv().step(_NOTHING)
+
+
+def test_options_set_start_and_target() -> None:
+    """The target is a point or angles; options left out are drawn."""
+    env = FingerReachEnv()
+    _, info = env.reset(seed=0, options={"posture": [0.5, 0.1, 0.6, 0.3]})
+    np.testing.assert_array_equal(env.plant.angles, [0.5, 0.1, 0.6, 0.3])
+    other = env.reset(options={"posture": [0.5, 0.1, 0.6, 0.3]})[1]
+    assert (info["target"] != other["target"]).all()
+    info = env.reset(options={"target": _REST})[1]
+    np.testing.assert_allclose(info["target"], fingertip(JOINT_REST, PHALANX_LENGTH_M))
+    assert (env.plant.angles != JOINT_REST).all()
+    info = env.reset(options={"target": (0.05, 0.01, -0.04)})[1]
+    np.testing.assert_array_equal(info["target"], (0.05, 0.01, -0.04))
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "sentence"),
+    [
+        ({"postur": _REST}, UnknownName, "'postur'. Did you mean 'posture'"),
+        ({"path": "circle"}, UnknownName, "There are: posture, target"),
+        ({"posture": [0.0, 0.0]}, FingerError, "four angles in rad, MCP_flexion, .*; got"),
+        ({"posture": [2.0, 0.0, 0.0, 0.0]}, FingerError, r"within \[-0.349.* and \[1.571"),
+        ({"posture": [np.nan] * 4}, FingerError, "A posture must be four angles"),
+        ({"target": [0.1, 0.2]}, FingerError, "three finite numbers, m, or four angles"),
+        ({"target": [0.1, np.nan, 0.0]}, FingerError, "three finite numbers, m"),
+    ],
+)
+def test_invalid_options_are_refused(
+    options: dict[str, Any], error: type[Exception], sentence: str
+) -> None:
+    """Errors state what is valid and what was given."""
+    with pytest.raises(error, match=sentence):
+        FingerReachEnv().reset(seed=0, options=options)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "sentence"),
+    [
+        ({"actions": "tensions"}, UnknownName, "'tensions'. Did you mean 'tension'"),
+        ({"gap": "reel-like"}, UnknownName, "'reel-like'. Did you mean 'real-like'"),
+        ({"gap": "wide", "parameters": NOMINAL}, FingerError, "Give either parameters or a gap"),
+        ({"parameters": {"fricton": 1.0}}, UnknownName, "No parameter of a finger .*'fricton'"),
+        ({"parameters": "{}x"}, FingerError, "Invalid finger parameters"),
+        ({"reward": {"effrt": 1.0}}, UnknownName, "'effrt'. Did you mean 'effort'"),
+        ({"render_mode": "rgb"}, UnknownName, "No render mode matches 'rgb'"),
+    ],
+)
+def test_invalid_arguments_are_refused(
+    arguments: dict[str, Any], error: type[Exception], sentence: str
+) -> None:
+    """Errors name the argument and suggest the nearest spelling."""
+    with pytest.raises(error, match=sentence):
+        FingerReachEnv(**arguments)
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        NOMINAL.replace(tendon_friction=1.0),
+        {"tendon_friction": 1.0},
+        NOMINAL.replace(tendon_friction=1.0).to_json(),
+    ],
+    ids=["parameters", "by name", "JSON"],
+)
+def test_a_spec_makes_the_env_again(parameters: Any) -> None:
+    """Specs round trip through JSON for all forms of `parameters`."""
+    wanted = NOMINAL.replace(tendon_friction=1.0)
+    with gym.make("shapechanger/Finger-v1", parameters=parameters, actions="length") as env:
+        assert env.unwrapped.parameters == wanted
+        spec = EnvSpec.from_json(env.spec.to_json())
+    with gym.make(spec) as again:
+        assert again.unwrapped.parameters == wanted
+        assert again.spec.kwargs["actions"] == "length"
+
+
+def test_a_gap_round_trips_in_a_spec() -> None:
+    """A gap in a spec is kept through JSON; `finger_seed` without a gap is refused."""
+    with gym.make("shapechanger/Finger-v1", gap=GAPS["wide"], finger_seed=2) as env:
+        parameters = env.unwrapped.parameters
+        spec = EnvSpec.from_json(env.spec.to_json())
+    with gym.make(spec) as again:
+        assert again.unwrapped.parameters == parameters
+    with pytest.raises(FingerError, match="so it needs a gap"):
+        FingerReachEnv(finger_seed=2)
+
+
+def test_noise_affects_observations_only() -> None:
+    """Angles and tensions have the given standard deviations; the distance is exact."""
+    env = FingerReachEnv(parameters={"joint_noise": 0.02, "tension_noise": 0.3})
+    env.reset(seed=0)
+    off, tensions = [], []
+    for _ in range(100):
+        seen, _, _, _, info = env.step(_NOTHING)
+        off.append(seen[:4] - env.plant.angles)
+        tensions.append(seen[8:15] + env.plant.data.actuator_force)
+        true = np.linalg.norm(env.plant.fingertip - info["target"])
+        assert info["distance"] == pytest.approx(true)
+    assert np.std(off) == pytest.approx(0.02, rel=0.15)
+    assert np.std(tensions) == pytest.approx(0.3, rel=0.15)
+
+
+@pytest.mark.parametrize("actions", ["impedance", "tension", "length"])
+def test_an_episode_starts_at_rest_with_any_delay(actions: str) -> None:
+    """Until the first command acts, tendons are just taut, whatever the last episode did."""
+    for parameters in ({}, {"command_delay": 0.040}):
+        env = FingerReachEnv(actions=actions, parameters=parameters)
+        for _ in range(2):
+            env.reset(seed=0, options={"posture": _REST})
+            still = env.plant.data.ctrl.astype(np.float32)
+            env.step(still)
+            assert np.abs(env.plant.data.actuator_force).max() < 1.5
+            assert np.degrees(np.abs(env.plant.angles - JOINT_REST)).max() < 2.0
+            for _ in range(5):
+                env.step(np.ones(7, np.float32))

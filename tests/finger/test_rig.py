@@ -1,0 +1,162 @@
+"""Observations of a rig in the terms of `Finger-v1`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from shapechanger.errors import RobotRefused
+from shapechanger.finger.anatomy import (
+    JOINT_RANGE,
+    JOINT_REST,
+    MOMENT_ARMS,
+    MOST_TENSION_N,
+    PHALANX_LENGTH_M,
+    TENDONS,
+)
+from shapechanger.finger.plant import JointVelocities
+from shapechanger.finger.rig import RigSenses
+from shapechanger.finger.task import fingertip
+from shapechanger.robot.profile import Profile
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.read import read_profile
+
+_STIFFNESS = 20e3
+
+
+def _senses_of(profile: Profile) -> RigSenses:
+    return RigSenses("it", profile.action_layout(), profile.state_layout(), _STIFFNESS, 0.02)
+
+
+def _senses() -> RigSenses:
+    """Return the senses of a rig without joint encoders."""
+    text = find_profile("finger").read_text()
+    begin, end = text.index("[sensor.joints]"), text.index("[limits]")
+    return _senses_of(read_profile(text[:begin] + text[end:], Path("it.toml")))
+
+
+def _encoders() -> RigSenses:
+    return _senses_of(load_profile(find_profile("finger")))
+
+
+def _state(angles: NDArray[np.float64], tensions: NDArray[np.float64]) -> NDArray[np.float64]:
+    lengths = -MOMENT_ARMS @ angles - tensions / _STIFFNESS
+    return np.concatenate([lengths, -MOMENT_ARMS @ angles, tensions, np.zeros(7)])
+
+
+def _measured(angles: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the state of a rig with encoders, at rest and without stretch."""
+    return np.concatenate([-arms @ angles, np.zeros(14), angles, np.zeros(7)])
+
+
+def test_angles_follow_from_lengths_and_stretch() -> None:
+    """Angles are exact for nominal arms."""
+    tensions = np.linspace(2.0, 20.0, 7)
+    seen = _senses().read(_state(JOINT_REST, tensions), (), np.zeros(7))
+    np.testing.assert_allclose(seen.angles, JOINT_REST, atol=1e-12)
+    np.testing.assert_allclose(seen.velocities, JOINT_REST, atol=1e-12)
+    np.testing.assert_array_equal(seen.tensions, tensions)
+
+
+def test_missing_readings_keep_their_value() -> None:
+    """A missing reading of one servo keeps its last value."""
+    senses = _senses()
+    first = senses.read(_state(JOINT_REST, np.full(7, 2.0)), (), np.zeros(7))
+    later = _state(JOINT_REST, np.full(7, 2.0))
+    later[0] = 0.7
+    kept = senses.read(later, ("FDP/length",), np.zeros(7))
+    np.testing.assert_array_equal(kept.lengths, first.lengths)
+
+
+def test_inconsistent_lengths_are_refused() -> None:
+    """An offset of one turn of a spool is refused; 4 mm of stretch is not."""
+    senses = _senses()
+    state = _state(JOINT_REST, np.full(7, 2.0))
+    state[3] += 0.004
+    senses.require_fit(senses.read(state, (), np.zeros(7)))
+    state[3] += 0.0314
+    with pytest.raises(RobotRefused, match=r"EDC is off by .* mm.*robot home"):
+        senses.require_fit(senses.read(state, (), np.zeros(7)))
+
+
+def test_tensions_become_shares_of_their_range() -> None:
+    """The pretension and less is 0, the maximum and more is 1."""
+    senses = _senses()
+    np.testing.assert_array_equal(senses.values(np.zeros(7)), np.zeros(7))
+    np.testing.assert_array_equal(senses.values(np.full(7, 99.0)), np.ones(7))
+    middle = 0.5 * (senses.least + senses.most)
+    np.testing.assert_allclose(senses.values(middle), np.full(7, 0.5), atol=1e-6)
+    assert (senses.most <= MOST_TENSION_N + 1e-9).all()
+
+
+def test_the_order_is_that_of_the_rig(tmp_path: Path) -> None:
+    """Values are in the order of the profile's tendons."""
+    text = find_profile("finger").read_text()
+    begin, end = text.index("[action.FDP]"), text.index("[action.FDS]")
+    moved = text[:begin] + text[end:] + "\n" + text[begin:end]
+    profile = read_profile(moved, tmp_path / "it.toml")
+    senses = _senses_of(profile)
+    tensions = senses.least.copy()
+    tensions[TENDONS.index("FDP")] = 99.0
+    assert senses.values(tensions).tolist() == [0.0] * 6 + [1.0]
+
+
+@pytest.mark.parametrize("name", ["car", "finger-pwm"])
+def test_other_robots_are_refused(name: str) -> None:
+    """Robots without tendons, or without their measurement, are refused."""
+    with pytest.raises(RobotRefused, match="it is not a finger"):
+        _senses_of(load_profile(find_profile(name)))
+
+
+def test_encoders_give_the_fingertip_for_any_arms() -> None:
+    """With arms off by 20 %, encoders are exact and lengths are not."""
+    rng = np.random.default_rng(1)
+    arms = MOMENT_ARMS * (1.0 + rng.uniform(-0.2, 0.2, MOMENT_ARMS.shape))
+    angles = np.array([0.9, -0.1, 1.1, 0.6])
+    seen = _encoders().read(_measured(angles, arms), (), np.zeros(7))
+    np.testing.assert_array_equal(seen.angles, angles)
+    np.testing.assert_array_equal(seen.fingertip, fingertip(angles, PHALANX_LENGTH_M))
+    np.testing.assert_allclose(seen.lengths, -arms @ angles)
+    state = np.delete(_measured(angles, arms), slice(21, 25))
+    assert np.abs(_senses().read(state, (), np.zeros(7)).angles - angles).max() > 0.05
+
+
+def test_velocities_are_smoothed_differences_of_the_encoders() -> None:
+    """Velocities equal those of the simulation with joint noise, and start at zero."""
+    senses, differences = _encoders(), JointVelocities(0.02)
+    fastest = 0.0
+    for i in range(5):
+        angles = JOINT_REST + 0.01 * i**2
+        seen = senses.read(_measured(angles, MOMENT_ARMS), (), np.zeros(7))
+        np.testing.assert_array_equal(seen.velocities, differences.of(angles))
+        fastest = float(seen.velocities.max())
+    assert fastest > 1.0
+    senses.forget()
+    seen = senses.read(_measured(JOINT_REST, MOMENT_ARMS), (), np.zeros(7))
+    np.testing.assert_array_equal(seen.velocities, np.zeros(4))
+
+
+def test_an_encoder_that_was_not_read_keeps_its_angle() -> None:
+    """Other encoders are still updated."""
+    senses = _encoders()
+    senses.read(_measured(JOINT_REST, MOMENT_ARMS), (), np.zeros(7))
+    later = _measured(JOINT_REST + 0.1, MOMENT_ARMS)
+    seen = senses.read(later, ("PIP_flexion/angle",), np.zeros(7))
+    np.testing.assert_allclose(seen.angles, JOINT_REST + np.array([0.1, 0.1, 0.0, 0.1]))
+
+
+def test_a_lost_turn_is_distinguished_from_wrong_arms() -> None:
+    """A lost turn of any spool is detected with arms off by up to 20 %."""
+    rng = np.random.default_rng(0)
+    senses, (low, high) = _encoders(), JOINT_RANGE.T
+    for _ in range(300):
+        arms = MOMENT_ARMS * (1.0 + rng.uniform(-0.2, 0.2, MOMENT_ARMS.shape))
+        state = _measured(rng.uniform(low, high), arms)
+        senses.require_fit(senses.read(state, (), np.zeros(7)))
+        lost = int(rng.integers(7))
+        state[lost] += rng.choice([-0.0314, 0.0314])
+        with pytest.raises(RobotRefused, match=f"{TENDONS[lost]} is off by"):
+            senses.require_fit(senses.read(state, (), np.zeros(7)))

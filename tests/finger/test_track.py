@@ -1,0 +1,230 @@
+"""`FingerTrack-v1`: paths, observations and errors."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path as File
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+
+from shapechanger.errors import PathError, UnknownName
+from shapechanger.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.finger.paths import KINDS, circle, from_callable, from_csv
+from shapechanger.finger.postures import angles_for
+from shapechanger.finger.task import fingertip
+from shapechanger.finger.track import PREVIEW_S, FingerTrackEnv, draw_path, require_reachable
+
+_NOTHING = np.zeros(7, np.float32)
+# A reachable path of 1.5 s along x.
+_TABLE = "t,x,y,z\n" + "".join(
+    f"{0.1 * i:.1f},{0.045 + 0.001 * i:.4f},0,-0.045\n" for i in range(16)
+)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_default_shapes_can_be_followed(kind: str) -> None:
+    """Each shape is reachable with default settings, and the finger starts on it at rest."""
+    env = FingerTrackEnv(path=kind)
+    _, info = env.reset(seed=1)
+    assert info["distance"] < 1e-5
+    np.testing.assert_array_equal(env.plant.data.qvel, 0.0)
+
+
+def test_observations_look_ahead() -> None:
+    """Observations have the path after 0.02, 0.06, 0.12 and 0.20 s, relative to the fingertip."""
+    env = FingerTrackEnv()
+    seen, info = env.reset(seed=0)
+    begins = info["target"]
+    times = np.linspace(0.0, 2.0, 200_001)
+    t = times[np.linalg.norm(env.path.at(times) - begins, axis=1).argmin()]
+    for step in range(4):
+        named = dict(zip(env.observation_layout.names, seen, strict=True))
+        tip = np.array([named[f"fingertip/{axis}"] for axis in "xyz"])
+        now = t + 0.02 * step
+        point = np.array([named[f"target/{axis}"] for axis in "xyz"])
+        np.testing.assert_allclose(point, env.path.at(now + 0.02), atol=2e-6)
+        way = np.array([named[f"target/d{axis}"] for axis in "xyz"])
+        np.testing.assert_allclose(tip + way, point, atol=1e-12)
+        for ahead in PREVIEW_S:
+            way = [named[f"ahead_{round(1e3 * ahead)}ms/d{axis}"] for axis in "xyz"]
+            np.testing.assert_allclose(tip + way, env.path.at(now + ahead), atol=2e-6)
+        seen, _, _, _, info = env.step(_NOTHING)
+        np.testing.assert_allclose(info["target"], point, atol=1e-12)
+
+
+def test_the_rms_error_starts_after_half_a_second() -> None:
+    """`rms` is infinite for 0.5 s, then the RMS distance since; below 3 mm is a success."""
+    env = FingerTrackEnv()
+    _, info = env.reset(seed=0)
+    assert info["rms"] == math.inf
+    distances = []
+    for step in range(1, 41):
+        _, reward, terminated, _, info = env.step(_NOTHING)
+        assert not terminated
+        assert reward == sum(info[f"reward_{term}"] for term in ("nearness", "effort", "change"))
+        true = math.dist(env.plant.fingertip, info["target"])
+        assert info["distance"] == pytest.approx(true)
+        distances.append(info["distance"])
+        if step <= 25:
+            assert info["rms"] == math.inf
+            assert not info["is_success"]
+        else:
+            assert info["rms"] == pytest.approx(np.sqrt(np.mean(np.square(distances[25:]))))
+            assert info["is_success"] == (info["rms"] < 0.003)
+    assert env.reset(seed=0)[1]["rms"] == math.inf
+
+
+@pytest.mark.parametrize(
+    ("place", "beyond"),
+    [((0.08, 0.0, -0.04), (9.5, 10.5)), ((0.05, 0.08, -0.03), (20.0, 120.0))],
+)
+def test_a_path_that_leaves_the_workspace_is_refused(
+    place: tuple[float, float, float], beyond: tuple[float, float]
+) -> None:
+    """The error states where, when and by how much."""
+    path = circle(0.012, place, hz=1.5)
+    with pytest.raises(PathError, match="The path leaves the finger's reach: at ") as caught:
+        FingerTrackEnv(path=path)
+    words = str(caught.value).split()
+    beyond_mm = float(words[words.index("beyond.") - 2])
+    assert beyond[0] < beyond_mm < beyond[1]
+    at = float(words[words.index("s") - 1])
+    x, y, z = (float(word.strip("(),")) for word in words[words.index("mm,") - 3 :][:3])
+    np.testing.assert_allclose([x, y, z], 1e3 * path.at(at), atol=1.0)
+
+
+def test_a_path_that_is_too_fast_is_refused() -> None:
+    """The error states when and which torque is missing; a slower path is accepted."""
+    with pytest.raises(
+        PathError, match=r"too weak .* at \d.\d\d s a joint lacks .* Make it slower"
+    ):
+        FingerTrackEnv(path={"kind": "circle", "hz": 8.0})
+    require_reachable(circle(hz=1.3))
+
+
+def test_the_start_angles_are_on_the_path() -> None:
+    """The fingertip of the start angles is the first point of the path."""
+    path = circle(phase=1.0)
+    angles = require_reachable(path)
+    place = fingertip(angles, PHALANX_LENGTH_M)
+    np.testing.assert_allclose(place, path.at(0.0), atol=1e-5)
+
+
+def test_a_file_can_be_followed(tmp_path: File) -> None:
+    """The target follows the file and stays at its last point."""
+    file = tmp_path / "tip.csv"
+    file.write_text(_TABLE)
+    env = FingerTrackEnv(path=str(file))
+    _, info = env.reset(seed=5)
+    np.testing.assert_allclose(info["target"], [0.045, 0.0, -0.045], atol=1e-9)
+    for _ in range(80):
+        _, _, _, _, info = env.step(_NOTHING)
+    np.testing.assert_allclose(info["target"], [0.060, 0.0, -0.045], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("0.7,", "0.5,"), "line 9: time runs backwards, from 0.6 s to 0.5 s"),
+        (("1.5,", "9.5,"), "line 17: the time step of 8.1 s is a gap"),
+        (("0.0500", "nan"), "x is 'nan', which is not finite"),
+        (("t,x,y,z", "t,x,y"), "lacks z"),
+    ],
+)
+def test_invalid_files_are_refused(tmp_path: File, change: tuple[str, str], sentence: str) -> None:
+    """Errors of the file name the line, and are raised when the env is made."""
+    file = tmp_path / "tip.csv"
+    assert change[0] in _TABLE
+    file.write_text(_TABLE.replace(*change))
+    with pytest.raises(PathError, match=sentence):
+        FingerTrackEnv(path=str(file))
+
+
+def test_a_file_in_millimetres_is_refused(tmp_path: File) -> None:
+    """The error names the expected unit."""
+    rows = [f"{0.1 * i:.1f},{45 + i},0,-45" for i in range(16)]
+    file = tmp_path / "tip.csv"
+    file.write_text("\n".join(["t,x,y,z", *rows]))
+    with pytest.raises(PathError, match="x, y, z in m"):
+        FingerTrackEnv(path=str(file))
+
+
+def test_a_function_of_time_can_be_followed() -> None:
+    """Endless functions are accepted; one that leaves the workspace is refused."""
+
+    def swaying(t: float) -> tuple[float, float, float]:
+        return 0.05 + 0.005 * math.sin(t), 0.0, -0.045
+
+    env = FingerTrackEnv(path=swaying)
+    _, info = env.reset(seed=0)
+    np.testing.assert_allclose(info["target"], [0.05, 0.0, -0.045])
+
+    def leaving(t: float) -> tuple[float, float, float]:
+        return 0.05 + 0.1 * t, 0.0, -0.045
+
+    with pytest.raises(PathError, match=r"at 0.60 s it is at \(110.0, 0.0, -45.0\) mm"):
+        FingerTrackEnv(path=from_callable(leaving, duration_s=0.6))
+
+
+def test_another_path_can_be_given_at_a_reset() -> None:
+    """A new path is kept until the next; an invalid one leaves the old path."""
+    env = FingerTrackEnv()
+    env.reset(seed=0)
+    first = env.path
+    with pytest.raises(PathError, match="leaves the finger's reach"):
+        env.reset(options={"path": circle(0.012, (0.09, 0.0, 0.0))})
+    with pytest.raises(UnknownName, match=r"'circel'. Did you mean 'circle'"):
+        env.reset(options={"path": "circel"})
+    with pytest.raises(UnknownName, match="There are: posture, path"):
+        env.reset(options={"target": [0.0, 0.0, 0.0]})
+    assert env.path is first
+    path = circle(0.008)
+    env.reset(options={"path": path})
+    env.reset()
+    assert env.path is path
+    env.reset(options={"posture": JOINT_REST.tolist()})
+    np.testing.assert_array_equal(env.plant.angles, JOINT_REST)
+
+
+@pytest.mark.slow
+def test_random_paths_differ_and_can_be_followed() -> None:
+    """Random paths follow from the seed, are reachable, and have the documented durations."""
+    env = FingerTrackEnv(path="random")
+    found = []
+    for seed in (1, 2, 1):
+        _, info = env.reset(seed=seed)
+        assert info["distance"] < 1e-5
+        found.append(env.path.at([0.0, 0.1, 0.3]))
+    np.testing.assert_array_equal(found[0], found[2])
+    assert (found[0] != found[1]).any()
+    rng = np.random.default_rng(0)
+    for _ in range(2):
+        path, begin = draw_path(rng)
+        assert path.closed
+        assert 0.5 <= path.duration_s <= 10.0
+        for point in path.at(np.linspace(0.0, path.duration_s, 20)):
+            begin, off = angles_for(point, begin)
+            assert off < 5e-4
+
+
+@pytest.mark.parametrize("path", ["line", {"kind": "circle", "radius": 0.008, "hz": 1.0}])
+def test_a_spec_makes_the_env_again(path: Any) -> None:
+    """Specs with a named path round trip through JSON."""
+    with gym.make("shapechanger/FingerTrack-v1", path=path) as env:
+        spec = EnvSpec.from_json(env.spec.to_json())
+        wanted = env.unwrapped.path.at([0.0, 0.2])
+    with gym.make(spec) as again:
+        np.testing.assert_array_equal(again.unwrapped.path.at([0.0, 0.2]), wanted)
+
+
+def test_a_loaded_file_is_a_path(tmp_path: File) -> None:
+    """A path read from a file does not need the file any more."""
+    file = tmp_path / "tip.csv"
+    file.write_text(_TABLE)
+    path = from_csv(file)
+    file.unlink()
+    assert FingerTrackEnv(path=path).path is path

@@ -1,0 +1,184 @@
+"""Visual anatomy of the finger."""
+
+from __future__ import annotations
+
+import itertools
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
+from shapechanger.finger.model import TARGET, FingerFigure
+from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.visuals import (
+    TENDON_COLOURS,
+    THICKEST_M,
+    THINNEST_M,
+    route_names,
+)
+from tests.finger.commands import STRETCHED, at_rest, made, modes
+
+
+@pytest.mark.parametrize("mode", modes())
+@pytest.mark.parametrize("parameters", [NOMINAL, STRETCHED], ids=["stiff", "stretched"])
+def test_anatomy_does_not_change_the_simulation(parameters: FingerParameters, mode: str) -> None:
+    """States with and without anatomy are equal."""
+    found = []
+    for anatomy in (False, True):
+        model = made(parameters, mode, anatomy=anatomy)
+        data = at_rest(model, parameters)
+        rng = np.random.default_rng(0)
+        states = []
+        for _ in range(100):
+            data.ctrl[:] = rng.uniform(-1.0, 1.0, 7)
+            mujoco.mj_step(model, data, 5)
+            states.append(np.concatenate([data.qpos, data.qvel, data.act, data.actuator_force]))
+        found.append(np.array(states))
+    np.testing.assert_array_equal(*found)
+
+
+def test_without_anatomy_there_are_no_visual_elements() -> None:
+    """The numbers of tendons, sites, geoms and textures are minimal."""
+    plain, shown = made(), made(anatomy=True)
+    assert (plain.ntendon, plain.nsite, plain.ngeom, plain.ntex) == (8, 1, 5, 0)
+    assert (plain.wrap_type == mujoco.mjtWrap.mjWRAP_JOINT).all()
+    assert shown.ntendon > 14
+    np.testing.assert_array_equal(shown.body_mass.sum(), plain.body_mass.sum())
+
+
+def _site(model: mujoco.MjModel, data: mujoco.MjData, body: str, at: int) -> np.ndarray:
+    """Return point `at` of a spatial tendon in the frame of a body, m."""
+    world = data.site_xpos[at]
+    k = model.body(body).id
+    return data.xmat[k].reshape(3, 3).T @ (world - data.xpos[k])
+
+
+def _stops(model: mujoco.MjModel, course: str) -> list[tuple[str, int]]:
+    """Return body and number of each site of a route, from the wrist on."""
+    tendon = model.tendon(course).id
+    start, n = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
+    return [
+        (model.body(int(model.site_bodyid[site])).name, int(site))
+        for kind, site in zip(
+            model.wrap_type[start : start + n], model.wrap_objid[start : start + n], strict=True
+        )
+        if kind == mujoco.mjtWrap.mjWRAP_SITE
+    ]
+
+
+@pytest.mark.parametrize(
+    ("tendon", "ends_at"),
+    [
+        ("FDP", "distal"),
+        ("FDS", "middle"),
+        ("EIP", "distal"),
+        ("EDC", "distal"),
+        ("LUM", "distal"),
+        ("DI", "proximal"),
+        ("PI", "distal"),
+    ],
+)
+def test_each_tendon_ends_at_its_bone(tendon: str, ends_at: str) -> None:
+    """Routes start in the hand, pass the bones in order and end at the insertion."""
+    model = made(anatomy=True)
+    order = ["hand", "proximal", "middle", "distal"]
+    for course in route_names(tendon):
+        bodies = [body for body, _ in _stops(model, course)]
+        assert bodies[0] == "hand"
+        assert bodies[-1] == ends_at
+        assert bodies == sorted(bodies, key=order.index)
+
+
+def _places(tendon: str, body: str) -> np.ndarray:
+    """Return the points of a tendon's routes on a bone, in its frame, m, (n, 3)."""
+    model = made(anatomy=True)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return np.array(
+        [
+            _site(model, data, body, site)
+            for course in route_names(tendon)
+            for at, site in _stops(model, course)
+            if at == body
+        ]
+    )
+
+
+def test_routes_are_anatomical() -> None:
+    """Flexors are palmar, extensors dorsal, and intrinsic tendons lateral."""
+    for tendon, side in itertools.product(("FDP", "FDS"), ("hand", "proximal", "middle")):
+        assert (_places(tendon, side)[:, 2] < -0.002).all()
+    for tendon, side in itertools.product(("EIP", "EDC"), ("hand", "proximal", "middle", "distal")):
+        assert (_places(tendon, side)[:, 2] > 0.002).all()
+    for bone in ("hand", "proximal", "middle", "distal"):
+        assert _places("EIP", bone)[:, 1].max() < _places("EDC", bone)[:, 1].min()
+    assert _places("DI", "proximal")[0, 1] > 0.006
+    for tendon, sign in (("LUM", 1.0), ("PI", -1.0)):
+        assert sign * _places(tendon, "hand")[-1, 1] > 0.005
+        assert _places(tendon, "hand")[-1, 2] < -0.002
+        hood = _places(tendon, "proximal")
+        assert hood[0, 2] < 0.0 < hood[-1, 2]
+        assert (_places(tendon, "middle")[:, 2] > 0.003).all()
+        assert (sign * _places(tendon, "middle")[:, 1] > 0.0).all()
+
+
+def test_routes_agree_with_the_moment_arms() -> None:
+    """Routes shorten with their fixed tendons, for arms above 2.5 mm."""
+    model = made(anatomy=True)
+    data = mujoco.MjData(model)
+    arms = []
+    for sign in (1.0, -1.0):
+        lengths = []
+        for j in range(len(JOINTS)):
+            data.qpos[:] = JOINT_REST
+            data.qpos[j] += sign * 0.05
+            mujoco.mj_forward(model, data)
+            lengths.append([data.ten_length[model.tendon(f"{t}/course").id] for t in TENDONS])
+        arms.append(np.array(lengths).T)
+    shown = (arms[1] - arms[0]) / 0.1
+    true = NOMINAL.arms
+    large = np.abs(true) > 2.5e-3
+    # FDP and FDS are routed through the middle of the knuckle; their arms are slightly ulnar.
+    large[:2, 1] = False
+    assert large.sum() == 12
+    np.testing.assert_array_equal(np.sign(shown[large]), np.sign(true[large]))
+
+
+def test_route_lengths_are_bounded() -> None:
+    """Lengths change by less than 45 mm between all joint limits."""
+    model = made(anatomy=True)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    courses = [model.tendon(c).id for t in TENDONS for c in route_names(t)]
+    straight = data.ten_length[courses].copy()
+    for corner in itertools.product(*JOINT_RANGE):
+        data.qpos[:] = corner
+        mujoco.mj_forward(model, data)
+        assert np.abs(data.ten_length[courses] - straight).max() < 0.045
+
+
+def test_tendon_colours_are_distinct() -> None:
+    """The colours differ for the colour-blind too."""
+    assert tuple(TENDON_COLOURS) == TENDONS
+    # Deuteranopia: red and green merge, with the weights of Viénot et al. 1999.
+    seen = [(0.29 * r + 0.71 * g, b) for r, g, b in TENDON_COLOURS.values()]
+    for one, other in itertools.combinations(seen, 2):
+        assert np.linalg.norm(np.subtract(one, other)) > 0.1
+
+
+def test_show_sets_the_figure() -> None:
+    """`show` sets posture, tendon widths and target."""
+    figure = FingerFigure()
+    pulled = np.linspace(0.0, 1.2, 7)
+    figure.show(JOINT_REST, pulled, np.array([0.05, 0.01, -0.04]))
+    np.testing.assert_array_equal(figure.data.qpos, JOINT_REST)
+    body = figure.model.body(TARGET).id
+    np.testing.assert_array_equal(figure.data.xpos[body], [0.05, 0.01, -0.04])
+    widths = figure.model.tendon_width[[figure.model.tendon(f"{t}/course").id for t in TENDONS]]
+    assert widths[0] == pytest.approx(THINNEST_M)
+    assert widths[-1] == pytest.approx(THICKEST_M)
+    assert (np.diff(widths[:6]) > 0.0).all()
+    hidden = figure.without_target()
+    assert hidden.geom(TARGET).rgba[3] == 0.0
+    assert figure.model.geom(TARGET).rgba[3] > 0.0
