@@ -96,6 +96,19 @@ def test_import_registers_ids_without_a_simulator() -> None:
     assert (tuple(VEHICLE_ENVS), tuple(FINGER_ENVS)) == (_VEHICLES, _FINGERS)
 
 
+def test_a_finger_loads_few_modules() -> None:
+    """Making an env of the finger loads at most 40 of our modules, and no robot or other body."""
+    script = (
+        "import sys, gymnasium, shapechanger\n"
+        "gymnasium.make('shapechanger/Finger-v1')\n"
+        "print(*[name for name in sys.modules if name.partition('.')[0] == 'shapechanger'])"
+    )
+    modules = _run(script).split()
+    assert len(modules) <= 40
+    packages = {name.split(".")[1] for name in modules if "." in name}
+    assert not packages & {"bodies", "link", "morphology", "remote", "robot", "transfer", "twin"}
+
+
 def test_missing_mujoco_names_the_extra() -> None:
     """Without MuJoCo, making an env raises an error with the command that installs it."""
     plain = (*_IDS, *_FINGERS)
@@ -115,8 +128,9 @@ def test_missing_mujoco_names_both_extras_for_vehicles() -> None:
 @pytest.mark.parametrize("blocked", ["glfw", "imageio"])
 def test_missing_dependencies_of_mujoco_envs_name_the_extra(blocked: str) -> None:
     """Without a dependency of Gymnasium's MuJoCo envs, the error names the extra `sim`."""
-    lines = _run(_BLOCK.format(blocked=blocked) + _MAKE.format(ids=_IDS)).splitlines()
-    assert len(lines) == len(_IDS)
+    plain = (*_IDS, *_FINGERS)
+    lines = _run(_BLOCK.format(blocked=blocked) + _MAKE.format(ids=plain)).splitlines()
+    assert len(lines) == len(plain)
     for sentence in lines:
         assert sentence.endswith("run `pip install 'shapechanger[sim]'`.")
 
