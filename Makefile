@@ -30,7 +30,7 @@ PYTEST := $(RUN) -m pytest -n $(JOBS) --dist worksteal
 SITE := NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
 # Tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml). Tracing
 # slows the others down by a third, and they add nothing to it.
-COVERING := test_architecture.py test_errors.py test_layout.py envs/stepping envs/vector \
+COVERING := test_architecture.py contract/test_drive.py test_errors.py test_layout.py envs/stepping envs/vector \
 	finger/identify finger/paths finger/task \
 	laws link morphology robot/guard robot/profile tasks transfer/body_map transfer/metrics
 COVERING := $(addprefix tests/,$(COVERING))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.vehicle.drivers import CLONES
+from shapechanger.vehicles.envs.demonstrators import CLONES
 
 _SIZE: Final = (120, 160, 3)
 

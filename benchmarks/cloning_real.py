@@ -55,8 +55,8 @@ from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
 from shapechanger.demos.dataset import Dataset, load_dataset
-from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.transfer.learners.cloning import record_demonstrations
+from shapechanger.vehicles.envs.demonstrators import CLONES
 
 SPLITS: Final = 5
 SEEDS: Final = int(os.environ.get("SEEDS", "5"))

@@ -23,8 +23,8 @@ from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
 from shapechanger.cli import main
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.vehicle import VehicleEnv
-from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
+from shapechanger.vehicles.envs import VehicleEnv
+from shapechanger.vehicles.envs.evaluation import DriveResult, DriveScore, drive
 
 LAYOUTS: Final = 100
 MINUTES: Final = 10

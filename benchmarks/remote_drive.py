@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
-from shapechanger.envs.remote.waypoints import RemoteWaypointEnv
-from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveResult
+from shapechanger.remote.env import RemoteVehicleEnv
 from shapechanger.twin.robot import Operator
+from shapechanger.vehicles.envs.evaluation import LIMIT_S, METRES, Act, DriveResult
+from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 
 
 def drive_remote(
@@ -20,7 +20,7 @@ def drive_remote(
     metres: float = METRES,
     limit_s: float = LIMIT_S,
 ) -> DriveResult:
-    """Drive a served twin, as `shapechanger.envs.vehicle.evaluation.drive` does an env.
+    """Drive a served twin, as `shapechanger.vehicles.envs.evaluation.drive` does an env.
 
     Args:
         env: The robot, made with `on_reset=operator.place`; a collision must not end the episode.

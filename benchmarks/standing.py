@@ -21,14 +21,14 @@ from scipy.stats import binomtest
 from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.contract.world import Pose
-from shapechanger.envs.vehicle import RangesEnv
-from shapechanger.envs.vehicle.drivers import observe_ranges
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import PpoSettings
-from shapechanger.worlds.course import HELD_OUT
+from shapechanger.vehicles.courses.course import HELD_OUT
+from shapechanger.vehicles.envs import RangesEnv
+from shapechanger.vehicles.envs.demonstrators import observe_ranges
 
 OUT: Final = Path("results", "standing")
 SEEDS: Final = 3

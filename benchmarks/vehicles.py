@@ -18,13 +18,13 @@ import mujoco
 
 from benchmarks.clones import blind, find_clone, sighted
 from benchmarks.row import Row, asked
-from shapechanger.bodies.vehicles import VEHICLES
 from shapechanger.cli.train import Train
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.vehicle import RangesEnv, VehicleEnv
-from shapechanger.envs.vehicle.evaluation import LIMIT_S, METRES, Act, DriveScore, drive
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
-from shapechanger.worlds.course import HELD_OUT
+from shapechanger.vehicles.bodies import VEHICLES
+from shapechanger.vehicles.courses.course import HELD_OUT
+from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
+from shapechanger.vehicles.envs.evaluation import LIMIT_S, METRES, Act, DriveScore, drive
 
 EXPERT_LAYOUTS: Final = 50
 CLONE_LAYOUTS: Final = 20

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from benchmarks.row import Row
 from shapechanger.cli.suite import RunSuite
-from shapechanger.envs.vehicle.ranges import COLLISION_REWARD
 from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.metrics.intervals import estimate_difference
 from shapechanger.transfer.suite import StudyOutcome
+from shapechanger.vehicles.envs.ranges import COLLISION_REWARD
 
 SEEDS: Final = 5
 STEPS_A_MINUTE: Final = 1200.0

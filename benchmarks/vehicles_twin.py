@@ -21,12 +21,12 @@ from benchmarks.vehicles import counted, layouts
 from benchmarks.waypoints import taught_source
 from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
-from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
-from shapechanger.envs.vehicle.evaluation import METRES, Act, DriveResult, DriveScore, drive
 from shapechanger.layout import Layout
+from shapechanger.remote.env import RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import run_robot
+from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
+from shapechanger.vehicles.envs.evaluation import METRES, Act, DriveResult, DriveScore, drive
 
 LAYOUTS: Final = 10
 _CLOCKS: Final[dict[Literal["twin", "real"], Literal["lockstep", "realtime"]]] = {

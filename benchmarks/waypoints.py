@@ -34,19 +34,19 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.demos.drivers import DriverDecision, ExpertPilot, record_steps
 from shapechanger.demos.recording import RecordEpisodes
-from shapechanger.envs.remote.waypoints import RemoteWaypointEnv
-from shapechanger.envs.vehicle import VehicleEnv, WaypointEnv
-from shapechanger.envs.vehicle.drivers import CLONES, VehicleDemonstrator
-from shapechanger.envs.vehicle.evaluation import DriveResult, DriveScore, drive
-from shapechanger.envs.vehicle.waypoints import WaypointDemonstrator
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.twin.robot import run_robot
-from shapechanger.worlds.course import FLOODED, HELD_OUT
-from shapechanger.worlds.simulation import MujocoWorld
+from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT
+from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
+from shapechanger.vehicles.envs.demonstrators import CLONES, VehicleDemonstrator
+from shapechanger.vehicles.envs.evaluation import DriveResult, DriveScore, drive
+from shapechanger.vehicles.envs.waypoints import WaypointDemonstrator
+from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
+from shapechanger.vehicles.world import MujocoWorld
 
 VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3

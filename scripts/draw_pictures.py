@@ -29,17 +29,17 @@ from shapechanger.cli.pictures import write_film
 from shapechanger.cli.transfer import Transfer
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.files import read_json
 from shapechanger.finger.controller import FingerOracle
 from shapechanger.finger.policies import POLICIES
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import STUDY_FILE, Study
-from shapechanger.worlds.course import FLOODED, HELD_OUT, HOME
-from shapechanger.worlds.lens import LENSES
-from shapechanger.worlds.look import LOOKS, Look
-from shapechanger.worlds.simulation import MujocoWorld
+from shapechanger.vehicles.cameras.corruptions import CORRUPTIONS
+from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT, HOME
+from shapechanger.vehicles.courses.look import LOOKS, Look
+from shapechanger.vehicles.envs.demonstrators import CLONES
+from shapechanger.vehicles.world import MujocoWorld
 
 Picture = NDArray[np.uint8]
 Film = Callable[[Path], None]
@@ -109,7 +109,7 @@ def _sheet(world: str) -> Picture:
             look = drawn if seed == _SEEDS[-1] else None
             here = MujocoWorld(name, world, seed, size=_SIZE, look=look)
             seen = here.picture()
-            through = [lens(seen, seed) for lens in LENSES.values()]
+            through = [lens(seen, seed) for lens in CORRUPTIONS.values()]
             outside = [
                 here.outside(*_SIZE),
                 here.outside(*_SIZE, 2.0 * here.reach, azimuth_rad=_BEHIND),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.envs.vehicle.drivers import CLONES
+from shapechanger.vehicles.envs.demonstrators import CLONES
 
 pytestmark = pytest.mark.system
 
@@ -52,7 +52,7 @@ def test_wheel_holds_the_clones_and_the_profiles_of_the_vehicles(wheel: Path) ->
         assert CLONES[vehicle].relative_to(_SRC).as_posix() in inside
         profile = f"shapechanger/robot/profile/shipped/lab-{vehicle}.toml"
         assert profile in inside
-    assert "shapechanger/envs/vehicle/clones/README.md" in inside
+    assert "shapechanger/vehicles/envs/clones/README.md" in inside
     assert set(CLONES) == {"boat", "car", "tank", "truck"}
 
 

@@ -11,11 +11,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.envs.vehicle import WaypointEnv
 from shapechanger.errors import RobotRefused
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.vehicles.envs import WaypointEnv
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]

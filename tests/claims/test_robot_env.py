@@ -11,12 +11,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.envs.remote.four_way import FOUR_WAYS, FourWay
 from shapechanger.errors import LinkError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.robot import RunningRobot, run_robot
 from shapechanger.twin.wiring import TwinWiring, WiredOutput
+from shapechanger.vehicles.remote.discrete_driving import FOUR_WAYS, DiscreteDriving
 from tests.robot.profile.texts import HOVERCRAFT
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 from tests.twin.robots import until
@@ -118,7 +118,7 @@ def test_four_keys(car: RunningRobot) -> None:
     """Forward and backward drive, right and left steer."""
     with car.operator() as operator:
         operator.place(0)
-    env = FourWay(env_of(car))
+    env = DiscreteDriving(env_of(car))
     env.reset(seed=0)
     wanted = {"forward": (0, 1), "backward": (0, -1), "right": (1, 0), "left": (-1, 0)}
     info: dict[str, Any] = {}

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.envs.vehicle import VehicleEnv
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.twin.in_process import InProcessRobot
 from shapechanger.twin.robot import Whereabouts, run_robot
-from shapechanger.worlds.course import HELD_OUT, TRAINING
-from shapechanger.worlds.simulation import MujocoWorld
+from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
+from shapechanger.vehicles.envs import VehicleEnv
+from shapechanger.vehicles.world import MujocoWorld
 from tests.robots import write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]

@@ -18,8 +18,8 @@ import pytest
 
 from shapechanger.demos.episodes import drop
 from shapechanger.demos.exchange.archive import pack_episode
-from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.finger.policies import POLICIES
+from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.demos.exchange.small import all_of, content_of, drive
 from tests.hub_server import OWNER, READER, FakeHub, Repository, serve_hub
 

@@ -16,10 +16,10 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 from shapechanger.cli import main
-from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.finger.policies import POLICIES
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.learners.settings import OffPolicySettings
+from shapechanger.vehicles.envs.demonstrators import CLONES
 
 
 def _zip(path: Path, env: str = "shapechanger/InvertedPendulum-v1", **arguments: object) -> PPO:

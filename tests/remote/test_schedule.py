@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.envs.remote.vehicle import LATE, Schedule
+from shapechanger.remote.env import LATE, Schedule
 
 PERIOD = 0.05
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.errors import StudyError
 from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
 from shapechanger.transfer.learners.cloning import CloneLearner
@@ -15,6 +14,7 @@ from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan
+from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.transfer.lane import LANE, TINY_CLONING
 from tests.transfer.studies import BIG
 

@@ -15,13 +15,14 @@ from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board
 from shapechanger.twin.world.place import Place, open_world
 from shapechanger.twin.world.vehicle import DrivingWorld
-from shapechanger.worlds.simulation import MujocoWorld
+from shapechanger.vehicles.twin import course_place
+from shapechanger.vehicles.world import MujocoWorld
 from tests.twin.robots import CAR
 
 pytestmark = pytest.mark.realtime
 
 _PARTS = {"wheels", "steering"}
-_CORRIDOR = Place("corridor", "car")
+_CORRIDOR = course_place("corridor", "car")
 
 
 def test_the_default_place_is_the_room() -> None:
@@ -39,9 +40,10 @@ def test_the_room_does_not_import_mujoco() -> None:
         "sys.modules['mujoco'] = None\n"
         "from shapechanger.errors import MissingExtra\n"
         "from shapechanger.twin.world.place import Place, open_world\n"
+        "from shapechanger.vehicles.twin import course_place\n"
         "open_world(Place(), {'wheels'}, None, 1)\n"
         "try:\n"
-        "    open_world(Place('corridor', 'car'), {'wheels', 'steering'}, None, 1)\n"
+        "    open_world(course_place('corridor', 'car'), {'wheels', 'steering'}, None, 1)\n"
         "except MissingExtra as error:\n"
         "    print(error)"
     )
@@ -62,15 +64,15 @@ def test_a_place_in_mujoco() -> None:
 def test_an_invalid_place_is_refused() -> None:
     """Mismatched parts, unknown names and a boat on land raise errors."""
     with pytest.raises(ProfileError, match="A tank has no 'steering' or 'wheels'"):
-        open_world(Place("corridor", "tank"), _PARTS, None, 1)
+        open_world(course_place("corridor", "tank"), _PARTS, None, 1)
     with pytest.raises(UnknownName, match=r"No vehicle matches 'cra'. Did you mean 'car'"):
-        open_world(Place("corridor", "cra"), _PARTS, None, 1)
+        open_world(course_place("corridor", "cra"), _PARTS, None, 1)
     with pytest.raises(UnknownName, match=r"No world matches 'coridor'. Did you mean 'corridor'"):
-        open_world(Place("coridor", "car"), _PARTS, None, 1)
+        open_world(course_place("coridor", "car"), _PARTS, None, 1)
     with pytest.raises(UnknownName, match="No lens matches 'dark'"):
-        open_world(Place("corridor", "car", ("dark",)), _PARTS, None, 1)
+        open_world(course_place("corridor", "car", ("dark",)), _PARTS, None, 1)
     with pytest.raises(WorldError, match="A boat floats"):
-        open_world(Place("corridor", "boat"), {"propeller", "rudder"}, None, 1)
+        open_world(course_place("corridor", "boat"), {"propeller", "rudder"}, None, 1)
 
 
 def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
@@ -119,5 +121,5 @@ def test_a_board_that_fails_to_start_prints_the_reason(
 ) -> None:
     """The reason is on standard error before the board exits."""
     with pytest.raises(RobotError, match="did not start"):
-        start_board(CAR, "twin", tmp_path, place=Place("corridor", "tank"))
+        start_board(CAR, "twin", tmp_path, place=course_place("corridor", "tank"))
     assert "A tank has no 'steering' or 'wheels'" in capfd.readouterr().err

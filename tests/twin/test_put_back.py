@@ -13,13 +13,13 @@ from shapechanger.twin.hardware import connect
 from shapechanger.twin.robot import Operator, Whereabouts
 from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board
-from shapechanger.twin.world.place import Place
 from shapechanger.twin.world.vehicle import DrivingWorld
+from shapechanger.vehicles.twin import course_place
 from tests.twin.robots import CAR
 
 pytestmark = pytest.mark.realtime
 
-_CORRIDOR = Place("corridor", "car")
+_CORRIDOR = course_place("corridor", "car")
 
 
 def _lab_car() -> GuardPlan:

@@ -8,7 +8,7 @@ from lerobot.teleoperators import Teleoperator
 
 from lerobot_robot_shapechanger.config import ShapechangerConsoleConfig
 from lerobot_robot_shapechanger.link import Link, named
-from shapechanger.envs.remote.operator import Takeover
+from shapechanger.remote.operator import Takeover
 
 
 class ShapechangerConsole(Teleoperator):

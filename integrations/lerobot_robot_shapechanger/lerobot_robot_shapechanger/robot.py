@@ -11,12 +11,12 @@ from lerobot.robots import Robot
 
 from lerobot_robot_shapechanger.config import ShapechangerConfig
 from lerobot_robot_shapechanger.link import Link, named
-from shapechanger.envs.remote.operator import Takeover, interruption
 from shapechanger.errors import RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.link.messages import Observation
 from shapechanger.remote.client import RobotClient
 from shapechanger.remote.inbox import Received
 from shapechanger.remote.observations import IMAGE, RobotSpaces
+from shapechanger.remote.operator import Takeover, interruption
 
 CAMERA: Final = "camera"
 """Name of the picture in an observation."""

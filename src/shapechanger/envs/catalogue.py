@@ -238,7 +238,7 @@ def register_all() -> None:
         (WAYPOINT_ENVS, "WaypointEnv", _EPISODE_STEPS),
     ):
         for env_id, (vehicle, _) in envs.items():
-            entry_point = f"shapechanger.envs.vehicle:{kind}"
+            entry_point = f"shapechanger.vehicles.envs:{kind}"
             _register(env_id, entry_point, limit, kwargs={"vehicle": vehicle})
     for env_id, task in FINGER_ENVS.items():
         _register(env_id, task.entry_point, task.episode_steps)
@@ -247,8 +247,8 @@ def register_all() -> None:
     for env_id, entry_point, limit in (
         (REMOTE_FINGER, f"{remote}.finger:RemoteFingerEnv", reach.episode_steps),
         (REMOTE_FINGER_TRACK, f"{remote}.finger:RemoteFingerTrackEnv", track.episode_steps),
-        (REMOTE_VEHICLE, f"{remote}.vehicle:RemoteVehicleEnv", None),
-        (REMOTE_WAYPOINT, f"{remote}.waypoints:RemoteWaypointEnv", None),
+        (REMOTE_VEHICLE, "shapechanger.remote.env:RemoteVehicleEnv", None),
+        (REMOTE_WAYPOINT, "shapechanger.vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):
         _register(env_id, entry_point, limit, nondeterministic=True)  # A robot.
 

@@ -12,7 +12,6 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.envs.remote.vehicle import KNOWN_ROBOT, OnReset, RemoteVehicleEnv
 from shapechanger.errors import FingerError, RobotRefused, UnknownName, check_seed
 from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.env import FingerEnv, check_posture
@@ -26,6 +25,7 @@ from shapechanger.finger.rig import LengthApproach, RigSenses, StartApproach
 from shapechanger.finger.task import FingerSenses
 from shapechanger.finger.track import FingerTrackEnv
 from shapechanger.link.messages import Pace
+from shapechanger.remote.env import KNOWN_ROBOT, OnReset, RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 

@@ -93,7 +93,7 @@ class Board:
                 latest_only=is_real,
                 start_ns=clock.now_ns(),
                 seed=seed,
-                barcode=not settings.place.world,
+                barcode=not settings.place.opener,
             )
         listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         listening.bind(files.socket_path)

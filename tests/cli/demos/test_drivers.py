@@ -15,10 +15,10 @@ from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.drivers import Act, CorrectedPilot
-from shapechanger.envs.vehicle import RangesEnv
-from shapechanger.envs.vehicle.base import DrivingEnv
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
+from shapechanger.vehicles.envs import RangesEnv
+from shapechanger.vehicles.envs.base import DrivingEnv
 from tests.demos.corridor_env import CorridorEnv, Shows
 
 
@@ -104,7 +104,7 @@ def test_a_policy_with_other_inputs_is_refused(tmp_path: Path) -> None:
         pilot_of(CorridorEnv("both"), policy, "", 0)
     with pytest.raises(PolicyError, match=r"battery.*gets none"):
         pilot_of(CorridorEnv("picture"), clone(tmp_path / "state.safetensors"), "", 0)
-    from shapechanger.envs.vehicle.drivers import CLONES
+    from shapechanger.vehicles.envs.demonstrators import CLONES
 
     with pytest.raises(DemosError, match="drives by pictures"):
         pilot_of(CorridorEnv("state"), str(CLONES["car"]), "", 0)

@@ -9,7 +9,7 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.episodes import episodes_of, read_episode
-from shapechanger.envs.vehicle.drivers import CLONES
+from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.cli.demos.test_demos import output_of, refused
 
 SHORT = ("--minutes", "0.05", "--episode-s", "2", "--options", '{"size": [64, 48]}')
@@ -101,7 +101,7 @@ def test_ctrl_c_leaves_whole_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 130, and the episode is closed."""
-    from shapechanger.envs.vehicle.drivers import VehicleDemonstrator
+    from shapechanger.vehicles.envs.demonstrators import VehicleDemonstrator
 
     acts = VehicleDemonstrator.act
     calls = iter(range(100))

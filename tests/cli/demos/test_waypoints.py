@@ -18,12 +18,12 @@ from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
-from shapechanger.envs.vehicle import WaypointEnv
-from shapechanger.envs.waypoints import ACTION_LAYOUT, SteeringResponse
 from shapechanger.errors import DemosError, WorldError
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.settings import CloningSettings
+from shapechanger.vehicles.envs import WaypointEnv
+from shapechanger.vehicles.waypoints import ACTION_LAYOUT, SteeringResponse
 
 _ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
 _STATE = Layout(

@@ -17,6 +17,7 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.robot import Operator
 from shapechanger.twin.start import start_board
 from shapechanger.twin.world.place import Place
+from shapechanger.vehicles.twin import course_place
 from tests.robots import CAR, changed, write_profile
 
 pytestmark = pytest.mark.realtime
@@ -29,10 +30,10 @@ def _shipped(name: str) -> Profile:
 @pytest.mark.parametrize(
     ("name", "place"),
     [
-        ("lab-car", Place("corridor", "car")),
-        ("lab-tank", Place("corridor", "tank")),
-        ("lab-truck", Place("yard", "truck")),
-        ("lab-boat", Place("harbour", "boat")),
+        ("lab-car", course_place("corridor", "car")),
+        ("lab-tank", course_place("corridor", "tank")),
+        ("lab-truck", course_place("yard", "truck")),
+        ("lab-boat", course_place("harbour", "boat")),
         ("cat", Place()),
         ("finger", Place(finger=NOMINAL.to_json())),
         ("finger-pwm", Place()),
@@ -55,8 +56,8 @@ def test_a_finger_of_a_gap() -> None:
 def test_lenses_apply_to_the_default_world() -> None:
     """Lenses keep their order."""
     place = place_of(_shipped("lab-car"), "", ("night", "dirt"))
-    assert place == Place("corridor", "car", ("night", "dirt"))
-    assert place_of(_shipped("lab-car"), "yard", ()) == Place("yard", "car")
+    assert place == course_place("corridor", "car", ("night", "dirt"))
+    assert place_of(_shipped("lab-car"), "yard", ()) == course_place("yard", "car")
 
 
 def test_the_room_takes_any_robot() -> None:
@@ -80,7 +81,7 @@ def test_without_mujoco_the_default_is_the_room(monkeypatch: pytest.MonkeyPatch)
         serving, "find_spec", lambda name: found(name) if name != "mujoco" else None
     )
     assert place_of(_shipped("lab-car"), "", ()) == Place()
-    monkeypatch.setitem(__import__("sys").modules, "shapechanger.bodies.vehicles", None)
+    monkeypatch.setitem(__import__("sys").modules, "shapechanger.vehicles.bodies", None)
     with pytest.raises(MissingExtra, match=r"shapechanger\[sim\]"):
         place_of(_shipped("lab-car"), "corridor", ())
 

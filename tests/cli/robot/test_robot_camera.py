@@ -14,7 +14,7 @@ from shapechanger.cli import main
 from shapechanger.robot.profile.load import load_profile
 from tests.demos.exchange.small import huge
 from tests.robots import CAR, write_profile
-from tests.worlds.test_rectify import board_picture
+from tests.vehicles.cameras.test_rectify import board_picture
 
 
 @pytest.fixture(autouse=True)

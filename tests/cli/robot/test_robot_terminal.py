@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.envs.remote.vehicle import RemoteVehicleEnv
+from shapechanger.remote.env import RemoteVehicleEnv
 from shapechanger.remote.known_robots import KnownRobot, remember
 from shapechanger.twin.robot import run_robot
 from tests.cli.robot.typing import Person

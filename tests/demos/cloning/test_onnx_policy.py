@@ -16,8 +16,8 @@ from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
 from shapechanger.demos.cloning.pictures import CloningError, Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.layout import Feature, Layout
+from shapechanger.vehicles.envs.demonstrators import CLONES
 
 _FRAMING = Framing(height=24, width=32)
 _STATE = Layout((Feature("speed", "m/s"), Feature("distance", "m"), Feature("bump", "1")))

@@ -16,9 +16,9 @@ import torch
 from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
-from shapechanger.envs.vehicle.drivers import CLONES
 from shapechanger.errors import OutputError
 from shapechanger.tensor_file import read_tensors, tensor_bytes
+from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.demos.cloning.small import SMALL, demonstrations
 
 _PICTURES = demonstrations(20, 0).pictures

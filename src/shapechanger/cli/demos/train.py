@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.judge import Judgement
     from shapechanger.demos.cloning.learn import MemberCheck
     from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.envs.waypoints import SteeringResponse
     from shapechanger.transfer.learners.settings import CloningSettings
+    from shapechanger.vehicles.waypoints import SteeringResponse
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ def _view(camera: tuple[float, float] | None) -> CanonicalView:
 
 
 def _response(given: tuple[float, float] | None) -> SteeringResponse | None:
-    from shapechanger.envs.waypoints import SteeringResponse
+    from shapechanger.vehicles.waypoints import SteeringResponse
 
     return None if given is None else SteeringResponse(*given)
 

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 from shapechanger.demos.dataset import Dataset
 from shapechanger.demos.episodes import EpisodeHeader
-from shapechanger.envs.waypoints import (
+from shapechanger.errors import DemosError, StudyError
+from shapechanger.layout import Layout
+from shapechanger.vehicles.cameras.rectify import HALF_WIDTH_RAD, CameraGeometry, Rectifier
+from shapechanger.vehicles.waypoints import (
     ACTION_LAYOUT,
     WIDEST_RAD,
     SteeringResponse,
     fit_response,
     waypoints_of,
 )
-from shapechanger.errors import DemosError, StudyError
-from shapechanger.layout import Layout
-from shapechanger.worlds.rectify import HALF_WIDTH_RAD, CameraGeometry, Rectifier
 
 _COMMANDS: Final = ("steering", "throttle")
 _MOTION: Final = ("steering/applied", "speed", "yaw_rate")

@@ -20,7 +20,7 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:
-    from shapechanger.worlds.rectify import CameraGeometry
+    from shapechanger.vehicles.cameras.rectify import CameraGeometry
 
 # As in a profile.
 _LEAST_FOVY_DEG: Final = 10.0
@@ -85,7 +85,11 @@ class CameraView:
         self, picture: NDArray[np.uint8], corners: tuple[int, int] | None, stated: CameraPlan
     ) -> CameraGeometry:
         """Measure the geometry, and print how certain it is."""
-        from shapechanger.worlds.rectify import CameraGeometry, measure_camera, pitch_of_horizon
+        from shapechanger.vehicles.cameras.rectify import (
+            CameraGeometry,
+            measure_camera,
+            pitch_of_horizon,
+        )
 
         if corners is not None:
             found = measure_camera(picture, corners, self.fovy)
@@ -118,7 +122,7 @@ def _corners(board: str) -> tuple[int, int]:
 
 def _stated(profile: Profile) -> CameraGeometry:
     """Return the geometry that a profile states."""
-    from shapechanger.worlds.rectify import CameraGeometry
+    from shapechanger.vehicles.cameras.rectify import CameraGeometry
 
     camera = profile.camera
     if camera is None or camera.pitch_deg is None or camera.fovy_deg is None:
@@ -165,7 +169,7 @@ def _decoded(jpeg: bytes, subject: str) -> NDArray[np.uint8]:
 
 def _drawing(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np.uint8]:
     """Return the picture with the virtual camera's view drawn in, and that view beside it."""
-    from shapechanger.worlds.rectify import CANONICAL_SIZE, Rectifier, draw_view
+    from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE, Rectifier, draw_view
 
     height, width = (int(n) for n in picture.shape[:2])
     seen = Rectifier(geometry, (width, height))(picture)

@@ -23,8 +23,8 @@ from shapechanger.remote.known_robots import KnownRobot, recall
 from shapechanger.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
 
 if TYPE_CHECKING:
-    from shapechanger.envs.remote.pilot import DrivingPolicy, PolicyDriver
     from shapechanger.remote.client import RobotClient
+    from shapechanger.vehicles.remote.pilot import DrivingPolicy, PolicyDriver
 
 _LOOK_EVERY_S: Final = 0.2
 
@@ -301,8 +301,8 @@ class Driving:
 
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
-    from shapechanger.envs.remote.pilot import Origin, PolicyDriver, RobotFacts, require_fit
     from shapechanger.remote.client import RobotClient
+    from shapechanger.vehicles.remote.pilot import Origin, PolicyDriver, RobotFacts, require_fit
 
     policy: DrivingPolicy
     origin = Origin()

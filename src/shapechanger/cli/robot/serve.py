@@ -48,13 +48,13 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.twin.start import BoardAt, find_board, start_board
 from shapechanger.twin.world.place import Place
-from shapechanger.worlds.course import HOME, require_element
+from shapechanger.vehicles.courses.course import HOME, require_element
 
 _HERE: Final = "127.0.0.1"
 _LOOK_EVERY_S: Final = 0.1
 _EVERYWHERE: Final = "0.0.0.0"
 _ROOM: Final = "room"
-_PILOT: Final = "shapechanger.envs.remote.pilot"
+_PILOT: Final = "shapechanger.vehicles.remote.pilot"
 # A twin's clock is paused while it renders, and a guard that waits for it is alive.
 _TWIN_PATIENCE_MS: Final = 10_000
 
@@ -270,7 +270,7 @@ class Serve:
         if self.policy is None:
             return
         from shapechanger.demos.cloning.onnx_policy import OnnxClone
-        from shapechanger.envs.remote.pilot import Origin, RobotFacts, require_fit
+        from shapechanger.vehicles.remote.pilot import Origin, RobotFacts, require_fit
 
         files = [self.policy]
         if self.policy.is_dir():
@@ -411,14 +411,15 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
             raise RobotError("The plain room has a plain camera: choose a --world for a --lens.")
         return Place()
     try:
-        from shapechanger.bodies.vehicles import VEHICLES, require_fit
-        from shapechanger.worlds.layout import WORLDS
-        from shapechanger.worlds.lens import find_lens
+        from shapechanger.vehicles.bodies import VEHICLES, require_fit
+        from shapechanger.vehicles.cameras.corruptions import find_corruption
+        from shapechanger.vehicles.courses.layout import WORLDS
+        from shapechanger.vehicles.twin import course_place
     except ModuleNotFoundError as error:
         raise MissingExtra(error.name or "mujoco", "sim") from error
 
     for lens in lenses:
-        find_lens(lens)
+        find_corruption(lens)
     if not world and not lenses and (finger := finger_of(profile, "", None)) is not None:
         return finger
     if world and world not in WORLDS:
@@ -429,7 +430,7 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
             require_fit(profile.body, parts)
         except (ProfileError, UnknownName):
             return Place()
-        return Place(HOME[profile.body], profile.body, tuple(lenses))
+        return course_place(HOME[profile.body], profile.body, lenses)
     if profile.body not in VEHICLES:
         raise ProfileError(
             f"{profile.path}: there is no {profile.body} in MuJoCo, only {', '.join(VEHICLES)}; "
@@ -437,7 +438,7 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
         )
     require_fit(profile.body, parts)
     require_element(profile.body, floats=VEHICLES[profile.body].floats, world=world)
-    return Place(world, profile.body, tuple(lenses))
+    return course_place(world, profile.body, lenses)
 
 
 def make_known(robot: KnownRobot) -> str:

@@ -143,7 +143,7 @@ def _drive_by_policy(robot: KnownRobot) -> None:
 
     from shapechanger.demos.cloning.card import CloneCard
     from shapechanger.demos.cloning.pictures import Framing
-    from shapechanger.envs.remote.pilot import PolicyDriver
+    from shapechanger.vehicles.remote.pilot import PolicyDriver
 
     with RobotClient.connect(robot, frames=False) as client:
         actions = Layout.from_json(client.welcome.action_layout)

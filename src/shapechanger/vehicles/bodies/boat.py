@@ -1,0 +1,504 @@
+"""Boat: a hull with a central propeller and a rudder, and twin propellers as an alternative.
+
+A robot drives either the central propeller and the rudder, or the twins; parts that it does not
+drive stay still and have no effect.
+
+Surge u points ahead and sway v to the left; the rate of turn r is counter-clockwise. All are
+relative to the water. X and Y are forces, N, and N is the moment about the middle, N·m. Names
+follow T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., Wiley 2021.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import mujoco
+
+from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs, VehicleModel
+from shapechanger.vehicles.bodies.parts import (
+    HOBBY_MOTOR,
+    HOBBY_SERVO,
+    CameraMount,
+    add_camera,
+    add_hull,
+)
+from shapechanger.vehicles.bodies.shapes import (
+    Faces,
+    block,
+    extrude,
+    hull,
+    loft,
+    moved,
+    rod,
+    section,
+)
+from shapechanger.vehicles.bodies.visuals import Paint, add_shadow, dress, joined
+
+_WATER_DENSITY: Final = 1000.0  # kg/m3, fresh
+# Share of its full speed that the wash has reached at the rudder: 0.6 for hulls in H. Yasukawa and
+# Y. Yoshimura, Introduction of MMG standard method, J. Mar. Sci. Technol. 20 (2015).
+_CONTRACTED: Final = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Hull:
+    """Masses, added masses, drag and lift of a hull.
+
+    Attributes:
+        mass: Dry mass, kg.
+        inertia: Dry moment of inertia about the vertical axis, kg·m2.
+        added_surge: Added mass ahead, kg: water that accelerates with the hull.
+        added_sway: Added mass to the side, kg.
+        added_yaw: Added moment of inertia, kg·m2.
+        surge: Linear drag ahead, N·s/m.
+        surge_2: Quadratic drag ahead, N·s2/m2.
+        sway: Linear drag to the side, N·s/m.
+        sway_2: Quadratic drag to the side, N·s2/m2.
+        sway_lift: Lift coefficient of the hull as a wing, times speed and sway, N·s2/m2.
+        yaw: Linear drag of a turn, N·m·s.
+        yaw_2: Quadratic drag of a turn, N·m·s2.
+        yaw_lift: Lift moment of the hull as a wing, times speed and rate of turn, N·s2.
+    """
+
+    mass: float
+    inertia: float
+    added_surge: float
+    added_sway: float
+    added_yaw: float
+    surge: float
+    surge_2: float
+    sway: float
+    sway_2: float
+    sway_lift: float
+    yaw: float
+    yaw_2: float
+    yaw_lift: float
+
+    def acceleration(
+        self, u: float, v: float, r: float, x: float, y: float, n: float
+    ) -> tuple[float, float, float]:
+        """Rates of change of u, v and r under the forces of propellers and rudder.
+
+        These are the manoeuvring equations in three degrees of freedom (Fossen, chapter 6) with
+        the Coriolis terms of different masses along and across.
+
+        Args:
+            u: Surge, m/s.
+            v: Sway, m/s.
+            r: Rate of turn, rad/s.
+            x: Force ahead, N.
+            y: Force to the left, N.
+            n: Moment, N·m.
+        """
+        along, across = self.mass + self.added_surge, self.mass + self.added_sway
+        pace = math.hypot(u, v)
+        x += across * v * r - (self.surge + self.surge_2 * abs(u)) * u
+        y += -along * u * r - (self.sway + self.sway_2 * abs(v) + self.sway_lift * pace) * v
+        n += (along - across) * u * v
+        n -= (self.yaw + self.yaw_2 * abs(r) + self.yaw_lift * pace) * r
+        return x / along, y / across, n / (self.inertia + self.added_yaw)
+
+
+@dataclass(frozen=True, slots=True)
+class Propeller:
+    """A propeller whose thrust and torque are linear in the advance ratio J = V / (n D).
+
+    Attributes:
+        diameter: Diameter, m.
+        thrust: Thrust coefficient at J = 0.
+        thrust_ends: J at which the thrust is 0.
+        torque: Torque coefficient at J = 0.
+        torque_ends: J at which the torque is 0.
+        astern: Share of thrust and torque when turning backwards.
+        wake: Speed of the water at the propeller, as a share of the boat's.
+        pushes: Share of the thrust that moves the boat; the rest is thrust deduction.
+    """
+
+    diameter: float
+    thrust: float
+    thrust_ends: float
+    torque: float
+    torque_ends: float
+    astern: float
+    wake: float
+    pushes: float
+
+    def loads(self, n: float, u: float) -> tuple[float, float]:
+        """Thrust, N, and torque, N·m.
+
+        Args:
+            n: Turns per second; negative is backwards.
+            u: Speed of the boat through the water, m/s.
+        """
+        inflow = self.wake * u / self.diameter
+        common = _WATER_DENSITY * self.diameter**4 * abs(n) * (self.astern if n < 0.0 else 1.0)
+        thrust = common * self.thrust * (n - inflow / self.thrust_ends)
+        torque = common * self.diameter * self.torque * (n - inflow / self.torque_ends)
+        return thrust, torque
+
+    def wash(self, thrust: float, u: float) -> float:
+        """Speed of the water behind the propeller, m/s, by momentum theory.
+
+        Args:
+            thrust: Thrust, N.
+            u: Speed of the boat through the water, m/s.
+        """
+        ahead = self.wake * u
+        if thrust <= 0.0 or ahead < 0.0:
+            return ahead
+        disc = math.pi * self.diameter**2 / 4
+        far = math.sqrt(ahead * ahead + 2.0 * thrust / (_WATER_DENSITY * disc))
+        return ahead + _CONTRACTED * (far - ahead)
+
+
+@dataclass(frozen=True, slots=True)
+class Fin:
+    """A rudder or a skeg: a vertical plate in the water.
+
+    Attributes:
+        x: Position ahead of the middle, m; negative.
+        height: Height, m.
+        chord: Length along the flow, m.
+    """
+
+    x: float
+    height: float
+    chord: float
+
+    @property
+    def lift(self) -> float:
+        """Normal force over the sine of the angle and the square of the speed, N·s2/m2.
+
+        The slope 6.13 Λ / (Λ + 2.25) of a plate with the aspect ratio Λ is Fujii's; see Yasukawa
+        and Yoshimura (2015).
+        """
+        aspect = self.height / self.chord
+        slope = 6.13 * aspect / (aspect + 2.25)
+        return 0.5 * _WATER_DENSITY * self.height * self.chord * slope
+
+    def force(self, flow: float, v: float, r: float, angle: float) -> tuple[float, float, float]:
+        """Forces X and Y, N, and moment N, N·m.
+
+        Args:
+            flow: Speed of the water from ahead, m/s.
+            v: Sway, m/s.
+            r: Rate of turn, rad/s.
+            angle: Angle of the blade, rad, counter-clockwise; a negative one turns the boat left.
+        """
+        aside = v + self.x * r
+        sine, cosine = math.sin(angle), math.cos(angle)
+        normal = self.lift * math.hypot(flow, aside) * (flow * sine - aside * cosine)
+        across = normal * cosine
+        return -normal * sine, across, self.x * across
+
+
+_LENGTH: Final = 0.60  # m
+_WIDTH: Final = 0.20  # m
+_DRAUGHT: Final = 0.04  # m
+_BLOCK: Final = 0.55  # Block coefficient, usual for workboats.
+_MASS: Final = _WATER_DENSITY * _BLOCK * _LENGTH * _WIDTH * _DRAUGHT
+
+# Radius of gyration in yaw over length: 0.25, the usual estimate for ships (Fossen, chapter 6).
+_INERTIA: Final = _MASS * (0.25 * _LENGTH) ** 2
+# Added masses as shares of the dry ones are those of CyberShip II, a model of 1.26 m: R. Skjetne,
+# T. I. Fossen and P. Kokotović, Adaptive maneuvering, Automatica 41 (2005), table of parameters.
+_ADDED_SURGE: Final = 2.0 / 23.8
+_ADDED_SWAY: Final = 10.0 / 23.8
+_ADDED_YAW: Final = 1.0 / 1.76
+# Wetted surface and drag coefficient at a Froude number near 0.5: estimates. Friction alone gives
+# about 0.005 by the ITTC 1957 line, waves the rest.
+_WETTED: Final = 0.8 * _LENGTH * (_WIDTH + 2.0 * _DRAUGHT)  # m2
+_SURGE_COEFFICIENT: Final = 0.0135
+# Cross-flow drag of a hull with rounded bilges, an estimate after Hoerner in Fossen's chapter 6.
+_CROSSFLOW_COEFFICIENT: Final = 0.7
+
+# A hull with drift acts as a low wing. Clarke, Gedling and Hine's formulas (1983; in
+# Fossen, chapter 6) for the derivatives Y_v and N_r, from length L, beam B, draught T and block.
+_WING: Final = math.pi * (_DRAUGHT / _LENGTH) ** 2
+_SWAY_LIFT: Final = _WING * (1.0 + 0.4 * _BLOCK * _WIDTH / _DRAUGHT)
+_YAW_LIFT: Final = _WING * (0.25 + 0.039 * _WIDTH / _DRAUGHT - 0.56 * _WIDTH / _LENGTH)
+
+_HULL: Final = Hull(
+    mass=_MASS,
+    inertia=_INERTIA,
+    added_surge=_ADDED_SURGE * _MASS,
+    added_sway=_ADDED_SWAY * _MASS,
+    added_yaw=_ADDED_YAW * _INERTIA,
+    # Linear terms are estimates: they equal the quadratic ones at 0.1 m/s, and at 0.5 rad/s in yaw.
+    surge=0.1 * 0.5 * _WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT,
+    surge_2=0.5 * _WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT,
+    sway=0.1 * 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH,
+    sway_2=0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH,
+    sway_lift=0.5 * _WATER_DENSITY * _LENGTH**2 * _SWAY_LIFT,
+    # Cross-flow drag integrated over the length, for a turn about the middle.
+    yaw=0.5 * 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH**4 / 32.0,
+    yaw_2=0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH**4 / 32.0,
+    yaw_lift=0.5 * _WATER_DENSITY * _LENGTH**4 * _YAW_LIFT,
+)
+
+# Linear fits by eye to the open-water curves of a Wageningen B3-50 propeller with a pitch of 0.9
+# diameters (M. Oosterveld and P. van Oossanen 1975). Astern about half is left: an estimate.
+_PROPELLER: Final = Propeller(
+    diameter=0.035,
+    thrust=0.38,
+    thrust_ends=0.95,
+    torque=0.045,
+    torque_ends=1.1,
+    astern=0.5,
+    wake=0.85,
+    pushes=0.9,
+)
+_TWIN: Final = Propeller(0.028, 0.38, 0.95, 0.045, 1.1, 0.5, 0.9, 0.9)
+# Propeller of each part, and its position to the left, m.
+_PROPELLERS: Final = {
+    "propeller": (_PROPELLER, 0.0),
+    "left propeller": (_TWIN, 0.07),
+    "right propeller": (_TWIN, -0.07),
+}
+_SHAFT_X: Final = -0.23  # m
+
+# The motor with a gear of 2.5:1 instead of its own 4.4:1, as sold for model boats.
+_MOTOR: Final = HOBBY_MOTOR.geared(2.5 / 4.4)
+_PROPELLER_INERTIA: Final = 2e-6  # kg·m2, with entrained water: an estimate
+
+_RUDDER: Final = Fin(x=-0.27, height=0.045, chord=0.035)
+_SKEG: Final = Fin(x=-0.20, height=0.035, chord=0.10)
+_FULL_RUDDER: Final = math.radians(35.0)  # The usual limit of ships.
+
+_CAMERA: Final = CameraMount(x=0.16, y=0.0, z=0.14, pitch_rad=math.radians(3.0))
+
+_TURN: Final = 2.0 * math.pi
+
+
+class Floating(BoundVehicle):
+    """The boat in a simulation. It moves in the plane only: no heave, roll or pitch.
+
+    The simulated body has the dry mass. The applied force is that mass times the acceleration of
+    the manoeuvring equations.
+
+    Args:
+        model: Compiled model with the boat.
+        data: Its state.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        super().__init__(model, data, dict.fromkeys(_PROPELLERS, _MOTOR))
+        self._dt = float(model.opt.timestep)
+        self._shafts = {part: int(model.joint(f"vehicle/{part}").dofadr[0]) for part in _PROPELLERS}
+        # Three joints in a row: x, y and yaw.
+        self._qpos0 = int(model.joint("vehicle/chassis x").qposadr[0])
+        self._qvel0 = int(model.joint("vehicle/chassis x").dofadr[0])
+        self._rudder = int(model.joint("vehicle/rudder").qposadr[0])
+        self._servo = int(model.actuator("vehicle/rudder").id)
+        self._push = data.qfrc_applied
+        self._log_m = 0.0
+        self._logged_s = 0.0
+
+    def _place_chassis(self, x: float, y: float, heading: float) -> None:
+        p, v = self._qpos0, self._qvel0
+        self._qpos[p : p + 3] = (x, y, heading)
+        self._qvel[v : v + 3] = 0.0
+        self._log_m = 0.0
+        self._logged_s = float(self._data.time)
+
+    def drive(self, outputs: Outputs, battery_v: float) -> None:
+        """Apply outputs and the forces of the water."""
+        rudder = outputs.get("rudder", 0.0)
+        if rudder is not None:
+            self._ctrl[self._servo] = min(1.0, max(-1.0, rudder)) * _FULL_RUDDER
+        super().drive(outputs, battery_v)
+        # Twin propellers steer without a rudder.
+        self._apply_water("rudder" in outputs or "propeller" in outputs)
+
+    def motion(self) -> Motion:
+        """Current pose, and velocity over ground."""
+        heading, cosine, sine, vx, vy, r = self._state()
+        x, y = self._qpos[self._qpos0 : self._qpos0 + 2].tolist()
+        ahead, left = vx * cosine + vy * sine, vy * cosine - vx * sine
+        return Motion(x, y, math.remainder(heading, _TURN), ahead, left, r)
+
+    def travelled_m(self) -> float:
+        """Distance through the water since `place`; astern counts down."""
+        return self._log_m
+
+    def _state(self) -> tuple[float, float, float, float, float, float]:
+        """Heading, its cosine and sine, speeds along the world's axes, and rate of turn."""
+        heading = float(self._qpos[self._qpos0 + 2])
+        vx, vy, r = self._qvel[self._qvel0 : self._qvel0 + 3].tolist()
+        return heading, math.cos(heading), math.sin(heading), vx, vy, r
+
+    def _apply_water(self, has_rudder: bool) -> None:
+        """Apply the forces of the water to the hull and the propellers."""
+        _, cosine, sine, vx, vy, r = self._state()
+        wx, wy = vx - self._flow[0], vy - self._flow[1]
+        u, v = wx * cosine + wy * sine, wy * cosine - wx * sine
+        now_s = float(self._data.time)
+        # Whole steps, so that the same drive is as long at any time.
+        steps = round((now_s - self._logged_s) / self._dt)
+        self._log_m += u * self._dt * steps
+        self._logged_s = now_s
+        x, y, n = _SKEG.force(u, v, r, 0.0)
+        flow = u
+        for part, (propeller, beside) in _PROPELLERS.items():
+            rate, dof = self._drives[part].rate(), self._shafts[part]
+            if abs(rate) < 1e-3:  # Stopped: neither thrust nor torque.
+                self._push[dof] = 0.0
+                continue
+            thrust, torque = propeller.loads(rate / _TURN, u)
+            self._push[dof] = -torque
+            x += propeller.pushes * thrust
+            n -= propeller.pushes * thrust * beside
+            if part == "propeller":
+                flow = _flow_at_rudder(thrust, u)
+        if has_rudder:
+            rx, ry, rn = _RUDDER.force(flow, v, r, float(self._qpos[self._rudder]))
+            x, y, n = x + rx, y + ry, n + rn
+        du, dv, dr = _HULL.acceleration(u, v, r, x, y, n)
+        # From rates in the turning frame of the boat to the acceleration in the world. A uniform
+        # flow adds nothing, because u and v are relative to it.
+        along, across = _HULL.mass * (du - r * v), _HULL.mass * (dv + r * u)
+        i = self._qvel0
+        self._push[i] = along * cosine - across * sine
+        self._push[i + 1] = along * sine + across * cosine
+        self._push[i + 2] = _HULL.inertia * dr
+
+
+def _flow_at_rudder(thrust: float, u: float) -> float:
+    """Speed of the water at the rudder, m/s, part of which is in the propeller's wash.
+
+    Squares of speeds are averaged over the height, because forces are proportional to them.
+
+    Args:
+        thrust: Thrust of the central propeller, N.
+        u: Speed of the boat through the water, m/s.
+    """
+    if thrust <= 0.0 or u < 0.0:
+        return u
+    share = min(1.0, _PROPELLER.diameter / _RUDDER.height)
+    return math.sqrt(share * _PROPELLER.wash(thrust, u) ** 2 + (1.0 - share) * u * u)
+
+
+def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
+    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    box, ellipsoid = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_ELLIPSOID
+    chassis = spec.worldbody.add_body(name="vehicle/chassis")
+    chassis.add_joint(name="vehicle/chassis x", type=slide, axis=[1.0, 0.0, 0.0])
+    chassis.add_joint(name="vehicle/chassis y", type=slide, axis=[0.0, 1.0, 0.0])
+    chassis.add_joint(name="vehicle/chassis yaw", type=hinge, axis=[0.0, 0.0, 1.0])
+    chassis.explicitinertial = True
+    chassis.mass = _MASS
+    chassis.inertia = [0.1 * _INERTIA, _INERTIA, _INERTIA]
+    # Collision geoms: a box amidships and a rounded bow, without mass.
+    add_hull(chassis, "vehicle/hull", box, (-0.06, 0.0, 0.02), (0.24, _WIDTH / 2, 0.05), 0.0)
+    bow = (0.16, 0.0, 0.02), (0.14, _WIDTH / 2, 0.05)
+    add_hull(chassis, "vehicle/bow", ellipsoid, *bow, 0.0)
+    dress(chassis, _bodywork(), paint)
+    add_shadow(chassis, (-0.29, -0.08), (0.20, 0.08), paint)
+    for part, (_, y) in _PROPELLERS.items():
+        _add_propeller(spec, chassis, part, y)
+    _add_rudder(spec, chassis, paint)
+    add_camera(chassis, _CAMERA)
+
+
+@functools.cache
+def _bodywork() -> Mapping[str, Faces]:
+    """A workboat above its waterline, with the camera on its foredeck: colours and faces."""
+    deep = 0.058
+    cabin = ((-0.17, 0.108), (0.01, 0.108), (0.045, 0.056))
+    house = [section(x, [(0.062, 0.054), (0.056, z)]) for x, z in cabin]
+    screen = [
+        section(x, [(0.050, z - 0.001), (0.050, z)]) for x, z in ((0.0165, 0.101), (0.038, 0.069))
+    ]
+    z = _CAMERA.z
+    parts = [
+        ("white", hull(_LENGTH, 0.192, deep)),
+        ("orange", hull(_LENGTH + 0.004, 0.198, deep, low=0.72)),  # Rubbing strake.
+        ("deck", hull(0.94 * _LENGTH, 0.164, deep + 0.002, low=0.9)),
+        ("white", loft(house)),
+        ("glass", moved(loft(screen), (0.003, 0.0, 0.002))),
+        ("orange", block((-0.185, -0.064, 0.107), (0.022, 0.064, 0.113))),
+        ("dark", rod((-0.03, 0.0, 0.113), (-0.03, 0.0, 0.20), 0.003, 8)),  # Mast.
+        ("white", block((-0.034, -0.028, 0.165), (-0.026, 0.028, 0.172))),  # Radar.
+        ("dark", rod((-0.12, 0.0, 0.112), (-0.128, 0.0, 0.150), 0.014, 10)),  # Funnel.
+        ("orange", rod((-0.121, 0.0, 0.122), (-0.123, 0.0, 0.134), 0.0148, 10)),
+        ("grey", block((-0.275, -0.045, 0.058), (-0.205, 0.045, 0.072))),  # Hatch.
+        ("dark", rod((0.15, 0.0, 0.06), (0.15, 0.0, z - 0.006), 0.004, 8)),
+        ("dark", block((0.134, -0.013, z - 0.011), (0.157, 0.013, z + 0.011))),
+        ("steel", rod((0.156, 0.0, z), (0.1595, 0.0, z), 0.007)),
+    ]
+    for side in (-1.0, 1.0):
+        y = side * 0.0612
+        parts += [
+            ("glass", block((x, y - 0.003, 0.078), (x + 0.032, y + 0.0025, 0.099)))
+            for x in (-0.155, -0.110, -0.065, -0.020)
+        ]
+        posts = [
+            (-0.26, 0.079),
+            (-0.19, 0.088),
+            (-0.10, 0.091),
+            (0.0, 0.089),
+            (0.09, 0.082),
+            (0.18, 0.058),
+            (0.26, 0.024),
+        ]
+        tops = [(x, side * w, 0.088 + 0.03 * max(0.0, x)) for x, w in posts]
+        parts += [("steel", rod((x, v, 0.055), (x, v, h), 0.0013, 5)) for x, v, h in tops]
+        parts += [("steel", rod(a, b, 0.0013, 5)) for a, b in pairwise(tops)]
+        parts += [
+            ("dark", rod((x, 1.62 * y, 0.018), (x, 1.62 * y, 0.045), 0.008, 8))
+            for x in (-0.18, -0.02)
+        ]
+    return joined(parts)
+
+
+def _add_propeller(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, part: str, y: float) -> None:
+    """Add a propeller, below the water and so not drawn; `y` is its position to the left, m."""
+    name = f"vehicle/{part}"
+    # Its weight is part of the hull's, so that the centre of mass stays amidships.
+    shaft = chassis.add_body(name=name, pos=[_SHAFT_X, y, -_DRAUGHT])
+    shaft.explicitinertial = True
+    shaft.mass = 1e-4
+    shaft.inertia = [1e-8, 1e-8, 1e-8]
+    shaft.add_joint(
+        name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[1.0, 0.0, 0.0],
+        armature=_MOTOR.rotor_inertia + _PROPELLER_INERTIA,
+    )  # fmt: skip
+    _MOTOR.add(spec, name).wrap_joint(name, 1.0)
+
+
+def _add_rudder(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> None:
+    name = "vehicle/rudder"
+    stock = chassis.add_body(name=name, pos=[_RUDDER.x, 0.0, -_DRAUGHT])
+    stock.explicitinertial = True
+    stock.mass = 1e-4
+    stock.inertia = [1e-8, 1e-8, 1e-8]
+    stock.add_joint(
+        name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0],
+        damping=HOBBY_SERVO.damping, armature=2e-4,
+    )  # fmt: skip
+    # The rudder's head turns behind the transom.
+    head = extrude(
+        [(-0.058, 0.042), (-0.034, 0.042), (-0.036, 0.105), (-0.050, 0.105)], -0.003, 0.003
+    )
+    dress(stock, {"deck": head}, paint, ground_z=_DRAUGHT)
+    HOBBY_SERVO.add(spec, name, name)
+
+
+BOAT: Final = VehicleModel(
+    name="boat",
+    drives=(frozenset({"propeller", "rudder"}), frozenset({"left propeller", "right propeller"})),
+    length_m=_LENGTH,
+    width_m=_WIDTH,
+    nose_m=_LENGTH / 2,
+    floats=True,
+    camera=_CAMERA,
+    top_speed_mps=1.2,
+    turning_radius_m=0.7,  # At full throttle; measured in a test.
+    build=_build,
+    bind=Floating,
+)

@@ -1,0 +1,209 @@
+"""Interfaces of a vehicle: its model, and the vehicle in a running simulation."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+
+from shapechanger.vehicles.bodies.parts import CameraMount, DcMotor
+from shapechanger.vehicles.bodies.visuals import Paint
+
+Outputs = Mapping[str, float | None]
+"""Output of each part, from -1 to 1; None for a motor that is disconnected.
+
+For a motor it is a share of the battery's voltage, for a servo a share of its travel. Steering
+and rudder are negative to the left. A servo without pulses, None, keeps its last angle.
+"""
+
+
+class Motion(NamedTuple):
+    """Pose of a vehicle seen from above, and its velocity.
+
+    Attributes:
+        x: Position, m.
+        y: Position, m.
+        heading: Angle from the x axis, rad, counter-clockwise.
+        speed: Speed along the heading, m/s; backward is negative.
+        lateral_speed: Speed to the left, m/s.
+        yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
+    """
+
+    x: float
+    y: float
+    heading: float
+    speed: float
+    lateral_speed: float
+    yaw_rate: float
+
+
+class MotorDrive:
+    """A motor in a running simulation, which turns the joints of a tendon.
+
+    Args:
+        model: Compiled model.
+        data: Its state.
+        name: Name of the actuator and the tendon.
+        motor: Properties of the motor.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, name: str, motor: DcMotor
+    ) -> None:
+        self._motor = motor
+        self._actuator = int(model.actuator(name).id)
+        self._tendon = int(model.tendon(name).id)
+        self._ctrl = data.ctrl
+        self._velocity = data.ten_velocity
+        self._angle = data.ten_length
+        self._is_open = False
+
+    def set(self, value: float | None, battery_v: float) -> None:
+        """Set the voltage.
+
+        Args:
+            value: Share of the battery's voltage, -1 to 1; None for a disconnected motor.
+            battery_v: Voltage of the battery.
+        """
+        self._is_open = value is None
+        self._ctrl[self._actuator] = (
+            self._motor.volts_per_speed * self._velocity[self._tendon]
+            if value is None
+            else min(1.0, max(-1.0, value)) * battery_v
+        )
+
+    def current_a(self) -> float:
+        """Current from the battery, A."""
+        if self._is_open:
+            return 0.0
+        volts, speed = self._ctrl[self._actuator], self._velocity[self._tendon]
+        return self._motor.amperes(float(volts), float(speed))
+
+    def turned(self) -> float:
+        """Angle of the shaft, rad."""
+        return float(self._angle[self._tendon])
+
+    def rate(self) -> float:
+        """Speed of the shaft, rad/s."""
+        return float(self._velocity[self._tendon])
+
+
+class BoundVehicle(ABC):
+    """A vehicle in a running simulation. Its origin is on the ground below its middle.
+
+    Args:
+        model: Compiled model with the vehicle.
+        data: Its state.
+        motors: Motor of each driving part; its actuator is named "vehicle/" plus the part.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, motors: Mapping[str, DcMotor]
+    ) -> None:
+        self._model = model
+        self._data = data
+        self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._drives = {
+            part: MotorDrive(model, data, f"vehicle/{part}", motor)
+            for part, motor in motors.items()
+        }
+        self._flow = (0.0, 0.0)
+        # Addresses in qpos and qvel of the joints of wheels, rudders and trailers.
+        self._joints = [
+            (int(joint.qposadr[0]), int(joint.dofadr[0]))
+            for joint in map(model.joint, range(model.njnt))
+            if joint.name.startswith("vehicle/") and not joint.name.startswith("vehicle/chassis")
+        ]
+
+    @abstractmethod
+    def _place_chassis(self, x: float, y: float, heading: float) -> None:
+        """Set position and velocity of the chassis; see `place`."""
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """Put the vehicle at a pose, at rest and with straight wheels.
+
+        Args:
+            x: Position, m.
+            y: Position, m.
+            heading: Angle from the x axis, rad, counter-clockwise.
+        """
+        self._place_chassis(x, y, heading)
+        for qpos, qvel in self._joints:
+            self._qpos[qpos] = 0.0
+            self._qvel[qvel] = 0.0
+        self._ctrl[:] = 0.0
+        self._data.qfrc_applied[:] = 0.0
+        self._data.qacc_warmstart[:] = 0.0
+        mujoco.mj_forward(self._model, self._data)
+
+    def drive(self, outputs: Outputs, battery_v: float) -> None:
+        """Apply outputs and, to a boat, the forces of the water; call it every 10 ms.
+
+        Args:
+            outputs: Output of each part; 0 for those that are missing.
+            battery_v: Voltage of the battery under load.
+        """
+        for part, drive in self._drives.items():
+            drive.set(outputs.get(part, 0.0), battery_v)
+
+    @abstractmethod
+    def motion(self) -> Motion:
+        """Current pose and velocity."""
+
+    @abstractmethod
+    def travelled_m(self) -> float:
+        """Distance that the wheels rolled since `place`, or that a boat moved through the water."""
+
+    def current_a(self) -> float:
+        """Current of the motors, A, >= 0; a braking motor draws none."""
+        return sum([drive.current_a() for drive in self._drives.values()])
+
+    def set_current(self, vx: float, vy: float) -> None:
+        """Set the flow of the water; land vehicles ignore it, and `place` keeps it.
+
+        Args:
+            vx: Flow along the world's x axis, m/s.
+            vy: Flow along the world's y axis, m/s.
+        """
+        self._flow = (vx, vy)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleModel:
+    """A kind of vehicle.
+
+    Attributes:
+        name: Name, such as "car".
+        drives: Alternative sets of parts that drive and steer it; a robot has exactly one set.
+        optional_parts: Further parts that a robot may have; they have no effect in simulation.
+        length_m: Length from bumper to bumper, trailer included.
+        width_m: Largest width.
+        nose_m: Distance from the origin to the front bumper.
+        floats: Whether it moves on water.
+        camera: Mount of its camera.
+        top_speed_mps: Speed at full throttle and `BATTERY_V`, on level ground or in still water.
+        turning_radius_m: Radius of the origin's path at full lock; 0 if it turns on the spot.
+        build: Adds its body, joints, motors and looks to a model.
+        bind: Finds them in the compiled model.
+    """
+
+    name: str
+    drives: tuple[frozenset[str], ...]
+    optional_parts: frozenset[str] = frozenset()
+    length_m: float
+    width_m: float
+    nose_m: float
+    floats: bool = False
+    camera: CameraMount
+    top_speed_mps: float
+    turning_radius_m: float
+    build: Callable[[mujoco.MjSpec, Paint], None]
+    bind: Callable[[mujoco.MjModel, mujoco.MjData], BoundVehicle]
+
+    @property
+    def parts(self) -> frozenset[str]:
+        """All parts that have an effect."""
+        return frozenset[str]().union(*self.drives)

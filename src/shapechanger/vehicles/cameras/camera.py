@@ -1,0 +1,312 @@
+"""Cameras on board and outside: offscreen rendering without MuJoCo's shadows and reflections."""
+
+from __future__ import annotations
+
+import math
+import os
+import weakref
+from dataclasses import dataclass
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import RenderError, WorldError
+from shapechanger.rendering import choose_gl, open_context
+from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
+
+_COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
+_MOST_GEOMS: Final = 2000
+
+
+# Ids of the processes that have rendered. A fork of one would deadlock on threads that it lacks.
+_drawing: set[int] = set()
+
+
+class _Renderer:
+    """Renders views of a model.
+
+    The OpenGL context is opened for the first picture, so that a process that has only built a
+    camera, such as the parent of an `AsyncVectorEnv`, can be forked.
+
+    Args:
+        size: Width and height of the pictures in pixels.
+        hidden: Group of geoms that are not drawn.
+
+    Raises:
+        RenderError: If the width or the height is below 1.
+    """
+
+    def __init__(self, size: tuple[int, int], hidden: int) -> None:
+        self._width, self._height = size
+        _require_pixels(size)
+        self._gl: Any = None
+        self._wanted: mujoco.MjModel | None = None
+        self._rect = mujoco.MjrRect(0, 0, *size)
+        self._picture = np.empty((self._height, self._width, 3), np.uint8)
+        self._context: mujoco.MjrContext | None = None
+        self._scene: mujoco.MjvScene | None = None
+        self._camera = mujoco.MjvCamera()
+        self._option = mujoco.MjvOption()
+        self._option.geomgroup[hidden] = 0
+
+    def _open(self, model: mujoco.MjModel) -> None:
+        """Create the rendering context of a model."""
+        if self._gl is None:
+            if _drawing - {os.getpid()}:
+                raise RenderError(
+                    "A process that was forked after rendering cannot render: start it by "
+                    "spawning, such as with gym.make_vec(..., vector_kwargs={'context': 'spawn'})."
+                )
+            choose_gl()
+            self._gl = open_context(self._width, self._height)
+            _drawing.add(os.getpid())
+            self._finalizer = weakref.finalize(self, _free, self._gl)
+            self._finalizer.atexit = False
+        self._gl.make_current()
+        if self._context is not None:
+            self._context.free()
+        model.vis.global_.offwidth, model.vis.global_.offheight = self._width, self._height
+        model.vis.quality.offsamples = model.vis.quality.shadowsize = 0
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._scene = mujoco.MjvScene(model, _MOST_GEOMS)
+        for flag in _COSTLY:
+            self._scene.flags[flag] = 0
+
+    def _render(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
+        """Return the picture of a state, (height, width, 3), upside down; it is overwritten.
+
+        Raises:
+            RenderError: If no model was selected, or no OpenGL context can be opened.
+        """
+        if self._wanted is not None:
+            self._open(self._wanted)
+            self._wanted = None
+        if self._scene is None or self._context is None:
+            raise RenderError("The camera has no model: call `look_through` first.")
+        self._gl.make_current()
+        mujoco.mjv_updateScene(
+            model,
+            data,
+            self._option,
+            None,
+            self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value,
+            self._scene,
+        )
+        self._arrange(self._scene)
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        mujoco.mjr_readPixels(self._picture, None, self._rect, self._context)
+        return self._picture
+
+    def _arrange(self, scene: mujoco.MjvScene) -> None:
+        """Change the geoms of a scene before it is rendered."""
+
+    def close(self) -> None:
+        """Free the OpenGL context and forget the model."""
+        self._wanted = None
+        if self._context is not None:
+            self._gl.make_current()
+            self._context.free()
+            self._context = self._scene = None
+        if self._gl is not None:
+            self._finalizer()
+            self._gl = None
+
+
+class OnboardCamera(_Renderer):
+    """Renders the view of a camera in a model, without what is only seen from outside.
+
+    Args:
+        size: Width and height of the pictures in pixels.
+
+    Raises:
+        RenderError: If the width or the height is below 1.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        super().__init__(size, OUTSIDE_VIEW)
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
+
+    def look_through(self, model: mujoco.MjModel, camera: str) -> None:
+        """Select the model and the camera.
+
+        Args:
+            model: Compiled model; its offscreen buffer is resized.
+            camera: Name of the camera.
+        """
+        self._wanted = model
+        self._camera.fixedcamid = model.camera(camera).id
+
+    def picture(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
+        """Render a state.
+
+        Args:
+            model: The selected model.
+            data: Its state.
+
+        Returns:
+            RGB picture, shape (height, width, 3), in a new array.
+
+        Raises:
+            RenderError: If no model was selected, or no OpenGL context can be opened.
+        """
+        return self._render(model, data)[::-1].copy()
+
+
+# Pixels of an outside view are the means of squares this wide, so that edges are smooth.
+_SUPERSAMPLED: Final = 2
+_BEHIND_ALL_M: Final = 1000.0
+_LARGEST: Final = 4096  # Width and height; software renderers draw no larger images.
+
+
+class OutsideCamera(_Renderer):
+    """Renders a model from outside, with smooth edges.
+
+    Args:
+        size: Width and height of the pictures in pixels.
+
+    Raises:
+        RenderError: If the width or the height is out of range.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        _require_pixels(size)  # Before it is supersampled, so that the error has the asked size.
+        if max(size) > _LARGEST:
+            raise RenderError(
+                f"A view from outside has at most {_LARGEST} pixels a side, got "
+                f"{size[0]} x {size[1]}."
+            )
+        super().__init__((_SUPERSAMPLED * size[0], _SUPERSAMPLED * size[1]), OWN_VIEW)
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE.value
+        self.size = size
+
+    def look_at(self, model: mujoco.MjModel) -> None:
+        """Select the model.
+
+        Args:
+            model: Compiled model; its offscreen buffer is resized.
+        """
+        self._wanted = model
+
+    def picture(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        middle: tuple[float, float, float],
+        distance_m: float,
+        azimuth_rad: float,
+        elevation_rad: float,
+    ) -> NDArray[np.uint8]:
+        """Render a state.
+
+        Args:
+            model: The selected model.
+            data: Its state.
+            middle: Point in the middle of the picture, m.
+            distance_m: Distance from it.
+            azimuth_rad: Direction of view seen from above, from the x axis, counter-clockwise.
+            elevation_rad: Angle of view above the horizon; negative looks down.
+
+        Returns:
+            RGB picture, shape (height, width, 3), in a new array.
+
+        Raises:
+            RenderError: If no model was selected, or no OpenGL context can be opened.
+        """
+        self._camera.lookat[:] = middle
+        self._camera.distance = distance_m
+        self._camera.azimuth = math.degrees(azimuth_rad)
+        self._camera.elevation = math.degrees(elevation_rad)
+        fine = self._render(model, data)[::-1]
+        squares = fine.reshape(self.size[1], _SUPERSAMPLED, self.size[0], _SUPERSAMPLED, 3)
+        return (squares.mean(axis=(1, 3)) + 0.5).astype(np.uint8)
+
+    def _arrange(self, scene: mujoco.MjvScene) -> None:
+        """Draw the ground before the shadows on it.
+
+        MuJoCo draws translucent geoms from far to near, and takes a large one for near.
+        """
+        for geom in scene.geoms[: scene.ngeom]:
+            if geom.rgba[3] < 1.0 and geom.modelrbound > 1.0:
+                geom.modelrbound = -_BEHIND_ALL_M
+
+
+def _require_pixels(size: tuple[int, int]) -> None:
+    if min(size) < 1:
+        raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
+
+
+def _free(gl: Any) -> None:
+    gl.free()
+
+
+# Largest errors of a screwed, printed mount: estimates.
+_HEIGHT_M: Final = 0.015
+_SIDE_M: Final = 0.01
+_ANGLE_RAD: Final = math.radians(3.0)
+
+_LOWEST_M: Final = 0.01  # Above the floor.
+_FARTHEST_M: Final = 1.0  # Still on the vehicle.
+
+
+@dataclass(frozen=True, slots=True)
+class CameraJitter:
+    """Error of a camera's pose.
+
+    Attributes:
+        up_m: Offset upwards, m.
+        left_m: Offset to the left, m.
+        roll_rad: Rotation about the line of sight; positive to the right.
+        pitch_rad: Positive down.
+        yaw_rad: Positive to the left.
+    """
+
+    up_m: float = 0.0
+    left_m: float = 0.0
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rad: float = 0.0
+
+    @staticmethod
+    def random(rng: np.random.Generator) -> CameraJitter:
+        """Draw uniform errors of up to 1.5 cm in height, 1 cm to the side and 3 degrees."""
+        up, left = rng.uniform(-1.0, 1.0, 2) * (_HEIGHT_M, _SIDE_M)
+        roll, pitch, yaw = rng.uniform(-_ANGLE_RAD, _ANGLE_RAD, 3)
+        return CameraJitter(float(up), float(left), float(roll), float(pitch), float(yaw))
+
+
+def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> None:
+    """Add an error to the pose of a camera; a refused error changes nothing.
+
+    Args:
+        model: Compiled model to change.
+        camera: Name of the camera.
+        jitter: The error.
+
+    Raises:
+        WorldError: If the error is not finite, or moves the camera off its vehicle or into the
+            floor.
+    """
+    place = model.camera(camera)
+    position = place.pos + np.array((0.0, jitter.left_m, jitter.up_m))
+    turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad
+    if not np.isfinite([*position, *turns]).all():
+        raise WorldError(f"The error of a camera's pose must be finite, got {jitter}.")
+    if position[2] < _LOWEST_M or np.abs(position).max() > _FARTHEST_M:
+        where = ", ".join(f"{x:.3f}" for x in position)
+        raise WorldError(f"The camera would be off its vehicle or in the floor, at ({where}) m.")
+    place.pos[:] = position
+    # A MuJoCo camera looks along -z of its frame, with x to the right and y up.
+    turned = np.empty(4)
+    for axis, angle in (
+        ((0.0, 1.0, 0.0), jitter.yaw_rad),
+        ((1.0, 0.0, 0.0), -jitter.pitch_rad),
+        ((0.0, 0.0, 1.0), -jitter.roll_rad),
+    ):
+        turn = np.empty(4)
+        mujoco.mju_axisAngle2Quat(turn, np.array(axis), angle)
+        mujoco.mju_mulQuat(turned, place.quat, turn)
+        place.quat[:] = turned

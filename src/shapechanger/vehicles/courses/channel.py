@@ -1,0 +1,341 @@
+"""Winding lanes in the open, yards and harbours: a smooth route between walls of short pieces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.vehicles.courses.course import Course, Surface, Wall
+from shapechanger.vehicles.courses.furniture import (
+    Lane,
+    LaneObstacles,
+    Scatter,
+    Size,
+    place_sun_patches,
+    scatter_obstacles,
+    weighted_choice,
+)
+from shapechanger.vehicles.courses.geometry import (
+    any_crossing,
+    arc_lengths,
+    even_distances,
+    grow_cells,
+    interpolate,
+    length,
+    normals,
+    resample,
+    scale_grid,
+    smooth,
+    tangent_radii,
+    trace_outline,
+    turn_angles,
+    wall_segments,
+)
+
+_FINE: Final = 1024
+"""Number of points of the route while it is shaped."""
+
+_COARSE: Final = 128
+"""Number of points for pairwise distances."""
+
+_WIND_RAD: Final = 0.4
+"""Smallest sum of the turns to either side, rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelShape:
+    """Ranges of a lane's shape, m.
+
+    Attributes:
+        pitch: Pitch of the grid that it follows.
+        cells: Number of grid cells that it encloses.
+        blur: Standard deviation by which its corners are smoothed.
+        length: Length of the route.
+        radius: Smallest radius of a curve.
+        half_width: Half width of the lane.
+        wall: Space for the wall between two parts of the lane, per part.
+    """
+
+    pitch: tuple[float, float]
+    cells: tuple[int, int]
+    blur: tuple[float, float]
+    length: tuple[float, float]
+    radius: float
+    half_width: tuple[float, float]
+    wall: float
+
+
+@dataclass(frozen=True, slots=True)
+class BankKind:
+    """A kind of bank.
+
+    Attributes:
+        surface: Material of its walls.
+        share: Weight with which it is drawn.
+        run: Range of its length, m.
+        piece: Length of each straight wall, m.
+        height: Range of heights above the ground or the water, m.
+        rough: Largest distance by which its corners stand back, m.
+    """
+
+    surface: Surface
+    share: float
+    run: tuple[float, float]
+    piece: float
+    height: tuple[float, float]
+    rough: float = 0.0
+
+
+def _dig_channel(
+    rng: np.random.Generator, shape: ChannelShape, spacing: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Try to lay out a route.
+
+    The corners of a loop on a grid are smoothed more and more until the lane fits everywhere.
+
+    Args:
+        rng: Random generator.
+        shape: Ranges of the shape.
+        spacing: Distance between points of the route, m.
+
+    Returns:
+        The route, m, (n, 2), and its distance from the banks, m, (n,); None if the random loop is
+        too tight or too close to itself.
+    """
+    loop = trace_outline(grow_cells(rng, int(rng.integers(shape.cells[0], shape.cells[1] + 1))))
+    if loop is None:
+        return None
+    points = scale_grid(rng, loop, *shape.pitch)
+    points += rng.normal(0.0, 0.1 * shape.pitch[0], size=points.shape)
+    if rng.random() < 0.5:
+        points = points[::-1]
+    turn = float(rng.uniform(-np.pi, np.pi))
+    points = points @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    # Scaling the grid too much would spoil the proportions of the lane.
+    points *= float(np.clip(rng.uniform(*shape.length) / length(points), 0.8, 1.2))
+    sharp = resample(points, length(points) / _FINE)
+    blur = shape.blur[0]
+    while True:
+        line = smooth(sharp, blur * _FINE / length(points))
+        coarse = line[:: _FINE // _COARSE]
+        room = tangent_radii(coarse)
+        most = np.minimum(0.85 * room, room - shape.wall)
+        if room.min() >= shape.radius and most.min() >= shape.half_width[0]:
+            break
+        blur *= 1.2
+        if blur > shape.blur[1]:
+            return None
+    if not shape.length[0] <= length(line) <= shape.length[1] or not _winds(coarse):
+        return None
+    # It starts where it is straight.
+    first = int(np.argmin(smooth(np.abs(turn_angles(coarse)), 2.0)))
+    line = np.roll(line, -first * (_FINE // _COARSE), axis=0)
+    coarse, most = np.roll(coarse, -first, axis=0), np.roll(most, -first)
+    low, high = shape.half_width
+    # The width varies every few metres, within the available space.
+    waves = smooth(rng.normal(size=_COARSE), 3.0 * _COARSE / length(line))
+    half = low + (high - low) * (0.5 + waves / (4.0 * float(waves.std())))
+    half = smooth(np.clip(np.minimum(half, most), low, high), 1.0)
+    route = resample(line, spacing)
+    knots = arc_lengths(coarse)
+    s = even_distances(float(knots[-1]), len(route))
+    return route, interpolate(half[:, None], knots, s)[:, 0]
+
+
+def _winds(line: NDArray[np.float64]) -> bool:
+    """Return whether a line turns to both sides by at least `_WIND_RAD` in sum."""
+    turned = turn_angles(line)
+    return bool(turned[turned > 0.0].sum() > _WIND_RAD < -turned[turned < 0.0].sum())
+
+
+def build_banks(
+    rng: np.random.Generator,
+    route: NDArray[np.float64],
+    half_width: NDArray[np.float64],
+    kinds: tuple[BankKind, ...],
+) -> tuple[tuple[Wall, ...], tuple[Wall, ...]]:
+    """Walls on the left and on the right of a route, each a closed line.
+
+    Args:
+        rng: Random generator.
+        route: Middle of the lane, m, (n, 2).
+        half_width: Distance of the banks, m, (n,).
+        kinds: Kinds of bank to draw from.
+    """
+    aside = normals(route) * half_width[:, None]
+    left = _bank(rng, (route + aside)[::-1], kinds)
+    return left, _bank(rng, route - aside, kinds)
+
+
+def _bank(
+    rng: np.random.Generator, line: NDArray[np.float64], kinds: tuple[BankKind, ...]
+) -> tuple[Wall, ...]:
+    """Walls along a closed line, with the lane on its left."""
+    knots = arc_lengths(line)
+    shares = [kind.share for kind in kinds]
+    ends: list[float] = []
+    chosen: list[BankKind] = []
+    heights: list[float] = []
+    s = 0.0
+    while s < knots[-1]:
+        kind = kinds[weighted_choice(rng, shares)]
+        count = max(1, round(float(rng.uniform(*kind.run)) / kind.piece))
+        height = float(rng.uniform(*kind.height))
+        for _ in range(count):
+            s += kind.piece
+            ends.append(s)
+            chosen.append(kind)
+            heights.append(height)
+            if s >= knots[-1]:
+                break
+    # Scaled so that the last piece ends where the first begins.
+    at_s = np.array(ends) * (knots[-1] / s)
+    points = interpolate(line, knots, at_s)
+    back = -normals(line)[np.searchsorted(knots[:-1], at_s % knots[-1]) % len(line)]
+    rough = np.array(
+        [min(a.rough, b.rough) for a, b in zip(chosen, [*chosen[1:], chosen[0]], strict=True)]
+    )
+    points += back * (rng.uniform(0.0, 1.0, len(points)) * rough)[:, None]
+    return tuple(
+        Wall(
+            (float(points[i - 1, 0]), float(points[i - 1, 1])),
+            (float(points[i, 0]), float(points[i, 1])),
+            heights[i],
+            kind.surface,
+        )
+        for i, kind in enumerate(chosen)
+    )
+
+
+_QUAY_M: Final = 0.6
+"""Height of a quay above the water, m."""
+
+_SPACING_M: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class OpenWorld:
+    """A kind of course in the open.
+
+    Attributes:
+        name: Name of the world.
+        shape: Ranges of the lane's shape.
+        half_width: Range of its final half width, m.
+        banks: Kinds of bank.
+        obstacles: Kinds of obstacle.
+        per_m: Range of the mean number of obstacles per metre.
+        gap_m: Smallest gap beside an obstacle, m.
+        current_mps: Fastest current, m/s; 0 on land.
+    """
+
+    name: str
+    shape: ChannelShape
+    half_width: tuple[float, float]
+    banks: tuple[BankKind, ...]
+    obstacles: tuple[Scatter, ...]
+    per_m: tuple[float, float]
+    gap_m: float
+    current_mps: float = 0.0
+
+
+YARD: Final = OpenWorld(
+    name="yard",
+    shape=ChannelShape(
+        pitch=(5.5, 8.0),
+        cells=(3, 5),
+        blur=(2.1, 4.5),
+        length=(40.0, 88.0),
+        radius=1.9,
+        half_width=(1.6, 2.45),
+        wall=0.25,
+    ),
+    half_width=(1.5, 2.5),
+    banks=(
+        BankKind("hedge", 0.4, (3.0, 12.0), 1.0, (0.9, 1.9)),
+        BankKind("fence", 0.25, (3.0, 10.0), 1.3, (0.9, 1.6)),
+        BankKind("brick", 0.2, (2.5, 8.0), 1.2, (1.2, 2.2)),
+        BankKind("shed", 0.15, (2.0, 4.0), 1.6, (2.1, 2.5)),
+    ),
+    obstacles=(
+        Scatter(Size("cone", (0.22, 0.34), (0.22, 0.34), (0.4, 0.7)), 0.3),
+        Scatter(Size("crate", (0.35, 0.6), (0.3, 0.45), (0.25, 0.5)), 0.2),
+        Scatter(Size("bin", (0.4, 0.55), (0.4, 0.55), (0.8, 1.1)), 0.15),
+        Scatter(Size("post", (0.08, 0.16), (0.08, 0.16), (0.7, 1.2)), 0.15),
+        Scatter(Size("tree", (0.2, 0.4), (0.2, 0.4), (2.5, 4.0)), 0.2),
+    ),
+    per_m=(0.12, 0.4),
+    gap_m=1.2,
+)
+"""Hedges, fences, sheds and brick walls."""
+
+HARBOUR: Final = OpenWorld(
+    name="harbour",
+    shape=ChannelShape(
+        pitch=(7.0, 10.5),
+        cells=(3, 4),
+        blur=(2.6, 6.0),
+        length=(48.0, 88.0),
+        radius=2.6,
+        half_width=(2.15, 3.4),
+        wall=0.45,
+    ),
+    half_width=(2.0, 3.5),
+    banks=(
+        BankKind("quay", 0.7, (5.0, 16.0), 2.0, (_QUAY_M, _QUAY_M)),
+        BankKind("rock", 0.3, (2.5, 8.0), 0.8, (0.35, 0.9), rough=0.35),
+    ),
+    obstacles=(
+        Scatter(Size("buoy", (0.35, 0.6), (0.35, 0.6), (0.5, 0.9)), 0.4),
+        Scatter(Size("crate", (0.4, 0.7), (0.4, 0.6), (0.25, 0.4)), 0.25),
+        # Most dinghies lie along the quay.
+        Scatter(Size("dinghy", (1.4, 2.0), (0.7, 0.9), (0.4, 0.5)), 0.35, moored=0.75),
+    ),
+    per_m=(0.08, 0.25),
+    gap_m=1.6,
+    current_mps=0.15,
+)
+"""Quays, rocks and a current."""
+
+
+def open_course(world: OpenWorld, rng: np.random.Generator, seed: int) -> Course | None:
+    """Try to lay out a yard or a harbour.
+
+    Args:
+        world: Kind of course.
+        rng: Random generator.
+        seed: Seed to record in the course.
+
+    Returns:
+        The course, or None if the random layout does not fit.
+    """
+    channel = _dig_channel(rng, world.shape, _SPACING_M)
+    if channel is None:
+        return None
+    lane = Lane(channel[0], *build_banks(rng, *channel, world.banks))
+    if any_crossing(wall_segments((*lane.left, *lane.right))):
+        return None
+    half_width = lane.half_width()
+    if half_width.min() < world.half_width[0] or half_width.max() > world.half_width[1]:
+        return None
+    obstacles = LaneObstacles(lane, half_width, world.gap_m)
+    scatter_obstacles(rng, obstacles, world.obstacles, per_m=float(rng.uniform(*world.per_m)))
+    current = (0.0, 0.0)
+    if world.current_mps:
+        speed = float(rng.uniform(0.0, world.current_mps))
+        angle = float(rng.uniform(-np.pi, np.pi))
+        current = (speed * float(np.cos(angle)), speed * float(np.sin(angle)))
+    return Course(
+        world=world.name,
+        seed=seed,
+        route=lane.route,
+        half_width=half_width,
+        walls=(*lane.left, *lane.right),
+        obstacles=tuple(obstacles.obstacles),
+        lamps=place_sun_patches(rng, lane.route, half_width),
+        ceiling_m=0.0,
+        gap_m=obstacles.gap_m,
+        current_mps=current,
+    )

@@ -1,0 +1,290 @@
+"""Corridors of an office building: straight legs, right-angled corners, and panelled walls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.vehicles.courses.course import Course, Lamp, Surface, Wall
+from shapechanger.vehicles.courses.furniture import Lane, LaneObstacles, Size, weighted_choice
+from shapechanger.vehicles.courses.geometry import (
+    arc_lengths,
+    grow_cells,
+    resample,
+    scale_grid,
+    trace_outline,
+)
+
+DOOR_M: Final = 0.9
+"""Width of a door without its frame, m."""
+
+FRAME_M: Final = 0.06
+"""Width of a door's frame, m."""
+
+RECESS_M: Final = 0.15
+"""Depth of a recessed door, m."""
+
+_PLAIN_M = (0.4, 2.4)
+
+# Panels in the plaster: surface, share, and range of widths, m.
+_PANELS: tuple[tuple[Surface, float, tuple[float, float]], ...] = (
+    ("door", 0.5, (DOOR_M + 2 * FRAME_M, DOOR_M + 2 * FRAME_M)),
+    ("window", 0.2, (1.0, 2.0)),
+    ("board", 0.18, (1.0, 2.4)),
+    ("glass", 0.12, (0.8, 1.6)),
+)
+_PANEL_SHARES = [share for _, share, _ in _PANELS]
+
+_Point = NDArray[np.float64]
+
+
+def panel_walls(
+    rng: np.random.Generator, corners: NDArray[np.float64], bends: NDArray[np.int64], height: float
+) -> tuple[Wall, ...]:
+    """Walls along a closed line of corners, with the lane on their left.
+
+    Args:
+        rng: Random generator.
+        corners: Corners, m, (n, 2); legs are at least 1.5 m long and at right angles.
+        bends: 1 for corners that stand out into the lane, -1 for nooks, (n,).
+        height: Height of the walls, m.
+    """
+    n = len(corners)
+    # Length by which corners are cut off, mostly 0.
+    cut = np.where(rng.random(n) < 0.3, rng.uniform(0.2, 0.5, n), 0.0)
+    brick = np.where((bends > 0) & (rng.random(n) < 0.35), rng.uniform(0.3, 0.8, n), 0.0)
+    walls: list[Wall] = []
+    for k in range(n):
+        after = (k + 1) % n
+        ahead = corners[after] - corners[k]
+        length = float(np.hypot(*ahead))
+        ahead /= length
+        start, end = corners[k] + ahead * cut[k], corners[after] - ahead * cut[after]
+        first, last = start + ahead * brick[k], end - ahead * brick[after]
+        if brick[k] > 0.0:
+            walls.append(_wall(start, first, height, "brick"))
+        walls.extend(_leg(rng, first, last, height))
+        if brick[after] > 0.0:
+            walls.append(_wall(last, end, height, "brick"))
+        if cut[after] > 0.0:
+            beyond = corners[(k + 2) % n] - corners[after]
+            beyond /= np.hypot(*beyond)
+            surface: Surface = "brick" if brick[after] > 0.0 else "plaster"
+            walls.append(_wall(end, corners[after] + beyond * cut[after], height, surface))
+    return tuple(walls)
+
+
+def _leg(rng: np.random.Generator, start: _Point, end: _Point, height: float) -> Iterator[Wall]:
+    """Plaster between two points, with panels in it."""
+    length = float(np.hypot(*(end - start)))
+    ahead = (end - start) / length
+    back = np.array([ahead[1], -ahead[0]]) * RECESS_M  # Away from the lane.
+    done = start
+    t = float(rng.uniform(*_PLAIN_M))
+    while True:
+        surface, _, bounds = _PANELS[weighted_choice(rng, _PANEL_SHARES)]
+        wide = float(rng.uniform(*bounds))
+        recessed = surface == "door" and rng.random() < 0.4
+        gap = float(rng.uniform(*_PLAIN_M))
+        if t + wide + 0.3 > length:
+            break
+        near, far = start + ahead * t, start + ahead * (t + wide)
+        yield _wall(done, near, height, "plaster")
+        if recessed:
+            yield _wall(near, near + back, height, "plaster")
+            yield _wall(near + back, far + back, height, surface)
+            yield _wall(far + back, far, height, "plaster")
+        else:
+            yield _wall(near, far, height, surface)
+        done, t = far, t + wide + gap
+    yield _wall(done, end, height, "plaster")
+
+
+def _wall(start: _Point, end: _Point, height: float, surface: Surface) -> Wall:
+    return Wall((float(start[0]), float(start[1])), (float(end[0]), float(end[1])), height, surface)
+
+
+_CEILING_M: Final = 2.5
+"""Height of the ceiling, and of every wall."""
+
+_PITCH_M = (4.0, 6.0)
+_WIDTH_M = (1.8, 2.4)
+_LENGTH_M = (40.0, 90.0)
+_GAP_M = 0.9
+_SPACING_M = 0.1
+
+# Furniture along the walls, with the depth as the width; common sizes.
+_FURNITURE = (
+    Size("box", (0.3, 0.6), (0.25, 0.45), (0.2, 0.5)),
+    Size("bin", (0.25, 0.35), (0.25, 0.35), (0.5, 0.7)),
+    Size("bench", (1.2, 1.6), (0.38, 0.45), (0.42, 0.48)),
+    Size("plant", (0.3, 0.45), (0.3, 0.45), (0.8, 1.5)),
+    Size("cabinet", (0.8, 1.2), (0.4, 0.5), (1.0, 1.9)),
+    Size("crate", (0.4, 0.6), (0.3, 0.4), (0.25, 0.4)),
+)
+_FURNITURE_SHARES = (0.2, 0.2, 0.18, 0.18, 0.14, 0.1)
+
+
+def corridor(rng: np.random.Generator, seed: int) -> Course | None:
+    """Try to lay out a corridor.
+
+    Args:
+        rng: Random generator.
+        seed: Seed to record in the course.
+
+    Returns:
+        The course, or None if the random layout does not fit.
+    """
+    corners = _corners(rng)
+    if corners is None:
+        return None
+    widths = rng.uniform(*_WIDTH_M, size=len(corners))
+    route, starts = _route(corners, widths)
+    along = arc_lengths(route)
+    if not _LENGTH_M[0] <= along[-1] <= _LENGTH_M[1]:
+        return None
+    normals = _normals(corners)
+    reach = (np.roll(normals * widths[:, None], 1, axis=0) + normals * widths[:, None]) / 2.0
+    turns = _turns(corners)
+    # Walls have the lane on their left: the right one runs forwards, the left one backwards.
+    right = panel_walls(rng, corners - reach, -turns, _CEILING_M)
+    left = panel_walls(rng, (corners + reach)[::-1], turns[::-1], _CEILING_M)
+    lane = Lane(route, left, right)
+    half_width = lane.half_width()
+    obstacles = LaneObstacles(lane, half_width, _GAP_M)
+    _furnish(rng, obstacles, corners, widths, starts)
+    _plant(rng, obstacles, corners, reach * turns[:, None], starts)
+    return Course(
+        world="corridor",
+        seed=seed,
+        route=route,
+        half_width=half_width,
+        walls=(*left, *right),
+        obstacles=tuple(obstacles.obstacles),
+        lamps=_lamps(rng, corners, widths),
+        ceiling_m=_CEILING_M,
+        gap_m=obstacles.gap_m,
+    )
+
+
+def _corners(rng: np.random.Generator) -> NDArray[np.float64] | None:
+    """Corners of the route in driving direction, the longest leg first, m, (n, 2)."""
+    loop = trace_outline(grow_cells(rng, int(rng.integers(3, 8))))
+    if loop is None:
+        return None
+    points = scale_grid(rng, loop, *_PITCH_M)
+    if rng.random() < 0.5:
+        points = points[::-1]
+    points = points[_turns(points) != 0]
+    if len(points) < 6:  # A rectangle turns one way only.
+        return None
+    legs = np.hypot(*(np.roll(points, -1, axis=0) - points).T)
+    return np.roll(points, -int(np.argmax(legs)), axis=0)
+
+
+def _turns(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Turn at each point: 1 to the left, -1 to the right, 0 for none."""
+    back = points - np.roll(points, 1, axis=0)
+    ahead = np.roll(points, -1, axis=0) - points
+    return np.sign(np.round(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], 6)).astype(
+        np.int64
+    )
+
+
+def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors to the left of each leg, (n, 2)."""
+    ahead = np.roll(corners, -1, axis=0) - corners
+    ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
+    return np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+
+
+def _route(
+    corners: NDArray[np.float64], widths: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Route with rounded corners, m, (m, 2), and the distance of each corner along it, m, (n,).
+
+    It starts after a third of the first leg. With half the width as the radius of a corner, its
+    distance from the inner edge is constant.
+    """
+    back = corners - np.roll(corners, 1, axis=0)
+    back /= np.hypot(back[:, 0], back[:, 1])[:, None]
+    ahead = np.roll(back, -1, axis=0)
+    radii = np.minimum(widths, np.roll(widths, 1)) / 2.0
+    pieces = [corners[:1] + (corners[1:2] - corners[:1]) / 3.0]
+    angles = np.linspace(0.0, np.pi / 2.0, 25)[:, None]
+    for k in [*range(1, len(corners)), 0]:
+        arc = (1.0 - np.sin(angles)) * -back[k] + (1.0 - np.cos(angles)) * ahead[k]
+        pieces.append(corners[k] + radii[k] * arc)
+    line = np.concatenate(pieces)
+    # The middle of a corner is the thirteenth point of its arc.
+    along = arc_lengths(line)[np.arange(len(corners)) * 25 + 13]
+    return resample(line, _SPACING_M), np.roll(along, 1)
+
+
+def _furnish(
+    rng: np.random.Generator,
+    obstacles: LaneObstacles,
+    corners: NDArray[np.float64],
+    widths: NDArray[np.float64],
+    along: NDArray[np.float64],
+) -> None:
+    """Add furniture along the walls, and a few boxes in the way."""
+    normals = _normals(corners)
+    density = rng.uniform(0.1, 0.35)  # Obstacles per metre.
+    for k in range(len(corners)):
+        after = (k + 1) % len(corners)
+        leg = corners[after] - corners[k]
+        length = float(np.hypot(*leg))
+        ahead, yaw = leg / length, float(np.arctan2(leg[1], leg[0]))
+        for _ in range(rng.poisson(density * length)):
+            size = _FURNITURE[weighted_choice(rng, _FURNITURE_SHARES)]
+            t = float(rng.uniform(1.2, length - 1.2))
+            side = 1.0 if rng.random() < 0.5 else -1.0
+            obstacle = size.draw(rng, yaw)
+            aside = widths[k] / 2.0 - obstacle.width / 2.0 - float(rng.uniform(0.005, 0.04))
+            if obstacle.kind in ("box", "crate") and rng.random() < 0.4:
+                aside *= float(rng.uniform(0.4, 0.9))
+                obstacle = replace(obstacle, yaw=yaw + float(rng.uniform(-0.6, 0.6)))
+            x, y = corners[k] + ahead * t + normals[k] * side * aside
+            obstacle = replace(obstacle, x=float(x), y=float(y))
+            obstacles.offer(obstacle, float(along[after]) - (length - t))
+
+
+def _plant(
+    rng: np.random.Generator,
+    obstacles: LaneObstacles,
+    corners: NDArray[np.float64],
+    inward: NDArray[np.float64],
+    along: NDArray[np.float64],
+) -> None:
+    """Add plants and bins in some nooks; `inward` points from a nook through its corner."""
+    for corner, way, s in zip(corners, inward, along, strict=True):
+        if rng.random() < 0.25:
+            size = _FURNITURE[3] if rng.random() < 0.7 else _FURNITURE[1]
+            obstacle = size.draw(rng, 0.0)
+            # Free of both walls.
+            x, y = corner - way + np.sign(way) * (obstacle.length / 2.0 + 0.02)
+            obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(s))
+
+
+def _lamps(
+    rng: np.random.Generator, corners: NDArray[np.float64], widths: NDArray[np.float64]
+) -> tuple[Lamp, ...]:
+    """Lamps along the middle of every leg, lengthwise or across."""
+    every = float(rng.uniform(2.0, 3.2))
+    long, wide = float(rng.uniform(0.9, 1.3)), float(rng.uniform(0.12, 0.3))
+    across = rng.random() < 0.35
+    lamps: list[Lamp] = []
+    for k, corner in enumerate(corners):
+        leg = corners[(k + 1) % len(corners)] - corner
+        length = float(np.hypot(*leg))
+        count = max(1, round(length / every))
+        yaw = float(np.arctan2(leg[1], leg[0])) + (np.pi / 2.0 if across else 0.0)
+        for i in range(count):
+            x, y = corner + leg * (i + 0.5) / count
+            lamps.append(Lamp(float(x), float(y), yaw, min(long, 0.6 * float(widths[k])), wide))
+    return tuple(lamps)

@@ -1,0 +1,224 @@
+"""Random placement of obstacles and patches of sun, which keeps the lane passable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.vehicles.courses.course import Lamp, Obstacle, ObstacleKind, Wall
+from shapechanger.vehicles.courses.geometry import (
+    arc_lengths,
+    distances_from_obstacle,
+    distances_to_segments,
+    length,
+    normals,
+    obstacle_gap,
+    wall_segments,
+)
+
+
+def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
+    """Draw an index with a probability proportional to its share.
+
+    `Generator.choice` is thirty times slower, and this is called for every panel of a wall.
+
+    Args:
+        rng: Random generator.
+        shares: Weights, >= 0.
+    """
+    left = float(rng.random()) * sum(shares)
+    for i, share in enumerate(shares):
+        left -= share
+        if left < 0.0:
+            return i
+    return len(shares) - 1
+
+
+FREE_AHEAD_M: Final = 3.0
+"""Length of the route after its first point that stays free, m."""
+
+FREE_BEHIND_M: Final = 2.0
+"""Length before it that stays free, m; a truck with its trailer is 1 m long."""
+
+_BEFORE_DOORS_M: Final = 0.3
+"""Smallest distance from a door, m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """Ranges of the size of a kind of obstacle, m."""
+
+    kind: ObstacleKind
+    length: tuple[float, float]
+    width: tuple[float, float]
+    height: tuple[float, float]
+
+    def draw(self, rng: np.random.Generator, yaw: float) -> Obstacle:
+        """Draw an obstacle at the origin; a round one is as wide as it is long.
+
+        Args:
+            rng: Random generator.
+            yaw: Angle of its length, rad.
+        """
+        length, width, height = (
+            float(rng.uniform(*bounds)) for bounds in (self.length, self.width, self.height)
+        )
+        obstacle = Obstacle(self.kind, 0.0, 0.0, yaw, length, width, height)
+        return replace(obstacle, yaw=0.0, width=length) if obstacle.is_round else obstacle
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """An empty lane.
+
+    Attributes:
+        route: Its middle, as in `Course`, m, (n, 2).
+        left: Walls on its left.
+        right: Walls on its right.
+    """
+
+    route: NDArray[np.float64]
+    left: tuple[Wall, ...]
+    right: tuple[Wall, ...]
+
+    def half_width(self) -> NDArray[np.float64]:
+        """Distance of each point of the route from the nearest wall, m, (n,)."""
+        return distances_to_segments(self.route, wall_segments((*self.left, *self.right))).min(
+            axis=1
+        )
+
+
+class LaneObstacles:
+    """Obstacles in a lane; those that would block it are rejected.
+
+    Vehicles pass an obstacle on its wider side. Two obstacles that are passed on the same side may
+    stand close together; two that are passed on different sides are a gap apart.
+
+    Args:
+        lane: The lane.
+        half_width: Result of `lane.half_width()`, m, (n,).
+        gap_m: Smallest gap that must remain, m.
+    """
+
+    def __init__(self, lane: Lane, half_width: NDArray[np.float64], gap_m: float) -> None:
+        self.lane = lane
+        self.half_width = half_width
+        self.obstacles: list[Obstacle] = []
+        self.gap_m = 2.0 * float(half_width.min())
+        """Narrowest remaining passage, m."""
+        walls = (*lane.left, *lane.right)
+        self._walls = wall_segments(walls)
+        self._lefts = len(lane.left)
+        self._doors = np.array([wall.surface == "door" for wall in walls])
+        self._wanted = gap_m
+        self._round_m = length(lane.route)
+        self._passed_left: list[bool] = []
+
+    def offer(self, obstacle: Obstacle, s: float) -> bool:
+        """Add an obstacle if it fits.
+
+        Args:
+            obstacle: The obstacle.
+            s: Distance of its middle along the route, m.
+
+        Returns:
+            Whether it was added.
+        """
+        reach = max(obstacle.length, obstacle.width) / 2.0
+        s %= self._round_m
+        if s - reach < FREE_AHEAD_M or self._round_m - s - reach < FREE_BEHIND_M:
+            return False
+        far = distances_from_obstacle(obstacle, self._walls)
+        left, right = float(far[: self._lefts].min()), float(far[self._lefts :].min())
+        if min(left, right) <= 0.0 or max(left, right) < self._wanted:
+            return False
+        # Doors stay free.
+        if (far[self._doors] < _BEFORE_DOORS_M).any():
+            return False
+        narrowest = max(left, right)
+        passed_left = left >= right
+        for other, other_left in zip(self.obstacles, self._passed_left, strict=True):
+            apart = obstacle_gap(obstacle, other)
+            if passed_left == other_left:
+                if apart <= 0.0:
+                    return False
+            elif apart < self._wanted + 0.1:
+                return False
+            else:
+                narrowest = min(narrowest, apart)
+        self.gap_m = min(self.gap_m, narrowest)
+        self.obstacles.append(obstacle)
+        self._passed_left.append(passed_left)
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """A kind of obstacle to scatter.
+
+    Attributes:
+        size: Kind and range of sizes.
+        share: Weight with which it is drawn.
+        moored: Probability of lying along a wall.
+    """
+
+    size: Size
+    share: float
+    moored: float = 0.0
+
+
+def scatter_obstacles(
+    rng: np.random.Generator, obstacles: LaneObstacles, kinds: tuple[Scatter, ...], per_m: float
+) -> None:
+    """Scatter obstacles over a lane.
+
+    Args:
+        rng: Random generator.
+        obstacles: The lane and its obstacles, which are added to.
+        kinds: Kinds to draw from.
+        per_m: Mean number of attempts per metre; obstacles that do not fit are dropped.
+    """
+    route, half_width = obstacles.lane.route, obstacles.half_width
+    along, left = arc_lengths(route), normals(route)
+    shares = [kind.share for kind in kinds]
+    for _ in range(rng.poisson(per_m * float(along[-1]))):
+        kind = kinds[weighted_choice(rng, shares)]
+        i = int(rng.integers(len(route)))
+        heading = float(np.arctan2(-left[i, 0], left[i, 1]))
+        obstacle = kind.size.draw(rng, heading)
+        if rng.random() < kind.moored:
+            side = 1.0 if rng.random() < 0.5 else -1.0
+            aside = side * (
+                float(half_width[i]) - obstacle.width / 2.0 - float(rng.uniform(0.05, 0.3))
+            )
+        else:
+            most = float(half_width[i]) - obstacle.width / 2.0
+            aside = float(rng.uniform(-most, most))
+            yaw = 0.0 if obstacle.is_round else float(rng.uniform(-np.pi, np.pi))
+            obstacle = replace(obstacle, yaw=yaw)
+        x, y = route[i] + left[i] * aside
+        obstacles.offer(replace(obstacle, x=float(x), y=float(y)), float(along[i]))
+
+
+def place_sun_patches(
+    rng: np.random.Generator, route: NDArray[np.float64], half_width: NDArray[np.float64]
+) -> tuple[Lamp, ...]:
+    """Two to eight patches of sun on a lane.
+
+    Args:
+        rng: Random generator.
+        route: Middle of the lane, m, (n, 2).
+        half_width: Half width of the lane, m, (n,).
+    """
+    left = normals(route)
+    lamps: list[Lamp] = []
+    for _ in range(int(rng.integers(2, 9))):
+        i = int(rng.integers(len(route)))
+        x, y = route[i] + left[i] * half_width[i] * float(rng.uniform(-0.6, 0.6))
+        long, wide = float(rng.uniform(0.8, 2.0)), float(rng.uniform(0.4, 1.0))
+        lamps.append(Lamp(float(x), float(y), float(rng.uniform(-np.pi, np.pi)), long, wide))
+    return tuple(lamps)

@@ -1,0 +1,309 @@
+"""Geometry of courses seen from above: closed lines, loops on a grid, and distances.
+
+Closed lines are arrays of points, m, (n, 2); the last point is joined to the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.vehicles.courses.course import Obstacle, Wall
+
+Points = NDArray[np.float64]
+
+
+def length(line: Points) -> float:
+    """Length of a closed line, m."""
+    return float(arc_lengths(line)[-1])
+
+
+def arc_lengths(line: Points) -> NDArray[np.float64]:
+    """Distance along a closed line to each point, and its length, m, (n + 1,)."""
+    steps = np.diff(line, axis=0, append=line[:1])
+    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+
+
+def interpolate(
+    line: NDArray[np.float64], knots: NDArray[np.float64], s: NDArray[np.float64]
+) -> Points:
+    """Interpolate values linearly along a closed line.
+
+    Args:
+        line: Values at its points, (n, k).
+        knots: Distances from `arc_lengths`, m, (n + 1,).
+        s: Distances to interpolate at, m, (m,); they wrap around.
+
+    Returns:
+        Values at `s`, (m, k).
+    """
+    whole = np.concatenate([line, line[:1]])
+    s = np.mod(s, knots[-1])
+    columns = [np.interp(s, knots, whole[:, k]) for k in range(whole.shape[1])]
+    return np.stack(columns, axis=1)
+
+
+def resample(line: Points, spacing: float) -> Points:
+    """Resample a closed line to points that are equally far apart in a straight line.
+
+    Equal arc lengths give unequal chords on a curved line; after two corrections they differ by
+    less than a thousandth on curves that vehicles can drive.
+
+    Args:
+        line: Points, m, (n, 2).
+        spacing: Approximate distance between the new points, m.
+    """
+    knots = arc_lengths(line)
+    n = max(8, round(float(knots[-1]) / spacing))
+    s = even_distances(float(knots[-1]), n)
+    for _ in range(2):
+        chords = arc_lengths(interpolate(line, knots, s))
+        s = np.interp(even_distances(float(chords[-1]), n), chords, np.append(s, knots[-1]))
+    return interpolate(line, knots, s)
+
+
+def even_distances(length_m: float, n: int) -> NDArray[np.float64]:
+    """Evenly spaced distances from 0 along a closed line, m, (n,).
+
+    Args:
+        length_m: Length of the line, m.
+        n: Number of distances.
+    """
+    return np.arange(n, dtype=np.float64) * (length_m / n)
+
+
+def smooth(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+    """Smooth values along a closed line with a periodic Gaussian filter.
+
+    Args:
+        values: Values at the points, (n, ...).
+        sigma: Standard deviation of the Gaussian, in points.
+    """
+    n = len(values)
+    waves = np.exp(-2.0 * (np.pi * sigma * np.fft.rfftfreq(n)) ** 2)
+    spectrum = np.fft.rfft(values, axis=0)
+    return np.fft.irfft(spectrum * waves.reshape(-1, *[1] * (values.ndim - 1)), n=n, axis=0)
+
+
+def normals(line: Points) -> Points:
+    """Unit vectors to the left of a closed line, (n, 2)."""
+    ahead = np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0)
+    ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
+    return np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+
+
+def turn_angles(line: Points) -> NDArray[np.float64]:
+    """Angle by which a closed line turns left at each point, rad, (n,)."""
+    ahead = np.roll(line, -1, axis=0) - line
+    back = np.roll(ahead, 1, axis=0)
+    return np.arctan2(
+        back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], (back * ahead).sum(axis=1)
+    )
+
+
+def tangent_radii(line: Points) -> NDArray[np.float64]:
+    """Half width to which a lane around a closed line can grow before it overlaps itself, m, (n,).
+
+    It is the radius of the smallest circle that is tangent to the line at a point and passes
+    through another point: small in tight curves, and where two parts of the line come close. A
+    similar quantity is the global radius of curvature (Gonzalez and Maddocks, PNAS 96, 1999,
+    pages 4769-4773).
+    """
+    x, y = line[:, 0] - line[:, :1], line[:, 1] - line[:, 1:]
+    left = normals(line)
+    squared = x * x + y * y
+    across = np.abs(x * left[:, :1] + y * left[:, 1:])
+    np.fill_diagonal(across, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radii = np.where(across > 1e-9, squared / (2.0 * across), np.inf)
+    return radii.min(axis=1)
+
+
+Cell = tuple[int, int]
+"""Column and row of a grid cell."""
+
+_SIDES = ((1, 0), (0, 1), (-1, 0), (0, -1))
+
+
+def grow_cells(rng: np.random.Generator, size: int) -> frozenset[Cell]:
+    """Grow a random set of cells that are connected by their sides.
+
+    The set may have holes, and cells that touch at a corner only; `trace_outline` rejects those.
+
+    Args:
+        rng: Random generator.
+        size: Number of cells.
+    """
+    cells: set[Cell] = {(0, 0)}
+    while len(cells) < size:
+        around = sorted({(x + i, y + j) for x, y in cells for i, j in _SIDES} - cells)
+        cells.add(around[int(rng.integers(len(around)))])
+    return frozenset(cells)
+
+
+def trace_outline(cells: frozenset[Cell]) -> NDArray[np.int64] | None:
+    """Grid points around a set of cells, counter-clockwise, one step apart, (n, 2).
+
+    Returns None if the outline touches itself or has several parts, so that no lane can follow it.
+    """
+    edges: dict[Cell, Cell] = {}
+    count = 0
+    for x, y in cells:
+        corners = ((x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1))
+        for side, (i, j) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+            if (x + i, y + j) not in cells:
+                edges[corners[side]] = corners[(side + 1) % 4]
+                count += 1
+    if len(edges) != count:  # Two edges leave one point: cells touch at a corner.
+        return None
+    first = min(edges)
+    loop = [first]
+    while (point := edges[loop[-1]]) != first:
+        loop.append(point)
+    return np.array(loop) if len(loop) == count else None
+
+
+def scale_grid(
+    rng: np.random.Generator, loop: NDArray[np.int64], shortest_m: float, longest_m: float
+) -> NDArray[np.float64]:
+    """Scale a loop to metres, with a random width for each row and column of the grid.
+
+    Args:
+        rng: Random generator.
+        loop: Grid points, (n, 2).
+        shortest_m: Smallest width of a row or column, m.
+        longest_m: Largest width, m.
+    """
+    steps = rng.uniform(shortest_m, longest_m, size=(2, int(np.ptp(loop)) + 2))
+    lines = np.cumsum(steps, axis=1)
+    shifted = loop - loop.min(axis=0)
+    return np.stack([lines[0, shifted[:, 0]], lines[1, shifted[:, 1]]], axis=1)
+
+
+Segments = NDArray[np.float64]
+"""Straight segments, m, (m, 4): x and y of the start, x and y of the end."""
+
+
+def wall_segments(walls: Iterable[Wall]) -> Segments:
+    """Segments on the ground that walls stand on, m, (m, 4)."""
+    return np.array([(*wall.start, *wall.end) for wall in walls], dtype=np.float64).reshape(-1, 4)
+
+
+def distances_to_segments(points: NDArray[np.float64], pieces: Segments) -> NDArray[np.float64]:
+    """Distance of each point from each segment, m, (n, m).
+
+    Args:
+        points: Points, m, (n, 2).
+        pieces: Segments, m, (m, 4).
+    """
+    x, y = points[:, 0:1] - pieces[:, 0], points[:, 1:2] - pieces[:, 1]
+    dx, dy = pieces[:, 2] - pieces[:, 0], pieces[:, 3] - pieces[:, 1]
+    share = np.clip((x * dx + y * dy) / np.maximum(dx * dx + dy * dy, 1e-12), 0.0, 1.0)
+    x -= share * dx
+    y -= share * dy
+    return np.sqrt(x * x + y * y)  # Twice as fast as np.hypot, which guards against overflow.
+
+
+def any_crossing(pieces: Segments) -> bool:
+    """Return whether any two segments cross; a common end does not count."""
+    start, along = pieces[:, :2], pieces[:, 2:] - pieces[:, :2]
+
+    def side(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Side of each segment (rows) that each point (columns) is on; left is positive."""
+        x, y = points[:, 0] - start[:, :1], points[:, 1] - start[:, 1:]
+        hand = along[:, :1] * y - along[:, 1:] * x
+        return np.where(np.abs(hand) < 1e-9, 0.0, hand)
+
+    parted = side(pieces[:, :2]) * side(pieces[:, 2:]) < 0.0
+    return bool((parted & parted.T).any())
+
+
+def box_sides(obstacle: Obstacle) -> Segments:
+    """Sides of a box, counter-clockwise, m, (4, 4)."""
+    ends = _to_world(obstacle, np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2.0)
+    return np.concatenate([ends, np.roll(ends, -1, axis=0)], axis=1)
+
+
+def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.float64]:
+    """Distance of an obstacle from each segment, m, (m,); 0 or less where they overlap.
+
+    Args:
+        obstacle: The obstacle.
+        pieces: Segments, m, (m, 4).
+    """
+    if obstacle.is_round:
+        return (
+            distances_to_segments(np.array([[obstacle.x, obstacle.y]]), pieces)[0]
+            - obstacle.length / 2.0
+        )
+    starts, ends = _into(obstacle, pieces[:, :2]), _into(obstacle, pieces[:, 2:])
+    half = np.array([obstacle.length, obstacle.width]) / 2.0
+    corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    far = distances_to_segments(corners, np.concatenate([starts, ends], axis=1)).min(axis=0)
+    far = np.minimum(far, np.minimum(_from_box(starts, half), _from_box(ends, half)))
+    return np.where(_crosses(starts, ends, half), 0.0, far)
+
+
+def obstacle_gap(one: Obstacle, other: Obstacle) -> float:
+    """Return the distance between two obstacles, m; 0 or less where they overlap.
+
+    Args:
+        one: An obstacle.
+        other: Another one.
+    """
+    if other.is_round:
+        return _from_point(one, other.x, other.y) - other.length / 2.0
+    if one.is_round:
+        return _from_point(other, one.x, one.y) - one.length / 2.0
+    return float(
+        min(
+            distances_from_obstacle(one, box_sides(other)).min(),
+            distances_from_obstacle(other, box_sides(one)).min(),
+        )
+    )
+
+
+def _from_point(obstacle: Obstacle, x: float, y: float) -> float:
+    if obstacle.is_round:
+        return float(np.hypot(obstacle.x - x, obstacle.y - y)) - obstacle.length / 2.0
+    half = np.array([obstacle.length, obstacle.width]) / 2.0
+    return float(_from_box(_into(obstacle, np.array([[x, y]])), half)[0])
+
+
+def _from_box(points: NDArray[np.float64], half: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of points from a box around the origin; 0 inside."""
+    over = np.maximum(np.abs(points) - half, 0.0)
+    return np.hypot(over[:, 0], over[:, 1])
+
+
+def _crosses(
+    starts: NDArray[np.float64], ends: NDArray[np.float64], half: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Mask of the segments that pass through a box around the origin, by clipping."""
+    ahead = ends - starts
+    ahead = np.where(np.abs(ahead) < 1e-12, 1e-12, ahead)
+    low, high = (-half - starts) / ahead, (half - starts) / ahead
+    enter = np.minimum(low, high).max(axis=1)
+    leave = np.maximum(low, high).min(axis=1)
+    return np.maximum(enter, 0.0) < np.minimum(leave, 1.0)
+
+
+def _axes(obstacle: Obstacle) -> NDArray[np.float64]:
+    """Unit vectors along its length and its width, as rows."""
+    c, s = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
+    return np.array([[c, s], [-s, c]])
+
+
+def _into(obstacle: Obstacle, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points in the frame of an obstacle, along its length and its width."""
+    return (points - np.array([obstacle.x, obstacle.y])) @ _axes(obstacle).T
+
+
+def _to_world(obstacle: Obstacle, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """World coordinates of points given as shares of its length and width."""
+    return shares * np.array([obstacle.length, obstacle.width]) @ _axes(obstacle) + [
+        obstacle.x,
+        obstacle.y,
+    ]

@@ -1,0 +1,302 @@
+"""Surfaces of a course as meshes with precomputed light: ground, ceiling, walls and obstacles."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from shapechanger.vehicles.courses.course import Course, Obstacle, Wall
+from shapechanger.vehicles.courses.harbour import add_banks, add_dinghy, extent
+from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.paint import CELLS, ROWS
+from shapechanger.vehicles.courses.quad_mesh import Array, QuadMesh, add_box, add_turned
+
+# Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
+_REACH: Final = 1.6
+# Share of the light on a wall that faces away from the sun.
+_SHADE: Final = 0.72
+# Light far from any lamp at full contrast, indoors and outdoors.
+_DARKEST: Final = 0.12
+_CLOUDED: Final = 0.6
+# Size of a ground patch indoors, where the light varies, and outdoors, m.
+_FINE: Final = 0.6
+_COARSE: Final = 3.0
+# Extent of the ground behind the walls, m; farther out it would be below one pixel.
+_INDOORS_BEHIND: Final = 0.8
+_OUTDOORS_BEHIND: Final = 30.0
+# Width of the ground's and the ceiling's texture, m.
+_GROUND_PERIOD: Final = 3.0
+_CEILING_PERIOD: Final = 2.4
+# Distance of lamps below the ceiling, and of verges above the ground, m.
+_GAP: Final = 0.02
+_VERGE_RISE: Final = 0.004
+_VERGE_WIDTH: Final = 0.4
+# Width of repeating textures, m.
+_PERIOD: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "plaster": 4.0,
+        "panel": 4.0,
+        "brick": 1.2,
+        "hedge": 1.5,
+        "fence": 1.2,
+        "quay": 2.4,
+        "shed": 2.0,
+        "rock": 2.0,
+    }
+)
+# Width of textures that show one object, which is fitted into its wall, m.
+_WHOLE: Final[Mapping[str, float]] = MappingProxyType(
+    {"door": 1.0, "window": 1.8, "board": 2.6, "glass": 1.4}
+)
+# Share of the plastered walls with wooden panels.
+_CLAD: Final = 0.2
+# Height of the brick texture, m, which repeats; the others are stretched to the wall.
+_BRICK_HEIGHT: Final = 1.8
+# Height of a door with its frame, m, below plaster.
+_DOOR_HEIGHT: Final = 2.1
+# Longest patch of a wall, m: shorter than the distance between two lamps, over which light varies.
+_LONGEST: Final = 0.8
+# Relative heights at which a wall's light is computed, and its factor there.
+_ROWS: Final = np.array([0.0, 0.35, 1.0])
+_UPWARDS: Final = np.array([0.86, 1.0, 0.94])
+
+# Boxes of each obstacle: half sizes and centre as shares of its length, width and height, and the
+# texture cell. The whole obstacle is -0.5 to 0.5 in x and y, and 0 to 1 in z.
+_Part = tuple[tuple[float, float, float], tuple[float, float, float], str]
+_LEG: Final = (0.05, 0.06, 0.4)
+_BOXES: Final[Mapping[str, tuple[_Part, ...]]] = MappingProxyType(
+    {
+        "box": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "cardboard"),),
+        "cabinet": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "cabinet"),),
+        "crate": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "crate"),),
+        "bench": (
+            (_LEG, (-0.4, -0.38, 0.4), "black"),
+            (_LEG, (-0.4, 0.38, 0.4), "black"),
+            (_LEG, (0.4, -0.38, 0.4), "black"),
+            (_LEG, (0.4, 0.38, 0.4), "black"),
+            ((0.5, 0.5, 0.15), (0.0, 0.0, 0.85), "dark wood"),
+        ),
+    }
+)
+# Solids of revolution: radius over the diameter, and height over the height.
+_Turned = tuple[tuple[tuple[float, float], ...], str]
+_ROUND: Final[Mapping[str, tuple[_Turned, ...]]] = MappingProxyType(
+    {
+        "bin": ((((0.42, 0.0), (0.5, 0.95), (0.5, 1.0), (0.0, 1.0)), "bin"),),
+        "plant": (
+            (((0.3, 0.0), (0.4, 0.3), (0.0, 0.3)), "clay"),
+            (((0.1, 0.28), (0.5, 0.5), (0.48, 0.75), (0.2, 0.98), (0.0, 1.0)), "leaves"),
+        ),
+        "cone": ((((0.5, 0.0), (0.5, 0.05), (0.36, 0.06), (0.05, 1.0), (0.0, 1.0)), "cone"),),
+        "post": ((((0.5, 0.0), (0.5, 0.96), (0.3, 1.0), (0.0, 1.0)), "post"),),
+        "tree": (
+            (((0.5, 0.0), (0.38, 0.1), (0.34, 0.5), (0.0, 0.5)), "bark"),
+            (((0.3, 0.4), (1.6, 0.55), (1.8, 0.72), (1.0, 0.92), (0.0, 1.0)), "leaves"),
+        ),
+        # As wide as its collision geom where a boat meets it.
+        "buoy": (
+            (((0.5, 0.0), (0.5, 0.06)), "black"),
+            (((0.48, 0.06), (0.48, 0.3), (0.36, 0.4), (0.15, 0.72), (0.0, 0.74)), "buoy"),
+            (((0.03, 0.72), (0.03, 0.82)), "black"),
+            (((0.0, 0.80), (0.17, 0.82), (0.0, 1.0)), "buoy"),
+        ),
+    }
+)
+
+
+class Surfaces:
+    """Surfaces of a course with precomputed light.
+
+    Args:
+        course: Course with its lamps or patches of sun; without any, the light is even.
+        look: Look with its contrast.
+    """
+
+    def __init__(self, course: Course, look: Look) -> None:
+        self._course = course
+        self._lamps = np.array([(lamp.x, lamp.y) for lamp in course.lamps]).reshape(-1, 2)
+        self._contrast = look.contrast
+        self._darkest = _DARKEST if course.ceiling_m > 0.0 else _CLOUDED
+        # Direction of the sun, or of the lamps, which the course's seed determines.
+        self._sun = np.random.default_rng([course.seed, 77]).uniform(-np.pi, np.pi)
+
+    def ground(self) -> QuadMesh:
+        """Ground of the lane and a margin, seen from above."""
+        corners = self._tiles()
+        if self._course.world == "harbour":
+            corners = np.concatenate([corners, self._open_water(corners)])
+        return _level(corners, 0.0, _GROUND_PERIOD, self._light_at(corners))
+
+    def ceiling(self) -> QuadMesh:
+        """Ceiling, seen from below."""
+        corners = self._tiles()[:, ::-1]
+        return _level(
+            corners, self._course.ceiling_m, _CEILING_PERIOD, 0.9 * self._light_at(corners)
+        )
+
+    def lamps(self) -> QuadMesh:
+        """Lamps, seen from below, with the middle of their texture cell everywhere."""
+        row, column = divmod(CELLS["lamp"], ROWS)
+        place = (np.array([column, row]) + 0.5) / ROWS
+        mesh = QuadMesh()
+        for lamp in self._course.lamps:
+            cos, sin = np.cos(lamp.yaw), np.sin(lamp.yaw)
+            half = 0.5 * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)]) * (lamp.length, lamp.width)
+            corners = np.full((1, 4, 3), self._course.ceiling_m - _GAP)
+            corners[0, :, 0] = lamp.x + cos * half[:, 0] - sin * half[:, 1]
+            corners[0, :, 1] = lamp.y + sin * half[:, 0] + cos * half[:, 1]
+            mesh.add(corners, np.tile(place, (1, 4, 1)))
+        return mesh
+
+    def verges(self) -> QuadMesh:
+        """Strips of grass along the walls."""
+        mesh = QuadMesh()
+        for wall in self._course.walls:
+            start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
+            length = float(np.hypot(*(end - start)))
+            along = (end - start) / length
+            inwards = _VERGE_WIDTH * np.array([-along[1], along[0]])
+            flat = np.array([start, end, end + inwards, start + inwards])
+            corners = np.concatenate([flat, np.full((4, 1), _VERGE_RISE)], axis=1)[None]
+            far = length / 1.5
+            uvs = np.array([[(0.0, 0.2), (far, 0.2), (far, 0.0), (0.0, 0.0)]])
+            mesh.add(corners, uvs, self._light_at(flat)[None])
+        return mesh
+
+    def walls(self) -> dict[str, QuadMesh]:
+        """Meshes of all walls, keyed by texture."""
+        result: dict[str, QuadMesh] = defaultdict(QuadMesh)
+        rng = np.random.default_rng([self._course.seed, 78])
+        for number, wall in enumerate(self._course.walls):
+            clad = rng.random() < _CLAD
+            # Walls of one kind start with different parts of the texture.
+            offset = (0.37 * number) % 1.0
+            if wall.surface == "door" and wall.height > _DOOR_HEIGHT + 0.05:
+                self._add_wall(result["door"], wall, 0.0, _DOOR_HEIGHT, offset)
+                self._add_wall(result["plaster"], wall, _DOOR_HEIGHT, wall.height, offset)
+            else:
+                name = "panel" if clad and wall.surface == "plaster" else wall.surface
+                self._add_wall(result[name], wall, 0.0, wall.height, offset)
+        if self._course.world == "harbour":
+            add_banks(self._course, result, self._light_at)
+        return dict(result)
+
+    def obstacles(self) -> QuadMesh:
+        """All obstacles of a course, which share one texture."""
+        mesh = QuadMesh()
+        for obstacle in self._course.obstacles:
+            bright = float(self._light_at(np.array([obstacle.x, obstacle.y])))
+            if obstacle.kind == "dinghy":
+                add_dinghy(mesh, obstacle, bright)
+            elif obstacle.is_round:
+                for outline, material in _ROUND[obstacle.kind]:
+                    profile = np.array(outline) * (obstacle.length, obstacle.height)
+                    add_turned(mesh, obstacle.x, obstacle.y, profile, material, bright)
+            else:
+                _add_boxes(mesh, obstacle, bright)
+        return mesh
+
+    def _light_at(self, points: Array) -> Array:
+        """Light at points, m, (..., 2), from 0 to 1."""
+        if not len(self._lamps):
+            return np.ones(points.shape[:-1])
+        flat = points.reshape(-1, 1, 2) - self._lamps
+        away = (flat * flat).sum(axis=2) / (_REACH * _REACH)
+        total = 1.0 - np.exp(-1.2 * (1.0 / (1.0 + away * away)).sum(axis=1))
+        dark = 1.0 - self._contrast * (1.0 - self._darkest)
+        return (dark + (1.0 - dark) * total).reshape(points.shape[:-1])
+
+    def _facing(self, angle: float) -> float:
+        """Factor on a wall whose front faces `angle`, rad; 0 to 1."""
+        turned = 0.5 + 0.5 * np.cos(angle - self._sun)
+        return float(1.0 - (1.0 - _SHADE) * min(1.0, 2.0 * self._contrast) * (1.0 - turned))
+
+    def _tiles(self) -> Array:
+        """Corners of the tiles that cover the lane, counter-clockwise from above, m, (n, 4, 2)."""
+        indoors = self._course.ceiling_m > 0.0
+        size = _FINE if indoors else _COARSE
+        behind = _INDOORS_BEHIND if indoors else _OUTDOORS_BEHIND
+        if self._course.world == "harbour":
+            behind = _COARSE
+        reach = float(self._course.half_width.max()) + behind
+        low, high = self._course.route.min(axis=0) - reach, self._course.route.max(axis=0) + reach
+        count = np.ceil((high - low) / size).astype(int)
+        origin = low + size * np.argwhere(np.ones(count, bool))
+        if indoors:
+            # Tiles far from the route are invisible.
+            every = max(1, int(size / self._course.spacing))
+            gaps = (origin + 0.5 * size)[:, None, :] - self._course.route[::every]
+            near = (gaps * gaps).sum(axis=2).min(axis=1) < (reach + size) ** 2
+            origin = origin[near]
+        return origin[:, None, :] + size * np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+
+    def _open_water(self, tiles: Array) -> Array:
+        """Corners of four large tiles around the others, up to the far shore, m, (4, 4, 2)."""
+        (x0, y0), (x1, y1) = tiles.min(axis=(0, 1)), tiles.max(axis=(0, 1))
+        middle, radius = extent(self._course)
+        (left, bottom), (right, top) = middle - radius, middle + radius
+        around = (
+            (left, bottom, right, y0), (left, y1, right, top), (left, y0, x0, y1),
+            (x1, y0, right, y1),
+        )  # fmt: skip
+        return np.array([[(a, b), (c, b), (c, d), (a, d)] for a, b, c, d in around])
+
+    def _add_wall(self, mesh: QuadMesh, wall: Wall, low: float, high: float, offset: float) -> None:
+        """Add a wall between two heights, in pieces short enough for the light to vary.
+
+        Args:
+            mesh: Mesh to extend.
+            wall: The wall.
+            low: Lower height, m.
+            high: Upper height, m.
+            offset: Start of the texture, 0 to 1.
+        """
+        start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
+        length = float(np.hypot(*(end - start)))
+        columns = max(1, int(np.ceil(length / _LONGEST)))
+        share = np.linspace(0.0, 1.0, columns + 1)
+        across, down = _spread(wall, length, low, high)
+        # Seen from the front, the end of the wall is on the left.
+        base = end + share[:, None] * (start - end)
+        rows = low + _ROWS * (high - low)
+        points = np.empty((len(rows), columns + 1, 3))
+        points[..., :2] = base
+        points[..., 2] = rows[:, None]
+        uvs = np.empty((len(rows), columns + 1, 2))
+        uvs[..., 0] = offset * (wall.surface in _PERIOD) + across * share
+        uvs[..., 1] = (1.0 - _ROWS[:, None]) * down
+        along = end - start
+        facing = self._facing(float(np.arctan2(along[0], -along[1])))
+        lights = _UPWARDS[:, None] * (facing * self._light_at(base))[None, :]
+        mesh.add_grid(points, uvs, lights)
+
+
+def _level(corners: Array, height: float, period: float, lights: Array) -> QuadMesh:
+    """Horizontal quads with a texture of a width `period`, m."""
+    mesh = QuadMesh()
+    up = np.full((*corners.shape[:2], 1), height)
+    mesh.add(np.concatenate([corners, up], axis=2), corners / period, lights)
+    return mesh
+
+
+def _spread(wall: Wall, length: float, low: float, high: float) -> tuple[float, float]:
+    """Repetitions of the texture along the wall and upwards."""
+    if low > 0.0:
+        # Above a door: the upper part of the plaster, without its skirting board.
+        return length / _PERIOD["plaster"], (high - low) / wall.height
+    if wall.surface in _WHOLE:
+        return float(max(1, round(length / _WHOLE[wall.surface]))), 1.0
+    return length / _PERIOD[wall.surface], high / _BRICK_HEIGHT if wall.surface == "brick" else 1.0
+
+
+def _add_boxes(mesh: QuadMesh, obstacle: Obstacle, bright: float) -> None:
+    size = np.array([obstacle.length, obstacle.width, obstacle.height])
+    cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
+    for half, place, material in _BOXES[obstacle.kind]:
+        dx, dy, dz = np.array(place) * size
+        middle = np.array([obstacle.x + cos * dx - sin * dy, obstacle.y + sin * dx + cos * dy, dz])
+        add_box(mesh, middle, np.array(half) * size, obstacle.yaw, material, bright)

@@ -1,0 +1,170 @@
+"""Drivers for `VehicleEnv`: the course expert, a demonstrator, and the shipped camera policies."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import WorldError, check_seed
+from shapechanger.vehicles.courses.course import Course
+from shapechanger.vehicles.expert import CourseExpert, Disturbance
+from shapechanger.vehicles.expert.traits import traits_of
+from shapechanger.vehicles.world import MujocoWorld
+
+BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
+"""Bearings of the distances that a teacher sees, degrees from the heading, positive to the left."""
+
+FARTHEST_M: Final = 6.0
+"""Distance that it sees where nothing is nearer, m."""
+
+LEAST_THROTTLE: Final = 0.25
+"""Least throttle of a teacher's vehicle that stands, in size; it overcomes the friction at rest.
+
+`shapechanger.vehicles.learning` holds its students to the same.
+"""
+
+_BEARINGS: Final = np.radians(BEARINGS_DEG)
+
+_FOLDER: Final = Path(__file__).parent / "clones"
+
+CLONES: Final[Mapping[str, Path]] = MappingProxyType(
+    {vehicle: _FOLDER / f"{vehicle}.safetensors" for vehicle in ("boat", "car", "tank", "truck")}
+)
+"""Files of the shipped camera policies by vehicle; `CameraPolicy.load` reads them.
+
+Each was cloned from ten minutes of its expert's driving; `clones/README.md` is their model card.
+"""
+
+
+class Demonstrator(ABC):
+    """Driver that makes mistakes and recovers from them, for demonstrations.
+
+    Args:
+        world: The world of the vehicle.
+        seed: Seed of the mistakes.
+        sway: Size of the mistakes, see `Disturbance`; None for what the expert can correct.
+
+    Raises:
+        WorldError: If the seed is not a whole number from 0.
+    """
+
+    def __init__(self, world: MujocoWorld, seed: int, sway: float | None = None) -> None:
+        self._world = world
+        self._sway = traits_of(world.vehicle.name).sway if sway is None else sway
+        kind = "The seed of a driver must be"
+        self._seeds = np.random.default_rng(check_seed(seed, WorldError, kind, largest=None))
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin an episode."""
+        self._disturbance = Disturbance(int(self._seeds.integers(2**31)), self._sway)
+
+    def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the driver's action, to learn from, and the disturbed one, to take.
+
+        Returns:
+            Each has shape (2,).
+        """
+        action = self._action()
+        return action, self._disturbance.applied(action)
+
+    @abstractmethod
+    def _action(self) -> NDArray[np.float32]:
+        """Return the driver's action, shape (2,)."""
+
+
+class VehicleDemonstrator(Demonstrator):
+    """Expert that knows the whole course; its actions are steering and throttle."""
+
+    def begin(self) -> None:
+        """Begin an episode."""
+        super().begin()
+        self._expert = ExpertDriver(self._world)
+
+    def _action(self) -> NDArray[np.float32]:
+        return self._expert(None)
+
+
+def course_expert(world: MujocoWorld) -> CourseExpert:
+    """Make the expert for the present course of a world."""
+    return CourseExpert(world.course, world.vehicle.name, path=world.path())
+
+
+def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
+    """Return what a teacher sees, shape (11,).
+
+    Distances from the middle of the front bumper at `BEARINGS_DEG`, m, up to `FARTHEST_M`; speed
+    along the heading, m/s; rate of turn, rad/s, counter-clockwise.
+    """
+    seen = world.inputs()
+    distances = world.ranges_m(_BEARINGS, FARTHEST_M)
+    return np.array((*distances, seen.speed, seen.yaw_rate), np.float32)
+
+
+def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
+    """Return an action that moves a vehicle which stands, unless its throttle is exactly 0.
+
+    A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest.
+    The vehicle then sees the same for ever, and stands for good. The exploration of the training
+    moved it, so that the training hardly saw this.
+
+    Args:
+        action: Steering and throttle, shape (2,).
+        stands: Whether the vehicle stands.
+    """
+    steering, throttle = action
+    if not stands or throttle == 0.0 or abs(throttle) >= LEAST_THROTTLE:
+        return action
+    return np.array((steering, np.copysign(LEAST_THROTTLE, throttle)), action.dtype)
+
+
+class TeacherDemonstrator(Demonstrator):
+    """A policy that sees distances, as a demonstrator; see `observe_ranges`.
+
+    Args:
+        world: The world of the vehicle.
+        act: The policy: maps observations, (n, 11), to actions, (n, 2).
+        seed: Seed of the mistakes.
+    """
+
+    def __init__(
+        self, world: MujocoWorld, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int
+    ) -> None:
+        super().__init__(world, seed)
+        self._policy = act
+
+    def _action(self) -> NDArray[np.float32]:
+        action = self._policy(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)
+        return leave_rest(action, self._world.inputs().stands)
+
+
+class ExpertDriver:
+    """Expert that drives on the present course of a world.
+
+    It counts in periods of 1/20 s. `DrivingEnv.expert` makes it for robots with this control rate.
+
+    Args:
+        world: The world of the vehicle.
+    """
+
+    def __init__(self, world: MujocoWorld) -> None:
+        self._world = world
+        self._course: Course | None = None
+        self._placed = 0
+
+    def __call__(self, observation: Any) -> NDArray[np.float32]:
+        """Return an action, (2,), steering and throttle; the observation is ignored."""
+        seen = self._world.inputs()
+        if self._world.course is not self._course:
+            self._course = self._world.course
+            self._expert = course_expert(self._world)
+        if self._world.placed != self._placed:
+            self._placed = self._world.placed
+            self._expert.reset(seen.pose)
+        return self._expert.act(seen.pose, seen.speed, seen.yaw_rate)

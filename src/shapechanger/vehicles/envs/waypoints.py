@@ -1,0 +1,243 @@
+"""One camera and one action for all vehicles: where the free way is, and how fast to go there.
+
+Networks that predict steering learn the body with it: full left is another circle in each vehicle.
+A waypoint means the same in all of them. What a body must know is how fast it turns when it steers,
+two numbers that it measures itself, in seconds and without pictures.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+from gymnasium.utils import EzPickle
+from numpy.typing import NDArray
+
+from shapechanger.errors import ProfileError, WorldError
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.vehicles.bodies import vehicle_model
+from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
+from shapechanger.vehicles.courses.course import FLOODED
+from shapechanger.vehicles.envs.base import Courses, DrivingEnv, resolve_profile
+from shapechanger.vehicles.envs.demonstrators import Demonstrator, course_expert
+from shapechanger.vehicles.envs.env import VehicleEnv
+from shapechanger.vehicles.envs.ranges import RangesEnv
+from shapechanger.vehicles.envs.shift import certify_vehicles
+from shapechanger.vehicles.waypoints import (
+    ACTION_LAYOUT,
+    AHEAD_M,
+    OBSERVATION_LAYOUT,
+    WIDEST_RAD,
+    SteeringResponse,
+    action_space,
+    command,
+    measure_response,
+    observation_space,
+)
+from shapechanger.vehicles.world import MujocoWorld
+
+# Standard deviation of the bearing's disturbance: the effect of steering by 0.25 in the car.
+_SWAY: Final = 0.18
+
+
+def _rectifier_of(profile: Profile, camera: CameraPlan) -> Rectifier:
+    """Return what warps the frames of a profile's camera.
+
+    Raises:
+        ProfileError: If the profile does not state how the camera looks, or it sees too little.
+    """
+    pitch, fovy = camera.pitch_deg, camera.fovy_deg
+    if pitch is None or fovy is None:
+        missing = " and ".join(
+            name for name, value in (("pitch_deg", pitch), ("fovy_deg", fovy)) if value is None
+        )
+        raise ProfileError(
+            f"{profile.path}: [camera] needs {missing} for waypoints: `shapechanger robot camera` "
+            "measures them from one picture of a checkerboard."
+        )
+    try:
+        return Rectifier(CameraGeometry(pitch, fovy), camera.size)
+    except WorldError as error:
+        raise ProfileError(f"{profile.path}: {error}") from error
+
+
+@lru_cache(maxsize=32)
+def _response_of(
+    vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, full_robot: bool
+) -> SteeringResponse:
+    """Measure the response of a simulated vehicle, once in a process.
+
+    Raises:
+        ProfileError: If the robot does not measure its speed and its rate of turn.
+    """
+    common: dict[str, Any] = {"world": world, "robot": robot, "courses": (0,), "put_back": True}
+    env = VehicleEnv(vehicle, image=False, **common) if full_robot else RangesEnv(vehicle, **common)
+    try:
+        places = env.observation_layout.slices
+        missing = [name for name in ("speed", "yaw_rate") if name not in places]
+        if missing:
+            raise ProfileError(
+                f"{resolve_profile(vehicle, robot)[0].path} has no sensor of "
+                f"{' and '.join(missing)}, which waypoints need on the full robot: add it to the "
+                "profile, or leave out full_robot."
+            )
+        return measure_response(env, places["speed"].start, places["yaw_rate"].start)
+    finally:
+        env.close()
+
+
+class WaypointEnv(DrivingEnv):
+    """The driving task with a camera and an action that are the same for all vehicles.
+
+    A policy that learned in one vehicle drives another one as it is: pictures are warped to one
+    virtual camera (`shapechanger.vehicles.cameras.rectify`), and the action is a waypoint, which
+    the vehicle turns into steering by its own `SteeringResponse`, measured when the env is made.
+
+    ## Action space
+    `Box(-1, 1, (2,), float32)`: bearing of the free way `AHEAD_M` ahead, in `WIDEST_RAD`, positive
+    to the right; and the speed, -1 for standing and 1 for full throttle. It acts for one control
+    period, 1/20 s.
+
+    ## Observation space
+    The rectified frame, RGB, `uint8`, shape (48, 80, 3).
+
+    ## Reward, start, end and info
+    Those of `RangesEnv`, or of `VehicleEnv` with `full_robot`.
+
+    Args:
+        vehicle: "car", "tank", "boat" or "truck".
+        world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
+            for a boat, so that vehicles differ in their bodies alone.
+        robot: Path or name of a profile; None for `lab-` followed by the vehicle.
+        full_robot: Whether the robot is emulated, as in `VehicleEnv`.
+        courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
+        randomise: Whether `reset` samples light, textures and the camera's pose too. Pictures are
+            warped as if the camera were in its place, so a policy sees the error of the pose.
+        put_back: Whether to put the vehicle back on the lane after a collision. A collision then
+            does not end the episode.
+        render_mode: "rgb_array" for `render` to return the camera's picture as it is.
+
+    Attributes:
+        parts: The parts that the robot's outputs move.
+        response: How the vehicle turns.
+
+    Raises:
+        UnknownName: If there is no such vehicle, world, profile or kind of courses.
+        ProfileError: If the profile moves other parts than the vehicle has, or has no camera that
+            sees what policies for all vehicles look at.
+        WorldError: If the vehicle cannot drive in the world.
+    """
+
+    certify_shift = staticmethod(certify_vehicles)
+
+    def __init__(
+        self,
+        vehicle: str,
+        *,
+        world: str | None = None,
+        robot: str | os.PathLike[str] | None = None,
+        full_robot: bool = False,
+        courses: Courses = "training",
+        randomise: bool = False,
+        put_back: bool = False,
+        render_mode: str | None = None,
+    ) -> None:
+        arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
+        EzPickle.__init__(self, vehicle, **arguments)
+        body = vehicle_model(vehicle)
+        self._rectifier = _rectifier_of(*resolve_profile(vehicle, robot))
+        world = world or (FLOODED if body.floats else "corridor")
+        common: dict[str, Any] = {
+            "world": world, "robot": robot, "courses": courses, "randomise": randomise,
+            "put_back": put_back,
+        }  # fmt: skip
+        self.response = _response_of(vehicle, world, robot, full_robot)
+        self._env: VehicleEnv | RangesEnv = (
+            VehicleEnv(vehicle, state=True, **common)
+            if full_robot
+            else RangesEnv(vehicle, camera=True, **common)
+        )
+        self.parts, self._world, self._draw = self._env.parts, self._env.world, self._env._draw
+        self.render_mode = render_mode
+        self._turns_on_the_spot = body.turning_radius_m == 0.0
+        self.observation_space, self.action_space = observation_space(), action_space()
+        self.observation_layout, self.action_layout = OBSERVATION_LAYOUT, ACTION_LAYOUT
+        self.metadata = {**self.metadata, "render_fps": self._env.metadata["render_fps"]}
+        self._speed = 0.0
+        places = self._env.observation_layout.slices
+        self._speed_at = places["speed"].start
+        if full_robot:
+            self._speed_at -= places["camera/image"].stop
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+        """Start an episode; see `VehicleEnv.reset`."""
+        super().reset(seed=seed)
+        seen, info = self._env.reset(seed=seed, options=options)
+        return self._observe(seen), info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.uint8], float, bool, bool, dict[str, Any]]:
+        """Drive towards a waypoint for one control period.
+
+        Raises:
+            SpaceMismatch: If the action is not two finite numbers.
+            ResetNeeded: If `reset` was never called.
+        """
+        steering = command(action, self.response, self._speed, on_the_spot=self._turns_on_the_spot)
+        seen, reward, terminated, truncated, info = self._env.step(steering)
+        return self._observe(seen), reward, terminated, truncated, info
+
+    def demonstrator(self, seed: int) -> WaypointDemonstrator:
+        """Return an expert that knows the whole course and recovers from its own mistakes.
+
+        Args:
+            seed: Seed of the mistakes.
+
+        Raises:
+            ProfileError: If the robot has another control rate than the expert.
+        """
+        self._require_rate_of_expert()
+        return WaypointDemonstrator(self.world, seed)
+
+    def close(self) -> None:
+        """Release the pins and the renderer."""
+        self._env.close()
+
+    def _observe(self, seen: Any) -> NDArray[np.uint8]:
+        if isinstance(self._env, RangesEnv):
+            self._speed = float(seen[self._speed_at])
+            return self._rectifier(self.world.picture())
+        self._speed = float(np.nan_to_num(seen["state"][self._speed_at]))
+        return self._rectifier(seen["image"])
+
+
+class WaypointDemonstrator(Demonstrator):
+    """Expert that points out the free way; its actions are waypoints, bearing and speed.
+
+    Args:
+        world: The world of the vehicle.
+        seed: Seed of the mistakes.
+    """
+
+    def __init__(self, world: MujocoWorld, seed: int) -> None:
+        super().__init__(world, seed, _SWAY)
+
+    def begin(self) -> None:
+        """Begin an episode."""
+        super().begin()
+        self._expert = course_expert(self._world)
+
+    def _action(self) -> NDArray[np.float32]:
+        pose, path = self._world.pose, self._expert.path
+        station = path.nearest(pose.x, pose.y).station
+        x, y = path.at(station + AHEAD_M)
+        left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
+        share = self._expert.speeds[path.index(station)] / self._world.vehicle.top_speed_mps
+        return np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)

@@ -1,0 +1,367 @@
+"""Driver that follows a path planned on the whole course.
+
+The steering is pure pursuit: R. C. Coulter, "Implementation of the Pure Pursuit Path Tracking
+Algorithm", CMU-RI-TR-92-01 (1992). The circle that is tangent to the vehicle's heading and passes
+through a point at distance L and angle a has the curvature 2 sin(a) / L. A boat drifts, so it aims
+like a ship on a line of sight (T. I. Fossen, "Handbook of Marine Craft Hydrodynamics and Motion
+Control", 2011, chapter 10), with its drift angle subtracted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.contract.world import Pose
+from shapechanger.vehicles.courses.course import Course
+from shapechanger.vehicles.expert.path import (
+    ClearanceField,
+    CoursePath,
+    plan_path_for,
+    speed_profile,
+)
+from shapechanger.vehicles.expert.traits import PERIOD_S, Traits, traits_of
+
+
+def _wrap_angle(angle: float) -> float:
+    """Equivalent angle from -pi to pi, rad."""
+    return math.remainder(angle, 2 * math.pi)
+
+
+def _clipped(value: float) -> float:
+    return max(-1.0, min(1.0, value))
+
+
+DRIFT_S: Final = 0.8
+"""Time constant of the drift average, s: longer than turns, so that the current remains."""
+
+STICKING: Final = 0.1
+"""Rate of turn, rad/s, from which a tank's full dead band is compensated; less below it, so that
+it does not twitch on straights."""
+
+ABOUT: Final = 0.9
+"""Angle to the target, rad, above which a tank turns on the spot."""
+
+ABOUT_RATE: Final = 2.5
+"""Rate of that turn over the angle, 1/s; a slower turn gets stuck in friction."""
+
+
+class Pursuit:
+    """Steering towards a point ahead.
+
+    Args:
+        traits: Driving properties of the vehicle.
+    """
+
+    def __init__(self, traits: Traits) -> None:
+        self._traits = traits
+        self._before: Pose | None = None
+        self._drift = 0.0
+
+    def reset(self) -> None:
+        """Forget the drift."""
+        self._before, self._drift = None, 0.0
+
+    def moved(self, pose: Pose) -> None:
+        """Update the drift estimate; call it once per period."""
+        before, self._before = self._before, pose
+        if before is None:
+            return
+        dx, dy = pose.x - before.x, pose.y - before.y
+        going = math.hypot(dx, dy) / PERIOD_S > 0.2 * self._traits.top_speed
+        now = _wrap_angle(math.atan2(dy, dx) - pose.heading) if going else 0.0
+        if abs(now) > math.pi / 3:  # Astern, or moved by hand.
+            now = 0.0
+        self._drift += (now - self._drift) * PERIOD_S / DRIFT_S
+
+    def steering(
+        self, pose: Pose, speed: float, yaw_rate: float, target: tuple[float, float]
+    ) -> float:
+        """Steering towards a point, from -1, left, to 1.
+
+        Args:
+            pose: Pose of the vehicle.
+            speed: Speed along its heading, m/s.
+            yaw_rate: Rate of turn, rad/s, counter-clockwise.
+            target: x and y of the point, m.
+        """
+        dx, dy = target[0] - pose.x, target[1] - pose.y
+        distance = max(math.hypot(dx, dy), 0.1)
+        angle = _wrap_angle(math.atan2(dy, dx) - pose.heading)
+        match self._traits.drive:
+            case "wheels":
+                return _clipped(-self._curvature(angle, distance) / self._traits.turn)
+            case "tracks":
+                rate = max(speed, 0.3 * self._traits.top_speed) * self._curvature(angle, distance)
+                if abs(angle) > ABOUT:
+                    rate = ABOUT_RATE * angle
+                # Tracks slip by an unknown amount, so the missing rate of turn is fed back.
+                value = (1.5 * rate - 0.5 * yaw_rate) / self._traits.turn
+                value += self._traits.dead * _clipped(rate / STICKING)
+                return _clipped(-value)
+            case "rudder":
+                angle = _wrap_angle(angle - self._drift)
+                rate = 1.6 * angle
+                water = max(speed, 0.3 * self._traits.top_speed)
+                return _clipped(-(2.0 * rate - 1.0 * yaw_rate) / (self._traits.turn * water))
+
+    def _curvature(self, angle: float, distance: float) -> float:
+        """Curvature of the circle to the target, 1/m; targets behind count as abeam."""
+        side = math.sin(angle) if abs(angle) < math.pi / 2 else math.copysign(1.0, angle)
+        return 2 * side / distance
+
+
+PATIENCE_S: Final = 0.7
+"""Time after which a driven vehicle that stands still counts as stuck, s."""
+
+SCRAPING_S: Final = 3.0
+"""Time after which a slow vehicle counts as scraping along a wall, s."""
+
+ASKED: Final = 0.25
+"""Throttle or steering above which a vehicle counts as driven."""
+
+STILL: Final = 0.05
+"""Share of the top speed below which it stands still."""
+
+SLOW: Final = 0.25
+"""Share of the top speed below which it is slow."""
+
+TURNING: Final = 0.15
+"""Rate of turn, rad/s, above which it does not stand still."""
+
+BACK_AT_MOST_S: Final = 4.0
+BACK_THROTTLE: Final = -0.6
+
+
+class _Move(NamedTuple):
+    """One part of a recovery.
+
+    Attributes:
+        seconds: Duration.
+        steering: Constant steering.
+        throttle: Constant throttle.
+    """
+
+    seconds: float
+    steering: float
+    throttle: float
+
+
+class Recovery:
+    """Detects that a vehicle is stuck, and takes over until it is free.
+
+    Args:
+        traits: Driving properties of the vehicle.
+        rng: Random generator that varies the manoeuvres, so that none repeats for ever.
+    """
+
+    def __init__(self, traits: Traits, rng: np.random.Generator) -> None:
+        self._traits = traits
+        self._rng = rng
+        self._moves: deque[_Move] = deque()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all timers and manoeuvres."""
+        self._moves.clear()
+        self._left_s = 0.0  # Remaining time of the first move.
+        self._still_s = 0.0
+        self._slow_s = 0.0
+        self._free_s = 0.0
+        self._tries = 0
+
+    @property
+    def active(self) -> bool:
+        """Return whether a manoeuvre is being driven."""
+        return bool(self._moves)
+
+    def watch(
+        self, action: tuple[float, float], speed: float, yaw_rate: float, *, blocked: bool
+    ) -> None:
+        """Update the timers from an action and its effect.
+
+        Args:
+            action: Steering and throttle.
+            speed: Speed, m/s.
+            yaw_rate: Rate of turn, rad/s.
+            blocked: Whether an obstacle ahead prevents a necessary turn.
+        """
+        share = abs(speed) / self._traits.top_speed
+        driven = abs(action[1]) > ASKED
+        turned = self._traits.drive == "tracks" and abs(action[0]) > ASKED
+        straight = abs(yaw_rate) < TURNING  # Turning on the spot is progress.
+        still = share < STILL and straight
+        # A boat with its bow at a quay turns until its stern touches as well, and then is stuck for
+        # good; a car scrapes along. A tank turns away on the spot.
+        still |= blocked and share < SLOW and action[1] > 0 and self._traits.drive != "tracks"
+        self._still_s = self._still_s + PERIOD_S if still and (driven or turned) else 0.0
+        self._slow_s = self._slow_s + PERIOD_S if share < SLOW and straight and driven else 0.0
+        self._free_s = self._free_s + PERIOD_S if share >= SLOW else 0.0
+        if self._free_s > SCRAPING_S and not self.active:
+            self._tries = 0
+
+    def action(self, angle: float) -> tuple[float, float] | None:
+        """Steering and throttle of the manoeuvre; None if the vehicle is not stuck.
+
+        Args:
+            angle: Angle from the heading to the target, rad, counter-clockwise.
+        """
+        if self.active:
+            self._left_s -= PERIOD_S
+            if self._left_s <= 0 or self._still_s > PATIENCE_S:  # Finished, or stuck again.
+                self._moves.popleft()
+                self._begin_move()
+        elif self._still_s > PATIENCE_S - PERIOD_S / 2:
+            self._begin(angle, scraping=False)
+        elif self._slow_s > SCRAPING_S:
+            self._begin(angle, scraping=True)
+        return self._moves[0][1:] if self.active else None
+
+    def _begin(self, angle: float, *, scraping: bool) -> None:
+        """Choose the moves of a manoeuvre."""
+        self._tries += 1
+        longer = 1.4 ** (self._tries - 1) * self._rng.uniform(0.8, 1.2)
+        side: Literal[-1, 1] = 1 if angle >= 0 else -1
+        if self._tries > 2 and self._rng.random() < 0.4:
+            side = -1 if side == 1 else 1
+        if self._traits.drive == "rudder" and scraping:
+            # A rudder swings the stern, which a quay beside it prevents. Steering towards the quay
+            # puts the bow there and frees the stern; then the boat backs away.
+            self._moves.append(_Move(1.5 * longer, float(side), 0.5))
+        seconds = (2.5 if self._traits.drive == "rudder" else 1.0) * longer
+        # Going back, wheels and rudders turn the other way; tracks do not.
+        turn = side * min(1.0, 0.4 + abs(angle))
+        turn *= -0.5 if self._traits.drive == "tracks" else 1.0
+        self._moves.append(_Move(min(seconds, BACK_AT_MOST_S), turn, BACK_THROTTLE))
+        self._begin_move()
+
+    def _begin_move(self) -> None:
+        self._left_s = self._moves[0].seconds if self._moves else 0.0
+        self._still_s = self._slow_s = 0.0
+
+
+SPEED_GAIN: Final = 1.5
+"""Gain of the throttle on the speed error, both relative to their maxima."""
+
+REACTION_S: Final = 0.15
+"""Delay from an action to its effect, s, over which the pose is predicted."""
+
+ASIDE: Final = 0.7
+"""Angle to the target, rad, above which a vehicle must turn before it can go on."""
+
+BLOCKED_M: Final = 0.15
+"""Clearance ahead of the nose, m, that is too small for that."""
+
+
+class CourseExpert:
+    """Drives a vehicle around a course, along a planned path.
+
+    Args:
+        course: The course.
+        vehicle: Name of the vehicle: "car", "tank", "truck" or "boat".
+        seed: Seed of the recovery manoeuvres.
+        path: The path, if it is already planned.
+
+    Attributes:
+        path: The path that it follows.
+        speeds: Speed at each point of the path, m/s, (N,).
+
+    Raises:
+        UnknownName: If the vehicle is unknown.
+        WorldError: If there is no path around the course.
+    """
+
+    def __init__(
+        self,
+        course: Course,
+        vehicle: str,
+        seed: int = 0,
+        *,
+        path: CoursePath | None = None,
+    ) -> None:
+        traits = self._traits = traits_of(vehicle)
+        self.path = path or plan_path_for(course, traits)
+        self.speeds = speed_profile(self.path, traits)
+        self._obstacles = ClearanceField(course)
+        self._pursuit = Pursuit(traits)
+        self._recovery = Recovery(traits, np.random.default_rng(seed))
+        self._station: float | None = None
+
+    def reset(self, pose: Pose) -> None:
+        """Start at a pose."""
+        self._station = self.path.nearest(pose.x, pose.y).station
+        self._pursuit.reset()
+        self._recovery.reset()
+
+    def act(self, pose: Pose, speed: float, yaw_rate: float = 0.0) -> NDArray[np.float32]:
+        """Choose an action; call it once per period.
+
+        Args:
+            pose: Pose of the vehicle.
+            speed: Speed along its heading, m/s.
+            yaw_rate: Rate of turn, rad/s, counter-clockwise seen from above.
+
+        Returns:
+            Steering and throttle, from -1 to 1, (2,); -1 steers left.
+        """
+        if self._station is None:
+            self.reset(pose)
+        self._pursuit.moved(pose)
+        soon = self._soon(pose, speed, yaw_rate)
+        spot = self.path.nearest(soon.x, soon.y, self._station)
+        self._station = spot.station
+        look = self._traits.look_m + self._traits.look_s * max(speed, 0.0)
+        target = self.path.at(spot.station + look)
+        angle = _wrap_angle(math.atan2(target[1] - soon.y, target[0] - soon.x) - soon.heading)
+        back = self._recovery.action(angle)
+        if back is None:
+            steering = self._pursuit.steering(soon, speed, yaw_rate, target)
+            action = self._driven(steering, spot.station, spot.lateral, angle, speed)
+        else:
+            action = back
+        blocked = abs(angle) > ASIDE and self._ahead(pose) < BLOCKED_M
+        self._recovery.watch(action, speed, yaw_rate, blocked=blocked)
+        return np.array(action, np.float32)
+
+    def _ahead(self, pose: Pose) -> float:
+        """Clearance at `BLOCKED_M` ahead of the nose, m."""
+        reach = self._traits.body.nose_m + BLOCKED_M
+        nose = (
+            pose.x + reach * math.cos(pose.heading),
+            pose.y + reach * math.sin(pose.heading),
+        )
+        return float(self._obstacles.distance(np.array([nose]))[0])
+
+    def _soon(self, pose: Pose, speed: float, yaw_rate: float) -> Pose:
+        """Predicted pose when the current action takes effect."""
+        ahead = speed * REACTION_S
+        heading = pose.heading + yaw_rate * REACTION_S / 2
+        return Pose(
+            pose.x + ahead * math.cos(heading),
+            pose.y + ahead * math.sin(heading),
+            pose.heading + yaw_rate * REACTION_S,
+        )
+
+    def _driven(
+        self, steering: float, station: float, lateral: float, angle: float, speed: float
+    ) -> tuple[float, float]:
+        """Steering and throttle for driving forward."""
+        traits = self._traits
+        here = self.path.index(station)
+        wanted = float(self.speeds[here])
+        # Off the path there is less room than planned, and a wrong heading must be corrected.
+        room = float(self.path.clearance[here]) - abs(lateral) - traits.half_width_m
+        if room < traits.margin_m:
+            wanted *= 0.5 + 0.5 * max(room, 0.0) / traits.margin_m
+        slowest = 0.1 if traits.drive == "tracks" else 0.4
+        wanted *= max(math.cos(angle), slowest)
+        throttle = wanted / traits.top_speed
+        throttle += SPEED_GAIN * (wanted - speed) / traits.top_speed
+        throttle = max(traits.least_throttle, min(1.0, throttle))
+        if traits.drive == "tracks":  # Saturating one track would prevent the turn.
+            throttle = min(throttle, 1.0 - abs(steering))
+        return steering, throttle

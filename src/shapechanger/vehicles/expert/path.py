@@ -1,0 +1,505 @@
+"""Planning of a smooth, collision-free path around a course, and its speed profile.
+
+The cheapest way over a lattice decides on which side to pass each obstacle; the path is then the
+least bent line between bounds around that way. Its points are `middle + offset * left`, so the sum
+of its squared second differences is a quadratic function of the offsets, and the best offsets are
+the solution of a convex problem. Racing lines are found like this: F. Braghin et al., "Race driver
+model", Computers and Structures 86 (2008); A. Heilmeier et al., "Minimum curvature trajectory
+planning", Vehicle System Dynamics 58 (2020).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from shapechanger.errors import WorldError
+from shapechanger.vehicles.courses.course import Course
+from shapechanger.vehicles.courses.geometry import arc_lengths, wall_segments
+from shapechanger.vehicles.expert.line import ClosedLine
+from shapechanger.vehicles.expert.traits import Traits
+
+FAR_M: Final = 2.5
+"""Largest distance that is computed, m; larger ones are reported as this."""
+
+_CHUNK: Final = 256
+
+
+class ClearanceField:
+    """Distances from the walls and obstacles of a course, seen from above.
+
+    Args:
+        course: The course.
+    """
+
+    def __init__(self, course: Course) -> None:
+        walls = wall_segments(course.walls)
+        self._start, self._end = walls[:, :2], walls[:, 2:]
+        self._obstacles = course.obstacles
+
+    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance of each point from the nearest wall or obstacle, m, (N,).
+
+        It is at most `FAR_M`, and 0 inside an obstacle. It is fast if neighbours in the array are
+        close to each other.
+
+        Args:
+            points: Points, m, (N, 2).
+        """
+        parts = [self._near(points[i : i + _CHUNK]) for i in range(0, len(points), _CHUNK)]
+        return np.concatenate([np.empty(0), *parts])
+
+    def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances of points that are close together."""
+        low, high = points.min(axis=0) - FAR_M, points.max(axis=0) + FAR_M
+        start, end = self._start, self._end
+        near = (np.maximum(start, end) >= low) & (np.minimum(start, end) <= high)
+        start, end = start[near.all(axis=1)], end[near.all(axis=1)]
+        step = (end - start)[:, None]
+        away = points - start[:, None]  # (walls, points, 2)
+        share = np.einsum("wpj,wpj->wp", away, np.broadcast_to(step, away.shape))
+        squared = np.maximum(np.einsum("wpj,wpj->wp", step, step), 1e-12)
+        away -= np.clip(share / squared, 0.0, 1.0)[:, :, None] * step
+        squared = np.einsum("wpj,wpj->wp", away, away)
+        found = np.sqrt(squared.min(axis=0, initial=FAR_M**2))
+        for thing in self._obstacles:
+            reach = thing.length + thing.width
+            here = np.array((thing.x, thing.y))
+            if (here + reach < low).any() or (here - reach > high).any():
+                continue
+            dx, dy = (points - here).T
+            if thing.is_round:
+                off = np.hypot(dx, dy) - thing.length / 2
+            else:
+                cos, sin = np.cos(thing.yaw), np.sin(thing.yaw)
+                along = np.abs(cos * dx + sin * dy) - thing.length / 2
+                across = np.abs(cos * dy - sin * dx) - thing.width / 2
+                off = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
+            found = np.minimum(found, np.maximum(off, 0.0))
+        return found
+
+
+STATION_M: Final = 0.2
+OFFSET_M: Final = 0.1
+
+SLOPES: Final = np.arange(-2, 3)
+"""Changes of the offset from one station to the next, in steps of `OFFSET_M`."""
+
+BEND_COST: Final = 0.15
+"""Cost of changing the slope by one."""
+
+SLANT_COST: Final = 0.02
+"""Cost of a slope of one."""
+
+NARROW_COST: Final = 1.0
+"""Cost of a point with the smallest allowed clearance; it is quadratic in what is missing to the
+preferred clearance."""
+
+_NARROW_SHARE: Final = 2.0 / 3.0
+
+OVERLAP_M: Final = 12.0
+"""Length of the search beyond a whole lap, m. A way hardly depends on its offset that far back, so
+that a lap cut from the middle is closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Rows of points across the lane, at stations along it.
+
+    Attributes:
+        middle: Middle of the lane, m, (N, 2).
+        left: Unit vectors to the left, (N, 2).
+        offsets: Offsets from the middle, m, positive to the left, (K,).
+        clearance: Clearance of each point, m, (N, K); 0 outside the lane.
+    """
+
+    middle: NDArray[np.float64]
+    left: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+
+
+def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
+    """Lay a lattice over the lane of a course.
+
+    Args:
+        course: The course.
+        obstacles: Its clearances.
+    """
+    line = ClosedLine(course.route)
+    count = max(round(line.length / STATION_M), 8)
+    middle = np.array([line.at(line.length * i / count) for i in range(count)])
+    half_width = np.interp(
+        np.arange(count) * line.length / count,
+        line.stations,
+        course.half_width,
+        period=line.length,
+    )
+    step = line.length / count
+    # The direction over 0.8 m; rows would cross each other in tight corners with a shorter one.
+    ahead = np.roll(middle, -2, axis=0) - np.roll(middle, 2, axis=0)
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
+    side = int(np.floor(half_width.max() / OFFSET_M))
+    offsets = np.linspace(-side, side, 2 * side + 1) * OFFSET_M
+    points = middle[:, None] + offsets[None, :, None] * left[:, None]
+    clearance = obstacles.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
+    clearance[np.abs(offsets)[None, :] > half_width[:, None]] = 0.0
+    # Beyond the centre of a corner, rows run backward; such points are outside the lane.
+    gained = np.einsum("ikj,ij->ik", np.roll(points, -1, axis=0) - points, ahead)
+    backward = gained < 0.2 * step
+    clearance[backward | np.roll(backward, 1, axis=0)] = 0.0
+    return Lattice(middle, left, offsets, clearance)
+
+
+def cheapest_way(lattice: Lattice, least_m: float, comfort_m: float) -> NDArray[np.int64]:
+    """The closed way with the least cost of bends and narrow passages.
+
+    It is found by dynamic programming over stations, with offset and slope as the state.
+
+    Args:
+        lattice: The lattice.
+        least_m: Smallest clearance, m.
+        comfort_m: Clearance above which more is worth nothing, m.
+
+    Returns:
+        Index of the offset at each station, (N,).
+
+    Raises:
+        WorldError: If there is no such way.
+    """
+    missing = np.clip((comfort_m - lattice.clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
+    cost = np.where(lattice.clearance >= least_m, NARROW_COST * missing**2, np.inf)
+    count = len(cost)
+    overlap = min(round(OVERLAP_M / STATION_M), count)
+    way = _search(cost, np.arange(count + overlap) % count, None, least_m)
+    seam = overlap // 2
+    if way[seam] != way[seam + count]:
+        stations = (np.arange(count + 1) + seam) % count
+        closed = _search(cost, stations, int(way[seam + count]), least_m)
+        return np.roll(closed[:-1], seam)
+    return np.roll(way[seam : seam + count], seam)
+
+
+def _search(
+    cost: NDArray[np.float64], stations: NDArray[np.int64], seam: int | None, least_m: float
+) -> NDArray[np.int64]:
+    """The cheapest way along stations, as indices of offsets, (M,).
+
+    Args:
+        cost: Cost of each offset, (N, K).
+        stations: Stations to visit, in order, (M,).
+        seam: Offset to start and end with; None leaves both free.
+        least_m: Smallest clearance, m, for error messages.
+
+    Raises:
+        WorldError: If there is no way.
+    """
+    width = cost.shape[1]
+    bends = BEND_COST * (SLOPES[:, None] - SLOPES[None, :]) ** 2  # (from, to)
+    slants = SLANT_COST * SLOPES**2
+    total = np.full((width, len(SLOPES)), np.inf)
+    total[:] = cost[stations[0]][:, None]
+    if seam is not None:
+        total[np.arange(width) != seam] = np.inf
+    came_from = np.empty((len(stations), width, len(SLOPES)), np.int8)
+    for row, station in enumerate(stations[1:], start=1):
+        turned = total[:, :, None] + bends  # (offset, slope before, slope after)
+        chosen = turned.argmin(axis=1)
+        best = np.take_along_axis(turned, chosen[:, None, :], axis=1)[:, 0, :] + slants
+        total = np.full_like(total, np.inf)
+        for slope, gain in enumerate(SLOPES):
+            # From offset k to k + gain.
+            to = slice(max(gain, 0), width + min(gain, 0))
+            of = slice(max(-gain, 0), width + min(-gain, 0))
+            total[to, slope] = best[of, slope] + cost[station, to]
+            came_from[row, to, slope] = chosen[of, slope]
+        if not np.isfinite(total).any():
+            raise WorldError(
+                f"The course is blocked for anything {2 * least_m:.2f} m wide "
+                f"{station * STATION_M:.0f} m from its start. Use a narrower vehicle, a smaller "
+                "margin, or another seed."
+            )
+    if seam is not None:
+        total[np.arange(width) != seam] = np.inf
+        if not np.isfinite(total).any():
+            raise WorldError(
+                f"No way around this course with a width of {2 * least_m:.2f} m returns to its "
+                "start. Use a smaller margin, or another seed."
+            )
+    offset, slope = np.unravel_index(int(np.argmin(total)), total.shape)
+    way = np.empty(len(stations), np.int64)
+    for row in range(len(stations) - 1, -1, -1):
+        way[row] = offset
+        before = came_from[row, offset, slope] if row else 0
+        offset, slope = offset - SLOPES[slope], before
+    return way
+
+
+ROUNDS: Final = 150
+RELAXATION: Final = 1.6
+"""Over-relaxation: 1.5 to 1.8 converge faster than 1 (S. Boyd et al., "Distributed Optimization and
+Statistical Learning via the Alternating Direction Method of Multipliers", 2011, section 3.4.3)."""
+
+
+def _least_bent(
+    middle: NDArray[np.float64],
+    left: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    wish: NDArray[np.float64],
+    pull: float,
+) -> NDArray[np.float64]:
+    """Offsets of the least bent closed line between bounds.
+
+    The alternating direction method approximates the solution, and an active-set step refines it.
+    SciPy's `lsq_linear` takes 3.7 times as long for lines of a course's size.
+
+    Args:
+        middle: Evenly spaced points, m, (N, 2).
+        left: Direction in which each point may move, (N, 2).
+        low: Smallest offset of each point, m, (N,).
+        high: Largest offset of each point, m, (N,).
+        wish: Preferred offset of each point, m, (N,).
+        pull: Weight of the preferred offsets, 1/m^4: a curvature of 1/m costs as much as an offset
+            of `1 / sqrt(pull)` m from them.
+
+    Returns:
+        Offsets within the bounds, m, (N,).
+    """
+    count = len(middle)
+    step = float(np.linalg.norm(np.roll(middle, -1, axis=0) - middle, axis=1).mean())
+    bend = (
+        np.roll(np.eye(count), 1, axis=1) + np.roll(np.eye(count), -1, axis=1) - 2 * np.eye(count)
+    )
+    bend /= step**2
+    gram = bend.T @ bend
+    quadratic = gram * (left @ left.T) + pull * np.eye(count)
+    linear = np.einsum("ij,ij->i", left, gram @ middle) - pull * wish
+    # Alternating direction method in scaled form: a step without bounds, then a projection.
+    weight = 10.0 * pull + 1.0
+    inverse = np.linalg.inv(quadratic + weight * np.eye(count))
+    bounded = np.clip(wish, low, high)
+    debt = np.zeros(count)
+    for _ in range(ROUNDS):
+        free = inverse @ (weight * (bounded - debt) - linear)
+        free = RELAXATION * free + (1 - RELAXATION) * bounded
+        bounded = np.clip(free + debt, low, high)
+        debt += free - bounded
+    # Exact solution for the points that are not on a bound.
+    moves = (bounded > low + 1e-6) & (bounded < high - 1e-6)
+    if moves.any():
+        fixed = quadratic[np.ix_(moves, ~moves)] @ bounded[~moves]
+        bounded[moves] = np.linalg.solve(quadratic[np.ix_(moves, moves)], -linear[moves] - fixed)
+    return np.clip(bounded, low, high)
+
+
+_SPACING_M: Final = 0.1
+"""Approximate distance between the points of a path, m."""
+
+PULL: Final = 0.02
+"""Weight of the preferred offsets, 1/m^4; see `_least_bent`."""
+
+ATTEMPTS: Final = 8
+"""Number of attempts to push a line away from obstacles."""
+
+
+class CoursePath(ClosedLine):
+    """A closed path around a course.
+
+    Args:
+        points: Evenly spaced points, m, (N, 2).
+        heading: Direction at each point, rad, counter-clockwise from the x axis, (N,).
+        curvature: Curvature at each point, 1/m, positive to the left, (N,).
+        clearance: Distance of each point from the nearest wall or obstacle, m, (N,).
+
+    Attributes:
+        heading: See above.
+        curvature: See above.
+        clearance: See above.
+    """
+
+    def __init__(
+        self,
+        points: NDArray[np.float64],
+        heading: NDArray[np.float64],
+        curvature: NDArray[np.float64],
+        clearance: NDArray[np.float64],
+    ) -> None:
+        super().__init__(points)
+        self.heading = heading
+        self.curvature = curvature
+        self.clearance = clearance
+
+
+def plan_path(
+    course: Course, half_width_m: float, margin_m: float, *, comfort_m: float | None = None
+) -> CoursePath:
+    """Plan a smooth path around a course.
+
+    Args:
+        course: The course.
+        half_width_m: Half width of the vehicle, m.
+        margin_m: Smallest clearance beside the vehicle, m.
+        comfort_m: Preferred clearance, m; None for three times the margin.
+
+    Returns:
+        A path with a clearance of at least `half_width_m + margin_m` at every point.
+
+    Raises:
+        WorldError: If no such path exists.
+    """
+    least = half_width_m + margin_m
+    comfort = half_width_m + (3 * margin_m if comfort_m is None else comfort_m)
+    obstacles = ClearanceField(course)
+    lattice = lay_lattice(course, obstacles)
+    # Between two lattice points the line may come closer to obstacles, so ask for a spare first.
+    for spare in (0.03, 0.0):
+        try:
+            way = cheapest_way(lattice, least + spare, max(comfort, least + 0.05))
+        except WorldError:
+            if not spare:
+                raise
+            continue
+        path = _smoothed(lattice, way, obstacles, least, comfort)
+        if path is not None:
+            return path
+    raise WorldError(
+        f"No smooth path through the {course.world} with seed {course.seed} leaves "
+        f"{margin_m:.2f} m on each side of a vehicle {2 * half_width_m:.2f} m wide. Use a smaller "
+        "margin, or another seed."
+    )
+
+
+def _smoothed(
+    lattice: Lattice,
+    way: NDArray[np.int64],
+    obstacles: ClearanceField,
+    least: float,
+    comfort: float,
+) -> CoursePath | None:
+    """A smooth path that passes all obstacles on the same sides as a way, or None."""
+    extra = np.zeros(len(way))
+    for _ in range(ATTEMPTS):
+        low, high = _room(lattice, way, least, comfort, extra)
+        offsets = _least_bent(lattice.middle, lattice.left, low, high, lattice.offsets[way], PULL)
+        path = _splined(lattice.middle + offsets[:, None] * lattice.left, obstacles)
+        short = least - path.clearance
+        if short.max() <= 0:
+            return path
+        # Ask for more clearance wherever it is missing, and try again.
+        knots = np.arange(len(path.points)) * len(way) // len(path.points)
+        need = np.zeros(len(way))
+        np.maximum.at(need, knots, np.maximum(short, 0.0))
+        for shift in (-2, -1, 1, 2):
+            need = np.maximum(need, np.roll(need, shift))
+        extra += 1.2 * need + 0.005 * (need > 0)
+    return None
+
+
+def _room(
+    lattice: Lattice,
+    way: NDArray[np.int64],
+    least: float,
+    comfort: float,
+    extra: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Bounds of the offset at each station, m, with the preferred clearance where it fits."""
+    low, high = np.empty(len(way)), np.empty(len(way))
+    for i, k in enumerate(way):
+        # They always include the way, so bounds of neighbours overlap.
+        clear = float(lattice.clearance[i, k])
+        wanted = min(max(comfort, least + extra[i]), clear - 0.02 + extra[i])
+        wanted = min(max(wanted, least + extra[i]), clear)
+        first, last = _run(lattice.clearance[i] >= wanted, int(k))
+        low[i] = _edge(lattice, i, first, -1, wanted)
+        high[i] = _edge(lattice, i, last, +1, wanted)
+    return low, high
+
+
+def _run(mask: NDArray[np.bool_], k: int) -> tuple[int, int]:
+    """First and last index of the run of true values around an index."""
+    false = np.flatnonzero(~mask)
+    after = np.searchsorted(false, k)
+    first = int(false[after - 1]) + 1 if after else 0
+    last = int(false[after]) - 1 if after < len(false) else len(mask) - 1
+    return first, last
+
+
+def _edge(lattice: Lattice, i: int, k: int, side: int, wanted: float) -> float:
+    """Offset beyond point k at which the clearance falls below `wanted`, m."""
+    here = float(lattice.offsets[k])
+    beyond = k + side
+    if not 0 <= beyond < len(lattice.offsets):
+        return here
+    inside, outside = float(lattice.clearance[i, k]), float(lattice.clearance[i, beyond])
+    if outside == 0.0 or inside <= wanted or outside >= inside:
+        return here  # 0 may mark a point outside the lane.
+    share = (inside - wanted) / (inside - outside)
+    return here + min(share, 1.0) * (float(lattice.offsets[beyond]) - here)
+
+
+def _splined(knots: NDArray[np.float64], obstacles: ClearanceField) -> CoursePath:
+    """An evenly spaced path through points, by a periodic cubic spline."""
+    chords = arc_lengths(knots)
+    spline = CubicSpline(chords, np.vstack((knots, knots[:1])), bc_type="periodic")
+    # Even steps of the parameter are only approximately even along the line.
+    around = float(chords[-1])
+    count = max(round(around / _SPACING_M), 8)
+    fine = np.linspace(0.0, around, 4 * count + 1)
+    arcs = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))))
+    even = np.linspace(0.0, float(arcs[-1]), count, endpoint=False)
+    where = np.interp(even, arcs, fine)
+    points, first, second = spline(where), spline(where, 1), spline(where, 2)
+    speed = np.hypot(first[:, 0], first[:, 1])
+    curvature = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3
+    heading = np.arctan2(first[:, 1], first[:, 0])
+    return CoursePath(points, heading, curvature, obstacles.distance(points))
+
+
+def plan_path_for(course: Course, traits: Traits) -> CoursePath:
+    """Plan a path for a vehicle, with less clearance where its own does not fit.
+
+    Passages are as wide as the vehicles of a world need, and a boat in a flooded corridor would
+    need more: 6 of the first 1,300 training courses are too narrow for its clearance.
+
+    Args:
+        course: The course.
+        traits: Driving properties of the vehicle.
+
+    Raises:
+        WorldError: If two thirds of its clearance do not fit either.
+    """
+    try:
+        return plan_path(course, traits.half_width_m, traits.margin_m, comfort_m=traits.comfort_m)
+    except WorldError:
+        narrow = _NARROW_SHARE * traits.margin_m
+        return plan_path(course, traits.half_width_m, narrow, comfort_m=traits.comfort_m)
+
+
+def speed_profile(path: CoursePath, traits: Traits) -> NDArray[np.float64]:
+    """Speed at each point of a path, m/s, (N,).
+
+    It is limited by the lateral acceleration in curves, by narrow passages, and by braking before
+    both.
+
+    Args:
+        path: The path.
+        traits: Driving properties of the vehicle.
+    """
+    least = traits.half_width_m + traits.margin_m
+    comfort = traits.half_width_m + traits.comfort_m
+    room = np.clip((path.clearance - least) / (comfort - least), 0.0, 1.0)
+    speed = traits.top_speed * traits.cruise * (0.65 + 0.35 * room)
+    bend = np.maximum(np.abs(path.curvature), 1e-6)
+    speed = np.minimum(speed, np.sqrt(traits.lateral_limit / bend))
+    step = path.length / len(speed)
+    for i in range(2 * len(speed) - 1, -1, -1):  # Two laps, because the path is closed.
+        here, after = i % len(speed), (i + 1) % len(speed)
+        can_brake_from = np.sqrt(speed[after] ** 2 + 2 * traits.braking * step)
+        speed[here] = min(speed[here], can_brake_from)
+    return speed

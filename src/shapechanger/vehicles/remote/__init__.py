@@ -1,0 +1,1 @@
+"""Vehicles on the network and policies on board."""

@@ -1,0 +1,71 @@
+"""Action wrapper with the four keys of 2017."""
+
+from __future__ import annotations
+
+import operator
+from contextlib import suppress
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import SpaceMismatch
+
+FOUR_WAYS: Final = ("forward", "backward", "right", "left")
+"""Meanings of the actions 0 to 3, in the order of the columns of 2017's `labels.csv`."""
+
+_STEERING_THROTTLE: Final = 2
+
+
+class DiscreteDriving(gym.ActionWrapper[Any, np.int64, NDArray[np.float32]]):
+    """Wrapper for driving with one of four keys, as with the car of 2017.
+
+    In 2017 an action was a one-hot vector of four numbers. A steering key did not drive.
+
+    Args:
+        env: An env whose action is [steering, throttle], in [-1, 1].
+        throttle: Throttle of forward and backward, 0 to 1.
+        steering: Steering of right and left, 0 to 1.
+        throttle_in_turns: Throttle of right and left, -1 to 1; 0 as in 2017.
+
+    Raises:
+        SpaceMismatch: If the env has other actions.
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Any, NDArray[np.float32]],
+        throttle: float = 1.0,
+        steering: float = 1.0,
+        throttle_in_turns: float = 0.0,
+    ) -> None:
+        if env.action_space.shape != (_STEERING_THROTTLE,):
+            raise SpaceMismatch(
+                f"DiscreteDriving needs an env with [steering, throttle], got {env.action_space}."
+            )
+        super().__init__(env)
+        self.action_space = gym.spaces.Discrete(len(FOUR_WAYS))
+        self._actions = np.array(
+            [
+                (0.0, throttle),
+                (0.0, -throttle),
+                (steering, throttle_in_turns),
+                (-steering, throttle_in_turns),
+            ],
+            np.float32,
+        )
+
+    def action(self, action: np.int64 | int) -> NDArray[np.float32]:
+        """Return [steering, throttle] of a key, see `FOUR_WAYS`.
+
+        Raises:
+            SpaceMismatch: If the action is not 0, 1, 2 or 3.
+        """
+        key = -1
+        with suppress(TypeError):  # For 1.5, a list or text.
+            key = operator.index(action)
+        if not 0 <= key < len(FOUR_WAYS):
+            keys = ", ".join(f"{number} ({way})" for number, way in enumerate(FOUR_WAYS))
+            raise SpaceMismatch(f"The four keys are {keys}; got {action!r}.")
+        return self._actions[key].copy()

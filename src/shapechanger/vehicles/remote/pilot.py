@@ -1,0 +1,350 @@
+"""A policy that drives a robot, from a workstation or in a process on board.
+
+`python -m shapechanger.vehicles.remote.pilot` is the process on board. It reads one line of JSON,
+its task, and writes lines of JSON: what it does, and why it ends. The end of its input ends it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.demos.cloning.pictures import PolicyError
+from shapechanger.demos.statistics import is_same_rate
+from shapechanger.errors import RobotRefused, ShapechangerError
+from shapechanger.layout import Layout
+from shapechanger.link.messages import Welcome
+from shapechanger.remote.client import RobotClient
+from shapechanger.remote.env import RemoteVehicleEnv
+from shapechanger.remote.known_robots import KnownRobot
+from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
+from shapechanger.vehicles.waypoints import ACTION_LAYOUT
+
+if TYPE_CHECKING:
+    from shapechanger.demos.cloning.card import CloneCard
+    from shapechanger.robot.daemon.plan import DaemonPlan
+
+# s. A reset waits in steps of this length, and checks between them whether to end.
+_LOOK_EVERY_S: Final = 1.0
+_END_S: Final = 10.0
+_WAITS_ON_BOARD: Final = "It waits until nobody has control and you arm the robot for it."
+
+
+class DrivingPolicy(Protocol):
+    """A policy cloned from demonstrations: `CameraPolicy` with PyTorch, `OnnxClone` without."""
+
+    @property
+    def card(self) -> CloneCard:
+        """Card of the policy."""
+        ...
+
+    def predict(
+        self, picture: NDArray[np.uint8] | None, state: NDArray[np.floating] | None = None
+    ) -> NDArray[np.float32]:
+        """Return the action, shape (m,), for a picture, shape (H, W, 3), and a state, (k,)."""
+        ...
+
+
+class Origin(NamedTuple):
+    """What a policy learned with, besides its layouts.
+
+    Attributes:
+        body: Kind of robot, such as "car"; "" for any.
+        control_hz: Actions per second; None if unknown.
+    """
+
+    body: str = ""
+    control_hz: float | None = None
+
+
+class RobotFacts(NamedTuple):
+    """What a policy has to fit.
+
+    Attributes:
+        name: Name of the robot.
+        body: Kind of robot.
+        actions: Layout of its actions.
+        state: Layout of its state.
+        control_hz: Actions per second.
+        image_size: Width and height of its pictures, pixels; None without a camera.
+        has_geometry: Whether it states how its camera looks.
+        turning: Turn at full steering, rad for each metre and for each second; None if unknown.
+    """
+
+    name: str
+    body: str
+    actions: Layout
+    state: Layout
+    control_hz: float
+    image_size: tuple[int, int] | None
+    has_geometry: bool
+    turning: tuple[float, float] | None
+
+    @classmethod
+    def of_welcome(cls, welcome: Welcome) -> RobotFacts:
+        """Return the facts of a robot that was reached."""
+        return cls(
+            welcome.robot,
+            welcome.body,
+            Layout.from_json(welcome.action_layout),
+            Layout.from_json(welcome.state_layout),
+            welcome.control_hz,
+            welcome.image_size,
+            None not in (welcome.camera_pitch_deg, welcome.camera_fovy_deg),
+            welcome.turning,
+        )
+
+    @classmethod
+    def of_plan(cls, plan: DaemonPlan) -> RobotFacts:
+        """Return the facts of a robot that is about to be served."""
+        camera = plan.camera
+        return cls(
+            plan.robot,
+            plan.body,
+            Layout.from_json(plan.action_layout),
+            Layout.from_json(plan.state_layout),
+            plan.control_hz,
+            None if camera is None else camera.size,
+            camera is not None and None not in (camera.pitch_deg, camera.fovy_deg),
+            plan.turning,
+        )
+
+
+def points_ways(card: CloneCard) -> bool:
+    """Return whether a policy gives waypoints, which any vehicle can follow."""
+    return card.action_layout is not None and card.action_layout.names == ACTION_LAYOUT.names
+
+
+def require_fit(card: CloneCard, origin: Origin, robot: RobotFacts, *, measures: bool) -> None:
+    """Refuse a policy that does not fit a robot; the message names what differs.
+
+    Args:
+        card: Card of the policy.
+        origin: What it learned with.
+        robot: The robot.
+        measures: Whether the vehicle's turning may be measured before it drives.
+
+    Raises:
+        PolicyError: If body, rate, actions or state differ.
+        RobotRefused: If the robot has no camera, or does not say how it looks or turns.
+    """
+    if origin.body and origin.body != robot.body:
+        raise PolicyError(
+            f"The policy learned to steer a {origin.body}, and {robot.name} is a {robot.body}: "
+            "only policies of waypoints move from one body to another."
+        )
+    rate = origin.control_hz
+    jitter = card.data.get("rate_jitter", 0.0)
+    jitter = float(jitter) if isinstance(jitter, int | float) else 0.0
+    if rate is not None and not is_same_rate(rate, robot.control_hz, jitter):
+        within = f" (varying by {100 * jitter:.0f} %)" if jitter else ""
+        raise PolicyError(
+            f"The policy learned at {rate:g} actions a second{within}, and {robot.name} has "
+            f"control_hz = {robot.control_hz:g}."
+        )
+    has_waypoints = points_ways(card)
+    if not has_waypoints:
+        card.require_layouts(robot.actions, robot.state)
+    if card.eyes != "none" and robot.image_size is None:
+        raise RobotRefused(f"{robot.name} has no camera, and the policy drives by pictures.")
+    if not has_waypoints:
+        return
+    if not robot.has_geometry:
+        raise RobotRefused(
+            f"The profile of {robot.name} does not state pitch_deg and fovy_deg of its camera, "
+            "which waypoints need: measure them with `shapechanger robot camera`."
+        )
+    if robot.turning is None and not measures:
+        raise RobotRefused(
+            f"The profile of {robot.name} does not state turn_deg_per_m or turn_deg_per_s, which "
+            "waypoints need on board: `shapechanger robot drive --policy` measures them."
+        )
+
+
+class PolicyDriver:
+    """A policy that drives between a person's permission and their next intervention.
+
+    Between these it waits. It connects as a program, in the thread that calls `run`, or in one of
+    its own from `__enter__` to `__exit__`.
+
+    Args:
+        policy: The policy.
+        name: Displayed name.
+        robot: The robot.
+        on_note: Called with its state whenever that changes.
+        waits: What to say while it waits; "" for what a person at a terminal can do.
+
+    Attributes:
+        note: Its state, for display.
+    """
+
+    def __init__(
+        self,
+        policy: DrivingPolicy,
+        name: str,
+        robot: KnownRobot,
+        on_note: Callable[[str], object] = lambda _: None,
+        waits: str = "",
+    ) -> None:
+        self.note = ""
+        self._policy = policy
+        self._name = name
+        self._robot = robot
+        self._on_note = on_note
+        self._waits = waits
+        self._ended = threading.Event()
+        self._failure: Exception | None = None
+        self._why = ""
+        self._sees = policy.card.eyes != "none"
+        self._feels = policy.card.state_layout is not None
+        self._thread = threading.Thread(target=self._run, name="pilot", daemon=True)
+
+    def __enter__(self) -> Self:
+        """Start the thread."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Release the robot and end the thread."""
+        self.end()
+        self._thread.join(_END_S)
+
+    def end(self) -> None:
+        """Let `run` return, after the robot is released."""
+        self._ended.set()
+
+    def require_well(self) -> None:
+        """Raise the error that ended the thread.
+
+        Raises:
+            Exception: If there is one.
+        """
+        if self._failure is not None:
+            raise self._failure
+
+    def run(self) -> None:
+        """Drive whenever a person permits it, until `end` is called.
+
+        Raises:
+            LinkError: If the robot cannot be reached.
+            PolicyError: If the policy gives an action that no robot can take.
+        """
+        env = self._env()
+        try:
+            while not self._ended.is_set():
+                # Refused while the robot is disarmed or held by another client.
+                with contextlib.suppress(RobotRefused):
+                    self._drive(env, env.reset()[0])
+        finally:
+            env.close()
+
+    def _run(self) -> None:
+        try:
+            self.run()
+        except Exception as error:  # Raised again in the main thread.
+            self._failure = error
+
+    def _env(self) -> RemoteVehicleEnv | RemoteWaypointEnv:
+        with RobotClient.connect(self._robot, frames=False) as there:
+            welcome = there.welcome
+        options: dict[str, Any] = {
+            "robot": self._robot.address,
+            "key": self._robot.key,
+            "fingerprint": self._robot.fingerprint,
+            "pace": "lockstep" if welcome.clock == "twin" else "realtime",
+            "interventions": True,
+            "on_reset": "person",
+            "on_waiting": self._wait_for,
+            "reset_timeout_s": _LOOK_EVERY_S,
+            "name": self._name,
+        }
+        if points_ways(self._policy.card):
+            return RemoteWaypointEnv(response=welcome.turning, **options)
+        return RemoteVehicleEnv(
+            size=welcome.image_size or (160, 120), image=self._sees, state=self._feels, **options
+        )
+
+    def _drive(self, env: RemoteVehicleEnv | RemoteWaypointEnv, observation: Any) -> None:
+        """Drive until the episode ends."""
+        self._why = ""
+        self._say("it drives")
+        while not self._ended.is_set():
+            action = self._policy.predict(*self._perceived(observation))
+            if not np.isfinite(action).all():
+                # The robot would refuse it, too, and stop.
+                raise PolicyError(f"The policy gave {action.tolist()}, which is no command.")
+            observation, _, terminated, truncated, info = env.step(action)
+            watches = "intervene_action" in info
+            self._say("you drive, and the policy watches" if watches else "it drives")
+            if terminated or truncated:
+                self._why = info["truncated_because"] or "It collided."
+                return
+
+    def _perceived(self, observation: Any) -> tuple[Any, Any]:
+        """Split an observation into frame and state; None for unused parts."""
+        if self._sees and self._feels:
+            return observation["image"], observation["state"]
+        return (observation, None) if self._sees else (None, observation)
+
+    def _wait_for(self, text: str) -> None:
+        self._say(f"{self._why} {self._waits or text}".strip())
+
+    def _say(self, note: str) -> None:
+        if note != self.note:
+            self.note = note
+            self._on_note(note)
+
+
+def main() -> int:
+    """Run a policy on board, and return the exit status."""
+    # Standard output is for the daemon alone: whatever prints must not break a line.
+    out = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+
+    def tell(**said: str) -> None:
+        with contextlib.suppress(OSError):  # The daemon is gone, and so is the robot.
+            out.write(json.dumps({name: text[:400] for name, text in said.items()}) + "\n")
+
+    task = json.loads(sys.stdin.readline())
+    robot = KnownRobot(**task["robot"])
+    file = Path(task["policy"])
+    try:
+        from shapechanger.demos.cloning.onnx_policy import OnnxClone
+
+        policy = OnnxClone(file)
+        with RobotClient.connect(robot, frames=False) as there:
+            facts = RobotFacts.of_welcome(there.welcome)
+        require_fit(policy.card, Origin(policy.body, policy.control_hz), facts, measures=False)
+        driver = PolicyDriver(
+            policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
+        )
+        watch = threading.Thread(target=_end_with_input, args=(driver,), daemon=True)
+        watch.start()
+        driver.run()
+    except ShapechangerError as error:
+        tell(failed=str(error))
+        return 1
+    except Exception as error:  # Of a policy, which may be anything.
+        tell(failed=f"{type(error).__name__}: {error}")
+        raise
+    return 0
+
+
+def _end_with_input(driver: PolicyDriver) -> None:
+    """End a policy when the process that started it closes its input, or is gone."""
+    while sys.stdin.readline():
+        pass
+    driver.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,185 @@
+"""`RemoteWaypoint-v1`: a vehicle on the network with the camera and the action of all vehicles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import RobotRefused, WorldError
+from shapechanger.layout import Layout
+from shapechanger.link.messages import Welcome
+from shapechanger.remote.env import RemoteVehicleEnv
+from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
+from shapechanger.vehicles.waypoints import (
+    ACTION_LAYOUT,
+    OBSERVATION_LAYOUT,
+    SteeringResponse,
+    action_space,
+    command,
+    measure_response,
+    observation_space,
+)
+
+_SENSORS: Final = ("speed", "yaw_rate")
+
+
+class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
+    """Drive a vehicle on the network by waypoints, with a policy from any other vehicle.
+
+    The camera's frames are warped to the virtual camera of `WaypointEnv`, by the pitch and the
+    field of view that the robot's profile states (`shapechanger robot camera` measures them). The
+    vehicle turns waypoints into steering by its own `SteeringResponse`. The first reset measures it
+    unless the profile states it or it is given: **the robot drives for 5 s with random commands**,
+    at 0.4 to 0.8 of its throttle, without looking where it goes; its guard's limits and reflexes
+    hold. Put it on free ground for that. The env then waits for the operator again, who puts it at
+    the start.
+
+    ## Action space and observation space
+    Those of `WaypointEnv`.
+
+    ## Reward, start, end and info
+    Those of `RemoteVehicleEnv`.
+
+    Args:
+        robot: Name of a known robot, or its address, HOST or HOST:PORT.
+        response: Turn for each metre, rad/m, and for each second, rad/s, at full steering, as a
+            former env measured them (`response`); None for those of the robot's profile, or to
+            measure them in the first reset.
+        options: Further arguments of `RemoteVehicleEnv`, but for `size`, `state` and `image`.
+
+    Attributes:
+        response: How the vehicle turns; None before the first reset.
+
+    Raises:
+        RobotRefused: If the robot is not a vehicle, the geometry of its camera is unknown, its
+            camera does not see what policies for all vehicles look at, or it does not measure its
+            speed or, without a given response, its rate of turn.
+        StudyError: If the vehicle does not turn as it steers.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  # Gymnasium's.
+
+    def __init__(
+        self, robot: str, *, response: tuple[float, float] | None = None, **options: Any
+    ) -> None:
+        self.response = None if response is None else SteeringResponse(*response)
+        self._env = RemoteVehicleEnv(robot, size=None, image=True, state=True, **options)
+        try:
+            welcome = self._env.welcome
+            if self.response is None and welcome.turning is not None:
+                self.response = SteeringResponse(*welcome.turning)
+            self._rectifier = _rectifier_of(welcome)
+            self._state_at = _state_places(welcome, self.response is None)
+        except BaseException:
+            self._env.close()
+            raise
+        # Only tracks turn a vehicle on the spot.
+        self._on_the_spot = welcome.body == "tank"
+        self._speed = 0.0
+        self.render_mode = self._env.render_mode
+        self.metadata = self._env.metadata
+        self.observation_space, self.action_space = observation_space(), action_space()
+        self.observation_layout, self.action_layout = OBSERVATION_LAYOUT, ACTION_LAYOUT
+
+    @property
+    def welcome(self) -> Welcome:
+        """Description of the robot."""
+        return self._env.welcome
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+        """Measure the response if it is unknown, and bring the robot to the start.
+
+        Raises:
+            StudyError: If the vehicle does not turn as it steers.
+            RobotRefused: If the robot was not armed in time, or refuses the client.
+            LinkError: If the robot cannot be reached in time.
+        """
+        super().reset(seed=seed)
+        if self.response is None:
+            self.response = measure_response(_Numbers(self._env), *self._state_at)
+        seen, info = self._env.reset(seed=seed, options=options)
+        return self._observe(seen), info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.uint8], float, bool, bool, dict[str, Any]]:
+        """Drive towards a waypoint for one control period; see `RemoteVehicleEnv.step`.
+
+        Raises:
+            SpaceMismatch: If the action is not two finite numbers.
+            ResetNeeded: If the link was lost, or `reset` was never called.
+        """
+        if self.response is None:
+            raise gym.error.ResetNeeded("Call reset() before the first step.")
+        steering = command(action, self.response, self._speed, on_the_spot=self._on_the_spot)
+        seen, reward, terminated, truncated, info = self._env.step(steering)
+        return self._observe(seen), reward, terminated, truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the newest frame as the camera took it; see `RemoteVehicleEnv.render`."""
+        return self._env.render()
+
+    def close(self) -> None:
+        """Stop the robot, and give control back."""
+        self._env.close()
+
+    def _observe(self, seen: dict[str, Any]) -> NDArray[np.uint8]:
+        self._speed = float(np.nan_to_num(seen["state"][self._state_at[0]]))
+        return self._rectifier(seen["image"])
+
+
+class _Numbers(gym.ObservationWrapper[Any, Any, Any]):
+    """The numbers of the state, without the picture."""
+
+    def observation(self, observation: dict[str, Any]) -> NDArray[np.float32]:
+        return observation["state"]
+
+
+def _rectifier_of(welcome: Welcome) -> Rectifier:
+    """Return what warps the frames of a robot.
+
+    Raises:
+        RobotRefused: If the robot has no camera, does not state how it looks, or has one that sees
+            too little.
+    """
+    size, pitch, fovy = welcome.image_size, welcome.camera_pitch_deg, welcome.camera_fovy_deg
+    if size is None:
+        raise RobotRefused(f"{welcome.robot} has no camera, which a policy with waypoints needs.")
+    if pitch is None or fovy is None or not (math.isfinite(pitch) and 0.0 < fovy < 180.0):
+        raise RobotRefused(
+            f"{welcome.robot} does not state pitch_deg and fovy_deg of its camera: measure them "
+            "with `shapechanger robot camera`, and serve the profile that it writes."
+        )
+    try:
+        return Rectifier(CameraGeometry(pitch, fovy), size)
+    except WorldError as error:
+        raise RobotRefused(f"{welcome.robot}: {error}") from error
+
+
+def _state_places(welcome: Welcome, measures: bool) -> tuple[int, int]:
+    """Return the places of the speed and the rate of turn in the state.
+
+    Raises:
+        RobotRefused: If it steers by other actions, or lacks a sensor.
+    """
+    actions = Layout.from_json(welcome.action_layout).names
+    if actions != ("steering", "throttle"):
+        raise RobotRefused(
+            f"{welcome.robot} has the actions {', '.join(actions)}, and waypoints become steering "
+            "and throttle."
+        )
+    places = Layout.from_json(welcome.state_layout).slices
+    needed = _SENSORS if measures else _SENSORS[:1]
+    missing = [name for name in needed if name not in places]
+    if missing:
+        raise RobotRefused(
+            f"{welcome.robot} has no sensor of {' and '.join(missing)}, which waypoints need"
+            + (": pass response=(RAD_PER_M, RAD_PER_S)." if missing == ["yaw_rate"] else ".")
+        )
+    return places["speed"].start, places["yaw_rate"].start if "yaw_rate" in places else 0

@@ -1,0 +1,280 @@
+"""The action of the envs with waypoints, and its conversion to steering and back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.contract.world import STANDING_MPS, STANDING_RADPS
+from shapechanger.errors import SpaceMismatch, StudyError
+from shapechanger.layout import Element, Feature, Layout
+from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE
+
+AHEAD_M: Final = 0.8
+"""Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
+
+WIDEST_RAD: Final = 1.0
+"""Bearing of the waypoint at an action of -1 or 1, rad."""
+
+_SLOWEST_MPS: Final = 0.3  # Below this, a measured speed says little about the turn to come.
+_LEAST_THROTTLE: Final = 0.25  # Less does not overcome the friction of all vehicles.
+_AT_LOCK: Final = 0.99  # Steering from which a command counts as full.
+# Of a fit to a drive: largest change of the steering within the lag of the turn, the jitter of the
+# steps' times, and the least share of the turning that the steering must explain.
+_CHANGE: Final = 0.1
+_LAG_S: Final = 0.1
+_JITTER_S: Final = 0.02
+_EXPLAINED: Final = 0.5
+_ROUNDING: Final = 1e-9
+
+# Of the measurement: 5 s of driving, with new random commands every 0.3 s, of which the first half
+# is left out because the vehicle is still changing its motion.
+_SECONDS: Final = 5.0
+_HOLD: Final = 6
+
+
+@dataclass(frozen=True, slots=True)
+class SteeringResponse:
+    """How fast a vehicle turns when it steers.
+
+    rate of turn to the right = steering * (per_metre * speed + per_second). Wheels turn the vehicle
+    the more, the faster it rolls; tracks turn it where it stands.
+
+    Attributes:
+        per_metre: Turn for each metre at full steering, rad/m.
+        per_second: Turn for each second at full steering, rad/s.
+
+    Raises:
+        StudyError: If the vehicle does not turn, or a number is negative.
+    """
+
+    per_metre: float
+    per_second: float
+
+    def __post_init__(self) -> None:
+        if not (min(self.per_metre, self.per_second) >= 0.0 < self.per_metre + self.per_second):
+            raise StudyError(
+                "A vehicle must turn to the right when it steers to the right: the turn was "
+                f"{self.per_metre:.2f} rad/m and {self.per_second:.2f} rad/s."
+            )
+
+    def steering(self, bearing: float, speed: float) -> float:
+        """Return the steering, from -1 to 1, that leads to a waypoint `AHEAD_M` ahead.
+
+        Pure pursuit: the circle through a point at the distance L and the bearing b has the
+        curvature 2 sin(b) / L (R. C. Coulter, CMU-RI-TR-92-01, 1992).
+
+        Args:
+            bearing: Bearing of the waypoint, rad, positive to the right.
+            speed: Speed along the heading, m/s.
+        """
+        speed = max(speed, _SLOWEST_MPS)
+        rate = 2.0 * math.sin(bearing) / AHEAD_M * speed
+        return max(-1.0, min(1.0, rate / (self.per_metre * speed + self.per_second)))
+
+
+def measure_response(
+    env: gym.Env[Any, Any], speed_at: int, yaw_rate_at: int, seed: int = 0
+) -> SteeringResponse:
+    """Measure how a vehicle turns, from 5 s of its own motion at random commands.
+
+    Args:
+        env: A vehicle that observes numbers, with steering and throttle as its action. It is reset.
+        speed_at: Place of the speed, m/s, in its observation.
+        yaw_rate_at: Place of the rate of turn, rad/s, positive to the left.
+        seed: Seed of the start and the commands.
+
+    Raises:
+        StudyError: If it does not turn as it steers.
+    """
+    from scipy.optimize import nnls  # Not there on a robot, which does not measure itself.
+
+    rng = np.random.default_rng(seed)
+    env.reset(seed=seed)
+    command = np.zeros(2, np.float32)
+    turning: list[tuple[float, float]] = []
+    rates: list[float] = []
+    step = -1  # Since the commands began, which a reset interrupts.
+    for _ in range(round(_SECONDS * env.metadata["render_fps"])):
+        step += 1
+        if step % _HOLD == 0:
+            command = np.array((rng.uniform(-0.5, 0.5), rng.uniform(0.4, 0.8)), np.float32)
+        seen, _, terminated, truncated, _ = env.step(command)
+        if step % _HOLD >= _HOLD // 2:
+            turning.append((float(command[0] * seen[speed_at]), float(command[0])))
+            rates.append(-float(seen[yaw_rate_at]))
+        if terminated or truncated:
+            env.reset()
+            step = -1
+    per_metre, per_second = nnls(np.array(turning), np.array(rates))[0]
+    return SteeringResponse(float(per_metre), float(per_second))
+
+
+def fit_response(
+    steering: NDArray[np.floating],
+    speed: NDArray[np.floating],
+    yaw_rate: NDArray[np.floating],
+    times_s: NDArray[np.floating] | None = None,
+) -> SteeringResponse:
+    """Fit how a vehicle turns to one or more drives.
+
+    Only steps count in which the steering is known not to have changed for 0.1 s, because the turn
+    lags behind it: neither the first of an episode, nor the first after a gap. Those in which
+    something was not measured are left out, too.
+
+    Args:
+        steering: Steering that the outputs had, -1 to 1, positive to the right, shape (n,).
+        speed: Speed along the heading, m/s, shape (n,).
+        yaw_rate: Rate of turn, rad/s, positive to the left, shape (n,).
+        times_s: Time of each step since the start of its episode, s, shape (n,); an episode begins
+            where time does not go on. None for one episode in steps of 1/20 s.
+
+    Raises:
+        StudyError: If the drive does not tell it.
+    """
+    from scipy.optimize import nnls
+
+    if times_s is None:
+        times_s = np.arange(len(steering)) / 20.0
+    rows = np.stack((steering * speed, steering, -yaw_rate), axis=1).astype(np.float64)
+    steady = np.isfinite(rows).all(axis=1) & _is_steady(steering, times_s)
+    turning, rates = rows[steady, :2], rows[steady, 2]
+    numbers, error = nnls(turning, rates) if len(rates) else (np.zeros(2), 0.0)
+    explained = 1.0 - error**2 / max(float(rates @ rates), _ROUNDING)
+    if not numbers.any() or explained < _EXPLAINED:
+        raise StudyError(
+            f"In this drive, steering explains {max(0.0, explained):.0%} of how the vehicle turns, "
+            f"and {_EXPLAINED:.0%} are needed: drive curves to both sides."
+        )
+    return SteeringResponse(float(numbers[0]), float(numbers[1]))
+
+
+def _is_steady(steering: NDArray[np.floating], times_s: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Return at which steps the steering has not changed for as long as the turn lags behind."""
+    passed_s = np.diff(times_s)
+    usual_s = float(np.median(passed_s)) if len(passed_s) else 0.0
+    jitter_s = min(0.5 * usual_s, _JITTER_S)
+    whole = (passed_s > 0.0) & (passed_s <= max(_LAG_S + jitter_s, 1.5 * usual_s))
+    stretch = np.concatenate(([0], np.cumsum(~whole)))  # Number of the stretch without gaps.
+    _, begins = np.unique(stretch, return_index=True)
+    steady = times_s - times_s[begins][stretch] >= _LAG_S - jitter_s
+    for steps in range(1, len(steering)):
+        recent = times_s[steps:] - times_s[:-steps] <= _LAG_S + jitter_s
+        recent &= stretch[steps:] == stretch[:-steps]
+        if not recent.any():
+            break
+        steady[steps:] &= ~recent | (np.abs(steering[steps:] - steering[:-steps]) < _CHANGE)
+    return steady
+
+
+_COLUMNS, _ROWS = CANONICAL_SIZE
+
+OBSERVATION_LAYOUT: Final = Layout(
+    (
+        Feature(
+            "camera/canonical", "1", 0.0, 255.0, Element("camera", "front"), (_ROWS, _COLUMNS, 3)
+        ),
+    )
+)
+"""Layout of a rectified frame."""
+
+ACTION_LAYOUT: Final = Layout(
+    (
+        Feature("waypoint/bearing", "1", -1.0, 1.0, gain=WIDEST_RAD, gain_unit="rad"),
+        Feature("waypoint/speed", "1", -1.0, 1.0),
+    )
+)
+"""Layout of a waypoint."""
+
+
+def observation_space() -> gym.Space[Any]:
+    """Return the space of rectified frames."""
+    return gym.spaces.Box(0, 255, (_ROWS, _COLUMNS, 3), np.uint8)
+
+
+def action_space() -> gym.Space[Any]:
+    """Return the space of waypoints."""
+    return gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+def command(
+    action: NDArray[np.float32], response: SteeringResponse, speed: float, *, on_the_spot: bool
+) -> NDArray[np.float32]:
+    """Return the steering and throttle that lead a vehicle to a waypoint.
+
+    Args:
+        action: Bearing and speed, each from -1 to 1; values beyond are clipped.
+        response: How the vehicle turns.
+        speed: Its speed along the heading, m/s.
+        on_the_spot: Whether it turns by its tracks, of which full throttle would saturate one.
+
+    Raises:
+        SpaceMismatch: If the action is not two finite numbers.
+    """
+    values = np.asarray(action, np.float64)
+    if values.shape != (2,) or not np.isfinite(values).all():
+        raise SpaceMismatch(
+            f"A waypoint is a bearing and a speed, each from -1 to 1, got {values.tolist()}."
+        )
+    bearing, share = np.clip(values, -1.0, 1.0).tolist()
+    steering = response.steering(bearing * WIDEST_RAD, speed)
+    throttle = max(_LEAST_THROTTLE, 0.5 * (share + 1.0))
+    if on_the_spot:
+        throttle = min(throttle, max(_LEAST_THROTTLE, 1.0 - abs(steering)))
+    return np.array((steering, throttle), np.float32)
+
+
+class WaypointLabels(NamedTuple):
+    """Waypoints that a driver's commands lead to.
+
+    Attributes:
+        actions: Bearing and speed, each from -1 to 1, shape (n, 2).
+        usable: Whether a command says where the way is, shape (n,). Those of a vehicle that stands
+            still, drives backward, or did not measure its speed do not.
+        at_limit: Whether it only says that the way is at least as far aside, shape (n,): at full
+            steering, or beyond the widest bearing.
+    """
+
+    actions: NDArray[np.float32]
+    usable: NDArray[np.bool_]
+    at_limit: NDArray[np.bool_]
+
+
+def waypoints_of(
+    commands: NDArray[np.floating], response: SteeringResponse, speed: NDArray[np.floating]
+) -> WaypointLabels:
+    """Return the waypoints that a driver's commands lead to, the inverse of `command`.
+
+    The steering gives the circle that the vehicle drives, and the waypoint is where it is `AHEAD_M`
+    away. At full steering, and where tracks turn on the spot, the way may be farther aside than the
+    waypoint, which is then the nearest one with the same command. The throttle gives the speed;
+    throttles below a quarter, of brakes too, become speeds that `command` turns into a quarter.
+
+    Args:
+        commands: Steering and throttle, shape (n, 2); values beyond [-1, 1] are clipped.
+        response: How the vehicle turns.
+        speed: Its speed along the heading, m/s, shape (n,); NaN where it was not measured.
+    """
+    values = np.clip(np.asarray(commands, np.float64), -1.0, 1.0)
+    steering, throttle = values.T
+    fast = np.maximum(speed, _SLOWEST_MPS)
+    turn = steering * (response.per_metre * fast + response.per_second)
+    sine = 0.5 * AHEAD_M * turn / fast
+    widest = math.sin(WIDEST_RAD)
+    bearing = np.arcsin(np.clip(sine, -widest, widest)) / WIDEST_RAD
+    moves = np.abs(speed) >= STANDING_MPS
+    turns = np.abs(steering) * response.per_second >= STANDING_RADPS
+    # Backwards it cannot point ahead; at rest only a throttle, or tracks that turn, say something.
+    usable = np.where(
+        moves, speed > 0.0, (throttle >= _LEAST_THROTTLE) | ((throttle >= 0.0) & turns)
+    )
+    return WaypointLabels(
+        np.stack((bearing, np.clip(2.0 * throttle - 1.0, -1.0, 1.0)), axis=1).astype(np.float32),
+        usable & np.isfinite(values).all(axis=1) & np.isfinite(speed),
+        (np.abs(steering) >= _AT_LOCK) | (np.abs(sine) >= widest),
+    )

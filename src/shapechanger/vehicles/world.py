@@ -1,0 +1,557 @@
+"""A vehicle on a course, simulated in MuJoCo."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.contract.world import RESTING_V, Pose, Readings
+from shapechanger.errors import WorldError
+from shapechanger.vehicles.bodies import SIM_DT, Motion, add_vehicle, vehicle_model
+from shapechanger.vehicles.bodies.parts import CameraMount, aim_camera
+from shapechanger.vehicles.cameras.camera import (
+    CameraJitter,
+    OnboardCamera,
+    OutsideCamera,
+    move_camera,
+)
+from shapechanger.vehicles.cameras.corruptions import find_corruption
+from shapechanger.vehicles.courses.course import HOME, Course, require_element
+from shapechanger.vehicles.courses.layout import lay_out, start_pose
+from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.scene import add_course
+from shapechanger.vehicles.expert.line import CourseProgress
+from shapechanger.vehicles.expert.path import CoursePath, plan_path_for
+from shapechanger.vehicles.expert.traits import traits_of
+
+BUMPER_SPREAD: Final = math.radians(60.0)
+"""Largest bearing, rad, from the middle of the vehicle, at which a contact presses the bumper."""
+
+APART_S: Final = 0.5
+"""Contacts that follow one another within this time, s, belong to the same collision."""
+
+PORTRAITS_RAD: Final = tuple(
+    math.radians(degrees) for degrees in (125.0, -125.0, 150.0, -150.0, 55.0, -55.0, 25.0, -25.0)
+)
+"""Directions of view of a portrait, rad from the heading: from ahead first, then from behind."""
+
+_CAMERA: Final = "vehicle/camera"
+_CHASSIS: Final = "vehicle/chassis"
+_INNER_OHM: Final = 0.12  # Of the battery and its leads.
+_IDLE_A: Final = 0.6  # Current of the computer.
+_CONE: Final = (-math.radians(7.0), 0.0, math.radians(7.0))  # An HC-SR04 hears 15 degrees.
+_SOLID_GROUP: Final = 3  # Group of the collision geoms; see `shapechanger.vehicles.courses.scene`.
+_COARSE_DT: Final = 2.0 * SIM_DT
+_ROUNDING_S: Final = 1e-9
+# Laying out a course takes 70 ms and planning a path 60, so both are kept; a model takes 5 MB.
+_KEPT_COURSES: Final = 64
+# Views from outside are a little above, at a height on the vehicle, m. At MuJoCo's field of view of
+# 45 degrees a sphere of radius 1 fills the height at a distance of 2.6.
+_ABOVE_RAD: Final = math.radians(-20.0)
+_LOOKED_AT_M: Final = 0.06
+_DISTANCE_PER_REACH: Final = 3.0
+# Farthest distance between two updates of the progress, m: well below `line.WINDOW_M`.
+_PROGRESS_M: Final = 0.5
+
+
+class MujocoWorld:
+    """A vehicle on a course; see `World`.
+
+    Args:
+        vehicle: Name of the vehicle, such as "car".
+        world: Kind of course, such as "corridor"; None for the vehicle's own (`HOME`).
+        seed: Seed of the course and of the first start.
+        size: Width and height of the camera's pictures in pixels; None for no camera.
+        pitch_deg: Angle of the camera's axis below the horizon, degrees; None for the vehicle's.
+        fovy_deg: Vertical field of view of the camera, degrees; None for the vehicle's.
+        look: Light and colours; None for the usual look of the world.
+        lenses: Names of camera faults; see `shapechanger.vehicles.cameras.corruptions`.
+        coarse: Whether to take twice as long steps, but for a vehicle that turns on the spot, and
+            to let wheels meet only the ground. The hull, which is wider, meets the walls.
+
+    Attributes:
+        vehicle: Model of the vehicle.
+        mount: Pose and field of view of the camera.
+        course: The course.
+        look: Light and colours.
+        lenses: Names of camera faults.
+        model: Compiled MuJoCo model.
+        data: State of the simulation.
+        placed: How often the vehicle was put somewhere, at a start or back on its path.
+        resting_v: Voltage of the battery without load.
+
+    Raises:
+        UnknownName: If the vehicle, the world or a lens is unknown.
+        WorldError: If the vehicle does not fit the world.
+    """
+
+    def __init__(
+        self,
+        vehicle: str,
+        world: str | None = None,
+        seed: int = 0,
+        *,
+        size: tuple[int, int] | None = (160, 120),
+        pitch_deg: float | None = None,
+        fovy_deg: float | None = None,
+        look: Look | None = None,
+        lenses: Sequence[str] = (),
+        coarse: bool = False,
+    ) -> None:
+        self.vehicle = vehicle_model(vehicle)
+        self.mount = self.vehicle.camera.aimed(pitch_deg, fovy_deg)
+        self._coarse = coarse
+        # With the longer step a tank, which skids when it turns, would turn a fifth less.
+        self._step_s = _COARSE_DT if coarse and self.vehicle.turning_radius_m > 0.0 else SIM_DT
+        self._world = HOME[vehicle] if world is None else world
+        self.look: Look = Look.of(self._world) if look is None else look
+        self._camera = None if size is None else OnboardCamera(size)
+        self._outside: OutsideCamera | None = None
+        self.lenses = tuple(lenses)
+        self._distortions = [find_corruption(name) for name in lenses]
+        self.resting_v = RESTING_V
+        self._travelled_m = 0.0
+        self.placed = 0
+        self.lay_out(seed)
+
+    @property
+    def seed(self) -> int:
+        """Seed of the course."""
+        return self.course.seed
+
+    @property
+    def collisions(self) -> int:
+        """Number of collisions since the vehicle was placed."""
+        return self._contacts.collisions
+
+    @property
+    def touches(self) -> bool:
+        """Return whether the vehicle is in contact with a wall or an obstacle."""
+        return self._contacts.touches
+
+    @property
+    def bumped(self) -> bool:
+        """Return whether a contact presses the front bumper."""
+        return self._contacts.bumped
+
+    @property
+    def progress_m(self) -> float:
+        """Distance along the course since the vehicle was placed, m; backwards counts down."""
+        return self._progress.update(*self._motion[:2])
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of the vehicle."""
+        return Pose(*self._motion[:3])
+
+    def lay_out(
+        self, seed: int, look: Look | None = None, camera: CameraJitter | None = None
+    ) -> None:
+        """Change the course and put the vehicle at a start; see `World.lay_out`.
+
+        Args:
+            seed: Seed of the course and the start.
+            look: New light and colours; None to keep them.
+            camera: Error of the camera's pose; None for none.
+
+        Raises:
+            WorldError: If the seed has no course, or the camera would be off its vehicle. The world
+                is unchanged then.
+        """
+        look = self.look if look is None else look
+        require_element(self.vehicle.name, floats=self.vehicle.floats, world=self._world)
+        course, model = _compiled(
+            self.vehicle.name, self._world, seed, look, self._coarse, self._step_s, self.mount
+        )
+        if camera is not None:
+            model = copy.copy(model)
+            move_camera(model, _CAMERA, camera)
+        # All checks are above, so that an error leaves the world unchanged.
+        self.look, self.model = look, model
+        self.course: Course = course
+        self.data = mujoco.MjData(self.model)
+        self._bound = self.vehicle.bind(self.model, self.data)
+        self._bound.set_current(*self.course.current_mps)
+        self._contacts = ContactTracker(self.model)
+        self._progress = CourseProgress(self.course)
+        self._chassis = self.model.body(_CHASSIS).id
+        self._solid = np.zeros(mujoco.mjNGROUP, np.uint8)
+        self._solid[_SOLID_GROUP] = 1
+        if self._camera is not None:
+            self._camera.look_through(self.model, _CAMERA)
+        if self._outside is not None:
+            self._outside.look_at(self.model)
+        self.place(seed)
+
+    def place(self, seed: int) -> None:
+        """Put the vehicle at a start, at rest; see `World.place`."""
+        self.put(start_pose(self.course, seed))
+
+    def put(self, pose: Pose) -> None:
+        """Put the vehicle at a pose, at rest, and reset its progress and collisions."""
+        self._rest_at(pose)
+        self._contacts.reset()
+        self._progress.reset(pose.x, pose.y)
+        self._updated_at = pose.x, pose.y
+
+    def path(self) -> CoursePath:
+        """A path around the course for this vehicle, planned on the first call.
+
+        Raises:
+            WorldError: If there is no such path.
+        """
+        return _planned(self.vehicle.name, self._world, self.course.seed)
+
+    def put_back(self) -> None:
+        """Put the vehicle on the nearest point of its path, at rest.
+
+        Progress and collisions keep counting.
+
+        Raises:
+            WorldError: If there is no path around the course for this vehicle.
+        """
+        path, here = self.path(), self._motion
+        i = path.index(path.nearest(here.x, here.y).station)
+        x, y = path.points[i]
+        self._rest_at(Pose(float(x), float(y), float(path.heading[i])))
+        self._contacts.release()
+        self._progress.update(float(x), float(y))
+        self._updated_at = float(x), float(y)
+
+    def zero_odometer(self) -> None:
+        """Reset the travelled distance, as restarting the robot does."""
+        self._travelled_m = 0.0
+
+    def truth(self) -> dict[str, float]:
+        """`progress_m` and `collisions`; see `World.truth`."""
+        return {"progress_m": self.progress_m, "collisions": float(self.collisions)}
+
+    def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
+        """Simulate for a time, in whole steps; see `World.advance`.
+
+        The voltage of the battery and the contacts are updated once, so call it every 10 ms where
+        these matter.
+        """
+        self._rest_s += dt_s
+        steps = int((self._rest_s + _ROUNDING_S) / self._step_s)
+        if steps:
+            self._rest_s -= steps * self._step_s
+            self._step(outputs, steps)
+        x, y = self._motion[:2]
+        before_x, before_y = self._updated_at
+        if math.hypot(x - before_x, y - before_y) > _PROGRESS_M:
+            self._updated_at = x, y
+            self._progress.update(x, y)
+
+    def inputs(self) -> Readings:
+        """Quantities that sensors measure; see `World.inputs`."""
+        x, y, heading, speed, _, yaw_rate = self._motion
+        return Readings(
+            pose=Pose(x, y, heading),
+            speed=speed,
+            travelled_m=self._travelled_m,
+            acceleration_x=self._acceleration[0],
+            acceleration_y=self._acceleration[1],
+            yaw_rate=yaw_rate,
+            bumped=self._contacts.bumped,
+            battery_v=self.resting_v - _INNER_OHM * self._current_a,
+            current_a=self._current_a,
+        )
+
+    def distance_m(self) -> float:
+        """Distance by the shortest of three rays; see `World.distance_m`."""
+        pose = self._motion
+        height = 0.5 * self.vehicle.camera.z
+        start = np.array((pose.x, pose.y, height))
+        hit = np.zeros(1, np.int32)
+        found = math.inf
+        for angle in _CONE:
+            ray = np.array((math.cos(pose.heading + angle), math.sin(pose.heading + angle), 0.0))
+            distance = mujoco.mj_ray(
+                self.model, self.data, start, ray, self._solid, True, self._chassis, hit
+            )
+            if distance >= 0.0:
+                found = min(found, distance)
+        return max(0.0, found - self.vehicle.nose_m)
+
+    def ranges_m(
+        self, bearings: NDArray[np.float64], farthest_m: float = 6.0
+    ) -> NDArray[np.float64]:
+        """Distances from the middle of the front bumper to walls and obstacles.
+
+        Args:
+            bearings: Directions from the heading, rad, positive to the left, (n,); each from -pi/2
+                to pi/2, where the vehicle itself is not in the way.
+            farthest_m: Distance returned where there is nothing nearer, m.
+
+        Returns:
+            Distances, m, (n,).
+        """
+        pose, nose = self._motion, self.vehicle.nose_m
+        start = np.array(
+            (
+                pose.x + nose * math.cos(pose.heading),
+                pose.y + nose * math.sin(pose.heading),
+                0.5 * self.vehicle.camera.z,
+            )
+        )
+        angles = pose.heading + bearings
+        rays = np.zeros((len(angles), 3))
+        rays[:, 0], rays[:, 1] = np.cos(angles), np.sin(angles)
+        hit = np.empty(len(angles), np.int32)
+        found = np.empty(len(angles))
+        mujoco.mj_multiRay(
+            self.model,
+            self.data,
+            start,
+            rays.ravel(),
+            self._solid,
+            True,
+            self._chassis,
+            hit,
+            found,
+            None,
+            len(angles),
+            farthest_m,
+        )
+        found[hit < 0] = farthest_m
+        return np.minimum(found, farthest_m, out=found)
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Picture of the front camera; see `World.picture`.
+
+        Raises:
+            WorldError: If the world was made without a camera.
+        """
+        if self._camera is None:
+            raise WorldError("This world has no camera: pass a `size`.")
+        picture = self._camera.picture(self.model, self.data)
+        for distort in self._distortions:
+            picture = distort(picture, self.course.seed)
+        return picture
+
+    @property
+    def reach(self) -> float:
+        """Distance from the middle of the vehicle, trailer included, to its farthest point, m."""
+        return 0.5 * math.hypot(self.vehicle.length_m, self.vehicle.width_m)
+
+    def outside(
+        self,
+        width: int = 480,
+        height: int = 360,
+        reach: float | None = None,
+        *,
+        azimuth_rad: float | Sequence[float] = PORTRAITS_RAD,
+        elevation_rad: float = _ABOVE_RAD,
+    ) -> NDArray[np.uint8]:
+        """Picture of the vehicle in its world from outside, (height, width, 3).
+
+        Args:
+            width: Width in pixels.
+            height: Height in pixels.
+            reach: Radius in view around the middle of the vehicle, m; None for its own reach.
+            azimuth_rad: Direction of view from its heading, counter-clockwise; 0 is from behind.
+                Of several, the first in which no wall hides the vehicle, if there is one.
+            elevation_rad: Angle of view above the horizon; negative looks down.
+
+        Raises:
+            RenderError: If the size is out of range, or nothing can be drawn here.
+        """
+        if self._outside is None or self._outside.size != (width, height):
+            camera = OutsideCamera((width, height))
+            if self._outside is not None:
+                self._outside.close()
+            self._outside = camera
+            camera.look_at(self.model)
+        x, y, heading = self._motion[:3]
+        middle = self.vehicle.nose_m - 0.5 * self.vehicle.length_m
+        ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
+        centre = np.array((x, y, _LOOKED_AT_M)) + middle * ahead
+        distance = _DISTANCE_PER_REACH * (reach or self.reach)
+        views = (azimuth_rad,) if isinstance(azimuth_rad, int | float) else azimuth_rad
+        view = next(
+            (
+                azimuth
+                for azimuth in views
+                if self._sees(centre, ahead, distance, heading + azimuth, elevation_rad)
+            ),
+            views[0],
+        )
+        return self._outside.picture(
+            self.model,
+            self.data,
+            (centre[0], centre[1], centre[2]),
+            distance,
+            heading + view,
+            elevation_rad,
+        )
+
+    def _sees(
+        self,
+        centre: NDArray[np.float64],
+        ahead: NDArray[np.float64],
+        distance: float,
+        azimuth_rad: float,
+        elevation_rad: float,
+    ) -> bool:
+        """Return whether neither nose nor tail is behind a wall or an obstacle."""
+        flat = math.cos(elevation_rad)
+        eye = centre - distance * np.array(
+            (
+                flat * math.cos(azimuth_rad),
+                flat * math.sin(azimuth_rad),
+                math.sin(elevation_rad),
+            )
+        )
+        hit = np.zeros(1, np.int32)
+        for end in (-0.5 * self.vehicle.length_m, 0.5 * self.vehicle.length_m):
+            ray = centre + end * ahead - eye
+            met = mujoco.mj_ray(
+                self.model, self.data, eye, ray, self._solid, True, self._chassis, hit
+            )
+            if 0.0 <= met < 1.0 and self.model.geom_bodyid[hit[0]] == 0:  # In lengths of the ray.
+                return False
+        return True
+
+    def close(self) -> None:
+        """Free the cameras' OpenGL contexts."""
+        for camera in (self._camera, self._outside):
+            if camera is not None:
+                camera.close()
+        self._camera = self._outside = None
+
+    def _rest_at(self, pose: Pose) -> None:
+        self.placed += 1
+        mujoco.mj_resetData(self.model, self.data)
+        self._bound.place(pose.x, pose.y, pose.heading)
+        mujoco.mj_forward(self.model, self.data)
+        self._motion = self._bound.motion()
+        self._rest_s = 0.0
+        self._acceleration = (0.0, 0.0)
+        self._rolled_m = self._bound.travelled_m()
+        self._current_a = _IDLE_A
+
+    def _step(self, outputs: Mapping[str, float | None], steps: int) -> None:
+        """Take simulation steps with the same outputs and the same voltage of the battery."""
+        bound, dt_s = self._bound, steps * self._step_s
+        bound.drive(outputs, self.resting_v - _INNER_OHM * self._current_a)
+        mujoco.mj_step(self.model, self.data, nstep=steps)
+        before, now = self._motion, bound.motion()
+        self._motion = now
+        self._contacts.follow(self.data, now, dt_s)
+        self._acceleration = ((now.speed - before.speed) / dt_s, now.speed * now.yaw_rate)
+        rolled_m = bound.travelled_m()
+        self._travelled_m += rolled_m - self._rolled_m
+        self._rolled_m = rolled_m
+        self._current_a = _IDLE_A + bound.current_a()
+
+
+@lru_cache(maxsize=_KEPT_COURSES)
+def _compiled(
+    vehicle: str,
+    world: str,
+    seed: int,
+    look: Look,
+    coarse: bool,
+    step_s: float,
+    mount: CameraMount,
+) -> tuple[Course, mujoco.MjModel]:
+    """Return a course, and the compiled model of a vehicle on it; neither may be changed."""
+    course = lay_out(world, seed)
+    spec = mujoco.MjSpec()
+    add_course(spec, course, look)
+    add_vehicle(spec, vehicle, look.tone())
+    aim_camera(spec.camera(_CAMERA), mount)
+    spec.option.timestep = step_s
+    if coarse:
+        _let_wheels_meet_only_the_ground(spec)
+    return course, spec.compile()
+
+
+def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
+    """Pair wheels with the ground, since searching for all they meet takes a third of a step."""
+    ground = spec.geom("world/ground")
+    for geom in spec.geoms:
+        if geom.contype & ground.conaffinity and geom.name.startswith("vehicle/"):
+            geom.contype = geom.conaffinity = 0
+            # As MuJoCo combines the frictions of two geoms.
+            wins = geom.priority > ground.priority
+            slide, spin, roll = (
+                geom.friction if wins else np.maximum(geom.friction, ground.friction)
+            )
+            spec.add_pair(
+                geomname1=ground.name,
+                geomname2=geom.name,
+                friction=[slide, slide, spin, roll, roll],
+            )
+
+
+@lru_cache(maxsize=_KEPT_COURSES)
+def _planned(vehicle: str, world: str, seed: int) -> CoursePath:
+    """Return a path around a course for a vehicle."""
+    return plan_path_for(lay_out(world, seed), traits_of(vehicle))
+
+
+class ContactTracker:
+    """Tracks contacts of a vehicle with walls and obstacles.
+
+    Args:
+        model: Model whose vehicle geoms are named "vehicle/...", and its walls and obstacles
+            "world/wall/..." and "world/thing/...".
+
+    Attributes:
+        collisions: Number of collisions since `reset`.
+        bumped: Whether a contact presses the front bumper.
+        touches: Whether there is any contact.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        names = [model.geom(i).name for i in range(model.ngeom)]
+        self._hull = np.array([name.startswith("vehicle/") for name in names])
+        self._solid = np.array([name.startswith(("world/wall", "world/thing")) for name in names])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all contacts and collisions."""
+        self.collisions = 0
+        self.release()
+
+    def release(self) -> None:
+        """Forget the current contacts, so that the next one is a new collision."""
+        self.bumped = self.touches = False
+        self._since_s = math.inf
+
+    def follow(self, data: mujoco.MjData, motion: Motion, dt_s: float) -> None:
+        """Update from the contacts of a simulation step.
+
+        Args:
+            data: State after the step.
+            motion: Pose of the vehicle.
+            dt_s: Length of the step, s.
+        """
+        self._since_s += dt_s
+        self.bumped = self.touches = False
+        if data.ncon == 0:
+            return
+        pairs = data.contact.geom
+        if not self._solid[pairs].any():
+            return  # Usual case: only the wheels touch the ground.
+        first, second = pairs[:, 0], pairs[:, 1]
+        hits = (self._hull[first] & self._solid[second]) | (self._hull[second] & self._solid[first])
+        hits &= data.contact.dist <= 0.0
+        if not hits.any():
+            return
+        self.touches = True
+        if self._since_s > APART_S:
+            self.collisions += 1
+        self._since_s = 0.0
+        for x, y, _ in data.contact.pos[hits]:
+            bearing = math.atan2(y - motion.y, x - motion.x) - motion.heading
+            self.bumped |= abs(math.remainder(bearing, math.tau)) <= BUMPER_SPREAD

@@ -1,0 +1,245 @@
+"""Properties of all four vehicles."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
+from shapechanger.vehicles.bodies.parts import BATTERY_V
+from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
+from tests.vehicles.bodies.grounds import AHEAD, ALL, LAND, TO_THE_LEFT, ground, scaled
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_vehicle_at_rest_stays(name: str) -> None:
+    """It creeps by less than 0.1 mm in ten seconds."""
+    here = ground(name)
+    here.drive(1.0, {})
+    before = here.vehicle.motion()
+    here.drive(10.0, {})
+    after = here.vehicle.motion()
+    assert math.hypot(after.x - before.x, after.y - before.y) < 1e-4
+    assert abs(after.heading - before.heading) < 1e-4
+    assert abs(here.height()) < 1e-3
+    assert here.vehicle.current_a() == 0.0
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_top_speed_is_as_declared(name: str) -> None:
+    """The top speed is as declared, and the odometer agrees."""
+    here = ground(name)
+    here.drive(6.0, AHEAD[name])
+    assert here.vehicle.motion().speed == pytest.approx(here.kind.top_speed_mps, rel=0.1)
+    pose = here.vehicle.motion()
+    assert abs(pose.y) < 0.02
+    assert here.vehicle.travelled_m() == pytest.approx(pose.x, rel=0.03)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_speed_falls_with_the_voltage(name: str) -> None:
+    """At 80 % of the voltage, the speed is 60 to 90 % of the top speed."""
+    here = ground(name)
+    here.drive(5.0, AHEAD[name], battery_v=0.8 * BATTERY_V)
+    assert 0.6 < here.vehicle.motion().speed / here.kind.top_speed_mps < 0.9
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_reverse_is_negative(name: str) -> None:
+    """Speed and distance are negative in reverse."""
+    here = ground(name)
+    here.drive(2.0, scaled(AHEAD[name], -0.5))
+    assert here.vehicle.motion().speed < -0.05
+    assert here.vehicle.travelled_m() < -0.03
+    assert here.vehicle.motion().x < -0.03
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_left_is_counter_clockwise(name: str) -> None:
+    """Left turns are positive, and right turns mirror them."""
+    here = ground(name)
+    here.drive(3.0, TO_THE_LEFT[name])
+    left = here.vehicle.motion().yaw_rate
+    assert left > 0.1
+    mirrored = dict(TO_THE_LEFT[name])
+    for part in ("steering", "rudder"):
+        if part in mirrored:
+            mirrored[part] *= -1.0
+    if name == "tank":
+        mirrored = scaled(mirrored, -1.0)
+    here.vehicle.place(0.0, 0.0, 0.0)
+    here.drive(3.0, mirrored)
+    assert here.vehicle.motion().yaw_rate == pytest.approx(-left, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("value", [0.03, -0.05])
+def test_small_outputs_do_not_move_a_vehicle(name: str, value: float) -> None:
+    """Outputs within the dead band have no effect."""
+    here = ground(name)
+    here.drive(2.0, scaled(AHEAD[name], value))
+    assert here.pace() < 1e-3
+    here.drive(2.0, scaled(AHEAD[name], math.copysign(0.2, value)))
+    assert here.pace() > 0.01
+
+
+@pytest.mark.parametrize("name", LAND)
+def test_zero_brakes_and_none_coasts(name: str) -> None:
+    """A shorted motor brakes more than an open one."""
+    here = ground(name)
+    ways: list[float] = []
+    for value in (0.0, None):
+        here.vehicle.place(0.0, 0.0, 0.0)
+        here.drive(3.0, AHEAD[name])
+        start = here.vehicle.motion().x
+        here.drive(0.5, dict.fromkeys(AHEAD[name], value))
+        ways.append(here.vehicle.motion().x - start)
+        assert here.vehicle.current_a() == 0.0
+    braked, coasted = ways
+    assert 0.0 < braked < 0.3 * here.kind.top_speed_mps
+    assert coasted > 1.3 * braked
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_stalled_motor_draws_the_most_current(name: str) -> None:
+    """The stall current is that of the winding, and less flows at speed."""
+    here = ground(name)
+    here.vehicle.drive(AHEAD[name], BATTERY_V)
+    stalled = here.vehicle.current_a()
+    motors = 2 if name == "tank" else 1
+    assert stalled == pytest.approx(motors * BATTERY_V / 1.0, rel=0.01)  # 1 Ohm.
+    here.drive(3.0, AHEAD[name])
+    assert 0.2 < here.vehicle.current_a() < 0.3 * stalled
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("heading", [0.0, 0.6])
+def test_a_wall_stops_a_vehicle(name: str, heading: float) -> None:
+    """It neither climbs nor tips."""
+    here = ground(name, wall_x=6.0)
+    here.vehicle.place(0.0, 0.0, heading)
+    most_height, least_upright, furthest = 0.0, 1.0, 0.0
+    for _ in range(round(9.0 / SIM_DT)):
+        here.vehicle.drive(AHEAD[name], BATTERY_V)
+        mujoco.mj_step(here.model, here.data)
+        most_height = max(most_height, abs(here.height()))
+        least_upright = min(least_upright, here.uprightness())
+        furthest = max(furthest, here.vehicle.motion().x)
+    assert most_height < 0.05
+    assert least_upright > math.cos(math.radians(20.0))
+    assert 3.0 < furthest < 6.0
+    if heading == 0.0:
+        assert furthest == pytest.approx(6.0 - here.kind.nose_m, abs=0.05)
+        assert here.pace() < 0.05
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_vehicle_comes_off_a_wall_slowly(name: str) -> None:
+    """With open motors it rebounds at 5 to 20 % of its speed before the collision."""
+    here = ground(name, wall_x=3.0)
+    while here.vehicle.motion().x < 3.0 - here.kind.nose_m - 0.03:
+        here.drive(SIM_DT, AHEAD[name])
+    before, least = here.vehicle.motion().speed, math.inf
+    for _ in range(100):
+        here.drive(SIM_DT, dict.fromkeys(AHEAD[name]))
+        least = min(least, here.vehicle.motion().speed)
+    assert 0.05 < -least / before < 0.2
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_random_outputs_are_stable(name: str) -> None:
+    """Random outputs and voltages keep the vehicle upright and its state finite."""
+    rng = np.random.default_rng(7)
+    here = ground(name, wall_x=2.0)
+    with np.errstate(all="raise"):
+        for _ in range(300):
+            values = {part: float(rng.uniform(-1.3, 1.3)) for part in AHEAD[name]}
+            some = {part: None if rng.random() < 0.1 else value for part, value in values.items()}
+            here.drive(0.2, some, battery_v=float(rng.uniform(5.0, 8.4)))
+            assert abs(here.height()) < 0.1
+            assert here.uprightness() > 0.8
+    assert np.isfinite(here.data.qpos).all()
+    assert np.isfinite(here.data.qvel).all()
+    assert not any(warning.number for warning in here.data.warning)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_place_resets_the_state(name: str) -> None:
+    """Motion after `place` does not depend on what was before."""
+    here = ground(name)
+    ends: list[tuple[float, float, float, float]] = []
+    for _ in range(2):
+        here.vehicle.place(1.0, -2.0, 0.7)
+        pose = here.vehicle.motion()
+        assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, -2.0, 0.7))
+        assert here.vehicle.travelled_m() == 0.0
+        assert here.pace() == 0.0
+        here.drive(1.0, TO_THE_LEFT[name])
+        pose = here.vehicle.motion()
+        ends.append((pose.x, pose.y, pose.heading, here.vehicle.travelled_m()))
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_speed_is_along_the_heading(name: str) -> None:
+    """Speed is measured along the heading."""
+    here = ground(name)
+    here.vehicle.place(0.0, 0.0, 2.5)
+    here.drive(2.0, AHEAD[name])
+    assert here.vehicle.motion().speed > 0.5
+    assert abs(here.vehicle.motion().lateral_speed) < 0.01
+    pose = here.vehicle.motion()
+    assert math.atan2(pose.y, pose.x) == pytest.approx(2.5, abs=0.02)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_names_and_collision_bits(name: str) -> None:
+    """Collision bits and names follow the conventions."""
+    model = ground(name).model
+    for i in range(model.ngeom):
+        geom = model.geom(i)
+        if geom.name.startswith("world/"):
+            continue
+        bits = (int(geom.contype[0]), int(geom.conaffinity[0]))
+        assert bits in ((0, 0), (2, 1), (10, 5))
+        drawn = (OWN_VIEW, OUTSIDE_VIEW)
+        assert int(geom.group[0]) in (drawn if bits == (0, 0) else (3,))  # 3 is not drawn.
+    kinds = (model.body, model.nbody), (model.joint, model.njnt), (model.actuator, model.nu)
+    for element, count in kinds:
+        assert all(element(i).name.startswith(("vehicle/", "world")) for i in range(count))
+    camera = model.camera("vehicle/camera")
+    mount = VEHICLES[name].camera
+    assert camera.pos == pytest.approx((mount.x, mount.y, mount.z))
+    assert camera.fovy[0] == mount.fovy_deg
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_size_is_as_declared(name: str) -> None:
+    """The extent of the collision geoms is as declared."""
+    here = ground(name)
+    hits: list[float] = []
+    for geom in map(here.model.geom, range(here.model.ngeom)):
+        if geom.contype[0] not in (2, 10):
+            continue
+        half = here.model.geom_aabb[geom.id, 3:]
+        place, turn = here.data.geom_xpos[geom.id], here.data.geom_xmat[geom.id].reshape(3, 3)
+        reach = np.abs(turn) @ half
+        hits.append(place[0] + reach[0])
+        assert abs(place[1]) + reach[1] <= here.kind.width_m / 2 + 1e-6
+        assert place[0] - reach[0] >= here.kind.nose_m - here.kind.length_m - 1e-6
+    assert max(hits) == pytest.approx(here.kind.nose_m, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_camera_looks_ahead(name: str) -> None:
+    """The camera looks along the heading, level or slightly down."""
+    here = ground(name)
+    here.vehicle.place(0.0, 0.0, 1.0)
+    axes = here.data.camera("vehicle/camera").xmat.reshape(3, 3)
+    ahead, up = -axes[:, 2], axes[:, 1]
+    assert math.atan2(ahead[1], ahead[0]) == pytest.approx(1.0)
+    assert -0.15 < ahead[2] <= 1e-9
+    assert up[2] > 0.98

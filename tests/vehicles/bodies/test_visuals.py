@@ -1,0 +1,86 @@
+"""Looks of vehicles: they change no physics, and own cameras do not see what is for outside."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.vehicles.bodies import VEHICLES, add_vehicle
+from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
+from tests.vehicles.bodies.grounds import ALL
+
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+
+
+def _spec(name: str) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec()
+    add_vehicle(spec, name)
+    return spec
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_looks_have_no_mass_and_touch_nothing(name: str) -> None:
+    """Without its visual geoms, masses, inertias and collision geoms are exactly the same."""
+    model, bare = _spec(name).compile(), _spec(name)
+    for geom in list(bare.geoms):
+        if geom.group in (OWN_VIEW, OUTSIDE_VIEW):
+            assert geom.contype == geom.conaffinity == 0
+            assert geom.mass == 0.0
+            bare.delete(geom)
+    plain = bare.compile()
+    for field in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_M0"):
+        np.testing.assert_array_equal(getattr(model, field), getattr(plain, field), err_msg=field)
+    solid = (model.geom_contype | model.geom_conaffinity) > 0
+    assert solid.sum() == plain.ngeom
+    for field in ("type", "size", "pos", "quat", "friction", "solref", "solimp", "contype",
+                  "conaffinity", "bodyid", "priority"):  # fmt: skip
+        mine, theirs = getattr(model, f"geom_{field}")[solid], getattr(plain, f"geom_{field}")
+        np.testing.assert_array_equal(mine, theirs, err_msg=field)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_outside_a_vehicle_is_made_of_meshes(name: str) -> None:
+    """What is seen from outside is meshes above the ground, or below it as their reflection."""
+    model = _spec(name).compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    seen = np.flatnonzero(model.geom_group == OUTSIDE_VIEW)
+    assert len(seen) >= 8
+    assert (model.geom_type[seen] == _MESH).all()
+    heights: list[float] = []
+    for i in seen:
+        mesh = model.geom_dataid[i]
+        if model.mesh(mesh).name.endswith("/shadow"):
+            continue
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        turn = data.geom_xmat[i].reshape(3, 3)
+        points = model.mesh_vert[first : first + count] @ turn.T + data.geom_xpos[i]
+        assert np.abs(points[:, 1]).max() <= 0.5 * VEHICLES[name].width_m + 0.015  # With mirrors.
+        heights += list(points[:, 2])
+    assert max(heights) == pytest.approx(-min(heights), abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("yaw", [0.0, 2.0])
+def test_brightness_does_not_change_with_the_heading(name: str, yaw: float) -> None:
+    """Normals have the chosen brightness in a light that shines straight up: the roof the most."""
+    model = _spec(name).compile()
+    data = mujoco.MjData(model)
+    half = 0.5 * yaw
+    if model.joint(0).type[0] == mujoco.mjtJoint.mjJNT_FREE:
+        data.qpos[3:7] = np.cos(half), 0.0, 0.0, np.sin(half)
+    else:
+        data.qpos[2] = yaw
+    mujoco.mj_forward(model, data)
+    brightest: list[float] = []
+    for i in np.flatnonzero(model.geom_group == OUTSIDE_VIEW):
+        if model.body(model.geom_bodyid[i]).name != "vehicle/chassis":
+            continue
+        mesh = model.geom_dataid[i]
+        first, count = model.mesh_normaladr[mesh], model.mesh_normalnum[mesh]
+        turn = data.geom_xmat[i].reshape(3, 3)
+        light = -(model.mesh_normal[first : first + count] @ turn.T)[:, 2]
+        assert light.min() > -1e-5
+        brightest.append(float(light.max()))
+    assert max(brightest) == pytest.approx(1.0, abs=1e-5)

@@ -1,0 +1,113 @@
+"""Camera faults."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import UnknownName, WorldError
+from shapechanger.vehicles.cameras.corruptions import (
+    CORRUPTIONS,
+    Corruption,
+    Picture,
+    blur,
+    dirt,
+    find_corruption,
+    glare,
+    night,
+)
+
+_ALL = pytest.mark.parametrize("change", CORRUPTIONS.values(), ids=CORRUPTIONS)
+
+
+def _picture(height: int = 120, width: int = 160) -> Picture:
+    """Return a picture with edges and all levels."""
+    rng = np.random.default_rng(0)
+    rough = rng.integers(0, 256, (height // 8 + 1, width // 8 + 1, 3), np.uint8)
+    return np.kron(rough, np.ones((8, 8, 1), np.uint8))[:height, :width].copy()
+
+
+@_ALL
+@pytest.mark.parametrize(
+    "size", [(120, 160), (64, 64), (33, 47), (1, 1), (1, 300), (300, 1), (409, 427), (1080, 1920)]
+)
+def test_lenses_keep_size_and_type(change: Corruption, size: tuple[int, int]) -> None:
+    """A lens keeps the shape and dtype."""
+    before = _picture(*size)
+    kept = before.copy()
+    after = change(before, 3)
+    assert after.shape == before.shape
+    assert after.dtype == np.uint8
+    assert not np.may_share_memory(before, after)
+    np.testing.assert_array_equal(before, kept)
+    if before.size > 3:  # A blur of one pixel is that pixel.
+        assert not np.array_equal(before, after)
+
+
+@_ALL
+@pytest.mark.parametrize("shape", [(12, 16), (12, 16, 1), (12, 16, 4), (2, 12, 16, 3)])
+def test_lenses_refuse_what_is_no_colour_picture(
+    change: Corruption, shape: tuple[int, ...]
+) -> None:
+    """A grey picture, one with an alpha channel and a batch are refused."""
+    with pytest.raises(WorldError, match=r"takes a picture of shape \(H, W, 3\), uint8, got"):
+        change(np.zeros(shape, np.uint8), 0)
+
+
+@_ALL
+def test_lenses_are_deterministic(change: Corruption) -> None:
+    """A lens is a function of picture and seed, and does not change its input."""
+    np.testing.assert_array_equal(change(_picture(), 5), change(_picture(), 5))
+
+
+@pytest.mark.parametrize("change", [night, glare, dirt])
+def test_another_seed_gives_another_picture(change: Corruption) -> None:
+    """Another seed changes the result."""
+    assert not np.array_equal(change(_picture(), 5), change(_picture(), 6))
+
+
+def test_night_halves_the_brightness_and_adds_noise() -> None:
+    """Noise varies between images."""
+    white = np.full((120, 160, 3), 255, np.uint8)
+    dark = night(white, 0)
+    assert dark.mean(axis=(0, 1)) == pytest.approx([117.3, 127.5, 168.3], abs=0.5)
+    assert dark.std(axis=(0, 1)) == pytest.approx(9.0, abs=0.3)
+    other = white.copy()
+    other[0, 0] = 254
+    assert not np.array_equal(night(other, 0)[1:], dark[1:])
+
+
+def test_glare_only_adds_light() -> None:
+    """Glare brightens all pixels and saturates its middle."""
+    black = np.zeros((120, 160, 3), np.uint8)
+    lit = glare(black, 1)
+    assert lit.max() > 225
+    assert lit.min() >= 20
+
+
+def test_blur_keeps_the_sum() -> None:
+    """Blur keeps the sum, with a standard deviation of 1.25 % of the width."""
+    point = np.zeros((121, 161, 3), np.uint8)
+    point[56:65, 76:85] = 255
+    soft = blur(point, 0).astype(float)[..., 0]
+    assert soft.sum() == pytest.approx(255 * 81, rel=0.02)
+    columns = np.arange(161)
+    variance = (soft.sum(axis=0) * (columns - 80) ** 2).sum() / soft.sum()
+    assert variance == pytest.approx((81 - 1) / 12 + (0.0125 * 161) ** 2, rel=0.05)
+
+
+def test_dirt_does_not_move() -> None:
+    """Spots do not move between pictures, and most pixels stay clean."""
+    white = np.full((120, 160, 3), 255, np.uint8)
+    grey = np.full((120, 160, 3), 200, np.uint8)
+    spots = dirt(white, 2)[..., 0] < 230
+    assert 0.01 < spots.mean() < 0.4
+    darker = dirt(grey, 2)[..., 0]
+    assert darker[spots].max() < 200
+
+
+def test_an_unknown_lens_is_refused() -> None:
+    """The error suggests the nearest name."""
+    assert find_corruption("night") is night
+    with pytest.raises(UnknownName, match="Did you mean 'glare'"):
+        find_corruption("glair")

@@ -1,0 +1,129 @@
+"""Views of a vehicle in its world from outside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from shapechanger.errors import RenderError
+from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW
+from shapechanger.vehicles.courses.course import HOME
+from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
+from shapechanger.vehicles.world import PORTRAITS_RAD, MujocoWorld
+
+pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
+
+
+@contextmanager
+def _invisible(world: MujocoWorld, *, only_shadow: bool = False) -> Iterator[None]:
+    """Hide what is seen of the vehicle from outside; compiled models are shared and cached."""
+    model = world.model
+    hidden = [
+        i
+        for i in np.flatnonzero(model.geom_group == OUTSIDE_VIEW)
+        if model.mesh(model.geom_dataid[i]).name.endswith("/shadow") or not only_shadow
+    ]
+    model.geom_group[hidden] = 5
+    try:
+        yield
+    finally:
+        model.geom_group[hidden] = OUTSIDE_VIEW
+
+
+def _changed(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    return np.abs(one.astype(int) - other).max(axis=2) > 3
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_it_shows_the_vehicle_in_its_world(vehicle: str) -> None:
+    """The vehicle is in the middle, smaller with a larger reach, on ground with a texture."""
+    world = MujocoWorld(vehicle, size=None)
+    near, far = world.outside(160, 120), world.outside(160, 120, 3.0 * world.reach)
+    with _invisible(world):
+        empty, distant = world.outside(160, 120), world.outside(160, 120, 3.0 * world.reach)
+    world.close()
+    assert near.shape == (120, 160, 3)
+    shown, small = _changed(near, empty), _changed(far, distant)
+    assert 0.1 < shown.mean() < 0.6
+    assert shown.mean() > 4 * small.mean() > 0.0
+    rows, columns = np.nonzero(shown)
+    assert abs(columns.mean() - 80.0) < 16.0
+    assert abs(rows.mean() - 60.0) < 16.0
+    assert empty[80:].std(axis=(0, 1)).max() > 4.0  # No plain ground.
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_the_shadow_is_dark_and_soft(vehicle: str) -> None:
+    """A shadow only darkens, and most at the vehicle: it has many levels."""
+    world = MujocoWorld(vehicle, size=None)
+    shaded = world.outside(320, 240).astype(int)
+    with _invisible(world, only_shadow=True):
+        bare = world.outside(320, 240).astype(int)
+    world.close()
+    loss = (bare - shaded).sum(axis=2)
+    assert loss.min() >= -3
+    assert loss.max() > 30
+    assert len(np.unique(loss[loss > 0])) > 10
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_the_own_camera_does_not_see_it(vehicle: str) -> None:
+    """What is drawn for views from outside leaves the camera's picture as it is."""
+    world = MujocoWorld(vehicle, size=(160, 120))
+    before = world.picture()
+    world.outside(160, 120)
+    np.testing.assert_array_equal(world.picture(), before)
+    with _invisible(world):
+        np.testing.assert_array_equal(world.picture(), before)
+    world.close()
+
+
+def test_the_view_turns_with_the_vehicle() -> None:
+    """From behind, the vehicle looks the same on two starts, and its surroundings do not."""
+    world = MujocoWorld("truck", size=None)
+    seen: list[NDArray[np.bool_]] = []
+    for start in (0, 4):
+        world.place(start)
+        picture = world.outside(160, 120, azimuth_rad=0.0, elevation_rad=math.radians(-30.0))
+        with _invisible(world):
+            empty = world.outside(160, 120, azimuth_rad=0.0, elevation_rad=math.radians(-30.0))
+        seen.append(_changed(picture, empty))
+    world.close()
+    both, either = (seen[0] & seen[1]).sum(), (seen[0] | seen[1]).sum()
+    assert both > 0.9 * either
+
+
+def test_it_follows_a_new_course() -> None:
+    """After another course is laid out, it is shown; a picture of an env is the same view."""
+    env = VehicleEnv("boat", image=False, courses=(0, 1))
+    first = env.picture(64, 48)
+    env.reset(seed=0, options={"course": 1, "start": 0})
+    second = env.picture(64, 48)
+    np.testing.assert_array_equal(second, env.world.outside(64, 48))
+    env.close()
+    assert _changed(first, second).mean() > 0.2
+
+
+@pytest.mark.parametrize("size", [(0, 48), (0, 5), (-3, 7), (7, 0), (0, 5000), (64, 5000)])
+def test_a_size_out_of_range_is_refused(size: tuple[int, int]) -> None:
+    """The message has the size that was asked for."""
+    world = MujocoWorld("car", size=None)
+    limit = "cannot be" if min(size) < 1 else "at most 4096 pixels a side, got"
+    with pytest.raises(RenderError, match=f"{limit} {size[0]} x {size[1]}"):
+        world.outside(*size)
+    world.close()
+
+
+def test_no_wall_hides_the_vehicle() -> None:
+    """Pillars are between the vehicle and the first two views, so the third is chosen."""
+    env = WaypointEnv("car")
+    env.reset(seed=0)
+    views = [env.world.outside(160, 120, 0.4, azimuth_rad=each) for each in PORTRAITS_RAD[:3]]
+    chosen = env.world.outside(160, 120, 0.4)
+    env.close()
+    assert [np.array_equal(chosen, view) for view in views] == [False, False, True]

@@ -1,0 +1,174 @@
+"""Rectified images, and measuring a camera."""
+
+from __future__ import annotations
+
+import math
+from contextlib import closing
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from shapechanger.contract.world import Pose
+from shapechanger.errors import WorldError
+from shapechanger.vehicles.bodies import vehicle_model
+from shapechanger.vehicles.cameras.rectify import (
+    CANONICAL_SIZE,
+    CameraGeometry,
+    Rectifier,
+    draw_view,
+    measure_camera,
+    pitch_of_horizon,
+)
+from shapechanger.vehicles.world import MujocoWorld
+
+_SIZE = (160, 120)
+
+
+def _horizon(pitch_deg: float, fovy_deg: float) -> NDArray[np.uint8]:
+    """Return a picture that is white above the horizon and black below."""
+    wide, high = _SIZE
+    focal = 0.5 * high / math.tan(math.radians(fovy_deg) / 2.0)
+    row = 0.5 * high - focal * math.tan(math.radians(pitch_deg))
+    picture = np.zeros((high, wide, 3), np.uint8)
+    picture[: round(row)] = 255
+    return picture
+
+
+@pytest.mark.parametrize(
+    ("pitch_deg", "fovy_deg"), [(0.0, 48.8), (3.0, 48.8), (-2.0, 48.8), (4.0, 60.0), (0.0, 90.0)]
+)
+def test_the_horizon_is_level(pitch_deg: float, fovy_deg: float) -> None:
+    """The horizon is in the same row for all mounts."""
+    seen = Rectifier(CameraGeometry(pitch_deg, fovy_deg), _SIZE)(_horizon(pitch_deg, fovy_deg))
+    assert seen.shape == (CANONICAL_SIZE[1], CANONICAL_SIZE[0], 3)
+    assert (seen[:21] == 255).all()
+    assert (seen[23:] == 0).all()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_rectified_pictures_of_vehicles_agree() -> None:
+    """Rectified pictures of tank and truck are close to the car's."""
+    raw: dict[str, NDArray[np.float64]] = {}
+    rectified: dict[str, NDArray[np.float64]] = {}
+    for vehicle in ("car", "tank", "truck"):
+        mount = vehicle_model(vehicle).camera
+        geometry = CameraGeometry(math.degrees(mount.pitch_rad), mount.fovy_deg)
+        with closing(MujocoWorld(vehicle, "corridor", 11)) as world:
+            start = world.pose
+            # Put all lenses at the same place.
+            ahead = 0.12 - mount.x
+            world.put(
+                Pose(
+                    start.x + ahead * math.cos(start.heading),
+                    start.y + ahead * math.sin(start.heading),
+                    start.heading,
+                )
+            )
+            picture = world.picture()
+        raw[vehicle] = picture.astype(np.float64)
+        rectified[vehicle] = Rectifier(geometry, _SIZE)(picture).astype(np.float64)
+    for vehicle in ("tank", "truck"):
+        before = np.abs(raw[vehicle] - raw["car"]).mean()
+        after = np.abs(rectified[vehicle] - rectified["car"]).mean()
+        assert after < 0.6 * before
+
+
+def test_a_camera_that_misses_the_view_is_refused() -> None:
+    """Cameras that do not cover the virtual view are refused."""
+    with pytest.raises(WorldError, match=r"looks 30 degrees down .* misses 60 %"):
+        Rectifier(CameraGeometry(30.0, 48.8), _SIZE)
+    with pytest.raises(WorldError, match="vertical field of view of 20 degrees misses"):
+        Rectifier(CameraGeometry(0.0, 20.0), _SIZE)
+
+
+def test_pictures_of_another_size_are_refused() -> None:
+    """Pictures of another size are refused."""
+    rectify = Rectifier(CameraGeometry(0.0, 48.8), _SIZE)
+    with pytest.raises(WorldError, match=r"have the shape \(120, 160, 3\), got \(60, 80, 3\)"):
+        rectify(np.zeros((60, 80, 3), np.uint8))
+
+
+def board_picture(
+    pitch_deg: float,
+    fovy_deg: float,
+    turned_deg: float,
+    roll_deg: float = 0.0,
+    size: tuple[int, int] = (320, 240),
+) -> NDArray[np.uint8]:
+    """Draw an upright board of 7 x 5 inner corners, 12 squares away, with noise."""
+    wide, high = size
+    focal = 0.5 * high / math.tan(0.5 * math.radians(fovy_deg))
+    x, y = np.meshgrid(np.arange(0.25, wide, 0.5), np.arange(0.25, high, 0.5))
+    rays = np.stack((x - 0.5 * wide, y - 0.5 * high, np.full_like(x, focal)), axis=-1)
+    level = Rotation.from_euler("xz", (-pitch_deg, roll_deg), degrees=True).as_matrix()
+    board = Rotation.from_euler("y", turned_deg, degrees=True).as_matrix()
+    rays = rays @ level.T
+    middle = np.array((0.4, 0.8, 12.0))
+    places = rays * (middle @ board[:, 2] / (rays @ board[:, 2]))[..., None] - middle
+    across, down = places @ board[:, 0] + 4.0, places @ board[:, 1] + 3.0
+    dark = np.where((np.floor(across) + np.floor(down)) % 2 < 1, 30.0, 220.0)
+    paper = (across > -1.0) & (across < 9.0) & (down > -1.0) & (down < 7.0)
+    inside = (across > 0.0) & (across < 8.0) & (down > 0.0) & (down < 6.0)
+    fine = np.where(inside, dark, np.where(paper, 230.0, 110.0))
+    grey = fine.reshape(high, 2, wide, 2).mean(axis=(1, 3))
+    grey += np.random.default_rng(0).normal(0.0, 4.0, grey.shape)
+    return np.repeat(np.clip(grey, 0.0, 255.0).astype(np.uint8)[..., None], 3, axis=2)
+
+
+@pytest.mark.parametrize(
+    ("pitch_deg", "fovy_deg", "turned_deg", "roll_deg"),
+    [(0.0, 48.8, 35.0, 0.0), (4.0, 48.8, -35.0, 2.0), (-6.0, 62.0, 40.0, 0.0)],
+)
+def test_a_board_gives_pitch_and_field_of_view(
+    pitch_deg: float, fovy_deg: float, turned_deg: float, roll_deg: float
+) -> None:
+    """The pitch is measured to 0.1 degrees and the field of view to 0.5."""
+    found = measure_camera(board_picture(pitch_deg, fovy_deg, turned_deg, roll_deg), (7, 5))
+    assert found.geometry.pitch_deg == pytest.approx(pitch_deg, abs=0.15)
+    assert found.geometry.fovy_deg == pytest.approx(fovy_deg, abs=0.5)
+    assert found.roll_deg == pytest.approx(roll_deg, abs=0.15)
+    assert found.error_px < 0.2
+    assert abs(found.geometry.pitch_deg - pitch_deg) < 4.0 * found.pitch_sd_deg
+    assert abs(found.geometry.fovy_deg - fovy_deg) < 4.0 * found.fovy_sd_deg
+
+
+def test_a_board_that_faces_the_camera_needs_the_field_of_view() -> None:
+    """A board seen straight on needs a given field of view."""
+    picture = board_picture(3.0, 48.8, 0.0)
+    with pytest.raises(WorldError, match="field of view"):
+        measure_camera(picture, (7, 5))
+    found = measure_camera(picture, (7, 5), fovy_deg=48.8)
+    assert found.geometry.pitch_deg == pytest.approx(3.0, abs=0.3)
+    assert found.fovy_sd_deg == 0.0
+
+
+def test_pictures_without_the_board_are_refused() -> None:
+    """The message describes the board that was searched."""
+    with pytest.raises(WorldError, match="no checkerboard of 7 x 5 inner corners"):
+        measure_camera(np.full((120, 160, 3), 90, np.uint8), (7, 5))
+    with pytest.raises(WorldError, match="at least 3 inner corners"):
+        measure_camera(np.full((120, 160, 3), 90, np.uint8), (7, 2))
+
+
+@pytest.mark.parametrize(("pitch_deg", "fovy_deg"), [(0.0, 48.8), (5.0, 48.8), (-3.0, 62.0)])
+def test_a_horizon_gives_the_pitch(pitch_deg: float, fovy_deg: float) -> None:
+    """The row of the horizon gives the pitch."""
+    high = _SIZE[1]
+    row = float((_horizon(pitch_deg, fovy_deg)[:, 0, 0] == 255).sum())
+    assert pitch_of_horizon(row, high, fovy_deg) == pytest.approx(pitch_deg, abs=0.3)
+    with pytest.raises(WorldError, match="from 0 to 120"):
+        pitch_of_horizon(121.0, high, fovy_deg)
+
+
+def test_the_drawing_shows_the_horizon() -> None:
+    """`draw_view` marks the horizon."""
+    geometry = CameraGeometry(3.0, 48.8)
+    picture = _horizon(3.0, 48.8)
+    drawn = draw_view(picture, geometry)
+    changed = (drawn != picture).any(axis=-1)
+    row = int((picture[:, 0, 0] == 255).sum())
+    assert changed[row - 1 : row + 1, 10:-10].any(axis=0).mean() > 0.1
+    assert changed.mean() < 0.1

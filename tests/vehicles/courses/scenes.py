@@ -1,0 +1,57 @@
+"""A small hand-made course."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shapechanger.vehicles.courses.course import Course, Lamp, Obstacle, Surface, Wall
+
+_KINDS: dict[str, tuple[Surface, ...]] = {
+    "corridor": ("plaster", "door", "window", "brick", "board", "glass"),
+    "yard": ("hedge", "fence", "shed"),
+    "harbour": ("quay", "rock"),
+}
+
+
+def square(world: str) -> Course:
+    """Return a loop around a block of 4 m; the lane is 2 m wide, x and y from -1 to 7 m."""
+    side = np.arange(0.0, 6.0, 0.1)
+    zero, six = np.zeros_like(side), np.full_like(side, 6.0)
+    route = np.concatenate(
+        [
+            np.stack([side, zero], axis=1),
+            np.stack([six, side], axis=1),
+            np.stack([6.0 - side, six], axis=1),
+            np.stack([zero, 6.0 - side], axis=1),
+        ]
+    )
+    outer = [(-1.0, -1.0), (7.0, -1.0), (7.0, 7.0), (-1.0, 7.0)]
+    inner = [(1.0, 1.0), (1.0, 5.0), (5.0, 5.0), (5.0, 1.0)]
+    kinds = _KINDS[world]
+    indoors = world == "corridor"
+    walls = tuple(
+        Wall(loop[i], loop[(i + 1) % 4], 2.4 if indoors else 0.8, kinds[(i + k) % len(kinds)])
+        for k, loop in enumerate((outer, inner))
+        for i in range(4)
+    )
+    return Course(
+        world=world,
+        seed=7,
+        route=route,
+        half_width=np.ones(len(route)),
+        walls=walls,
+        obstacles=(
+            Obstacle("bench", 3.0, 0.6, 0.0, 1.2, 0.4, 0.45),
+            Obstacle("bin", 6.6, 3.0, 0.3, 0.3, 0.3, 0.6),
+        ),
+        lamps=(Lamp(5.0, 0.0, 0.5 * np.pi, 1.2, 0.3),) if indoors else (),
+        ceiling_m=2.4 if indoors else 0.0,
+        gap_m=1.0,
+    )
+
+
+def with_walls(course: Course, *walls: Wall) -> Course:
+    """Return the course with other walls and no obstacles."""
+    return replace(course, walls=walls, obstacles=(), lamps=())

@@ -1,0 +1,271 @@
+"""Properties of all courses, training and held-out."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from shapechanger.errors import UnknownName, WorldError
+from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT, Course, Obstacle
+from shapechanger.vehicles.courses.geometry import (
+    any_crossing,
+    distances_from_obstacle,
+    distances_to_segments,
+    obstacle_gap,
+    wall_segments,
+)
+from shapechanger.vehicles.courses.layout import lay_out
+from tests.vehicles.courses.raster import occupancy
+
+_SEEDS = [*range(20), *HELD_OUT[:20]]
+_WIDTHS = {"corridor": (1.8, 2.4), "yard": (3.0, 5.0), "harbour": (4.0, 7.0)}
+_GAPS = {"corridor": 0.9, "yard": 1.2, "harbour": 1.6}
+_RADII = {"corridor": 0.85, "yard": 1.8, "harbour": 2.5}
+
+each_world = pytest.mark.parametrize("world", tuple(_WIDTHS))
+
+
+@cache
+def _laid(world: str, seed: int) -> Course:
+    return lay_out(world, seed)
+
+
+def _courses(world: str) -> list[Course]:
+    return [_laid(world, seed) for seed in _SEEDS]
+
+
+def _bends(course: Course) -> np.ndarray:
+    """Return the left turn of the route at each point, rad."""
+    steps = np.diff(course.route, axis=0, append=course.route[:1])
+    headings = np.arctan2(steps[:, 1], steps[:, 0])
+    return (np.diff(headings, prepend=headings[-1:]) + math.pi) % (2 * math.pi) - math.pi
+
+
+def _same(one: Course, other: Course) -> bool:
+    return (
+        np.array_equal(one.route, other.route)
+        and np.array_equal(one.half_width, other.half_width)
+        and (one.walls, one.obstacles, one.lamps) == (other.walls, other.obstacles, other.lamps)
+        and (one.gap_m, one.current_mps) == (other.gap_m, other.current_mps)
+    )
+
+
+@each_world
+def test_the_seed_determines_the_course(world: str) -> None:
+    """Equal seeds give equal courses, different seeds different ones."""
+    for seed in _SEEDS[:5] + _SEEDS[-5:]:
+        np.random.seed(seed % 7)  # noqa: NPY002 - The global state must not matter.
+        assert _same(lay_out(world, seed), _laid(world, seed))
+    courses = _courses(world)
+    assert not any(_same(a, b) for i, a in enumerate(courses) for b in courses[:i])
+    assert {(c.world, c.seed) for c in courses} == {(world, seed) for seed in _SEEDS}
+
+
+@pytest.mark.parametrize("seed", [0, HELD_OUT[0]])
+def test_a_flooded_corridor_has_the_courses_of_the_corridor(seed: int) -> None:
+    """Only the name of the world differs, so that a boat and a car drive the same lanes."""
+    flooded = lay_out(FLOODED, seed)
+    assert _same(flooded, _laid("corridor", seed))
+    assert flooded.world == FLOODED
+
+
+@each_world
+def test_the_route_is_closed_and_evenly_spaced(world: str) -> None:
+    """Points are evenly spaced around the closed route, and its length is in range."""
+    for course in _courses(world):
+        steps = np.diff(course.route, axis=0, append=course.route[:1])
+        chords = np.hypot(steps[:, 0], steps[:, 1])
+        assert chords == pytest.approx(course.spacing, rel=2e-3)
+        assert course.spacing == pytest.approx(0.1, rel=0.02)
+        assert 40.0 <= course.length <= 90.0
+        assert course.half_width.shape == (len(course.route),)
+
+
+@each_world
+def test_courses_turn_both_ways(world: str) -> None:
+    """Each course turns left and right, and loops run in both directions."""
+    sums = set[int]()
+    for course in _courses(world):
+        bends = _bends(course)
+        assert bends[bends > 0].sum() > 0.3
+        assert bends[bends < 0].sum() < -0.3
+        sums.add(round(bends.sum() / (2 * math.pi)))
+    assert sums == {-1, 1}
+
+
+@each_world
+def test_curvature_is_limited(world: str) -> None:
+    """The curvature of the route stays within the limit of its world."""
+    for course in _courses(world):
+        # Averaged over half a metre, since angles between single points are coarse.
+        turned = np.abs(ndimage.uniform_filter1d(_bends(course), 5, mode="wrap"))
+        assert course.spacing / turned.max() >= 0.97 * _RADII[world]
+
+
+@each_world
+def test_walls_form_closed_lines(world: str) -> None:
+    """Each wall ends where exactly one other begins."""
+    for course in _courses(world):
+        starts = [wall.start for wall in course.walls]
+        ends = [wall.end for wall in course.walls]
+        assert len(set(starts)) == len(starts)
+        assert sorted(starts) == sorted(ends)
+        lengths = [math.dist(wall.start, wall.end) for wall in course.walls]
+        assert min(lengths) > 0.05
+        assert not any_crossing(wall_segments(course.walls))
+
+
+@each_world
+def test_walls_face_the_route(world: str) -> None:
+    """From the route, every ray hits the front of a wall."""
+    angles = np.linspace(0.0, 2 * math.pi, 90, endpoint=False) + 0.0123
+    ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    for course in _courses(world)[::3]:
+        feet = wall_segments(course.walls)
+        along = feet[:, 2:] - feet[:, :2]
+        for eye in course.route[::40]:
+            to = feet[:, :2] - eye
+            across = ways[:, :1] * along[:, 1] - ways[:, 1:] * along[:, 0]
+            far = (to[:, 0] * along[:, 1] - to[:, 1] * along[:, 0]) / across
+            share = (to[:, 0] * ways[:, 1:] - to[:, 1] * ways[:, :1]) / across
+            hit = (far > 0.0) & (share >= 0.0) & (share <= 1.0)
+            assert hit.any(axis=1).all()
+            nearest = np.where(hit, far, np.inf).argmin(axis=1)
+            # Rays come from the left of the wall and cross to its right.
+            assert (across[np.arange(len(ways)), nearest] > 0.0).all()
+
+
+@each_world
+def test_half_width_is_the_distance_to_the_walls(world: str) -> None:
+    """`half_width` is the distance from the route to the nearest wall."""
+    low, high = _WIDTHS[world]
+    for course in _courses(world):
+        nearest = distances_to_segments(course.route, wall_segments(course.walls)).min(axis=1)
+        assert course.half_width == pytest.approx(nearest, abs=1e-6)
+        assert nearest.min() >= low / 2.0 - 1e-6
+        # A corner of a corridor is as wide as its diagonal.
+        assert nearest.max() <= high / 2.0 * (math.sqrt(2.0) if world == "corridor" else 1.0)
+
+
+@each_world
+def test_obstacles_do_not_overlap(world: str) -> None:
+    """Obstacles overlap neither walls nor each other."""
+    for course in _courses(world):
+        feet = wall_segments(course.walls)
+        blocked, (x0, y0) = occupancy(_without(course), 0.05)
+        for i, obstacle in enumerate(course.obstacles):
+            assert distances_from_obstacle(obstacle, feet).min() > 0.0
+            assert not blocked[round((obstacle.y - y0) / 0.05), round((obstacle.x - x0) / 0.05)]
+            assert all(obstacle_gap(obstacle, other) > 0.0 for other in course.obstacles[:i])
+
+
+@each_world
+def test_the_start_is_free(world: str) -> None:
+    """The route is free around its first point."""
+    for course in _courses(world):
+        n = len(course.route)
+        behind, before = round(1.5 / course.spacing), round(2.0 / course.spacing)
+        near = course.route[np.arange(-behind, before + 1) % n]
+        pieces = np.concatenate([near[:-1], near[1:]], axis=1)
+        half = float(course.half_width.min())
+        for obstacle in course.obstacles:
+            assert distances_from_obstacle(obstacle, pieces).min() > min(0.5, half / 2.0)
+
+
+@each_world
+def test_the_whole_lane_has_the_promised_gap(world: str) -> None:
+    """A disc of diameter `gap_m` fits around the course on an occupancy grid."""
+    cell = 0.04
+    for course in _courses(world)[::2]:
+        assert course.gap_m >= _GAPS[world]
+        blocked, (x0, y0) = occupancy(course, cell)
+        room = ndimage.distance_transform_edt(~blocked) * cell
+        free = room >= course.gap_m / 2.0 - 1.5 * cell
+        # Cut the lane at the start: both sides must be connected around the course.
+        ahead = course.route[1] - course.route[-1]
+        ahead /= np.hypot(*ahead)
+        rows, columns = np.indices(blocked.shape)
+        x, y = x0 + columns * cell - course.route[0, 0], y0 + rows * cell - course.route[0, 1]
+        s, aside = x * ahead[0] + y * ahead[1], y * ahead[0] - x * ahead[1]
+        near = np.abs(aside) < 1.3 * float(course.half_width[0])
+        free &= ~(near & (np.abs(s) < 1.5 * cell))
+        labels, _ = ndimage.label(free)
+        after = set(labels[near & (s > 0.0) & (s < 0.5)].flat) - {0}
+        before = set(labels[near & (s < 0.0) & (s > -0.5)].flat) - {0}
+        assert after & before
+
+
+@each_world
+def test_lamps_are_over_the_lane(world: str) -> None:
+    """Lamps are in the lane, and only corridors have a ceiling."""
+    for course in _courses(world):
+        assert course.lamps
+        assert course.ceiling_m == (2.5 if world == "corridor" else 0.0)
+        middles = np.array([(lamp.x, lamp.y) for lamp in course.lamps])
+        far = np.hypot(*(middles[:, None] - course.route[None]).transpose(2, 0, 1)).min(axis=1)
+        assert far.max() < course.half_width.max()
+
+
+def test_corridors_have_corners_and_doors() -> None:
+    """Corridors have at least six corners and, over all seeds, all kinds of wall and furniture."""
+    surfaces, kinds = set[str](), set[str]()
+    for course in _courses("corridor"):
+        turned = np.abs(_bends(course)).sum() / (math.pi / 2.0)
+        assert turned == pytest.approx(round(turned), abs=0.01)
+        assert turned >= 5.99
+        assert {wall.height for wall in course.walls} == {2.5}
+        surfaces |= {wall.surface for wall in course.walls}
+        kinds |= {obstacle.kind for obstacle in course.obstacles}
+    assert surfaces == {"plaster", "door", "window", "brick", "board", "glass"}
+    assert kinds == {"box", "bin", "bench", "plant", "cabinet", "crate"}
+
+
+def test_yards_and_harbours_have_every_kind() -> None:
+    """Over all seeds every surface and obstacle occurs, and quays have their height."""
+    yards, harbours = _courses("yard"), _courses("harbour")
+    assert {w.surface for c in yards for w in c.walls} == {"hedge", "fence", "brick", "shed"}
+    assert {t.kind for c in yards for t in c.obstacles} == {"cone", "crate", "bin", "post", "tree"}
+    assert {w.surface for c in harbours for w in c.walls} == {"quay", "rock"}
+    assert {t.kind for c in harbours for t in c.obstacles} == {"buoy", "dinghy", "crate"}
+    quays = {w.height for c in harbours for w in c.walls if w.surface == "quay"}
+    assert quays == {0.6}
+
+
+def test_only_harbours_have_currents() -> None:
+    """Harbours have varying currents of up to 0.15 m/s; land has none."""
+    speeds = [math.hypot(*course.current_mps) for course in _courses("harbour")]
+    assert 0.1 < max(speeds) <= 0.15
+    assert min(speeds) < 0.05
+    assert all(c.current_mps == (0.0, 0.0) for w in ("corridor", "yard") for c in _courses(w))
+
+
+def test_unknown_worlds_and_seeds_are_refused() -> None:
+    """Errors list the worlds, or explain what is wrong with the seed."""
+    with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
+        lay_out("harbor", 0)
+    with pytest.raises(WorldError, match="from 0, got -1"):
+        lay_out("yard", -1)
+
+
+def test_a_layout_that_never_fits_raises(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search for a layout gives up with an error."""
+    from shapechanger.vehicles.courses import layout
+
+    def never(rng: np.random.Generator, seed: int) -> Course | None:
+        return None
+
+    monkeypatch.setattr(layout, "_MAKERS", {"yard": never})
+    with pytest.raises(WorldError, match="No yard with seed 3"):
+        lay_out("yard", 3)
+
+
+def _without(course: Course) -> Course:
+    obstacles: tuple[Obstacle, ...] = ()
+    return Course(
+        course.world, course.seed, course.route, course.half_width, course.walls, obstacles,
+        course.lamps, course.ceiling_m, course.gap_m,
+    )  # fmt: skip

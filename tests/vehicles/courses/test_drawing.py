@@ -1,0 +1,149 @@
+"""Rendered images of courses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from types import MappingProxyType
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from shapechanger.vehicles.cameras.camera import OnboardCamera
+from shapechanger.vehicles.courses import paint
+from shapechanger.vehicles.courses.course import Course, Wall
+from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.scene import add_course
+from tests.vehicles.courses.scenes import square, with_walls
+
+pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
+
+_WHITE = Look(light=1.0, warmth=0.0, contrast=0.0, gloss=0.0)
+_WIDTH, _HEIGHT = 160, 120
+
+
+def _draw(
+    course: Course, look: Look, place: tuple[float, float], angle: float
+) -> NDArray[np.uint8]:
+    """Render the view at `place`, 0.5 m above the ground, along `angle`, rad."""
+    spec = mujoco.MjSpec()
+    add_course(spec, course, look)
+    cos, sin = float(np.cos(angle)), float(np.sin(angle))
+    spec.worldbody.add_camera(
+        name="eye", pos=[*place, 0.5], xyaxes=[sin, -cos, 0.0, 0.0, 0.0, 1.0], fovy=66.0
+    )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = OnboardCamera((_WIDTH, _HEIGHT))
+    try:
+        camera.look_through(model, "eye")
+        return camera.picture(model, data)
+    finally:
+        camera.close()
+
+
+@pytest.fixture
+def quarters(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Texture that is green at the top left, red at the top right and blue below."""
+
+    def painted(rng: np.random.Generator) -> NDArray[np.float32]:
+        del rng
+        image = np.zeros((64, 64, 3), np.float32)
+        image[:32, :32, 1] = image[:32, 32:, 0] = image[32:, :, 2] = 1.0
+        return image
+
+    monkeypatch.setattr(paint, "PAINTERS", MappingProxyType({**paint.PAINTERS, "window": painted}))
+    paint.texture.cache_clear()
+    yield
+    paint.texture.cache_clear()
+
+
+@pytest.mark.usefixtures("quarters")
+@pytest.mark.parametrize("angle", [0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi])
+def test_a_texture_is_upright_and_not_mirrored(angle: float) -> None:
+    """Textures are upright and not mirrored on walls of any direction."""
+    ahead = np.array([np.cos(angle), np.sin(angle)])
+    right = np.array([ahead[1], -ahead[0]])
+    # A wall 1.8 m wide, 1 m ahead; its visible side is on the left of its direction.
+    start, end = ahead + 0.9 * right, ahead - 0.9 * right
+    wall = Wall((start[0], start[1]), (end[0], end[1]), 1.0, "window")
+    picture = _draw(with_walls(square("corridor"), wall), _WHITE, (0.0, 0.0), angle)
+    top, bottom = _HEIGHT // 2 - 20, _HEIGHT // 2 + 20
+    left, right_hand = _WIDTH // 2 - 30, _WIDTH // 2 + 30
+    assert picture[top, left].argmax() == 1
+    assert picture[top, right_hand].argmax() == 0
+    assert picture[bottom, left].argmax() == picture[bottom, right_hand].argmax() == 2
+
+
+def test_backs_of_walls_are_not_rendered() -> None:
+    """A wall seen from behind leaves the image unchanged."""
+    front = Wall((1.0, -1.0), (1.0, 1.0), 1.0, "brick")
+    back = replace(front, start=front.end, end=front.start)
+    course = with_walls(square("corridor"))
+    nothing, seen, unseen = (
+        _draw(replace(course, walls=walls), _WHITE, (0.0, 0.0), 0.0)
+        for walls in ((), (front,), (back,))
+    )
+    assert not np.array_equal(nothing, seen)
+    np.testing.assert_array_equal(nothing, unseen)
+
+
+def test_quays_have_a_rear_side() -> None:
+    """A quay seen from behind and above has a top and a rear side."""
+    quay = Wall((1.0, 1.0), (1.0, -1.0), 0.3, "quay")
+    course = with_walls(square("harbour"))
+    nothing, seen = (
+        _draw(replace(course, walls=walls), _WHITE, (0.0, 0.0), 0.0) for walls in ((), (quay,))
+    )
+    assert (nothing != seen).any(axis=2).mean() > 0.02
+
+
+@pytest.mark.parametrize("world", ["corridor", "yard", "harbour"])
+def test_every_world_renders(world: str) -> None:
+    """Pictures of every world are neither uniform nor saturated."""
+    picture = _draw(square(world), Look.of(world), (0.5, 0.0), 0.0)
+    assert 20 < picture.mean() < 200
+    assert picture.std() > 10
+
+
+def test_light_and_warmth_change_the_image() -> None:
+    """More light is brighter, and warmth removes blue."""
+    course, usual = square("corridor"), Look(light=0.6, warmth=0.2)
+
+    def mean(look: Look) -> NDArray[np.float64]:
+        return _draw(course, look, (0.5, 0.0), 0.0).mean(axis=(0, 1))
+
+    assert (mean(replace(usual, light=0.9)) > mean(usual) + 5).all()
+    warm, cold = mean(replace(usual, warmth=0.9)), mean(usual)
+    assert warm[2] < 0.6 * cold[2]
+    assert warm[0] > 0.95 * cold[0]
+
+
+def test_a_glossy_floor_reflects_lamps() -> None:
+    """With gloss, the floor below a lamp is brighter."""
+    course = square("corridor")
+    dull, glossy = (
+        _draw(course, replace(Look.of("corridor"), gloss=gloss), (-0.5, 0.0), 0.0)
+        for gloss in (0.0, 0.6)
+    )
+    # In this yellow light, only the lamp is white.
+    below = slice(_HEIGHT // 2, None)
+    assert glossy[below, :, 2].max() > 1.5 * dull[below, :, 2].max()
+
+
+def test_rendering_is_deterministic() -> None:
+    """Two renderings are equal."""
+    one, other = (_draw(square("harbour"), Look.of("harbour"), (0.5, 0.0), 0.2) for _ in "ab")
+    np.testing.assert_array_equal(one, other)
+
+
+def test_another_seed_has_other_textures() -> None:
+    """Another texture seed gives another picture."""
+    usual = Look.of("yard")
+    one, other = (
+        _draw(square("yard"), replace(usual, texture_seed=seed), (0.5, 0.0), 0.0) for seed in (0, 1)
+    )
+    assert np.abs(one.astype(int) - other).mean() > 2

@@ -1,0 +1,51 @@
+"""Random and default looks."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from shapechanger.errors import UnknownName
+from shapechanger.vehicles.courses.look import LOOKS, VARIANTS, Look
+
+
+@pytest.mark.parametrize("world", LOOKS)
+def test_a_random_look_stays_in_its_ranges(world: str) -> None:
+    """Random looks stay within the documented ranges."""
+    usual = Look.of(world)
+    for seed in range(200):
+        look = Look.random(world, np.random.default_rng(seed))
+        assert 0.6 * usual.light <= look.light <= min(1.0, 1.4 * usual.light)
+        assert abs(look.warmth - usual.warmth) <= 0.35
+        assert 0.0 <= look.warmth <= 1.0
+        assert abs(look.contrast - usual.contrast) <= 0.3
+        assert 0.0 <= look.contrast <= 1.0
+        assert 0.4 * usual.gloss <= look.gloss <= min(0.9, 1.6 * usual.gloss)
+        assert 0 <= look.texture_seed < VARIANTS
+        for channel in (*look.wall, *look.ground):
+            assert 0.75 <= channel <= 1.0
+
+
+def test_random_looks_are_reproducible() -> None:
+    """Equal seeds give equal looks; another seed changes each attribute."""
+    one, same, other = (Look.random("corridor", np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert one == same
+    for part in dataclasses.fields(Look):
+        assert getattr(one, part.name) != getattr(other, part.name)
+
+
+def test_tones_are_in_range() -> None:
+    """Tones stay within 0 to 1."""
+    for light in (0.0, 0.5, 1.0, 3.0):
+        assert all(0.0 <= c <= 1.0 for c in Look(light=light, warmth=1.0).tone())
+    assert Look(light=0.5, warmth=0.0).tone() == (0.5, 0.5, 0.5)
+
+
+def test_an_unknown_world_is_refused() -> None:
+    """The error suggests the nearest name."""
+    with pytest.raises(UnknownName, match="Did you mean 'harbour'"):
+        Look.of("harbor")
+    with pytest.raises(UnknownName, match="Did you mean 'yard'"):
+        Look.random("yrd", np.random.default_rng(0))

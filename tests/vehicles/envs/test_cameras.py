@@ -1,0 +1,139 @@
+"""Every simulation shows what the camera of the profile sees."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from shapechanger.errors import ProfileError
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.profile.load import find_profile
+from shapechanger.twin.world.place import Place, open_world
+from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
+from shapechanger.vehicles.envs import RangesEnv, VehicleEnv, WaypointEnv
+from shapechanger.vehicles.twin import course_place
+
+# Of lab-car, and the same place seen by others: pitch and field of view in degrees, and the size.
+_LAB = CameraPlan("picamera2", (160, 120), pitch_deg=0.0, fovy_deg=48.8)
+_OTHERS = [
+    CameraPlan("v4l2", (160, 120), pitch_deg=8.0, fovy_deg=70.0),
+    CameraPlan("v4l2", (320, 240), pitch_deg=-6.0, fovy_deg=85.0),
+    CameraPlan("picamera2", (160, 90), pitch_deg=2.0, fovy_deg=41.0),
+]
+
+
+def _profile(folder: Path, camera: CameraPlan, vehicle: str = "car") -> Path:
+    """Write the profile of a vehicle with another camera."""
+    path = folder / f"{vehicle}.toml"
+    stated = {
+        "size": f"size = {list(camera.size)}",
+        "pitch_deg": f"pitch_deg = {camera.pitch_deg}",
+        "fovy_deg": f"fovy_deg = {camera.fovy_deg}",
+    }
+    lines = find_profile(f"lab-{vehicle}").read_text().splitlines()
+    path.write_text("\n".join(stated.get(line.partition(" ")[0], line) for line in lines))
+    return path
+
+
+def _waypoints(folder: Path, camera: CameraPlan, *, full_robot: bool) -> NDArray[np.uint8]:
+    env = WaypointEnv("car", robot=_profile(folder, camera), full_robot=full_robot)
+    with closing(env):
+        return env.reset(options={"course": 11, "start": 11})[0]
+
+
+def _rectified(picture: NDArray[np.uint8], camera: CameraPlan) -> NDArray[np.uint8]:
+    assert camera.pitch_deg is not None
+    assert camera.fovy_deg is not None
+    return Rectifier(CameraGeometry(camera.pitch_deg, camera.fovy_deg), camera.size)(picture)
+
+
+def _ranges(folder: Path, camera: CameraPlan) -> NDArray[np.uint8]:
+    env = RangesEnv("car", robot=_profile(folder, camera), render_mode="rgb_array")
+    with closing(env):
+        env.reset(options={"course": 11, "start": 11})
+        picture = env.render()
+    assert picture is not None
+    return _rectified(picture, camera)
+
+
+def _twin(place: Place) -> Callable[[Path, CameraPlan], NDArray[np.uint8]]:
+    def seen(folder: Path, camera: CameraPlan) -> NDArray[np.uint8]:
+        world: Any = open_world(place, {"wheels", "steering"}, camera, 3)
+        picture = world.picture()
+        if place.opener:
+            world.close()
+        return _rectified(picture, camera)
+
+    return seen
+
+
+def _agree(seen: Callable[[Path, CameraPlan], NDArray[np.uint8]], folder: Path) -> None:
+    """Check that other cameras, warped as their profiles state, show what lab-car's shows."""
+    expected = seen(folder, _LAB).astype(np.float64)
+    # The same picture a pixel aside, which coarse pixels and edges come to.
+    aside = np.abs(expected[:, 1:] - expected[:, :-1]).mean()
+    for camera in _OTHERS:
+        gap = np.abs(seen(folder, camera) - expected).mean()
+        assert gap < 1.3 * aside, (camera, gap, aside)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize(
+    "seen",
+    [
+        lambda folder, camera: _waypoints(folder, camera, full_robot=False),
+        lambda folder, camera: _waypoints(folder, camera, full_robot=True),
+        _ranges,
+        _twin(course_place("corridor", "car")),
+    ],
+    ids=["waypoints", "waypoints-robot", "ranges", "twin"],
+)
+def test_every_course_is_seen_by_the_camera_of_the_profile(
+    seen: Callable[[Path, CameraPlan], NDArray[np.uint8]], tmp_path: Path
+) -> None:
+    """Frames of other cameras, warped as their profiles state, agree with those of lab-car."""
+    _agree(seen, tmp_path)
+
+
+def test_the_room_is_seen_by_the_camera_of_the_profile(tmp_path: Path) -> None:
+    """The same holds in the plain room of a served twin."""
+    _agree(_twin(Place()), tmp_path)
+
+
+def test_frames_have_the_size_of_the_profile(tmp_path: Path) -> None:
+    """An env's own size replaces the one of the profile."""
+    profile = _profile(tmp_path, _OTHERS[1])
+    for size, expected in ((None, (240, 320, 3)), ((64, 48), (48, 64, 3))):
+        with closing(VehicleEnv("car", robot=profile, size=size)) as env:
+            assert env.observation_space.shape == expected
+
+
+@pytest.mark.parametrize("full_robot", [False, True])
+def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path, full_robot: bool) -> None:
+    """The error names the profile, what is missing and ways out."""
+    profile = _profile(tmp_path, CameraPlan("v4l2", (160, 120), pitch_deg=0.0, fovy_deg=41.0))
+    message = (
+        r"car.toml: .* 41 degrees misses 20 % .* wider frames, of its whole sensor, or a wider"
+    )
+    with pytest.raises(ProfileError, match=message):
+        WaypointEnv("car", robot=profile, full_robot=full_robot)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_the_certificate_names_the_camera_of_the_profile(tmp_path: Path) -> None:
+    """Two cameras on the same car are a shift."""
+    other = _profile(tmp_path, _OTHERS[0])
+    with closing(VehicleEnv("car")) as source, closing(VehicleEnv("car", robot=other)) as target:
+        changes = VehicleEnv.certify_shift(source, target).changes
+    assert changes == (
+        "camera's angle below the horizon: 0 degrees -> 8 degrees",
+        "camera's angle of view: 48.8 degrees -> 70 degrees",
+    )

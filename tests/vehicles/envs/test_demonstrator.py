@@ -1,0 +1,101 @@
+"""Demonstrators of the vehicle envs."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapechanger.contract.env_ref import TaskDemonstrator
+from shapechanger.errors import ProfileError
+from shapechanger.robot.profile.load import find_profile
+from shapechanger.vehicles.courses.course import HOME
+from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_a_disturbed_demonstrator_makes_progress(vehicle: str) -> None:
+    """It makes mistakes and drives without collisions."""
+    with closing(VehicleEnv(vehicle, image=False)) as env:
+        driver: TaskDemonstrator = env.demonstrator(3)
+        env.reset(seed=2)
+        driver.begin()
+        mistakes = 0
+        for _ in range(100):
+            meant, done = driver.act()
+            assert env.action_space.contains(meant)
+            assert env.action_space.contains(done)
+            mistakes += not np.array_equal(meant, done)
+            _, _, terminated, _, info = env.step(done)
+            assert not terminated
+        assert info["progress"] > 1.0
+        assert mistakes > 0
+
+
+def test_mistakes_follow_from_the_seed() -> None:
+    """Mistakes are a function of seed and episode."""
+    shown: list[list[list[float]]] = []
+    with closing(VehicleEnv("car", image=False)) as env:
+        for seed in (1, 1, 2):
+            driver = env.demonstrator(seed)
+            for episode in range(2):
+                env.reset(seed=2)
+                driver.begin()
+                done: list[list[float]] = []
+                for _ in range(30):
+                    action = driver.act()[1]
+                    done.append(action.tolist())
+                    env.step(action)
+                if episode or seed != 2:
+                    shown.append(done)
+    first, second, again, again_second, other_second = shown
+    assert first == again
+    assert second == again_second
+    assert first != second
+    assert second != other_second
+
+
+def test_begin_takes_the_present_course() -> None:
+    """The demonstrator follows the course of the last reset."""
+    with closing(VehicleEnv("car", image=False)) as env:
+        driver = env.demonstrator(1)
+        for course in (3, 4):
+            _, info = env.reset(options={"course": course, "start": 1})
+            driver.begin()
+            for _ in range(40):
+                _, _, terminated, _, info = env.step(driver.act()[1])
+                assert not terminated
+            assert info["progress"] > 0.3
+
+
+def test_put_back_it_goes_on_as_from_a_start() -> None:
+    """It forgets the manoeuvre that would have freed it where it was stuck."""
+    with closing(VehicleEnv("car", image=False)) as env:
+        driver = env.demonstrator(1)
+        env.reset(options={"course": 3, "start": 1})
+        driver.begin()
+        # Without steps it drives in vain, until it backs away.
+        throttles = [driver.act()[0][1] for _ in range(20)]
+        assert throttles[0] > 0.5
+        assert throttles[-1] < 0.0
+        env.world.put_back()
+        assert driver.act()[0][1] > 0.5
+
+
+def test_another_control_rate_is_refused(tmp_path: Path) -> None:
+    """The experts count in steps of 1/20 s."""
+    text = find_profile("lab-car").read_text()
+    slow = tmp_path / "slow.toml"
+    slow.write_text(text.replace("control_hz = 20", "control_hz = 10"))
+    assert slow.read_text() != text
+    with closing(VehicleEnv("car", robot=slow, image=False)) as env:
+        with pytest.raises(ProfileError, match=r"control_hz = 10.*20 actions a second"):
+            env.demonstrator(1)
+        with pytest.raises(ProfileError, match=r"control_hz = 10.*20 actions a second"):
+            env.expert()
+        with pytest.raises(ProfileError, match=r"set control_hz = 20"):
+            env.taught_by(lambda seen: seen[:, :2], 1)
+    with closing(WaypointEnv("car", robot=slow)) as env, pytest.raises(ProfileError, match="20"):
+        env.demonstrator(1)

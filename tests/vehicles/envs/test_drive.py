@@ -1,0 +1,130 @@
+"""Results and scores of drives."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from shapechanger.errors import WorldError
+from shapechanger.vehicles.courses.course import HELD_OUT
+from shapechanger.vehicles.envs import VehicleEnv
+from shapechanger.vehicles.envs.evaluation import DriveResult, DriveScore, drive, poisson_interval
+
+_STRAIGHT = np.array([0.0, 0.5], np.float32)
+_STILL = np.zeros(2, np.float32)
+
+
+@pytest.fixture(scope="module")
+def car() -> Generator[VehicleEnv]:
+    """A car without a camera that is put back after collisions."""
+    with closing(VehicleEnv("car", image=False, put_back=True)) as env:
+        yield env
+
+
+@pytest.mark.parametrize(
+    ("count", "low", "high"),
+    # E. S. Pearson, H. O. Hartley, "Biometrika Tables for Statisticians" 1 (1966), table 40: the
+    # limits of a Poisson variable for 1 - 2a = 0.95.
+    [
+        (0, 0.0, 3.69),
+        (1, 0.0253, 5.57),
+        (2, 0.242, 7.22),
+        (5, 1.62, 11.67),
+        (10, 4.80, 18.39),
+        (50, 37.11, 65.92),
+    ],
+)
+def test_the_interval_agrees_with_tables(count: int, low: float, high: float) -> None:
+    """Limits equal published values."""
+    assert poisson_interval(count) == pytest.approx((low, high), abs=0.006)
+
+
+def test_the_interval_grows_with_the_confidence() -> None:
+    """The interval grows with the confidence."""
+    narrow, usual, wide = (poisson_interval(7, c) for c in (0.5, 0.95, 0.99))
+    assert wide[0] < usual[0] < narrow[0] < 7 < narrow[1] < usual[1] < wide[1]
+
+
+def test_scores_are_ratios_of_sums() -> None:
+    """Scores are ratios of sums."""
+    score = DriveScore.of(
+        [DriveResult(1, 30.0, 20.0, 0, True, 0.1), DriveResult(2, 10.0, 60.0, 2, False, 0.5)]
+    )
+    assert score.standing == pytest.approx((2.0 + 30.0) / 80.0)
+    assert score.speed == pytest.approx(0.5)
+    assert (score.slowest, score.fastest) == pytest.approx((1.0 / 6.0, 1.5))
+    assert score.collisions == 2
+    assert score.per_100_m == pytest.approx(5.0)
+    assert (score.low, score.high) == pytest.approx((0.242 / 0.4, 7.22 / 0.4), abs=0.02)
+    assert score.reached == 0.5
+    assert score.drives == 2
+
+
+def test_a_score_without_progress_has_no_bound() -> None:
+    """Without progress, the upper bound is infinite."""
+    score = DriveScore.of([DriveResult(1, -0.5, 60.0, 3, False)])
+    assert score.per_100_m == score.low == score.high == float("inf")
+    still = DriveScore.of([DriveResult(1, 0.0, 60.0, 0, False)])
+    assert (still.per_100_m, still.low, still.high) == (0.0, 0.0, float("inf"))
+
+
+def test_a_score_needs_a_drive() -> None:
+    """A score needs at least one drive."""
+    with pytest.raises(WorldError, match="at least one"):
+        DriveScore.of([])
+
+
+def test_the_expert_reaches_the_distance(car: VehicleEnv) -> None:
+    """The drive ends there, without collisions."""
+    done = drive(car, car.expert(), course=HELD_OUT[0], metres=5.0)
+    assert done.reached
+    assert 5.0 <= done.metres < 5.2
+    assert done.collisions == 0
+    assert 5.0 / 2.0 < done.seconds < 5.0
+    assert done.speed == pytest.approx(done.metres / done.seconds)
+    assert done.standing < 0.1
+    assert done.course == HELD_OUT[0]
+
+
+def test_a_drive_continues_after_a_collision(car: VehicleEnv) -> None:
+    """The collision counts once."""
+    pilot = car.expert()
+
+    def blind_at_first(observation: Any) -> NDArray[np.float32]:
+        return pilot(observation) if car.world.collisions else _STRAIGHT
+
+    done = drive(car, blind_at_first, course=HELD_OUT[0], metres=20.0)
+    assert done.collisions == 1
+    assert done.reached
+
+
+def test_a_drive_ends_at_the_time_limit(car: VehicleEnv) -> None:
+    """A drive ends at the time limit."""
+    done = drive(car, lambda _: _STILL, course=HELD_OUT[0], limit_s=2.0)
+    assert done.seconds == pytest.approx(2.0)
+    assert not done.reached
+    assert abs(done.metres) < 0.01
+    assert done.standing == 1.0
+
+
+def test_the_start_can_be_given(car: VehicleEnv) -> None:
+    """The default start has the course's seed; others can be given."""
+    starts: list[tuple[float, ...]] = []
+    for start in (None, HELD_OUT[0], 7, 7):
+        drive(car, lambda _: _STILL, course=HELD_OUT[0], start=start, limit_s=0.05)
+        starts.append((car.world.pose.x, car.world.pose.y))
+    assert starts[0] == starts[1] != starts[2] == starts[3]
+
+
+def test_an_env_that_ends_at_a_collision_is_refused() -> None:
+    """The error names the missing argument."""
+    with (
+        closing(VehicleEnv("car", image=False)) as env,
+        pytest.raises(WorldError, match="put_back=True"),
+    ):
+        drive(env, lambda _: _STRAIGHT, course=HELD_OUT[0])

@@ -1,0 +1,308 @@
+"""The env of a whole simulated robot."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import closing
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.contract.world import Pose
+from shapechanger.envs.catalogue import VEHICLE_ENVS
+from shapechanger.errors import (
+    ProfileError,
+    RenderError,
+    ShapechangerError,
+    SpaceMismatch,
+    UnknownName,
+    WorldError,
+)
+from shapechanger.vehicles.courses.course import HELD_OUT, HOME
+from shapechanger.vehicles.envs import VehicleEnv
+
+_AHEAD = np.array([0.0, 0.6], np.float32)
+
+
+def _car(**arguments: Any) -> VehicleEnv:
+    return VehicleEnv("car", **{"image": False, **arguments})
+
+
+def _played(env: VehicleEnv, seed: int, steps: int = 25) -> list[Any]:
+    """Return observations, rewards and poses of an episode."""
+    rng = np.random.default_rng(seed)
+    found: list[Any] = [env.reset(seed=seed)[0].tolist()]
+    for _ in range(steps):
+        action = rng.uniform((-1.0, 0.0), (1.0, 1.0)).astype(np.float32)
+        seen, reward, terminated, _, info = env.step(action)
+        found.append((seen.tolist(), reward, info["pose"], info["progress"]))
+        if terminated:
+            break
+    return found
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_each_vehicle_drives_in_its_default_world(vehicle: str) -> None:
+    """Half throttle makes progress, and reward and info agree."""
+    with closing(VehicleEnv(vehicle, image=False)) as env:
+        seen, info = env.reset(seed=1)
+        assert env.observation_space.contains(seen)
+        assert info["progress"] == pytest.approx(0.0, abs=0.01)
+        for _ in range(30):
+            seen, _, _, truncated, info = env.step(_AHEAD)
+            assert not truncated
+        assert env.observation_space.contains(seen)
+        assert info["progress"] > 0.15
+        assert info["armed"]
+        assert not info["emergency"]
+        assert info["course"] == env.world.seed
+        assert info["pose"] == (env.world.pose.x, env.world.pose.y, env.world.pose.heading)
+        np.testing.assert_allclose(info["action_applied"], _AHEAD, atol=0.01)
+        assert env.metadata["render_fps"] == 20
+
+
+def test_episodes_are_independent() -> None:
+    """An episode does not depend on earlier ones."""
+    with closing(_car()) as fresh, closing(_car()) as used:
+        wanted = _played(fresh, 3)
+        _played(used, 4)
+        assert _played(used, 3) == wanted
+        for _ in range(20):
+            used.step(_AHEAD)  # The vehicle is still rolling at the reset.
+        assert _played(used, 3) == wanted
+
+
+@pytest.mark.parametrize("vehicle", ["truck", "boat"])
+def test_trailer_and_current_are_reset(vehicle: str) -> None:
+    """Episodes of equal seeds are equal."""
+    with closing(VehicleEnv(vehicle, image=False)) as env:
+        wanted = _played(env, 3)
+        assert _played(env, 3) == wanted
+
+
+def test_course_and_start_follow_from_the_seed() -> None:
+    """Both can be given as options."""
+    with closing(_car()) as env:
+        drawn = [env.reset(seed=seed)[1] for seed in (1, 2, 1)]
+        assert drawn[0]["pose"] == drawn[2]["pose"]
+        assert drawn[0]["course"] == drawn[2]["course"] != drawn[1]["course"]
+        asked = env.reset(options={"course": 5, "start": 8})[1]
+        again = env.reset(options={"course": 5, "start": 8})[1]
+        other = env.reset(options={"course": 5, "start": 9})[1]
+        assert asked["course"] == other["course"] == 5
+        assert asked["pose"] == again["pose"] != other["pose"]
+
+
+def _into_the_wall(env: VehicleEnv) -> tuple[float, dict[str, Any], bool]:
+    """Drive at full lock and throttle until a collision."""
+    env.reset(seed=1)
+    for _ in range(200):
+        _, reward, terminated, _, info = env.step(np.array([-1.0, 0.6], np.float32))
+        if info["collisions"]:
+            return float(reward), info, terminated
+    raise AssertionError("There is no wall.")
+
+
+def test_a_collision_ends_the_episode() -> None:
+    """A collision ends the episode with the weight of the profile or the argument."""
+    for weight, arguments in ((-10.0, {}), (-3.0, {"reward": {"collision": -3.0}})):
+        with closing(_car(**arguments)) as env:
+            reward, info, terminated = _into_the_wall(env)
+            assert terminated
+            assert info["collisions"] == 1
+            assert info["reward_collision"] == weight
+            assert reward == pytest.approx(sum(info["reward_terms"].values()))
+
+
+def test_put_back_continues_the_episode() -> None:
+    """With `put_back` the episode continues, and further collisions count."""
+    with closing(_car(put_back=True)) as env:
+        env.reset(seed=1)
+        found = 0
+        for _ in range(300):
+            _, _, terminated, truncated, info = env.step(np.array([-0.3, 0.6], np.float32))
+            assert not terminated
+            assert not truncated
+            if info["collisions"] > found:
+                found = info["collisions"]
+                assert not env.world.touches
+                assert env.world.inputs().speed == 0.0
+        assert found > 1
+
+
+def test_layouts_match_the_spaces() -> None:
+    """The state has the size of its layout, and the actions are steering and throttle."""
+    with closing(_car()) as env:
+        assert env.observation_space.shape == (env.observation_layout.size,)
+        assert "speed" in env.observation_layout.names
+        assert env.action_layout.names == ("steering", "throttle")
+        assert env.action_space.contains(_AHEAD)
+
+
+def test_bang_steering_has_three_angles() -> None:
+    """Steering "bang" has three angles."""
+    for steering, applied in (("bang", 1.0), ("proportional", 0.5)):
+        with closing(_car(steering=steering)) as env:
+            env.reset(seed=1)
+            info = env.step(np.array([0.5, 0.0], np.float32))[4]
+            assert info["action_applied"][0] == applied
+
+
+def test_hold_out_applies_from_the_next_reset() -> None:
+    """All later courses are held-out ones."""
+    with closing(_car()) as env:
+        env.hold_out()
+        assert all(env.reset(seed=seed)[1]["course"] in HELD_OUT for seed in range(5))
+
+
+def test_pickling_keeps_all_arguments() -> None:
+    """The copy drives like the original."""
+    with (
+        closing(VehicleEnv("tank", world="yard", image=False, put_back=True)) as env,
+        closing(pickle.loads(pickle.dumps(env))) as copy,
+    ):
+        assert copy.world.vehicle.name == "tank"
+        assert copy.world.course.world == "yard"
+        assert _played(copy, 2) == _played(env, 2)
+
+
+def test_episodes_are_limited_to_1000_steps() -> None:
+    """The registered ids have a time limit."""
+    for env_id in VEHICLE_ENVS:
+        assert gym.spec(env_id).max_episode_steps == 1000
+
+
+def test_invalid_steps_are_refused() -> None:
+    """Steps before a reset and invalid actions raise errors."""
+    with closing(_car()) as env:
+        with pytest.raises(gym.error.ResetNeeded, match="reset"):
+            env.step(_AHEAD)
+        env.reset(seed=1)
+        for action in (np.zeros(3), np.array([np.nan, 0.0]), "left"):
+            with pytest.raises((SpaceMismatch, ValueError)):
+                env.step(action)  # pyright: ignore[reportArgumentType]  # The misuse.
+        assert env.render() is None
+
+
+def test_a_blocked_start_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A start in contact with an obstacle is refused."""
+    with closing(_car()) as env:
+        wall = env.world.course.walls[0]
+        middle = (np.array(wall.start) + np.array(wall.end)) / 2.0
+        pose = Pose(float(middle[0]), float(middle[1]), 0.0)
+        monkeypatch.setattr(env.world, "place", lambda _: env.world.put(pose))
+        with pytest.raises(WorldError, match="The car is stuck at start 3 of course 0: choose"):
+            env.reset(options={"course": 0, "start": 3})
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "arguments", "kind", "sentence"),
+    [
+        ("bus", {}, UnknownName, "No vehicle matches 'bus'"),
+        ("car", {"world": "corridr"}, UnknownName, "No world matches 'corridr'. Did you mean"),
+        ("boat", {"world": "corridor"}, WorldError, "A boat floats: it cannot drive in a corr"),
+        ("car", {"world": "harbour"}, WorldError, "A car does not float"),
+        ("tank", {"robot": "lab-car"}, ProfileError, "A tank has no 'steering' or 'wheels'"),
+        ("car", {"robot": "cat"}, ProfileError, "the robot has no camera, and this task needs"),
+        ("car", {"robot": "lab-cra"}, UnknownName, "No profile matches 'lab-cra'. Did you mean"),
+        ("car", {"lenses": ("nihgt",)}, UnknownName, "No lens matches 'nihgt'. Did you mean"),
+        ("car", {"lenses": "nihgt"}, UnknownName, "No lens matches 'nihgt'. Did you mean"),
+        ("car", {"steering": "bangg"}, UnknownName, "No steering matches 'bangg'. Did you mean"),
+        ("car", {"reward": {"speeed": 1.0}}, UnknownName, "No weight of the reward matches"),
+        ("car", {"courses": "hold-out"}, UnknownName, "No kind of courses matches 'hold-out'"),
+        ("car", {"courses": ()}, WorldError, "There are no courses to draw from"),
+        ("car", {"render_mode": "human"}, UnknownName, "No render mode matches 'human'"),
+        ("car", {"size": (0, 0)}, SpaceMismatch, r"each 1 to 1920 pixels, got \(0, 0\)"),
+        ("car", {"size": (160, -1)}, SpaceMismatch, "each 1 to 1920 pixels"),
+        ("car", {"size": (160,)}, SpaceMismatch, "each 1 to 1920 pixels"),
+        ("car", {"size": (16.5, 12)}, SpaceMismatch, "each 1 to 1920 pixels"),
+        ("car", {"size": (10**6, 12)}, SpaceMismatch, "each 1 to 1920 pixels"),
+        ("car", {"size": 160}, SpaceMismatch, "each 1 to 1920 pixels, got 160"),
+    ],
+)
+def test_invalid_arguments_are_refused(
+    vehicle: str, arguments: Mapping[str, Any], kind: type[ShapechangerError], sentence: str
+) -> None:
+    """Invalid arguments raise the package's errors."""
+    with pytest.raises(kind, match=sentence):
+        VehicleEnv(vehicle, image=False, **arguments)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_observations_can_have_image_and_state() -> None:
+    """`image`, `state` and `size` select the observation."""
+    with closing(VehicleEnv("car", size=(48, 32))) as env:
+        seen, _ = env.reset(seed=1)
+        assert seen.shape == (32, 48, 3)
+        assert seen.dtype == np.uint8
+        assert env.observation_space.contains(seen)
+        assert env.observation_layout.names[0].startswith("camera/image")
+    with closing(VehicleEnv("car", size=(48, 32), state=True)) as env:
+        both, _ = env.reset(seed=1)
+        assert set(both) == {"image", "state"}
+        np.testing.assert_array_equal(both["image"], seen)
+        assert env.observation_space.contains(both)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_render_shows_the_cameras_picture() -> None:
+    """Rendering before the first reset raises RenderError."""
+    with closing(_car(size=(48, 32), render_mode="rgb_array")) as env:
+        with pytest.raises(RenderError, match="before render"):
+            env.render()
+        env.reset(seed=1)
+        picture = env.render()
+        assert picture is not None
+        assert picture.shape == (32, 48, 3)
+        assert picture.std() > 5.0
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_random_looks_follow_from_the_seed() -> None:
+    """Random looks are a function of the seed."""
+    with closing(VehicleEnv("car", size=(48, 32), randomise=True)) as env:
+        asked = {"course": 2, "start": 2}
+        one, two, again = (env.reset(seed=seed, options=asked)[0] for seed in (1, 2, 1))
+        np.testing.assert_array_equal(one, again)
+        assert np.abs(one.astype(float) - two).mean() > 2.0
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_lenses_change_pictures_only() -> None:
+    """A single name is accepted."""
+    with (
+        closing(VehicleEnv("car", size=(48, 32))) as clear,
+        closing(VehicleEnv("car", size=(48, 32), lenses="night")) as night,
+    ):
+        bright, here = clear.reset(seed=1)
+        dark, there = night.reset(seed=1)
+        assert here["pose"] == there["pose"]
+        assert dark.mean() < bright.mean()
+
+
+def test_without_gpiozero_the_extra_is_named() -> None:
+    """Without gpiozero, the error names the extra to install."""
+    script = (
+        "import sys, importlib.util\n"
+        "found = importlib.util.find_spec\n"
+        "importlib.util.find_spec = lambda n, *a: None if n == 'gpiozero' else found(n, *a)\n"
+        "from shapechanger.errors import MissingExtra\n"
+        "from shapechanger.vehicles.envs import VehicleEnv\n"
+        "try:\n"
+        "    VehicleEnv('car', image=False)\n"
+        "except MissingExtra as error:\n"
+        "    print(error)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script], check=True, capture_output=True, text=True
+    )
+    assert run.stdout.endswith("run `pip install 'shapechanger[robot]'`.\n")

@@ -1,0 +1,181 @@
+"""The fast env with distances."""
+
+from __future__ import annotations
+
+import math
+from contextlib import closing
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.errors import SpaceMismatch, UnknownName, WorldError
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
+from shapechanger.vehicles.courses.course import HELD_OUT, HOME
+from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
+from shapechanger.vehicles.envs.demonstrators import (
+    BEARINGS_DEG,
+    FARTHEST_M,
+    LEAST_THROTTLE,
+    leave_rest,
+)
+from shapechanger.vehicles.envs.ranges import OutputShaper
+
+_COURSE = {"course": 2, "start": 2}
+_STEPS = 60
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_the_fast_env_matches_the_full_robot(vehicle: str) -> None:
+    """Equal actions lead to nearly equal poses."""
+    with (
+        closing(VehicleEnv(vehicle, image=False)) as robot,
+        closing(RangesEnv(vehicle)) as fast,
+    ):
+        robot.reset(options=_COURSE)
+        fast.reset(options=_COURSE)
+        expert = robot.expert()
+        info: dict[str, Any] = {}
+        other: dict[str, Any] = {}
+        for _ in range(_STEPS):
+            action = expert(None)
+            info = robot.step(action)[-1]
+            other = fast.step(action)[-1]
+        (x, y, heading), (fast_x, fast_y, fast_heading) = info["pose"], other["pose"]
+        assert info["progress"] > 1.0
+        assert math.hypot(x - fast_x, y - fast_y) < 0.03 * info["progress"]
+        assert abs(math.remainder(heading - fast_heading, math.tau)) < math.radians(3.0)
+        assert other["progress"] == pytest.approx(info["progress"], rel=0.02)
+        assert other["collisions"] == info["collisions"] == 0
+
+
+def test_distances_are_those_to_the_walls() -> None:
+    """Distances agree with `distance_m`, and their sum across the lane with its width."""
+    with closing(RangesEnv("car")) as env:
+        seen, _ = env.reset(options=_COURSE)
+        assert env.observation_space.contains(seen)
+        distances = dict(zip(BEARINGS_DEG, seen, strict=False))
+        assert distances[0] == pytest.approx(env.world.distance_m(), rel=0.1)
+        assert 0.1 < distances[90] < FARTHEST_M
+        assert 0.1 < distances[-90] < FARTHEST_M
+        width = distances[90] + distances[-90]
+        pose = env.world.pose
+        env.world.put(type(pose)(pose.x, pose.y, pose.heading + math.pi))
+        turned = env.world.ranges_m(np.radians(BEARINGS_DEG))
+        assert turned[0] + turned[-1] == pytest.approx(width, rel=0.3)
+
+
+def test_a_collision_costs_and_ends_the_episode() -> None:
+    """Collisions cost and end the episode, unless `put_back`."""
+    ahead = np.array([0.0, 1.0], np.float32)
+    with closing(RangesEnv("car")) as env:
+        env.reset(options=_COURSE)
+        for _ in range(200):
+            _, reward, terminated, _, info = env.step(ahead)
+            if terminated:
+                break
+        assert info["collisions"] == 1
+        assert info["reward_terms"]["reward_collision"] == -3.0
+        assert reward == pytest.approx(sum(info["reward_terms"].values()))
+    with closing(RangesEnv("car", put_back=True)) as env:
+        env.reset(options=_COURSE)
+        costs = 0.0
+        for _ in range(200):
+            _, _, terminated, _, info = env.step(ahead)
+            costs += info["reward_terms"]["reward_collision"]
+            assert not terminated
+        assert info["collisions"] >= 2
+        assert costs == -3.0 * info["collisions"]
+
+
+def test_the_pause_after_a_collision_matches_the_full_robot() -> None:
+    """The bumper's reflex stops the vehicle for 0.75 s after `put_back`."""
+    ahead = np.array([0.0, 0.8], np.float32)
+    waits: list[int] = []
+    for env in (
+        VehicleEnv("car", image=False, put_back=True),
+        RangesEnv("car", put_back=True),
+    ):
+        with closing(env):
+            env.reset(options=_COURSE)
+            steps = 0
+            while env.step(ahead)[-1]["collisions"] == 0:
+                steps += 1
+                assert steps < 200
+            before = env.step(ahead)[-1]["progress"]
+            wait = 1
+            while env.step(ahead)[-1]["progress"] - before < 0.02:
+                wait += 1
+                assert wait < 60
+            waits.append(wait)
+    assert min(waits) >= 14
+    assert abs(waits[0] - waits[1]) <= 2
+
+
+def test_standing_still_costs() -> None:
+    """Standing still has a negative reward."""
+    with closing(RangesEnv("tank")) as env:
+        env.reset(options=_COURSE)
+        total = sum(env.step(np.zeros(2, np.float32))[1] for _ in range(20))
+        assert total == pytest.approx(-1.0, abs=0.01)
+
+
+def test_outputs_follow_the_guards_limits() -> None:
+    """Outputs have the guard's caps, slew and bump block."""
+    plan = GuardPlan(
+        "test",
+        (ActionPlan("throttle", high=0.5, slew_per_s=4.0, propels=True),),
+        (OutputPlan("drive", "hbridge", "wheels", {"throttle": 1.0}),),
+        limits=LimitPlan(bump_hold_ms=100),
+    )
+    shaper = OutputShaper(plan)
+    # Five ticks of 10 ms, at 0, 0.04, ... 0.16.
+    assert shaper.outputs((1.0,), False, 5)["wheels"] == pytest.approx(0.08)
+    for _ in range(4):
+        last = shaper.outputs((1.0,), False, 5)["wheels"]
+    assert last == pytest.approx(0.5)
+    blocked = [shaper.outputs((1.0,), bumped, 5)["wheels"] for bumped in (True, False, False)]
+    assert blocked[1] == pytest.approx(0.0)
+    assert blocked[2] == pytest.approx(0.08)
+    shaper.reset()
+    assert shaper.applied == (0.0,)
+
+
+def test_invalid_use_is_refused() -> None:
+    """Misuse raises errors that explain it."""
+    with pytest.raises(UnknownName, match="No vehicle matches 'carr'"):
+        RangesEnv("carr")
+    with pytest.raises(UnknownName, match="No weight of the reward matches 'colision'"):
+        RangesEnv("car", reward={"colision": -1.0})
+    with closing(RangesEnv("car", courses=HELD_OUT)) as env:
+        with pytest.raises(gym.error.ResetNeeded):
+            env.step(np.zeros(2, np.float32))
+        env.reset(seed=0)
+        with pytest.raises(SpaceMismatch, match="steering and throttle"):
+            env.step(np.zeros(3, np.float32))
+        with pytest.raises(SpaceMismatch, match="steering and throttle"):
+            env.step(np.array([np.nan, 0.0], np.float32))
+        with pytest.raises(WorldError, match="has no camera"):
+            env.world.picture()
+
+
+def test_a_vehicle_that_stands_is_moved() -> None:
+    """At rest a small throttle acts with the least size, in its direction, and 0 stays 0."""
+    for throttle, least_m, most_m in ((0.05, 0.03, 1.0), (-0.05, -1.0, -0.03), (0.0, -0.01, 0.01)):
+        with closing(RangesEnv("car")) as env:
+            env.reset(options=_COURSE)
+            for _ in range(20):
+                *_, info = env.step(np.array([1.0, throttle], np.float32))
+            assert least_m <= info["progress"] <= most_m, throttle
+
+
+def test_a_teacher_leaves_rest_alike() -> None:
+    """What it demonstrates, and what its student learns, is what moved it in its own env."""
+    action = np.array([1.0, -0.02], np.float32)
+    with closing(VehicleEnv("car", image=False)) as env:
+        env.reset(options=_COURSE)
+        driver = env.taught_by(lambda seen: action[np.newaxis], seed=0)
+        meant, _ = driver.act()
+    assert meant.tolist() == [1.0, -LEAST_THROTTLE]
+    assert leave_rest(action, stands=False) is action

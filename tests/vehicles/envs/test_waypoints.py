@@ -1,0 +1,277 @@
+"""The waypoint env, and measuring a steering response."""
+
+from __future__ import annotations
+
+import math
+import re
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shapechanger.envs.catalogue import WAYPOINT_ENVS
+from shapechanger.errors import ProfileError, SpaceMismatch, StudyError
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.vehicles.bodies import vehicle_model
+from shapechanger.vehicles.courses.course import HOME
+from shapechanger.vehicles.envs import RangesEnv, WaypointEnv
+from shapechanger.vehicles.waypoints import (
+    AHEAD_M,
+    WIDEST_RAD,
+    SteeringResponse,
+    command,
+    fit_response,
+    measure_response,
+    waypoints_of,
+)
+
+_COURSE = {"course": 2, "start": 2}
+
+
+def test_steering_follows_from_the_bearing() -> None:
+    """Steering has the bearing's sign and saturates."""
+    car, tank = SteeringResponse(2.0, 0.0), SteeringResponse(0.0, 4.0)
+    assert car.steering(0.0, 1.0) == 0.0
+    assert car.steering(0.1, 1.0) == -car.steering(-0.1, 1.0) > 0.0
+    assert car.steering(1.0, 1.0) == 1.0
+    # For a car the steering does not depend on the speed, for tracks it grows with it.
+    assert car.steering(0.2, 2.0) == pytest.approx(car.steering(0.2, 1.0))
+    assert tank.steering(0.2, 1.0) == pytest.approx(2.0 * tank.steering(0.2, 0.5))
+    assert tank.steering(0.2, 1.0) == pytest.approx(2.0 * math.sin(0.2) / AHEAD_M / 4.0)
+
+
+@pytest.mark.parametrize("numbers", [(0.0, 0.0), (-1.0, 2.0), (math.nan, 1.0)])
+def test_invalid_responses_are_refused(numbers: tuple[float, float]) -> None:
+    """A response without a turn, or with the wrong sign, is refused."""
+    with pytest.raises(StudyError, match="must turn to the right when it steers to the right"):
+        SteeringResponse(*numbers)
+
+
+_BODIES = {"wheels": SteeringResponse(2.0, 0.0), "tracks": SteeringResponse(0.8, 3.1)}
+
+
+@pytest.mark.parametrize("body", _BODIES)
+@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
+def test_commands_lead_back_to_their_waypoints(body: str, speed: float) -> None:
+    """Within the range of steering and throttle, the two are inverse to each other."""
+    response = _BODIES[body]
+    bearings, shares = np.meshgrid(np.linspace(-0.7, 0.7, 15), np.linspace(-0.5, -0.1, 5))
+    wanted = np.stack((bearings.ravel(), shares.ravel()), axis=1).astype(np.float32)
+    commands = np.array([command(one, response, speed, on_the_spot=False) for one in wanted])
+    speeds = np.full(len(wanted), speed)
+    found = waypoints_of(commands, response, speeds)
+    assert found.usable.all()
+    within = ~found.at_limit
+    assert within.mean() > 0.7
+    np.testing.assert_allclose(found.actions[within], wanted[within], atol=1e-5)
+    # At the limit, too, the waypoint has the same command, if not the same bearing.
+    again = [command(one, response, speed, on_the_spot=False) for one in found.actions]
+    np.testing.assert_allclose(again, commands, atol=1e-5)
+
+
+def test_full_steering_only_bounds_the_waypoint() -> None:
+    """At full lock, and turning on the spot, the way may be farther aside."""
+    car, tank = _BODIES["wheels"], _BODIES["tracks"]
+    locked = waypoints_of(np.array([[1.0, 0.5], [-1.0, 0.5]]), car, np.ones(2))
+    assert locked.at_limit.all()
+    assert locked.usable.all()
+    aside = math.asin(0.5 * AHEAD_M * 2.0) / WIDEST_RAD
+    np.testing.assert_allclose(locked.actions[:, 0], [aside, -aside], rtol=1e-6)
+    turning = waypoints_of(np.array([[-0.8, 0.0]]), tank, np.zeros(1))
+    assert turning.usable.all()
+    assert turning.at_limit.all()
+    np.testing.assert_allclose(turning.actions, [[-1.0, -1.0]])
+
+
+def test_commands_that_do_not_point_ahead_are_not_usable() -> None:
+    """Standing, driving backward, and an unknown speed say nothing; braking and starting do."""
+    commands = np.array(
+        [
+            (0.5, 0.0),  # Stands, with turned wheels.
+            (0.5, 0.1),  # Stands, with too little throttle.
+            (0.0, -0.6),  # Begins to back.
+            (0.3, -0.6),  # Backs.
+            (0.0, 0.5),  # Unknown speed.
+            (np.nan, 0.5),
+            (0.3, 0.5),  # Starts.
+            (0.3, -0.6),  # Brakes.
+        ]
+    )
+    speed = np.array([0.0, 0.0, 0.0, -0.5, np.nan, 1.0, 0.0, 1.5])
+    found = waypoints_of(commands, _BODIES["wheels"], speed)
+    assert found.usable.tolist() == [False] * 6 + [True, True]
+    np.testing.assert_allclose(found.actions[6:, 1], [0.0, -1.0])
+    braked = command(found.actions[7], _BODIES["wheels"], 1.5, on_the_spot=False)
+    assert braked[1] == pytest.approx(0.25)  # A waypoint cannot brake harder.
+
+
+@pytest.mark.parametrize("body", _BODIES)
+def test_the_response_is_fitted_to_a_drive(body: str) -> None:
+    """Steps with changing steering, in which the turn lags, and unknown ones are left out."""
+    rng = np.random.default_rng(0)
+    steering = np.repeat(rng.uniform(-0.6, 0.6, 60), 6)
+    speed = np.repeat(rng.uniform(0.5, 2.0, 60), 6)
+    turn = steering * (_BODIES[body].per_metre * speed + _BODIES[body].per_second)
+    yaw_rate = -turn + rng.normal(0.0, 0.02, len(turn))
+    lags = np.abs(steering - np.roll(steering, 1)) > 0.1
+    yaw_rate[lags] += 3.0 * rng.normal(size=lags.sum())
+    yaw_rate[10] = np.nan
+    found = fit_response(steering, speed, yaw_rate)
+    assert found.per_metre == pytest.approx(_BODIES[body].per_metre, abs=0.05)
+    assert found.per_second == pytest.approx(_BODIES[body].per_second, abs=0.05)
+
+
+@settings(max_examples=30)
+@given(
+    lengths=st.lists(st.integers(1, 60), min_size=1, max_size=6),
+    hz=st.sampled_from([5.0, 10.0, 20.0, 50.0]),
+    lags=st.booleans(),
+    gap=st.integers(0, 60),
+)
+def test_lags_do_not_cross_borders_of_episodes(
+    *, lengths: list[int], hz: float, lags: bool, gap: int
+) -> None:
+    """The turn lags at the start of each episode and after a gap, and no fit is misled by it."""
+    lengths = [*lengths, 60]  # One that is long enough at each rate.
+    lag = max(1, round(0.1 * hz))
+    columns: list[list[float]] = [[], [], []]
+    for place, length in enumerate(lengths):
+        times = np.arange(length) / hz
+        begins = [0]
+        if gap < length:  # Steps that somebody dropped.
+            times[gap:] += 3.0
+            begins.append(gap)
+        yaw_rate = np.full(length, -1.0)
+        for begin in begins:
+            yaw_rate[begin : begin + lag] *= not lags
+        for column, new in zip(
+            columns, (np.full(length, (-1.0) ** place), yaw_rate, times), strict=True
+        ):
+            column += new.tolist()
+    steering, yaw_rate, times = map(np.array, columns)
+    yaw_rate *= steering
+    found = fit_response(0.5 * steering, np.ones(len(steering)), yaw_rate, times)
+    assert found.per_metre + found.per_second == pytest.approx(2.0)
+
+
+def test_the_first_steps_of_a_drive_do_not_follow_its_last() -> None:
+    """Without times a drive is one episode, whose first 0.1 s say nothing."""
+    yaw_rate = np.full(40, -1.0)
+    yaw_rate[:2] = 0.0
+    found = fit_response(np.full(40, 0.5), np.ones(40), yaw_rate)
+    assert found.per_metre + found.per_second == pytest.approx(2.0)
+
+
+def test_a_drive_that_does_not_tell_the_response_is_refused() -> None:
+    """Straight driving, turning against the steering, and no measurement are refused."""
+    rng = np.random.default_rng(0)
+    steering, speed = np.repeat(rng.uniform(-0.6, 0.6, 40), 5), np.ones(200)
+    for yaw_rate in (rng.normal(0.0, 0.3, 200), 2.0 * steering, np.full(200, np.nan)):
+        with pytest.raises(StudyError, match=r"steering explains .* drive curves to both sides"):
+            fit_response(steering, speed, yaw_rate)
+    with pytest.raises(StudyError, match="drive curves to both sides"):
+        fit_response(np.zeros(200), speed, rng.normal(0.0, 0.3, 200))
+
+
+@pytest.mark.parametrize("vehicle", HOME)
+def test_profiles_have_the_simulated_cameras(vehicle: str) -> None:
+    """The camera of each profile agrees with that of its body."""
+    camera = load_profile(find_profile(f"lab-{vehicle}")).camera
+    mount = vehicle_model(vehicle).camera
+    assert camera is not None
+    assert camera.pitch_deg == pytest.approx(math.degrees(mount.pitch_rad))
+    assert camera.fovy_deg == mount.fovy_deg
+
+
+def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
+    """The error names the missing settings and the command that measures them."""
+    lines = find_profile("lab-car").read_text().splitlines()
+    path = tmp_path / "car.toml"
+    path.write_text("\n".join(line for line in lines if not line.startswith("pitch_deg")))
+    with pytest.raises(ProfileError, match=r"\[camera\] needs pitch_deg for waypoints: .* camera"):
+        WaypointEnv("car", robot=path)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "missing"),
+    [(("wheel",), "speed"), (("motion",), "yaw_rate"), (("wheel", "motion"), "speed and yaw_rate")],
+)
+def test_a_full_robot_without_its_sensors_is_refused(
+    tmp_path: Path, sensors: tuple[str, ...], missing: str
+) -> None:
+    """Waypoints of the full robot need its own measurements, and the error names them."""
+    text = find_profile("lab-car").read_text(encoding="utf-8")
+    for sensor in sensors:
+        text = re.sub(rf"^\[sensor\.{sensor}\]\n(?:[^\[\n].*\n|\n)*", "", text, flags=re.MULTILINE)
+    path = tmp_path / "car.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ProfileError, match=f"car.toml has no sensor of {missing}, which waypoints"):
+        WaypointEnv("car", robot=path, full_robot=True)
+
+
+def test_the_measured_response_matches_the_geometry() -> None:
+    """The measured response of the car is close to its geometry."""
+    with closing(RangesEnv("car", put_back=True)) as env:
+        places = env.observation_layout.slices
+        found = measure_response(env, places["speed"].start, places["yaw_rate"].start)
+    # The tangent of the full lock over the wheelbase, 1/m; the tyres slip a little.
+    drawn = math.tan(math.radians(28.0)) / 0.26
+    assert found.per_metre + found.per_second == pytest.approx(drawn, rel=0.15)
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize(("env_id", "vehicle"), [(i, v) for i, (v, _) in WAYPOINT_ENVS.items()])
+def test_following_true_waypoints_has_no_collisions(env_id: str, vehicle: str) -> None:
+    """Following the expert's waypoints causes no collisions."""
+    with closing(WaypointEnv(vehicle, put_back=True)) as env:
+        seen, _ = env.reset(options=_COURSE)
+        assert env.observation_space.contains(seen)
+        guide = env.demonstrator(0)
+        for _ in range(150):
+            waypoint, _ = guide.act()
+            assert env.action_space.contains(waypoint)
+            *_, info = env.step(waypoint)
+        assert info["collisions"] == 0, env_id
+        assert info["progress"] > 2.0
+        assert env.world.course.world == ("flooded-corridor" if vehicle == "boat" else "corridor")
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_the_full_robot_follows_waypoints() -> None:
+    """The whole robot follows waypoints by its own sensors."""
+    with closing(WaypointEnv("car", full_robot=True, put_back=True)) as env:
+        env.reset(options=_COURSE)
+        guide = env.demonstrator(0)
+        for _ in range(60):
+            seen, _, _, _, info = env.step(guide.act()[0])
+        assert seen.shape == (48, 80, 3)
+        assert info["collisions"] == 0
+        assert info["progress"] > 3.0
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_randomised_episodes_look_different() -> None:
+    """The same start on the same course has other light and another camera each time."""
+    with closing(WaypointEnv("car")) as env, closing(WaypointEnv("car", randomise=True)) as drawn:
+        usual, same = (env.reset(seed=0, options=_COURSE)[0] for _ in range(2))
+        one, other = (drawn.reset(options=_COURSE)[0] for _ in range(2))
+    np.testing.assert_array_equal(usual, same)
+    assert np.abs(one.astype(int) - usual).mean() > 3.0
+    assert np.abs(one.astype(int) - other).mean() > 3.0
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_invalid_waypoints_are_refused() -> None:
+    """Other shapes and infinite values raise SpaceMismatch."""
+    with closing(WaypointEnv("car")) as env:
+        env.reset(options=_COURSE)
+        for wrong in (np.zeros(3, np.float32), np.array([0.0, np.inf], np.float32)):
+            with pytest.raises(SpaceMismatch, match="A waypoint is a bearing and a speed"):
+                env.step(wrong)

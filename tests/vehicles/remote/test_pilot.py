@@ -1,0 +1,208 @@
+"""Which policies may drive a robot, and a policy on board of a twin."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+from collections.abc import Generator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.demos.cloning.card import CloneCard
+from shapechanger.demos.cloning.onnx_policy import export_clone
+from shapechanger.demos.cloning.pictures import Framing, PolicyError
+from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.errors import RobotRefused
+from shapechanger.layout import Feature, Layout
+from shapechanger.remote.client import RobotClient
+from shapechanger.robot.profile.load import find_profile
+from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.vehicles.envs.demonstrators import CLONES
+from shapechanger.vehicles.remote.pilot import Origin, RobotFacts, require_fit
+from shapechanger.vehicles.waypoints import ACTION_LAYOUT
+from tests.twin.robots import until
+
+_STEERING = Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in ("steering", "throttle")))
+_STATE = Layout((Feature("speed", "m/s"),))
+_CAR = RobotFacts("my-car", "car", _STEERING, _STATE, 20.0, (160, 120), True, (1.9, 0.0))
+_CLONE = CloneCard(framing=Framing(), channels=(1,), features=1)
+_WAYPOINTS = CloneCard(framing=Framing(), channels=(1,), features=1, action_layout=ACTION_LAYOUT)
+
+
+def test_policies_that_fit() -> None:
+    """A clone of the same body and rate, and waypoints from any body."""
+    require_fit(_CLONE, Origin("car", 20.0), _CAR, measures=False)
+    require_fit(_CLONE, Origin(), _CAR, measures=False)
+    require_fit(_WAYPOINTS, Origin("", 20.0), _CAR, measures=False)
+    require_fit(_WAYPOINTS, Origin(), _CAR._replace(turning=None), measures=True)
+
+
+@pytest.mark.parametrize(
+    ("card", "origin", "robot", "words"),
+    [
+        (_CLONE, Origin("tank"), _CAR, "learned to steer a tank, and my-car is a car"),
+        (_CLONE, Origin("car", 10.0), _CAR, "10 actions a second, and my-car has control_hz = 20"),
+        (_CLONE, Origin(), _CAR._replace(image_size=None), "my-car has no camera"),
+        (_CLONE, Origin(), _CAR._replace(actions=_STATE), "those required here are speed"),
+        (_WAYPOINTS, Origin(), _CAR._replace(has_geometry=False), "pitch_deg and fovy_deg"),
+        (_WAYPOINTS, Origin(), _CAR._replace(turning=None), "turn_deg_per_m or turn_deg_per_s"),
+    ],
+)
+def test_policies_that_do_not_fit(
+    card: CloneCard, origin: Origin, robot: RobotFacts, words: str
+) -> None:
+    """The sentence names what differs."""
+    with pytest.raises((PolicyError, RobotRefused)) as refusal:
+        require_fit(card, origin, robot, measures=False)
+    assert words in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("hz", "jitter", "fits"),
+    [
+        (19.61, 0.0, False),
+        (19.61, 0.03, True),
+        (19.0, 0.03, False),
+        (10.0, 0.9, False),  # No jitter makes half of a rate the same.
+        (20.1, "much", True),
+    ],
+)
+def test_a_rate_within_the_jitter_of_the_recording_fits(
+    hz: float, jitter: object, fits: bool
+) -> None:
+    """A policy's own demonstrations say how exactly its rate is known."""
+    card = msgspec.structs.replace(_CLONE, data={"rate_jitter": jitter})
+    with contextlib.nullcontext() if fits else pytest.raises(PolicyError, match="control_hz = 20"):
+        require_fit(card, Origin("car", hz), _CAR, measures=False)
+
+
+@pytest.fixture(scope="module")
+def student(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shipped clone of a car, exported by the command."""
+    file = tmp_path_factory.mktemp("policies") / "student.onnx"
+    main(["policies", "export", str(CLONES["car"]), "--out", str(file)])
+    return file
+
+
+@pytest.mark.parametrize(
+    ("profile", "name", "words"),
+    [
+        ("lab-tank", "student.onnx", "learned to steer a car, and lab-tank is a tank"),
+        ("lab-car", "studnt.onnx", "student.onnx?"),
+        ("lab-car", "student.safetensors", "policies export"),
+        ("lab-car", "", "There is no policy NAME.onnx"),
+    ],
+)
+def test_serving_refuses_other_policies(
+    profile: str,
+    name: str,
+    words: str,
+    student: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Before anything is served."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    path = (student.parent if name.endswith(".onnx") else tmp_path) / name
+    (tmp_path / "student.safetensors").touch()
+    capsys.readouterr()
+    command = ["robot", "serve", profile, "--twin", "--world", "room", "--port", "0"]
+    with pytest.raises(SystemExit) as stop:
+        main([*command, "--policy", str(path)])
+    assert stop.value.code == 2
+    assert words in capsys.readouterr().err
+
+
+@contextlib.contextmanager
+def _served(policy: Path, clock: str) -> Generator[tuple[RunningRobot, RobotClient]]:
+    """A twin of lab-car with a policy on board, armed for it by a person who watches."""
+    with run_robot(
+        find_profile("lab-car"),
+        clock="twin" if clock == "twin" else "real",
+        arguments=("--policy", str(policy)),
+    ) as robot:
+        pace = "lockstep" if clock == "twin" else "realtime"
+        with robot.client(role="person", frames=False, pace=pace) as person:
+            until(lambda: person.ask().message.holder == policy.stem)
+            # A policy that fails at once releases the robot before the answer.
+            with contextlib.suppress(RobotRefused):
+                person.arm()
+            yield robot, person
+
+
+def _pilot(robot: RunningRobot) -> int:
+    """Return the process id of the policy."""
+    words = ["pgrep", "-P", str(robot.pid_of("daemon")), "-f", "remote.pilot"]
+    return int(subprocess.check_output(words).split()[0])
+
+
+def _moves(person: RobotClient) -> bool:
+    return any(person.ask().message.action_applied)
+
+
+@pytest.mark.gl
+@pytest.mark.system
+@pytest.mark.realtime
+def test_a_policy_drives_on_board(student: Path) -> None:
+    """It drives once a person arms the robot; a person takes over; it is ended and restarted."""
+    with _served(student, "twin") as (robot, person), robot.operator() as operator:
+        until(lambda: operator.where().truth["progress_m"] > 2.0)
+        # Guard, daemon and twin have a higher priority, where the system permits it.
+        assert os.getpriority(os.PRIO_PROCESS, _pilot(robot)) >= 0
+        assert operator.where().truth["collisions"] == 0.0
+        person.take()
+        until(lambda: person.ask().message.mine)
+        seen = person.ask().message
+        person.command([0.0] * 2, answers=seen.seq)
+        until(lambda: person.ask().message.suggested_by == "student")
+        person.run_policy("")
+        until(lambda: person.policies is not None and person.policies.running == "")
+        assert person.policies.names == ("student",)
+        person.release()
+        person.run_policy("student")
+        until(lambda: person.ask().message.holder == "student")
+        # Nothing moves before a person arms the robot again.
+        assert not person.ask().message.armed
+
+
+@pytest.mark.gl
+@pytest.mark.system
+@pytest.mark.realtime
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_policy_that_dies_or_hangs_stops_the_robot(student: Path, number: int) -> None:
+    """Without a person doing anything."""
+    with _served(student, "twin" if number == signal.SIGKILL else "real") as (robot, person):
+        until(lambda: _moves(person))
+        pid = _pilot(robot)
+        os.kill(pid, number)
+        until(lambda: not _moves(person))
+        if number == signal.SIGKILL:
+            until(lambda: person.ask().message.holder == "")
+            assert person.policies is not None
+            until(lambda: person.policies.text == "student ended: its process ended with code -9.")
+        else:
+            os.kill(pid, signal.SIGCONT)
+
+
+@pytest.mark.gl
+@pytest.mark.system
+@pytest.mark.realtime
+def test_a_policy_of_nan_moves_nothing(tmp_path: Path) -> None:
+    """It ends with a sentence at its first action, and the robot stays at rest."""
+    policy = CameraPolicy.blank(_CLONE, seed=0)
+    policy.network.hands.bias.data[:] = np.nan
+    file = tmp_path / "nan.onnx"
+    export_clone(policy, file)
+    with _served(file, "twin") as (_, person):
+        until(lambda: person.policies is not None and person.policies.running == "")
+        assert person.policies is not None
+        assert "The policy gave [nan, nan], which is no command." in person.policies.text
+        until(lambda: person.ask().message.holder == "")
+        assert not _moves(person)

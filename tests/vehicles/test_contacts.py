@@ -1,0 +1,100 @@
+"""Counting of collisions, and the bumper."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import pytest
+
+from shapechanger.vehicles.bodies import Motion
+from shapechanger.vehicles.world import APART_S, BUMPER_SPREAD, ContactTracker
+
+_DT = 0.01
+# A movable ball of 0.1 m, a wall with its face at x = 1 m, and the ground.
+_MODEL = """
+<mujoco><option gravity="0 0 0"/><worldbody>
+<geom name="world/ground" type="plane" size="5 5 1"/>
+<geom name="world/wall/0" type="box" pos="1.5 0 0.5" size="0.5 3 0.5"/>
+<body name="vehicle/chassis" pos="0 0 0.1"><freejoint/>
+<geom name="vehicle/hull" type="sphere" size="0.1"/></body>
+</worldbody></mujoco>
+"""
+
+
+class _Bench:
+    def __init__(self) -> None:
+        self.model = mujoco.MjModel.from_xml_string(_MODEL)
+        self.data = mujoco.MjData(self.model)
+        self.touch = ContactTracker(self.model)
+
+    def stand(self, x: float, seconds: float = _DT, heading: float = 0.0) -> None:
+        """Stay at x for a while."""
+        self.data.qpos[:3] = x, 0.0, 0.1
+        mujoco.mj_forward(self.model, self.data)
+        for _ in range(round(seconds / _DT)):
+            self.touch.follow(self.data, Motion(x, 0.0, heading, 0.0, 0.0, 0.0), _DT)
+
+
+def test_ground_contact_is_no_collision() -> None:
+    """Contacts with the ground are ignored."""
+    bench = _Bench()
+    bench.stand(0.0)
+    assert bench.data.ncon > 0
+    assert not bench.touch.touches
+    assert bench.touch.collisions == 0
+
+
+def test_wall_contact_is_a_collision() -> None:
+    """A lasting contact is one collision."""
+    bench = _Bench()
+    bench.stand(0.91, seconds=3.0)
+    assert bench.touch.touches
+    assert bench.touch.collisions == 1
+    bench.stand(0.5)
+    assert not bench.touch.touches
+
+
+def test_bouncing_counts_once() -> None:
+    """Contacts within 0.5 s are one collision, later ones another."""
+    bench = _Bench()
+    bench.stand(0.91)
+    bench.stand(0.5, seconds=0.9 * APART_S)
+    bench.stand(0.91)
+    assert bench.touch.collisions == 1
+    bench.stand(0.5, seconds=1.1 * APART_S)
+    bench.stand(0.91)
+    assert bench.touch.collisions == 2
+
+
+def test_a_contact_after_release_counts() -> None:
+    """A contact after `release` is a new collision."""
+    bench = _Bench()
+    bench.stand(0.91)
+    bench.touch.release()
+    assert not bench.touch.touches
+    bench.stand(0.91)
+    assert bench.touch.collisions == 2
+
+
+def test_a_reset_clears_collisions() -> None:
+    """`reset` clears the counter and the bumper."""
+    bench = _Bench()
+    bench.stand(0.91)
+    bench.touch.reset()
+    assert bench.touch.collisions == 0
+    assert not bench.touch.bumped
+
+
+@pytest.mark.parametrize(
+    ("off", "felt"), [(0.0, True), (0.9, True), (-0.9, True), (1.1, False), (math.pi, False)]
+)
+def test_the_bumper_is_at_the_front(off: float, felt: bool) -> None:
+    """Contacts at the side or rear are collisions without a bump.
+
+    `off` is the bearing of the wall over `BUMPER_SPREAD`, or pi for behind.
+    """
+    bench = _Bench()
+    bench.stand(0.91, heading=off if off == math.pi else off * BUMPER_SPREAD)
+    assert bench.touch.collisions == 1
+    assert bench.touch.bumped is felt

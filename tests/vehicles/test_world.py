@@ -1,0 +1,346 @@
+"""A simulated vehicle on a course."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from shapechanger.contract.world import RESTING_V, Pose
+from shapechanger.errors import UnknownName, WorldError
+from shapechanger.vehicles import world as world_module
+from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
+from shapechanger.vehicles.cameras.camera import CameraJitter
+from shapechanger.vehicles.courses.course import HOME, Course
+from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.world import MujocoWorld
+
+_AHEAD: Mapping[str, Mapping[str, float]] = {
+    "car": {"wheels": 0.5, "steering": 0.0},
+    "truck": {"wheels": 0.5, "steering": 0.0},
+    "tank": {"left track": 0.5, "right track": 0.5},
+    "boat": {"propeller": 0.5, "rudder": 0.0},
+}
+_EACH = pytest.mark.parametrize("vehicle", VEHICLES)
+
+
+def _world(vehicle: str = "car", seed: int = 3) -> MujocoWorld:
+    return MujocoWorld(vehicle, seed=seed, size=None)
+
+
+def _drive(world: MujocoWorld, outputs: Mapping[str, float | None], seconds: float) -> None:
+    for _ in range(round(seconds / 0.01)):
+        world.advance(0.01, outputs)
+
+
+@_EACH
+def test_poses_that_are_computed_once_change_no_drive(
+    vehicle: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With MuJoCo's sleep flag a drive into a wall and a picture's poses are bit for bit alike."""
+    states: list[tuple[bytes, ...]] = []
+    world = _world(vehicle)
+    assert world.model.opt.enableflags == mujoco.mjtEnableBit.mjENBL_SLEEP
+    for flags in (mujoco.mjtEnableBit.mjENBL_SLEEP, 0):
+        monkeypatch.setattr(world.model.opt, "enableflags", int(flags))
+        world.put(_before_a_wall(world, 0.3))
+        _drive(world, _AHEAD[vehicle], 2.0)
+        assert world.collisions
+        data = world.data
+        states.append(tuple(x.tobytes() for x in (data.qpos, data.qvel, data.geom_xpos)))
+        world.put(world.pose)
+        _drive(world, {}, 30.0)  # At rest: it would fall asleep.
+        _drive(world, _AHEAD[vehicle], 0.1)
+        states[-1] += (world.data.qpos.tobytes(),)
+    assert states[0] == states[1]
+
+
+@_EACH
+def test_wheels_that_meet_only_the_ground_change_no_drive(
+    vehicle: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until it hits a wall with its hull, a coarse world of equal steps is bit for bit alike."""
+    monkeypatch.setattr(world_module, "_COARSE_DT", SIM_DT)
+    poses: list[Pose] = []
+    for coarse in (False, True):
+        world = MujocoWorld(vehicle, seed=3, size=None, coarse=coarse)
+        world.put(_before_a_wall(world, 1.0))
+        for _ in range(600):
+            if world.collisions:
+                break
+            poses.append(world.pose)
+            world.advance(0.01, _AHEAD[vehicle])
+        assert world.collisions == 1
+    assert poses[: len(poses) // 2] == poses[len(poses) // 2 :]
+
+
+def test_only_the_tank_needs_the_short_step() -> None:
+    """Coarse worlds have a longer step, but for a vehicle that skids when it turns."""
+    steps = {
+        vehicle: MujocoWorld(vehicle, size=None, coarse=True).model.opt.timestep
+        for vehicle in VEHICLES
+    }
+    assert steps.pop("tank") == SIM_DT
+    assert set(steps.values()) == {2.0 * SIM_DT}
+
+
+def _before_a_wall(world: MujocoWorld, distance: float) -> Pose:
+    """Return a pose that faces the middle of the longest wall at this distance."""
+    ends = [np.array((wall.start, wall.end)) for wall in world.course.walls]
+    start, end = max(ends, key=lambda wall: float(np.hypot(*(wall[1] - wall[0]))))
+    along = (end - start) / np.hypot(*(end - start))
+    x, y = (start + end) / 2.0 + distance * np.array((-along[1], along[0]))
+    return Pose(float(x), float(y), math.atan2(-along[0], along[1]))
+
+
+@_EACH
+def test_a_vehicle_starts_in_its_default_world_at_rest(vehicle: str) -> None:
+    """A vehicle starts in its default world, at rest and free."""
+    world = _world(vehicle)
+    seen = world.inputs()
+    assert world.course.world == HOME[vehicle]
+    assert world.seed == 3
+    assert seen.speed == pytest.approx(0.0, abs=1e-6)
+    assert not world.touches
+    assert world.truth() == {"progress_m": 0.0, "collisions": 0.0}
+
+
+@_EACH
+def test_driving_ahead_is_progress(vehicle: str) -> None:
+    """Half throttle for two seconds makes progress."""
+    world = _world(vehicle)
+    _drive(world, _AHEAD[vehicle], 2.0)
+    assert world.truth()["progress_m"] > 0.3
+    assert world.inputs().speed > 0.2
+    assert world.inputs().travelled_m > 0.2
+
+
+def test_simulation_is_deterministic() -> None:
+    """Equal seeds and outputs give equal poses."""
+    poses = []
+    for _ in range(2):
+        world = _world()
+        _drive(world, _AHEAD["car"], 1.0)
+        poses.append(world.pose)
+    assert poses[0] == poses[1]
+
+
+def test_the_time_step_of_calls_does_not_matter() -> None:
+    """The remainder of a step is carried over to the next call."""
+    cut, steps, whole = _world(), _world(), _world()
+    for _ in range(300):
+        cut.advance(SIM_DT / 3.0, _AHEAD["car"])
+    for _ in range(100):
+        steps.advance(SIM_DT, _AHEAD["car"])
+    for _ in range(10):
+        whole.advance(10.0 * SIM_DT, _AHEAD["car"])
+    assert cut.pose == steps.pose
+    assert whole.pose.x == pytest.approx(steps.pose.x, abs=0.01)
+    assert whole.pose.y == pytest.approx(steps.pose.y, abs=0.01)
+    assert cut.data.time == pytest.approx(100 * SIM_DT)
+
+
+def test_place_restarts_at_a_seeded_pose() -> None:
+    """`place` resets motion and progress, and its seed gives the pose."""
+    world = _world()
+    world.place(5)
+    first = world.pose
+    _drive(world, _AHEAD["car"], 1.0)
+    world.place(6)
+    assert world.pose != first
+    world.place(5)
+    assert world.pose == first
+    assert world.progress_m == 0.0
+    assert world.inputs().speed == 0.0
+
+
+def test_place_keeps_the_odometer() -> None:
+    """`place` keeps the travelled distance."""
+    world = _world()
+    _drive(world, _AHEAD["car"], 1.0)
+    before = world.inputs().travelled_m
+    world.place(4)
+    assert world.inputs().travelled_m == before
+    _drive(world, {"wheels": -0.5, "steering": 0.0}, 1.0)
+    assert world.inputs().travelled_m < before
+
+
+def test_lay_out_changes_the_course() -> None:
+    """`lay_out` is reproducible."""
+    world = _world()
+    walls = world.course.walls
+    world.lay_out(4)
+    assert world.seed == 4
+    assert world.course.walls != walls
+    world.lay_out(3)
+    assert world.course.walls == walls
+
+
+def test_the_battery_sags_under_load() -> None:
+    """The battery's voltage drops with current and with `resting_v`."""
+    world = _world()
+    idle = world.inputs()
+    assert RESTING_V - 0.2 < idle.battery_v < RESTING_V
+    world.advance(0.05, {"wheels": 1.0, "steering": 0.0})
+    loaded = world.inputs()
+    assert loaded.current_a > idle.current_a + 1.0
+    assert loaded.battery_v < idle.battery_v
+    world.resting_v = 6.0
+    assert world.inputs().battery_v < 6.0
+
+
+def test_the_distance_to_a_wall() -> None:
+    """`distance_m` is measured from the front bumper."""
+    world = _world()
+    world.put(_before_a_wall(world, 0.9))
+    assert world.distance_m() == pytest.approx(0.9 - world.vehicle.nose_m, abs=0.005)
+
+
+def test_running_into_a_wall_is_one_collision() -> None:
+    """A crash stops the car, presses the bumper and counts once."""
+    world = _world()
+    world.put(_before_a_wall(world, 0.7))
+    _drive(world, _AHEAD["car"], 2.0)
+    assert world.collisions == 1
+    assert world.touches
+    assert world.inputs().bumped
+    assert world.inputs().speed == pytest.approx(0.0, abs=0.1)
+    assert world.distance_m() == pytest.approx(0.0, abs=0.03)
+
+
+def test_put_back_frees_the_vehicle() -> None:
+    """After `put_back` the vehicle is free nearby, and collisions and progress are kept."""
+    world = _world()
+    world.put(_before_a_wall(world, 0.7))
+    _drive(world, _AHEAD["car"], 2.0)
+    before, progress = world.pose, world.progress_m
+    world.put_back()
+    after = world.pose
+    assert math.hypot(after.x - before.x, after.y - before.y) < 2.0
+    assert world.collisions == 1
+    assert abs(world.progress_m - progress) < 2.0
+    assert world.inputs().speed == 0.0
+    progress = world.progress_m
+    _drive(world, _AHEAD["car"], 0.6)
+    assert not world.touches
+    assert world.progress_m > progress + 0.05
+
+
+def test_acceleration_in_the_body_frame() -> None:
+    """Acceleration is forward at a start and centripetal in a bend."""
+    world = _world()
+    _drive(world, _AHEAD["car"], 0.05)
+    assert world.inputs().acceleration_x > 0.1
+    _drive(world, {"wheels": 0.5, "steering": -1.0}, 0.5)
+    seen = world.inputs()
+    assert seen.yaw_rate > 0.2
+    assert seen.acceleration_y == pytest.approx(seen.speed * seen.yaw_rate, rel=0.2)
+
+
+def test_a_boat_drifts_with_the_current() -> None:
+    """A boat without thrust drifts with the current."""
+    world = _world("boat")
+    start, flow = world.pose, world.course.current_mps
+    assert math.hypot(*flow) > 0.0
+    _drive(world, {"propeller": 0.0, "rudder": 0.0}, 4.0)
+    moved = world.pose.x - start.x, world.pose.y - start.y
+    assert moved[0] * flow[0] + moved[1] * flow[1] > 0.0
+
+
+def test_picture_needs_a_camera() -> None:
+    """The error names the missing argument."""
+    with pytest.raises(WorldError, match="has no camera: pass a `size`"):
+        _world().picture()
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "world", "sentence"),
+    [
+        ("boat", "corridor", "A boat floats: it cannot drive in a corridor"),
+        ("car", "harbour", "A car does not float: it cannot drive in a harbour"),
+    ],
+)
+def test_unsuitable_worlds_are_refused(vehicle: str, world: str, sentence: str) -> None:
+    """Boats need water, and other vehicles land."""
+    with pytest.raises(WorldError, match=sentence):
+        MujocoWorld(vehicle, world, size=None)
+
+
+def test_unknown_names_are_refused() -> None:
+    """Errors suggest the nearest name."""
+    with pytest.raises(UnknownName, match=r"No vehicle matches 'tnak'. Did you mean 'tank'"):
+        MujocoWorld("tnak", "corridor", size=None)
+    with pytest.raises(UnknownName, match=r"No world matches 'yrad'. Did you mean 'yard'"):
+        MujocoWorld("car", "yrad", size=None)
+    with pytest.raises(UnknownName, match=r"No lens matches 'nihgt'. Did you mean 'night'"):
+        MujocoWorld("car", size=None, lenses=("nihgt",))
+
+
+def test_a_failed_layout_changes_nothing() -> None:
+    """A failed `lay_out` leaves the world unchanged."""
+    world = _world()
+    model, course, look = world.model, world.course, world.look
+    with pytest.raises(WorldError, match="Seeds of courses count from 0"):
+        world.lay_out(-1)
+    dim = replace(look, light=0.3)
+    with pytest.raises(WorldError, match="off its vehicle or in the floor"):
+        world.lay_out(4, dim, CameraJitter(up_m=-1.0))
+    assert (world.model, world.course, world.look) == (model, course, look)
+    _drive(world, _AHEAD["car"], 0.2)
+
+
+def test_a_layout_error_keeps_the_course(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error of the layout propagates and keeps the old course."""
+    world = _world()
+
+    def too_tight(kind: str, seed: int) -> Course:
+        raise WorldError(f"No {kind} with seed {seed} can be laid out: too tight.")
+
+    monkeypatch.setattr(world_module, "lay_out", too_tight)
+    with pytest.raises(WorldError, match="No corridor with seed 77777 can be laid out"):
+        world.lay_out(77_777)  # Not in the cache of another test.
+    assert world.seed == 3
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_an_image_shows_the_course_and_its_light() -> None:
+    """Pictures have the requested size and show the look."""
+    world = MujocoWorld("car", seed=3, size=(64, 48))
+    bright = world.picture()
+    assert bright.shape == (48, 64, 3)
+    assert bright.dtype == np.uint8
+    assert bright.std() > 5.0
+    world.lay_out(3, replace(Look.of("corridor"), light=0.2))
+    dark = world.picture()
+    assert dark.mean() < 0.8 * bright.mean()
+    world.close()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_a_moved_camera_changes_the_image() -> None:
+    """A camera error lasts until the next layout."""
+    world = MujocoWorld("car", seed=3, size=(64, 48))
+    usual = world.picture()
+    world.lay_out(3, camera=CameraJitter(yaw_rad=0.05))
+    assert not np.array_equal(world.picture(), usual)
+    world.lay_out(3)
+    np.testing.assert_array_equal(world.picture(), usual)
+    world.close()
+
+
+@pytest.mark.gl
+@pytest.mark.usefixtures("gl")
+def test_lenses_change_images_only() -> None:
+    """Lenses change pictures only."""
+    clear = MujocoWorld("car", seed=3, size=(64, 48))
+    night = MujocoWorld("car", seed=3, size=(64, 48), lenses=("night", "dirt"))
+    assert night.pose == clear.pose
+    assert night.picture().mean() < clear.picture().mean()
+    for world in (clear, night):
+        world.close()
