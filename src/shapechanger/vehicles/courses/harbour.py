@@ -46,7 +46,7 @@ def add_banks(course: Course, walls: dict[str, QuadMesh], light: Callable[[Array
 
     Args:
         course: The course.
-        walls: Meshes keyed by the name of their texture, which are extended; tops of quays are "paving".
+        walls: Meshes to extend, keyed by texture; tops of quays are "paving".
         light: Brightness at points, m, (..., 2), from 0 to 1.
     """
     for wall, (start, end) in zip(course.walls, _rears(course.walls), strict=True):
