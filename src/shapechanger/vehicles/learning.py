@@ -27,6 +27,7 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.learners.cloning import stated
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.versions import ENV, identify, require_same_env
+from shapechanger.vehicles.envs.demonstrators import LEAST_THROTTLE
 
 STUDENT_STEPS: Final = 7200
 """Default steps of a student: six minutes, a third of which the teacher drives."""
@@ -39,9 +40,8 @@ _EPISODE_STEPS: Final = 200
 # round of as many steps students had 1.8 collisions per 100 m.
 _ROUNDS: Final = 2
 # Pictures do not show the speed. Where the teacher brakes or starts depending on it, a clone takes
-# the mean of both actions; one stood still on one course of 17. Less throttle than this does not
-# overcome the friction of every vehicle.
-_LEAST_THROTTLE: Final = 0.25
+# the mean of both actions; one stood still on one course of 17. So it never drives with less than
+# `LEAST_THROTTLE`.
 # Limit of the training steps of the clones that drive a round.
 _BETWEEN: Final = 1500
 
@@ -144,7 +144,7 @@ class _Lessons:
                 meant, disturbed = (_going(action) for action in self._teacher.act())
                 self._pictures.append(prepare(picture[np.newaxis], self._settings.framing)[0])
                 # The whole range of the throttle above the least is that of the network's output.
-                share = (meant[1] - _LEAST_THROTTLE) / (1.0 - _LEAST_THROTTLE)
+                share = (meant[1] - LEAST_THROTTLE) / (1.0 - LEAST_THROTTLE)
                 self._actions.append(np.array((meant[0], 2.0 * share - 1.0), np.float32))
                 done = disturbed if student is None else student.predict(picture)
                 picture, _, terminated, truncated, _ = self._env.step(done)
@@ -168,10 +168,10 @@ class _Lessons:
             seed=self._seed % 2**31,
             episodes=self._episodes,
         )
-        card = msgspec.structs.replace(policy.card, low=(-1.0, _LEAST_THROTTLE), high=(1.0, 1.0))
+        card = msgspec.structs.replace(policy.card, low=(-1.0, LEAST_THROTTLE), high=(1.0, 1.0))
         return CameraPolicy(policy.network, card)
 
 
 def _going(action: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return steering and throttle with at least the least throttle."""
-    return np.array((action[0], max(action[1], _LEAST_THROTTLE)), np.float32)
+    return np.array((action[0], max(action[1], LEAST_THROTTLE)), np.float32)
