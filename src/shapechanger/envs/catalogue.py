@@ -242,11 +242,10 @@ def register_all() -> None:
             _register(env_id, entry_point, limit, kwargs={"vehicle": vehicle})
     for env_id, task in FINGER_ENVS.items():
         _register(env_id, task.entry_point, task.episode_steps)
-    remote = "shapechanger.envs.remote"
     reach, track = FINGER_ENVS.values()
     for env_id, entry_point, limit in (
-        (REMOTE_FINGER, f"{remote}.finger:RemoteFingerEnv", reach.episode_steps),
-        (REMOTE_FINGER_TRACK, f"{remote}.finger:RemoteFingerTrackEnv", track.episode_steps),
+        (REMOTE_FINGER, "shapechanger.finger.remote:RemoteFingerEnv", reach.episode_steps),
+        (REMOTE_FINGER_TRACK, "shapechanger.finger.remote:RemoteFingerTrackEnv", track.episode_steps),
         (REMOTE_VEHICLE, "shapechanger.remote.env:RemoteVehicleEnv", None),
         (REMOTE_WAYPOINT, "shapechanger.vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):

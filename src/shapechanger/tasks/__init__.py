@@ -1,1 +1,1 @@
-"""Tasks without bodies: rewards, ends of episodes, and paths to follow."""
+"""Tasks of a user's own, without bodies."""

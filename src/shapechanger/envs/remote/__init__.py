@@ -1,1 +1,0 @@
-"""Gymnasium envs of vehicles and fingers that are reached over the link."""
