@@ -135,7 +135,7 @@ _MODULES: Final = {
     "demos.dataset": ("Dataset", "load_dataset"),
     "envs.own": ("from_mjcf",),
     "envs.vector.make": ("make_vec",),
-    "identify": ("load_log",),
+    "finger.identify": ("load_log",),
     "morphology": (
         *("AddLimb", "AddSegment", "Cut", "Damping", "Density", "Friction", "Gear", "Gravity"),
         *("JointRange", "Lock", "Mass", "Radius", "Remove", "Split", "StartHeight", "Stiffness"),
