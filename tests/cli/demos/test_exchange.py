@@ -17,7 +17,7 @@ def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[s
     """Format, episodes, steps and images."""
     Import(keys_folder(tmp_path / "keys"), tmp_path / "data").run()
     assert capsys.readouterr().out == (
-        f"read {tmp_path / 'keys'} (2017): 1 episode, 3 steps, 3 pictures\n"
+        f"read {tmp_path / 'keys'} (csv): 1 episode, 3 steps, 3 pictures\n"
         f"wrote {tmp_path / 'data'}\n"
     )
 

@@ -83,23 +83,15 @@ def drive(data: Path, count: int = 5, **changes: Any) -> Path:
     return record(data, header(**changes), steps)
 
 
-def keys_folder(
-    folder: Path,
-    lines: Sequence[str] | None = None,
-    pictures: dict[str, bytes] | None = None,
-    newline: str = "\r\n",
-) -> Path:
-    """Create a folder in the format of 2017, of three pictures."""
+def keys_folder(folder: Path) -> Path:
+    """Create a table of others: the key that was held at each of three pictures."""
     folder.mkdir(parents=True)
-    names = [f"1499144070.{n}_0.12{n}.jpg" for n in (1, 2, 3)]
-    if lines is None:
-        held = ["1.0,0.0,0.0,0.0", "0.0,0.0,0.0,1.0", "0.0,0.0,0.0,0.0"]
-        lines = [f"{name},{keys}" for name, keys in zip(names, held, strict=True)]
-    if pictures is None:
-        pictures = {name: picture(n) for n, name in enumerate(names)}
-    (folder / "labels.csv").write_bytes("".join(f"{line}{newline}" for line in lines).encode())
-    for name, jpeg in pictures.items():
-        (folder / name).write_bytes(jpeg)
+    held = ["1.0,0.0,0.0,0.0", "0.0,0.0,0.0,1.0", "0.0,0.0,0.0,0.0"]
+    lines = ["file,forward,backward,right,left,timestamp"]
+    for n, keys in enumerate(held, 1):
+        (folder / f"{n}.jpg").write_bytes(picture(n - 1))
+        lines.append(f"{n}.jpg,{keys},1499144070.{n}")
+    (folder / "steps.csv").write_bytes("".join(f"{line}\r\n" for line in lines).encode())
     return folder
 
 

@@ -17,6 +17,7 @@ import pytest
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import (
+    ImportContext,
     export_recording,
     find_format,
     import_episodes,
@@ -33,9 +34,8 @@ from tests.demos.exchange.small import (
     picture,
     record,
     snapshot,
+    tub_folder,
 )
-
-FIRST, SECOND, THIRD = (f"1499144070.{n}_0.12{n}.jpg" for n in (1, 2, 3))
 
 
 def refused(folder: Path, out: Path, format: str = "auto", *, strict: bool = False) -> str:
@@ -60,47 +60,43 @@ def _edit(name: str, change: Callable[[bytes], bytes]) -> Callable[[Path], None]
     return edit
 
 
-def _labels(old: bytes, new: bytes) -> Callable[[Path], None]:
-    return _edit("labels.csv", lambda text: text.replace(old, new))
+def _table(old: bytes, new: bytes) -> Callable[[Path], None]:
+    return _edit("steps.csv", lambda text: text.replace(old, new))
 
 
 def _link_away(folder: Path) -> None:
     outside = folder.parent / "outside.jpg"
     outside.write_bytes(picture(9))
-    (folder / SECOND).unlink()
-    (folder / SECOND).symlink_to(outside)
+    (folder / "2.jpg").unlink()
+    (folder / "2.jpg").symlink_to(outside)
 
 
 def _pipe(folder: Path) -> None:
-    (folder / SECOND).unlink()
-    os.mkfifo(folder / SECOND)
+    (folder / "2.jpg").unlink()
+    os.mkfifo(folder / "2.jpg")
 
 
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
-        (lambda f: (f / SECOND).unlink(), "1 line with a picture that is missing: 2"),
-        (_edit(SECOND, lambda jpeg: jpeg[:-300]), "1 line with a damaged picture: 2"),
-        (_edit(THIRD, lambda jpeg: b""), "1 line with an empty picture: 3"),
-        (_edit(THIRD, lambda jpeg: bytes(900)), "1 line with an empty picture: 3"),
-        (_edit(THIRD, lambda jpeg: b"\x89PNG" + jpeg), "1 line with a damaged picture: 3"),
-        (_edit(THIRD, lambda jpeg: b"GIF89a" + jpeg), "that is not JPEG, PNG or BMP: 3"),
-        (_edit(SECOND, lambda jpeg: huge()), "1 line with a damaged picture: 2"),
-        (_edit(SECOND, lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
-        (_edit(FIRST, lambda jpeg: picture(1, 48, 32)), "another size than 40 x 32 pixels: 1"),
-        (lambda f: (f / "extra.jpg").write_bytes(picture(5)), "1 picture without a valid line"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"1.0,0.0,0.0,1.0"), "several keys held at once: 2"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,0.5"), "with a key that is not 0 or 1: 2"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0,nan"), "with a key that is not 0 or 1: 2"),
-        (_labels(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0"), "1 line that is not `file,forward"),
-        (_labels(SECOND.encode(), b"1499144070.2_/../" + SECOND.encode()), "leaves the folder"),
-        (_labels(SECOND.encode(), b"passwd"), "does not begin with the Unix time"),
-        (_labels(SECOND.encode(), FIRST.encode()), "the picture of another line: 2 (as 1)"),
-        (_link_away, "with a link that leaves the folder: 2"),
-        (_pipe, "it is not a regular file"),
+        (lambda f: (f / "2.jpg").unlink(), "There is no"),
+        (_edit("2.jpg", lambda jpeg: jpeg[:-300]), "is damaged"),
+        (_edit("3.jpg", lambda jpeg: b""), "is empty"),
+        (_edit("2.jpg", lambda jpeg: huge()), "claims 60000 x 60000 pixels"),
+        (_edit("2.jpg", lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
+        (_edit("2.jpg", lambda jpeg: picture(1, 48, 32)), "48 x 32 pixels, and not 40 x 32"),
+        (_table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"), "must be a number, got 'x'"),
+        (_table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0"), "line 3 has 5 cells instead of 6"),
+        (_table(b"0.0,0.0,0.0,1.0", b",,,"), "line 3: the action is empty"),
+        (_table(b"\n2.jpg", b"\n../2.jpg"), "leaves the folder"),
+        (_table(b"\n3.jpg", b"\n1.jpg"), "returns to the picture '1.jpg'"),
+        (_table(b"070.2", b"9" * 30), "captured_ns must be a time"),
+        (_table(b"1499144070.2", b"soon"), "captured_ns must be a number"),
+        (_link_away, "leaves the folder"),
+        (_pipe, "There is no"),
     ],
 )
-def test_a_damaged_folder_of_2017(
+def test_a_damaged_table_of_others(
     tmp_path: Path, spoil: Callable[[Path], object], expected: str
 ) -> None:
     """What is whole is imported, and the rest named; `strict` refuses instead."""
@@ -109,19 +105,21 @@ def test_a_damaged_folder_of_2017(
     assert expected in refused(folder, tmp_path / "data", strict=True)
     done = import_recording(folder, tmp_path / "data")
     assert expected in "; ".join(done.left_out)
-    assert done.steps == (3 if "extra.jpg" in "".join(done.left_out) else 2)
+    assert done.steps == 2
 
 
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
-        (_labels(b"0", b"\xff"), "is not text in UTF-8"),
-        (_edit("labels.csv", lambda t: t.decode().encode("utf-16")), "but in UTF-16"),
-        (_edit("labels.csv", lambda t: b""), "There is nothing to import"),
-        (_edit("labels.csv", lambda t: t + b'"open'), "is not valid CSV"),
+        (_table(b"file", b"\xff"), "is not text in UTF-8"),
+        (_edit("steps.csv", lambda t: t.decode().encode("utf-16")), "but in UTF-16"),
+        (_edit("steps.csv", lambda t: b""), "no column of an action"),
+        (_edit("steps.csv", lambda t: t.splitlines(True)[0]), "There is nothing to import"),
+        (_edit("steps.csv", lambda t: t + b'"open'), "is not valid CSV"),
+        (_table(b"backward", b"forward"), "two columns of one name"),
     ],
 )
-def test_a_table_of_2017_that_cannot_be_read(
+def test_a_table_of_others_that_cannot_be_read(
     tmp_path: Path, spoil: Callable[[Path], object], expected: str
 ) -> None:
     """A table without a line that can be read is refused."""
@@ -130,26 +128,16 @@ def test_a_table_of_2017_that_cannot_be_read(
     assert expected in refused(folder, tmp_path / "data")
 
 
-def test_lines_of_2017_are_read_in_the_order_of_their_times(tmp_path: Path) -> None:
-    """The names hold the times, so the order of the lines does not count, and is reported."""
-    folder = keys_folder(tmp_path / "keys")
-    _edit("labels.csv", lambda t: b"".join(t.splitlines(True)[::-1]))(folder)
-    done = import_recording(folder, tmp_path / "data")
-    assert done.steps == 3
-    assert "Time runs backwards by up to 0.1 s at line 2, line 3" in done.warnings[0]
-
-
 def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
     """Spreadsheets write a byte order mark."""
     folder = keys_folder(tmp_path / "keys")
-    _edit("labels.csv", lambda text: b"\xef\xbb\xbf" + text)(folder)
+    _edit("steps.csv", lambda text: b"\xef\xbb\xbf" + text)(folder)
     assert import_recording(folder, tmp_path / "data").steps == 3
 
 
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
-        (lambda f: (f / "header.json").unlink(), "There is no header.json"),
         (_edit("header.json", lambda t: t[:40]), "is not valid JSON"),
         (_edit("header.json", lambda t: t.replace(b'"format": 1', b'"format": 9')), "format 9"),
         (_edit("header.json", lambda t: t.replace(b'"unit"', b'"u"')), "header.json: This is not"),
@@ -263,7 +251,7 @@ def _spoilt(file: h5py.File) -> None:
         (_in_file(lambda f: f.__delitem__("episode_0/rewards")), "has no 'episode_0/rewards'"),
         (_in_file(_leads_away), "in another file"),
         (_edit("data/main_data.hdf5", lambda b: b.replace(b"SNOD", b"XXXX")), "is damaged"),
-        (_in_file(_short), "has 2 entries, but 5 are needed"),
+        (_in_file(_short), "has 2 entries, but"),
         (_in_file(_spoilt), "is damaged"),
     ],
 )
@@ -287,11 +275,11 @@ def test_folders_of_unknown_format(tmp_path: Path) -> None:
     assert "There is no" in refused(tmp_path / "gone", out)
     drive(tmp_path / "mine")
     assert "is a recording already" in refused(tmp_path / "mine", out)
-    both = keys_folder(tmp_path / "above/both")
-    assert f"{both} in it is 2017: import that" in refused(tmp_path / "above", out)
-    (both / "manifest.json").write_text("[]")
-    assert "looks like 2017 and tub" in refused(both, out)
-    assert import_recording(both, out, "2017").steps == 3
+    tub = tub_folder(tmp_path / "above/tub", [{"user/angle": 0.0, "user/throttle": 0.5}])
+    assert f"{tub} in it is tub: import that" in refused(tmp_path / "above", out)
+    (tub / "steps.csv").write_text("steering\n0\n")
+    assert "looks like tub and csv" in refused(tub, out)
+    assert import_recording(tub, out, "csv").steps == 1
 
 
 def test_unknown_formats(tmp_path: Path) -> None:
@@ -325,7 +313,6 @@ def test_invalid_outputs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "changes", "expected"),
     [
-        ("2017", {}, "steering, throttle, and those of the format of 2017"),
         ("minari", {"control_hz": 10.0}, "20, and .* 10: a Minari dataset has one kind"),
         ("minari", {"image_size": (80, 60)}, "40 x 32, and .* 80 x 60"),
     ],
@@ -392,10 +379,12 @@ def test_texts_are_not_formulas(tmp_path: Path) -> None:
 def test_a_file_that_disappears_is_named(tmp_path: Path) -> None:
     """A lazy import raises a clear error when its source is deleted."""
     folder = keys_folder(tmp_path / "keys")
-    ((_, steps),) = list(import_episodes(folder))
+    context = ImportContext()
+    ((_, steps),) = list(import_episodes(folder, context=context))
     next(steps)
     shutil.rmtree(folder)
-    with pytest.raises(DemosError, match="a picture that is missing"):
-        next(steps)
+    assert not list(steps)
+    with pytest.raises(DemosError, match="There is no"):
+        context.require_whole(folder)
     with pytest.raises(DemosError, match="There is no"):
         find_format(folder)

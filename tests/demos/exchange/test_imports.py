@@ -35,43 +35,43 @@ from tests.demos.exchange.small import (
 )
 
 
-def test_the_layout_of_2017(tmp_path: Path) -> None:
-    """Keys, times and picture bytes are imported; the source is unchanged."""
+def test_a_table_of_others(tmp_path: Path) -> None:
+    """Columns are known by their names; the source is unchanged."""
     folder = keys_folder(tmp_path / "keys")
     before = snapshot(folder)
-    assert find_format(folder) == "2017"
+    assert find_format(folder) == "csv"
     done = import_recording(folder, tmp_path / "data")
     assert (done.episodes, done.steps, done.pictures) == (1, 3, 3)
     (episode,) = all_of(tmp_path / "data")
-    assert Layout.from_json(episode.header.action_layout).names == (
-        "forward",
-        "backward",
-        "right",
-        "left",
-    )
+    layout = Layout.from_json(episode.header.action_layout)
+    assert layout.names == ("forward", "backward", "right", "left")
+    assert {(feature.low, feature.high) for feature in layout} == {(0.0, 1.0)}
     assert [step.action for step in episode.steps] == [(1, 0, 0, 0), (0, 0, 0, 1), (0, 0, 0, 0)]
-    assert [step.wall_ns for step in episode.steps] == [
+    assert [step.captured_ns for step in episode.steps] == [
         1_499_144_070_100_000_000 + n * 100_000_000 for n in range(3)
     ]
     assert [episode.jpeg(step) for step in episode.steps] == [picture(n) for n in range(3)]
-    assert episode.header.control_hz == pytest.approx(10.0)
+    assert (episode.header.control_hz, episode.header.source) == (10.0, "csv")
     assert {step.driver for step in episode.steps} == {"person"}
+    assert import_recording(folder, tmp_path / "slow", hz=5.0).notes[0].endswith("are left out.")
+    assert {step.clock_ns for step in all_of(tmp_path / "slow")[0].steps} == {None}
     assert snapshot(folder) == before
 
 
-def test_a_long_pause_ends_an_episode_of_2017(tmp_path: Path) -> None:
-    """Pauses of more than thirty periods split a drive; the export joins the parts again."""
-    times = [100.0, 100.1, 100.2, 103.2, 103.3, 106.5]
-    names = [f"{at}_.jpg" for at in times]
-    folder = keys_folder(
-        tmp_path / "keys",
-        [f"{name},1.0,0.0,0.0,0.0" for name in names],
-        {name: picture(n) for n, name in enumerate(names)},
+def test_a_table_of_others_with_states(tmp_path: Path) -> None:
+    """A prefix says which columns are the state; others are named."""
+    (tmp_path / "table").mkdir()
+    (tmp_path / "table/steps.csv").write_text(
+        "Angle;throttle;state/speed;lap;done\n0,5;1;2,25;7;0\n-1;0;nan;8;1\n0;oops;1;8;0\n"
     )
-    import_recording(folder, tmp_path / "data")
-    assert [len(e.steps) for e in all_of(tmp_path / "data")] == [5, 1]
-    export_recording(tmp_path / "data", tmp_path / "again", "2017")
-    assert snapshot(tmp_path / "again") == snapshot(folder)
+    done = import_recording(tmp_path / "table", tmp_path / "data", hz=20.0)
+    assert done.notes == ("Columns that are not imported: lap.",)
+    assert "throttle must be a number, got 'oops'" in done.left_out[0]
+    (episode,) = all_of(tmp_path / "data")
+    assert Layout.from_json(episode.header.action_layout).names == ("steering", "throttle")
+    assert [step.action for step in episode.steps] == [(0.5, 1.0), (-1.0, 0.0)]
+    assert episode.steps[0].state == (2.25,)
+    assert [step.terminated for step in episode.steps] == [False, True]
 
 
 _RECORDS: list[dict[str, Any]] = [
@@ -263,7 +263,7 @@ def test_episodes_are_read_without_writing(tmp_path: Path) -> None:
     keys_folder(tmp_path / "keys")
     before = snapshot(tmp_path)
     ((head, steps),) = list(import_episodes(tmp_path / "keys"))
-    assert head.source == "2017"
+    assert head.source == "csv"
     assert [(step.index, jpeg) for step, jpeg in steps] == [(n, picture(n)) for n in range(3)]
     assert snapshot(tmp_path) == before
 

@@ -165,5 +165,5 @@ def test_a_file_for_each_episode_and_no_import(tmp_path: Path) -> None:
     assert export_recording(tmp_path / "data", tmp_path / "out", "mcap").steps == 5
     counts = [len(of(messages(path), "/step")) for path in sorted((tmp_path / "out").iterdir())]
     assert counts == [3, 2]
-    with pytest.raises(UnknownName, match="There are: auto, 2017, tub, minari, lerobot, csv"):
+    with pytest.raises(UnknownName, match="There are: auto, tub, minari, lerobot, csv"):
         import_recording(tmp_path / "out", tmp_path / "back", "mcap")

@@ -21,10 +21,8 @@ from tests.demos.exchange.small import (
     content_of,
     drive,
     header,
-    keys_folder,
     picture,
     record,
-    snapshot,
 )
 
 # Lone surrogates are not valid text.
@@ -140,23 +138,6 @@ def test_every_kind_of_observation_round_trips(
     import_recording(tmp_path / "x-v0", tmp_path / "back")
     (before,), (after,) = all_of(tmp_path / "data"), all_of(tmp_path / "back")
     assert content_of(after) == content_of(before)
-
-
-@pytest.mark.parametrize("newline", ["\r\n", "\n"])
-@pytest.mark.parametrize("style", ["0.0", "0", "header"])
-def test_the_layout_of_2017_round_trips(tmp_path: Path, newline: str, style: str) -> None:
-    """Labels, names and images are equal byte for byte, in each notation of the labels."""
-    keys_folder(tmp_path / "keys", newline=newline)
-    labels = tmp_path / "keys/labels.csv"
-    text = labels.read_bytes()
-    if style == "0":
-        text = text.replace(b",0.0", b",0").replace(b",1.0", b",1")
-    if style == "header":
-        text = f"file,forward,backward,right,left{newline}".encode() + text
-    labels.write_bytes(text)
-    import_recording(tmp_path / "keys", tmp_path / "data")
-    export_recording(tmp_path / "data", tmp_path / "again", "2017")
-    assert snapshot(tmp_path / "again") == snapshot(tmp_path / "keys")
 
 
 @pytest.mark.parametrize("name", ["csv", "minari"])

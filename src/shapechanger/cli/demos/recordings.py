@@ -332,7 +332,7 @@ class Import:
     out: Path
     """The recording to make; it must not exist yet."""
     format: str = "auto"
-    """Format of the folder: 2017, tub, minari, lerobot or csv; auto detects it."""
+    """Format of the folder: tub, minari, lerobot, csv or an installed one; auto detects it."""
     camera: str = ""
     """Which camera to take from a LeRobot dataset or a tub that has several, such as front."""
     hz: float | None = None
@@ -376,7 +376,7 @@ class Export:
     """The folder to make; it must not exist yet. For minari its name ends in a version, as in
     drive-v0."""
     to: str
-    """Format to write: minari, lerobot, csv, mcap, 2017 or tub."""
+    """Format to write: minari, lerobot, csv, mcap, tub or an installed one."""
     dropped: bool = False
     """Write dropped steps too, marked as such; only minari, csv and mcap can."""
     task: str = ""

@@ -1,39 +1,42 @@
 """Import and export of recordings in other formats.
 
-```
-2017     a folder with labels.csv and JPEGs: which of four keys was held    in and out
-tub      Donkeycar tubs, version 2 and the older version 1                  in; version 2 out
-minari   datasets of the Gymnasium family                                   in and out
-lerobot  datasets of LeRobot, version 3: Parquet and video                  in and out
-csv      steps.csv, header.json and frames/                                 in and out
-mcap     a log of messages for each episode                                 out
-```
-
+A format is one file: it reads folders into `ExchangeEpisode`s, writes these, and declares a
+`Format` (`format`), which `convert` finds among our own and in the entry points
+`shapechanger.formats`. `columns` names each column of a step in all formats. `files` and `pictures`
+load what strangers made, within one budget; `times` measures rates; `exporting` splits recordings.
 Sources are never changed, and targets appear atomically.
 """
 
 from __future__ import annotations
 
 from shapechanger.demos.exchange.convert import (
-    FORMATS,
     Exported,
-    Format,
     Imported,
     export_recording,
     find_format,
+    formats,
     import_episodes,
     import_recording,
 )
-from shapechanger.demos.exchange.importing import ImportContext
+from shapechanger.demos.exchange.format import (
+    ExchangeEpisode,
+    ExchangeStep,
+    ExportContext,
+    Format,
+    ImportContext,
+)
 
 __all__ = [
-    "FORMATS",
+    "ExchangeEpisode",
+    "ExchangeStep",
+    "ExportContext",
     "Exported",
     "Format",
     "ImportContext",
     "Imported",
     "export_recording",
     "find_format",
+    "formats",
     "import_episodes",
     "import_recording",
 ]

@@ -1,15 +1,18 @@
-"""Import and export of recordings, and detection of formats."""
+"""Import and export of recordings, the registry of formats, and their detection."""
 
 from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import entry_points
 from itertools import groupby
 from pathlib import Path
-from typing import Final, Literal
+from types import MappingProxyType
+from typing import Final
 
 from shapechanger.demos.episodes import (
     EpisodeHeader,
@@ -20,62 +23,40 @@ from shapechanger.demos.episodes import (
     read_episode,
 )
 from shapechanger.demos.episodes.files import is_episode
-from shapechanger.demos.exchange.csv_files import TABLE, is_csv, read_csv, write_csv
+from shapechanger.demos.exchange import csv_files, lerobot, mcap, minari, tub
+from shapechanger.demos.exchange.exporting import consecutive_parts, exchange_episode
 from shapechanger.demos.exchange.files import cannot_read, new_folder
-from shapechanger.demos.exchange.importing import ImportContext
-from shapechanger.demos.exchange.keys_2017 import LABELS, is_2017, read_2017, write_2017
-from shapechanger.demos.exchange.lerobot_export import INFO, write_lerobot
-from shapechanger.demos.exchange.lerobot_import import is_lerobot, read_lerobot
-from shapechanger.demos.exchange.mcap_export import write_mcap
-from shapechanger.demos.exchange.minari_export import (
-    METADATA,
-    is_minari,
-    require_dataset_name,
-    write_minari,
-)
-from shapechanger.demos.exchange.minari_import import read_minari
-from shapechanger.demos.exchange.recorded import (
-    ConsecutiveParts,
+from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
-    exchange_episode,
+    ExportContext,
+    Format,
+    ImportContext,
     kept_steps,
 )
-from shapechanger.demos.exchange.tub_export import MANIFEST, write_tub
-from shapechanger.demos.exchange.tub_files import is_tub
-from shapechanger.demos.exchange.tub_import import read_tub
 from shapechanger.errors import DemosError, OutputError, UnknownName
 from shapechanger.files import cannot_write
 
-Format = Literal["2017", "tub", "minari", "lerobot", "csv", "mcap"]
+_GROUP: Final = "shapechanger.formats"
+_OWN: Final = (tub.FORMAT, minari.FORMAT, lerobot.FORMAT, csv_files.FORMAT, mcap.FORMAT)
 
 
-_DETECT: Final[dict[Format, Callable[[Path], bool]]] = {
-    "2017": is_2017,
-    "tub": is_tub,
-    "minari": is_minari,
-    "lerobot": is_lerobot,
-    "csv": is_csv,
-}
-_READ: Final[dict[Format, Callable[[Path, ImportContext], Iterator[ExchangeEpisode]]]] = {
-    "2017": read_2017,
-    "tub": read_tub,
-    "minari": read_minari,
-    "lerobot": read_lerobot,
-    "csv": read_csv,
-}
-_STATES_CAMERA: Final = ("lerobot", "tub")
-_NEEDS_RATE: Final = ("2017", "tub", "minari")
-_CONSECUTIVE: Final = {"lerobot": "LeRobot", "minari": "Minari"}
-"""Formats in which each step follows the one before, and how to name them."""
-_MARKS_DROPPED: Final = ("minari", "csv", "mcap")
+@cache
+def formats() -> Mapping[str, Format]:
+    """Return all formats by name: our own, and those that entry points of other packages name.
 
-FORMATS: Final[tuple[Format, ...]] = (*_READ, "mcap")
-"""Names of the formats; mcap can only be exported."""
-
-_EXPECTED: Final = (
-    f"{LABELS} beside JPEGs (2017), {MANIFEST} or record_0.json (tub), data/{METADATA} (minari), "
-    f"{INFO} (lerobot), or {TABLE} (csv)"
-)
+    Raises:
+        DemosError: If an entry point does not name a format, or one with a name that is taken.
+    """
+    found = {form.name: form for form in _OWN}
+    for point in entry_points(group=_GROUP):
+        form = point.load()
+        if not isinstance(form, Format) or form.name in found:
+            raise DemosError(
+                f"The entry point {point.name} in {_GROUP} must name a Format of another name than "
+                f"{', '.join(found)}."
+            )
+        found[form.name] = form
+    return MappingProxyType(found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +71,7 @@ class Exported:
         notes: What differs from the recording, as sentences.
     """
 
-    format: Format
+    format: str
     episodes: int
     steps: int
     left_out: int
@@ -111,7 +92,7 @@ class Imported:
         notes: Further facts, as sentences.
     """
 
-    format: Format
+    format: str
     episodes: int
     steps: int
     pictures: int
@@ -134,7 +115,7 @@ def export_recording(
     Args:
         data: A recording, or one episode; it is not changed.
         out: The folder to create, atomically.
-        format: One of the `FORMATS`.
+        format: Name of one of the `formats`.
         dropped: Whether to export excluded steps too, marked as such; minari, csv and mcap only.
         task: What the robot does, in words, for policies that follow language; lerobot only.
         images: Whether to store pictures as they were recorded, in place of video; lerobot only.
@@ -146,46 +127,29 @@ def export_recording(
         OutputError: If `out` cannot be written.
         MissingExtra: If a package that the format needs is not installed.
     """
-    if format not in FORMATS:
-        raise UnknownName("format", format, FORMATS)
-    if dropped and format not in _MARKS_DROPPED:
+    form = formats().get(format)
+    if form is None or form.write is None:
+        raise UnknownName("format", format, [n for n, one in formats().items() if one.write])
+    if dropped and "dropped" not in form.options:
         raise DemosError(
-            f"The format {format} cannot mark excluded steps: export to minari, csv or mcap, "
+            f"The format {format} cannot mark excluded steps: export to {_with_option('dropped')}, "
             "or leave the excluded steps out."
         )
-    if (task or images) and format != "lerobot":
+    if (task or images) and not form.options >= {"task", "images"}:
         raise DemosError(f"Tasks and the choice of images are of lerobot, and not of {format}.")
-    if format == "minari":
-        require_dataset_name(out)
     read = [read_episode(path) for path in episodes_of(data)]
     if not any(episode.steps if dropped else episode.kept for episode in read):
         raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
-    parts = ConsecutiveParts(_CONSECUTIVE.get(format, format))
-    if format in _CONSECUTIVE:
-        episodes = [part for one in read for part in parts.of(one, dropped=dropped)]
+    notes: list[str] = []
+    if form.consecutive:
+        episodes, notes = consecutive_parts(read, form, dropped=dropped)
     else:
         episodes = [exchange_episode(episode, dropped=dropped) for episode in read]
+    rewarded = all(step.reward is not None for one in read for step in one.kept)
+    context = ExportContext(out=out, task=task, images=images, rewarded=rewarded)
     with new_folder(out, data) as folder:
         try:
-            match format:
-                case "2017":
-                    steps = write_2017(episodes, folder)
-                case "tub":
-                    steps = write_tub(episodes, folder)
-                case "minari":
-                    steps = write_minari(episodes, folder, out.name)
-                case "lerobot":
-                    steps = write_lerobot(
-                        episodes,
-                        folder,
-                        task=task,
-                        images=images,
-                        rewarded=all(s.reward is not None for one in read for s in one.kept),
-                    )
-                case "csv":
-                    steps = write_csv(episodes, folder)
-                case "mcap":
-                    steps = write_mcap(episodes, folder)
+            steps = form.write(episodes, folder, context)
         except OutputError:  # Already worded, and a subclass of OSError.
             raise
         except OSError as error:
@@ -193,8 +157,13 @@ def export_recording(
         except OverflowError as error:
             raise DemosError(f"A number in {data} is too large for {format}: {error}.") from error
     total = sum(len(episode.steps) for episode in read)
-    notes = parts.notes(timed=format == "minari")
     return Exported(format, len(episodes), steps, total - steps, tuple(notes))
+
+
+def _with_option(option: str) -> str:
+    """Return the names of the formats with an option, such as "minari, csv or mcap"."""
+    *most, last = (name for name, form in formats().items() if option in form.options)
+    return f"{', '.join(most)} or {last}" if most else last
 
 
 def import_episodes(
@@ -203,8 +172,8 @@ def import_episodes(
     """Read a recording in another format, without writing anything.
 
     Args:
-        path: A folder in one of the `FORMATS`.
-        format: One of them, or "auto" to detect it.
+        path: A folder in one of the `formats`.
+        format: Name of one of them, or "auto" to detect it.
         context: Options; it collects what is left out. None to refuse a source that is incomplete
             or contradicts itself.
 
@@ -240,9 +209,9 @@ def import_recording(
     """Import a recording: what is whole, with a report on the rest.
 
     Args:
-        path: A folder in one of the `FORMATS`; it is not changed.
+        path: A folder in one of the `formats`; it is not changed.
         out: The recording to create, atomically.
-        format: One of the formats, or "auto" to detect it.
+        format: Name of one of the formats, or "auto" to detect it.
         camera: Which camera to take, such as "front"; "" for the only one. LeRobot and tubs only.
         hz: Steps per second; None to read or measure them. Only for formats that do not state it.
         strict: Whether to refuse a source that is incomplete or contradicts itself.
@@ -269,30 +238,31 @@ def import_recording(
         if not episodes or (context.left_out and not steps):
             why = f": {'; '.join(lines)}" if (lines := context.left_out_lines()) else ""
             raise DemosError(f"There is nothing to import in {path}{why}.")
-    return Imported(
-        found,
-        episodes,
-        steps,
-        pictures,
-        tuple(context.left_out_lines()),
-        tuple(context.warnings),
-        tuple(context.notes),
-    )
+    findings = map(tuple, (context.left_out_lines(), context.warnings, context.notes))
+    return Imported(found, episodes, steps, pictures, *findings)
 
 
-def _read(
-    path: Path, format: str, context: ImportContext
-) -> tuple[Format, Iterator[ExchangeEpisode]]:
+def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterator[ExchangeEpisode]]:
     """Return the format of a folder, and an iterator over its episodes."""
-    found = _require_format(format, path)
-    if context.camera and found not in _STATES_CAMERA:
-        raise DemosError(f"A camera is chosen in lerobot and tub, and {path} is {found}.")
+    importable = [name for name, form in formats().items() if form.read]
+    if format == "auto":
+        format = find_format(path)
+    elif format not in importable:
+        raise UnknownName("format", format, ("auto", *importable))
+    else:
+        _require_folder(path)
+        if format not in _formats_of(path):
+            raise DemosError(f"{path} is not {format}: expected {_expected()}; or omit --format.")
+    form = formats()[format]
+    if context.camera and "camera" not in form.options:
+        raise DemosError(f"A camera is chosen in lerobot and tub, and {path} is {format}.")
     if context.hz is not None:
-        if found not in _NEEDS_RATE:
-            raise DemosError(f"The format {found} states the rate itself: leave out --hz.")
+        if "hz" not in form.options:
+            raise DemosError(f"The format {format} states the rate itself: leave out --hz.")
         if not 0.0 < context.hz < math.inf:
             raise DemosError(f"--hz must be positive, got {context.hz:g}.")
-    return found, _READ[found](path, context)
+    assert form.read is not None
+    return format, form.read(path, context)
 
 
 def _began(header: EpisodeHeader) -> datetime:
@@ -303,7 +273,7 @@ def _began(header: EpisodeHeader) -> datetime:
         return datetime.now(UTC)
 
 
-def find_format(path: Path) -> Format:
+def find_format(path: Path) -> str:
     """Detect the format of a folder.
 
     Raises:
@@ -326,24 +296,17 @@ def find_format(path: Path) -> Format:
     if found:
         return found[0]
     for child in children:
-        if child.is_dir() and (formats := _formats_of(child)):
+        if child.is_dir() and (below := _formats_of(child)):
             raise DemosError(
-                f"{path} has none of the formats, but {child} in it is {formats[0]}: import that."
+                f"{path} has none of the formats, but {child} in it is {below[0]}: import that."
             )
     what = "has nothing that can be imported" if children else "is empty"
-    raise DemosError(f"{path} {what}: expected {_EXPECTED}.")
+    raise DemosError(f"{path} {what}: expected {_expected()}.")
 
 
-def _require_format(name: str, path: Path) -> Format:
-    """Return the named format, or the detected one for "auto"."""
-    if name == "auto":
-        return find_format(path)
-    if name not in _READ:
-        raise UnknownName("format", name, ("auto", *_READ))
-    _require_folder(path)
-    if not _DETECT[name](path):
-        raise DemosError(f"{path} is not {name}: expected {_EXPECTED}; or omit --format.")
-    return name
+def _expected() -> str:
+    signs = [f"{form.sign} ({name})" for name, form in formats().items() if form.read]
+    return f"{', '.join(signs[:-1])}, or {signs[-1]}"
 
 
 def _require_folder(path: Path) -> None:
@@ -353,8 +316,8 @@ def _require_folder(path: Path) -> None:
         raise DemosError(f"{path} is a file: give the folder that it is in, {path.parent}.")
 
 
-def _formats_of(path: Path) -> list[Format]:
-    return [name for name, detect in _DETECT.items() if detect(path)]
+def _formats_of(path: Path) -> list[str]:
+    return [name for name, form in formats().items() if form.detect and form.detect(path)]
 
 
 def _write(

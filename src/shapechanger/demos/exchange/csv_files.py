@@ -3,6 +3,9 @@
 Numbers are written so that they are read back exactly; an empty cell is a missing value, `nan` a
 value that nothing measured. Texts are written as JSON with its quotes, so that no spreadsheet takes
 one for a formula, and line ends and other special characters survive.
+
+Without a header, `steps.csv` is a table of others: its columns are known by their names or aliases
+in `columns`, and its pictures lie beside it.
 """
 
 from __future__ import annotations
@@ -10,103 +13,62 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal, InvalidOperation
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
+from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
+from shapechanger.demos.exchange.columns import BY_FIELD, COLUMNS, COMMANDS, fields_of, name_in
+from shapechanger.demos.exchange.exporting import value_names
 from shapechanger.demos.exchange.files import (
-    Pictures,
+    UNIT_UNKNOWN,
     cannot_read,
+    inside,
     parse_json,
     parse_json_object,
+    read_bytes,
     read_table,
     read_text,
-    resolve_file,
 )
-from shapechanger.demos.exchange.importing import ImportContext
-from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep, value_names
+from shapechanger.demos.exchange.format import (
+    ExchangeEpisode,
+    ExchangeStep,
+    ExportContext,
+    Format,
+    ImportContext,
+)
+from shapechanger.demos.exchange.pictures import Pictures
+from shapechanger.demos.exchange.times import TimedDrive, choose_rates
+from shapechanger.demos.jpeg import picture_size
 from shapechanger.errors import DemosError, LayoutError, UnknownName
-from shapechanger.layout import Layout
+from shapechanger.layout import Feature, Layout
 
-_N = TypeVar("_N", int, float)
-
-TABLE: Final = "steps.csv"
+_TABLE: Final = "steps.csv"
 _HEADER: Final = "header.json"
 _FRAMES: Final = "frames"
-
-_VECTORS: Final = ("action", "applied", "wanted", "state")
-_TIMES: Final = ("captured_ns", "decided_ns", "wall_ns")
-_BEFORE_VECTORS: Final = ("step", "frame", "driver")
-_AFTER_VECTORS: Final = (*_TIMES, "reward", "terms", "terminated", "truncated", "stop_reason")
-_AFTER_STEP: Final = ("marks", "dropped")
-_JSON_NAMES: Final = {dict: "object", list: "array", str: "string"}
+_JSON_TYPES: Final[dict[str, tuple[type, str]]] = {
+    "terms": (dict, "object"),
+    "marks": (list, "array"),
+    "stop_reason": (str, "string"),
+    "dropped": (str, "string"),
+}
 _MAX_NAMED: Final = 5
 _MAX_QUOTED: Final = 60
+_MAX_TIME: Final = 4e9  # In the unit of the column, of which ns fit into 64 bits.
 
-
-def write_csv(episodes: Sequence[ExchangeEpisode], folder: Path) -> int:
-    """Write episodes into an existing folder; several episodes get a subfolder each.
-
-    Args:
-        episodes: The episodes.
-        folder: Where to write.
-
-    Returns:
-        Number of steps written.
-    """
-    steps = 0
-    for number, episode in enumerate(episodes, 1):
-        place = folder if len(episodes) == 1 else folder / f"episode-{number:04d}"
-        place.mkdir(exist_ok=True)
-        steps += _write(episode, place)
-    return steps
-
-
-def is_csv(folder: Path) -> bool:
-    """Return whether a folder has the format.
-
-    Raises:
-        DemosError: If the folder cannot be read.
-    """
-    return bool(_tables_of(folder))
-
-
-def read_csv(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
-    """Yield the episodes of a folder.
-
-    Raises:
-        DemosError: If a file is missing or damaged.
-    """
-    for place in _tables_of(folder):
-        path = place / _HEADER
-        if not path.is_file():
-            raise DemosError(
-                f"There is no {_HEADER} beside {place / TABLE}, which defines its columns: restore "
-                "it."
-            )
-        fields = parse_json_object(read_text(path), str(path))
-        try:
-            header = EpisodeHeader.from_json(fields)
-            columns = _columns(header)
-        except (DemosError, LayoutError) as error:
-            raise DemosError(f"{path}: {error}") from error
-        yield ExchangeEpisode(
-            header=header,
-            rows=_rows(place, header, columns, context),
-            name=str(place),
-            outcome=str(fields.get("outcome", "")),
-        )
+_N = TypeVar("_N", int, float)
 
 
 def _tables_of(folder: Path) -> list[Path]:
     """Return the folders with a `steps.csv`: the folder itself, or its subfolders."""
-    if (folder / TABLE).is_file():
+    if (folder / _TABLE).is_file():
         return [folder]
     try:
-        return sorted(path for path in folder.iterdir() if (path / TABLE).is_file())
+        return sorted(path for path in folder.iterdir() if (path / _TABLE).is_file())
     except OSError as error:
         raise cannot_read(folder, error) from error
 
@@ -115,12 +77,21 @@ def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
     """Return the names of the columns of each field of a step, in order."""
     of_action = value_names(Layout.from_json(header.action_layout))
     of_state = value_names(Layout.from_json(header.state_layout)) if header.state_layout else []
-    vectors = {
-        name: [f"{name}/{place}" for place in (of_state if name == "state" else of_action)]
-        for name in _VECTORS
+    values = {"action": of_action, "state": of_state}
+    return {
+        column.field: [column.names["csv"] + name for name in values.get(column.kind, [""])]
+        for column in COLUMNS
     }
-    before = {name: [name] for name in _BEFORE_VECTORS}
-    return before | vectors | {name: [name] for name in (*_AFTER_VECTORS, *_AFTER_STEP)}
+
+
+def _write_all(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
+    """Write episodes; several episodes get a subfolder each."""
+    steps = 0
+    for number, episode in enumerate(episodes, 1):
+        place = folder if len(episodes) == 1 else folder / f"episode-{number:04d}"
+        place.mkdir(exist_ok=True)
+        steps += _write(episode, place)
+    return steps
 
 
 def _write(episode: ExchangeEpisode, folder: Path) -> int:
@@ -130,21 +101,23 @@ def _write(episode: ExchangeEpisode, folder: Path) -> int:
     (folder / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
     (folder / _FRAMES).mkdir()
     frame, number = "", 0
-    with (folder / TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
+    with (folder / _TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(chain.from_iterable(columns.values()))
         for number, row in enumerate(episode.rows, 1):
             if row.jpeg is not None:
                 frame = f"{number - 1:06d}.jpg"
                 (folder / _FRAMES / frame).write_bytes(row.jpeg)
-            step = row.step
-            cells = [str(number - 1), frame, step.driver]
-            for name in _VECTORS:
-                values = getattr(step, name)
-                cells += [""] * len(columns[name]) if values is None else map(_cell, values)
-            cells += [_cell(getattr(step, name)) for name in _AFTER_VECTORS]
-            dropped = "" if row.dropped is None else json.dumps(row.dropped)
-            writer.writerow([*cells, _cell(list(row.marks)), dropped])
+            cells = [str(number - 1), frame, row.step.driver]
+            for field, names in list(columns.items())[3:]:
+                value = getattr(row if field in {"marks", "dropped"} else row.step, field)
+                if BY_FIELD[field].kind in {"action", "state"}:
+                    cells += [""] * len(names) if value is None else map(_cell, value)
+                elif field == "dropped" and value is not None:
+                    cells.append(json.dumps(value))
+                else:
+                    cells.append(_cell(value))
+            writer.writerow(cells)
     return number
 
 
@@ -155,6 +128,8 @@ def _cell(value: Any) -> str:
             return str(value).lower()
         case int() | float():
             return repr(value)
+        case tuple():
+            value = list(cast("tuple[str, ...]", value))
         case dict():  # JSON has neither NaN nor infinity.
             numbers = cast("dict[str, float]", value)
             value = {n: v if math.isfinite(v) else repr(v) for n, v in numbers.items()}
@@ -163,45 +138,180 @@ def _cell(value: Any) -> str:
     return json.dumps(value) if value else ""
 
 
-def _rows(
-    folder: Path, header: EpisodeHeader, columns: dict[str, list[str]], context: ImportContext
-) -> Iterator[ExchangeStep]:
-    path = folder / TABLE
-    pictures = Pictures(header.image_size)
-    names = list(chain.from_iterable(columns.values()))
-    separator, table = read_table(path, len(names))
-    _require_columns(table[0][1] if table else [], names, str(path))
-    shown, before = "", -1
-    frames: set[str] = set()
-    for line, cells in table[1:]:
-        where = f"{path}, line {line}"
-        try:
-            if len(cells) != len(names):
-                hint = " (decimal commas need another separator)" if separator == "," else ""
-                raise DemosError(f"{where} has {len(cells)} cells instead of {len(names)}{hint}.")
-            row = _Row(dict(zip(names, cells, strict=True)), where, separator)
-            number = row.number("step", int)
-            if number is None:
-                raise DemosError(f"{where}: step is empty.")
-            if number <= before:
-                raise DemosError(f"{where}: step {number} comes after step {before}.")
-            step, frame, jpeg = row.step(columns), row.cells["frame"], None
-            if frame != shown:
-                if header.image_size is None:
-                    raise DemosError(f"{where} has a picture, but {_HEADER} has no image_size.")
-                if frame in frames:
-                    raise DemosError(
-                        f"{where} returns to the picture {frame!r} of an earlier step."
-                    )
-                jpeg = pictures.read(resolve_file(folder / _FRAMES, frame, where))
-            marks = tuple(map(str, row.json("marks", list) or ()))
-            dropped = row.json("dropped", str)
-        except DemosError as error:
-            context.leave_out("line", f"of {path}", str(error).removeprefix(f"{path}, ")[:-1])
+def _read_all(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+    """Yield the episodes of a folder."""
+    for place in _tables_of(folder):
+        path = place / _HEADER
+        if not path.is_file():
+            yield from _read_others(place, context)
             continue
-        before, shown = number, frame
-        frames.add(frame)
-        yield ExchangeStep(step=step, jpeg=jpeg, marks=marks, dropped=dropped)
+        if context.hz is not None:
+            raise DemosError("The format csv states the rate itself: leave out --hz.")
+        fields = parse_json_object(read_text(path), str(path))
+        try:
+            header = EpisodeHeader.from_json(fields)
+            columns = _columns(header)
+        except (DemosError, LayoutError) as error:
+            raise DemosError(f"{path}: {error}") from error
+        table = _Table(place, columns, list(chain.from_iterable(columns.values())))
+        yield ExchangeEpisode(
+            header=header,
+            rows=_with_pictures(table.lines(context), place / _FRAMES, header, context),
+            name=str(place),
+            outcome=str(fields.get("outcome", "")),
+        )
+
+
+def _read_others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+    """Yield the episode of a table without a header, unless it is empty."""
+    path = folder / _TABLE
+    _, lines = read_table(path)
+    named = [_known_name(name) for name in (lines[0][1] if lines else [])]
+    found = [name for name, _ in named]
+    prefix = {field: name_in("csv", field) for field in fields_of("action", "state")}
+    values = {
+        field: [name for name in found if name.startswith(start)] for field, start in prefix.items()
+    }
+    if not values["action"]:
+        raise DemosError(
+            f"There is no {_HEADER} beside {path}, and no column of an action: restore it, or name "
+            f"columns action/NAME, or {', '.join(COMMANDS)}."
+        )
+    columns = {c.field: values.get(c.field, [c.names["csv"]]) for c in COLUMNS}
+    known = set(chain.from_iterable(columns.values()))
+    if others := [name for name in found if name not in known]:
+        context.note(f"Columns that are not imported: {', '.join(others)}.")
+    if len(set(found)) < len(found):
+        raise DemosError(f"{path} has two columns of one name: rename one of them.")
+    parsed = list(_Table(folder, columns, found, dict(named)).lines(context))
+    if not parsed:
+        return
+    times = [line.step.captured_ns for line in parsed if line.step.captured_ns is not None]
+    timed = len(times) == len(parsed)
+    drive = TimedDrive(times if timed else [], range(len(parsed)), "line 2")
+    (hz,), believed = choose_rates([drive], context)
+    if not (timed and believed):
+        parsed = [replace(line, step=replace(line.step, captured_ns=None)) for line in parsed]
+    size = None
+    if shown := next((line.frame for line in parsed if line.frame), ""):
+        size = picture_size(read_bytes(inside(folder, shown, path), MAX_PICTURE_BYTES), shown)
+
+    def layout(field: str) -> str:
+        names = [name.removeprefix(prefix[field]) for name in values[field]]
+        features = (COMMANDS.get(name, Feature(name, UNIT_UNKNOWN)) for name in names)
+        return Layout(tuple(features)).to_json() if names else ""
+
+    header = EpisodeHeader(
+        action_layout=layout("action"),
+        state_layout=layout("state"),
+        image_size=size,
+        control_hz=hz,
+        clock="real" if timed and believed else "none",
+        source="csv",
+    )
+    rows = _with_pictures(parsed, folder, header, context)
+    yield ExchangeEpisode(header=header, rows=rows, name=str(folder))
+
+
+def _known_name(name: str) -> tuple[str, float]:
+    """Return the name of a column of others as in `steps.csv`, and its factor to that unit."""
+    plain = name.strip().lower()
+    if plain in COMMANDS:
+        return name_in("csv", "action") + COMMANDS[plain].name, 1.0
+    for column in COLUMNS:
+        if plain in column.aliases:
+            return column.names["csv"], column.aliases[plain]
+    return name.strip(), 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A line of a table, and how to name it in errors."""
+
+    step: Step
+    frame: str
+    where: str
+    marks: tuple[str, ...]
+    dropped: str | None
+
+
+def _with_pictures(
+    lines: Iterable[_Line], frames: Path, header: EpisodeHeader, context: ImportContext
+) -> Iterator[ExchangeStep]:
+    """Yield the steps of lines, each with its picture; the others are left out."""
+    pictures = Pictures(header.image_size)
+    shown, known = "", set[str]()
+    for line in lines:
+        jpeg = None
+        try:
+            if line.frame != shown:
+                if header.image_size is None:
+                    raise DemosError(
+                        f"{line.where} has a picture, but {_HEADER} has no image_size."
+                    )
+                if line.frame in known:
+                    raise DemosError(
+                        f"{line.where} returns to the picture {line.frame!r} of an earlier step."
+                    )
+                path = inside(frames, line.frame, line.where)
+                jpeg = read_bytes(path, MAX_PICTURE_BYTES)
+                pictures.check(jpeg, str(path))
+        except DemosError as error:
+            _leave_out(context, error, line.where)
+            continue
+        shown = line.frame
+        known.add(shown)
+        yield ExchangeStep(step=line.step, jpeg=jpeg, marks=line.marks, dropped=line.dropped)
+
+
+def _leave_out(context: ImportContext, error: DemosError, where: str) -> None:
+    table = where.rpartition(", ")[0]
+    context.leave_out("line", f"of {table}", str(error).removeprefix(f"{table}, ")[:-1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """A `steps.csv`.
+
+    Attributes:
+        folder: Its folder.
+        columns: Names of the columns of each field of a step.
+        names: Names of the columns in the table, in order.
+        factors: Factors of the columns of others; None for a table of Shapechanger.
+    """
+
+    folder: Path
+    columns: dict[str, list[str]]
+    names: Sequence[str]
+    factors: Mapping[str, float] | None = None
+
+    def lines(self, context: ImportContext) -> Iterator[_Line]:
+        """Yield the lines that can be read; the others are left out."""
+        path = self.folder / _TABLE
+        separator, table = read_table(path, len(self.names))
+        if self.factors is None:
+            _require_columns(table[0][1] if table else [], self.names, str(path))
+        before = -1
+        for line, cells in table[1:]:
+            where = f"{path}, line {line}"
+            try:
+                if len(cells) != len(self.names):
+                    hint = " (decimal commas need another separator)" if separator == "," else ""
+                    raise DemosError(
+                        f"{where} has {len(cells)} cells instead of {len(self.names)}{hint}."
+                    )
+                row = _Row(dict(zip(self.names, cells, strict=True)), where, separator)
+                number = before + 1 if self.factors else row.number("step", int)
+                if number is None:
+                    raise DemosError(f"{where}: step is empty.")
+                if number <= before:
+                    raise DemosError(f"{where}: step {number} comes after step {before}.")
+                found = row.line(self.columns, self.factors or {})
+            except DemosError as error:
+                _leave_out(context, error, where)
+                continue
+            before = number
+            yield found
 
 
 def _require_columns(found: Sequence[str], names: Sequence[str], where: str) -> None:
@@ -218,63 +328,85 @@ def _require_columns(found: Sequence[str], names: Sequence[str], where: str) -> 
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """One line of `steps.csv`.
+    """The cells of a line by the names of their columns.
 
-    Attributes:
-        cells: The cells by the name of their column.
-        where: How to name the line in errors.
-        separator: What separates the cells; other than commas, numbers may have decimal commas.
+    With another separator than commas, numbers may have decimal commas.
     """
 
     cells: dict[str, str]
     where: str
     separator: str
 
-    def step(self, columns: dict[str, list[str]]) -> Step:
-        """Return the step; `columns` are those of each of its fields."""
-        driver = self.cells["driver"]
+    def line(self, columns: dict[str, list[str]], factors: Mapping[str, float]) -> _Line:
+        """Return the parsed line; a table of others, which has factors, may lack columns."""
+        driver = self.cells.get("driver") or ("person" if factors else "")
         if driver not in DRIVERS:
             raise DemosError(f"{self.where}: {UnknownName('driver', driver, DRIVERS)}")
-        vectors = {name: self._vector(name, columns[name]) for name in _VECTORS}
-        if vectors["action"] is None:
+        fields: dict[str, Any] = {}
+        for column in COLUMNS:
+            name = column.names["csv"]
+            match column.kind:
+                case "action":
+                    fields[column.field] = self._vector(column.field, columns[column.field]) or None
+                case "state":
+                    fields[column.field] = self._vector(column.field, columns[column.field])
+                case "time":
+                    fields[column.field] = self._time(name, factors)
+                case "number":
+                    fields[column.field] = self.number(name, float)
+                case "flag":
+                    fields[column.field] = self._flag(name, "false" if factors else "")
+                case "json" | "text" if name in _JSON_TYPES:
+                    fields[column.field] = self._json(name)
+                case _:
+                    pass
+        if fields["action"] is None:
             raise DemosError(f"{self.where}: the action is empty.")
-        if vectors["state"] is None:
-            vectors["state"] = (math.nan,) * len(columns["state"])
-        terms = cast("dict[str, Any]", self.json("terms", dict) or {})
-        fields: dict[str, Any] = {
-            **vectors,
-            **{name: self.number(name, int) for name in _TIMES},
-            "reward": self.number("reward", float),
-            "terms": {name: self._parsed(str(v), float, name) for name, v in terms.items()},
-            "terminated": self._flag("terminated"),
-            "truncated": self._flag("truncated"),
-            "stop_reason": self.json("stop_reason", str) or "",
-        }
-        return Step(driver=driver, **fields)
+        if fields["state"] is None:
+            fields["state"] = (math.nan,) * len(columns["state"])
+        fields["stop_reason"] = fields["stop_reason"] or ""
+        terms = cast("dict[str, Any]", fields["terms"] or {})
+        fields["terms"] = {n: self._parsed(str(v), float, "terms") for n, v in terms.items()}
+        marks = tuple(map(str, fields.pop("marks") or ()))
+        dropped = fields.pop("dropped")
+        step = Step(driver=driver, **fields)
+        return _Line(step, self.cells.get("frame", ""), self.where, marks, dropped)
 
     def number(self, name: str, kind: type[_N]) -> _N | None:
         """Return the number in a column; None for an empty cell."""
-        cell = self.cells[name]
+        cell = self.cells.get(name, "")
         return self._parsed(cell, kind, name) if cell else None
 
-    def json(self, name: str, kind: type) -> Any:
-        """Return the JSON of a type in a column; None for an empty cell."""
-        cell = self.cells[name]
-        if not cell:
+    def _time(self, name: str, factors: Mapping[str, float]) -> int | None:
+        """Return a time, ns; those of others may have another unit, and digits after the point."""
+        cell = self.cells.get(name, "")
+        if name not in factors or not cell:
+            return self.number(name, int)
+        try:
+            value = Decimal(cell if self.separator == "," else cell.replace(",", "."))
+            if not value.is_finite() or abs(value) > _MAX_TIME:
+                raise DemosError(f"{self.where}: {name} must be a time, got {cell!r}.")
+        except InvalidOperation as error:
+            raise DemosError(f"{self.where}: {name} must be a number, got {cell!r}.") from error
+        return int(value * int(factors[name]))
+
+    def _json(self, name: str) -> Any:
+        """Return the JSON in a column; None for an empty cell."""
+        if not (cell := self.cells.get(name, "")):
             return None
+        kind, word = _JSON_TYPES[name]
         value = parse_json(cell, f"{self.where}: {name}: {cell[:_MAX_QUOTED]!r}")
         if not isinstance(value, kind):
             raise DemosError(
-                f"{self.where}: {name} must be a JSON {_JSON_NAMES[kind]}, got "
-                f"{cell[:_MAX_QUOTED]!r}."
+                f"{self.where}: {name} must be a JSON {word}, got {cell[:_MAX_QUOTED]!r}."
             )
         return value
 
-    def _vector(self, name: str, columns: Sequence[str]) -> tuple[float, ...] | None:
+    def _vector(self, field: str, columns: Sequence[str]) -> tuple[float, ...] | None:
         values = [self.number(column, float) for column in columns]
         known = tuple(value for value in values if value is not None)
         if known and len(known) < len(values):
-            raise DemosError(f"{self.where}: some values of {name} are empty, but not all.")
+            raise DemosError(f"{self.where}: some values of {field} are empty, but not all.")
         return known if known or not columns else None
 
     def _parsed(self, text: str, kind: type[_N], name: str) -> _N:
@@ -284,8 +416,19 @@ class _Row:
             what = "an integer" if kind is int else "a number"
             raise DemosError(f"{self.where}: {name} must be {what}, got {text!r}.") from error
 
-    def _flag(self, name: str) -> bool:
-        word = self.cells[name].strip().lower()  # Spreadsheets write TRUE.
+    def _flag(self, name: str, default: str) -> bool:
+        word = (self.cells.get(name) or default).strip().lower()  # Spreadsheets write TRUE.
         if word not in {"true", "false", "1", "0"}:
             raise DemosError(f"{self.where}: expected true or false, got {self.cells[name]!r}.")
         return word in {"true", "1"}
+
+
+FORMAT: Final = Format(
+    name="csv",
+    title="CSV",
+    sign=_TABLE,
+    detect=lambda folder: bool(_tables_of(folder)),
+    read=_read_all,
+    write=_write_all,
+    options=frozenset({"dropped", "hz"}),
+)

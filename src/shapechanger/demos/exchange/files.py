@@ -1,4 +1,9 @@
-"""File access for imports and exports: sources are never changed, targets appear atomically."""
+"""File access for imports and exports: sources are never changed, targets appear atomically.
+
+Files of strangers are read here, within one budget: `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES`
+and `MAX_PIXELS` of a picture, `MAX_UNPACKED` of anything compressed, regular files inside the
+folder only.
+"""
 
 from __future__ import annotations
 
@@ -16,25 +21,34 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, cast
 
-from shapechanger.demos.episodes.files import (
-    MAX_PICTURE_BYTES,
-    MAX_TEXT_BYTES,
-    read_file,
-)
-from shapechanger.demos.jpeg import decode_picture, picture_size
+from shapechanger.demos.episodes.files import MAX_TEXT_BYTES, read_file
 from shapechanger.errors import DemosError, MissingExtra, OutputError
 from shapechanger.files import cannot_write
+
+MAX_UNPACKED: Final = 64 << 20
+"""Bytes in memory at once, and allowed for any file. A picture of `MAX_PIXELS` has 48 MiB."""
+
+MAX_PACKED: Final = 64
+"""Largest share of unpacked bytes to those of a file."""
+
+MAX_VALUES: Final = 1 << 17
+"""Largest number of values of a feature."""
+
+MAX_FEATURES: Final = 512
+"""Largest number of features that values become one by one; more become one array feature."""
+
+UNIT_UNKNOWN: Final = "?"
 
 _SEPARATORS: Final = (",", "\t", ";")
 _SEPARATOR_LINE: Final = re.compile(r"sep=([,;\t])")  # As Excel writes it.
 
 
+class UnpacksToTooMuch(DemosError):
+    """A file claims far more than it holds: nothing of it is imported."""
+
+
 def library(name: str, extra: str = "data") -> Any:
     """Import a module of a package that an extra installs.
-
-    Args:
-        name: Dotted name of the module.
-        extra: Name of the extra.
 
     Raises:
         MissingExtra: If it is not installed.
@@ -88,38 +102,46 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
         raise
 
 
-def name_problem(name: str) -> str:
-    """Return why a data set must not name a file like this, as part of a sentence; "" if it may."""
-    if not name:
-        return "is empty"
-    if name in {".", ".."} or any(character in name for character in "/\\\0"):
-        return "leaves the folder"
-    return ""
+def is_inside(folder: Path, name: str) -> bool:
+    """Return whether a name, with all links, leads to a place below a folder."""
+    try:
+        return (folder / name).resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError):  # A NUL, or too long.
+        return False
 
 
-def resolve_file(folder: Path, name: str, named_by: str) -> Path:
-    """Return the path of a file that a data set names.
+def inside(folder: Path, name: str, named_by: object) -> Path:
+    """Return the path of a regular file below a folder that a data set names.
 
     Args:
-        folder: The folder in which the file must lie.
+        folder: The folder.
         name: Its name according to the data set.
-        named_by: Where the name stands, such as "labels.csv, line 3".
+        named_by: Where the name stands, such as "steps.csv, line 3".
 
     Raises:
         DemosError: If there is no such file, or the name leads out of the folder.
     """
     path = folder / name
-    problem = name_problem(name)
-    if not problem and not path.resolve().is_relative_to(folder.resolve()):
-        problem = "is a link that leaves the folder"
-    if problem:
+    if not name or not is_inside(folder, name):
+        problem = "leaves the folder" if name else "is empty"
         raise DemosError(f"{named_by}: the name {name!r} {problem}.")
     if not path.is_file():
         raise DemosError(
-            f"{named_by} names {name!r}, which is not in {folder}: restore it, or remove the lines "
-            "that name it."
+            f"There is no {path}: {named_by} names {name!r}, which is not in {folder}. Restore it."
         )
     return path
+
+
+def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
+    """Return the content of a regular file.
+
+    Raises:
+        DemosError: If it cannot be read, or is too large.
+    """
+    try:
+        return read_file(path, most)
+    except OSError as error:
+        raise cannot_read(path, error) from error
 
 
 def read_text(path: Path) -> str:
@@ -128,25 +150,23 @@ def read_text(path: Path) -> str:
     Raises:
         DemosError: If the file cannot be read, is too large, or is not UTF-8.
     """
+    data = read_bytes(path)
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise DemosError(f"{path} is not text in UTF-8 but in UTF-16: save it as UTF-8.")
     try:
-        data = read_file(path, MAX_TEXT_BYTES)
-        if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            raise DemosError(f"{path} is not text in UTF-8 but in UTF-16: save it as UTF-8.")
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DemosError(
             f"{path} is not text in UTF-8 (byte {error.start}): save it as UTF-8."
         ) from error
-    except OSError as error:
-        raise cannot_read(path, error) from error
 
 
-def read_table(path: Path, columns: int) -> tuple[str, list[tuple[int, list[str]]]]:
+def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[str]]]]:
     """Read a CSV file, also as spreadsheets write it: with semicolons or tabs, and blank lines.
 
     Args:
         path: The file.
-        columns: Number of its columns.
+        columns: Least number of its columns.
 
     Returns:
         What separates the cells, and the number and the cells of each line that is not blank.
@@ -159,7 +179,7 @@ def read_table(path: Path, columns: int) -> tuple[str, list[tuple[int, list[str]
     stated = _SEPARATOR_LINE.fullmatch(first.strip())
     separator = stated[1] if stated else _SEPARATORS[0]
     if not stated:
-        found = [mark for mark in _SEPARATORS if first.count(mark) >= columns - 1]
+        found = [mark for mark in _SEPARATORS if first.count(mark) >= max(1, columns - 1)]
         # Decimal commas stand between semicolons, so the last one that fits separates.
         separator = found[-1] if found else _SEPARATORS[0]
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
@@ -176,12 +196,8 @@ def read_table(path: Path, columns: int) -> tuple[str, list[tuple[int, list[str]
 def parse_json(text: str, where: str) -> Any:
     """Parse JSON.
 
-    Args:
-        text: The JSON.
-        where: How to name it in errors.
-
     Raises:
-        DemosError: If it is not valid.
+        DemosError: If it is not valid; `where` names it.
     """
     try:
         return json.loads(text)
@@ -192,12 +208,8 @@ def parse_json(text: str, where: str) -> Any:
 def parse_json_object(text: str, where: str) -> dict[str, Any]:
     """Parse a JSON object.
 
-    Args:
-        text: The JSON.
-        where: How to name it in errors.
-
     Raises:
-        DemosError: If it is not valid, or not an object.
+        DemosError: If it is not valid, or not an object; `where` names it.
     """
     value = parse_json(text, where)
     if not isinstance(value, dict):
@@ -205,60 +217,28 @@ def parse_json_object(text: str, where: str) -> dict[str, Any]:
     return cast("dict[str, Any]", value)
 
 
+def own_headers(section: object, where: object) -> list[dict[str, Any]]:
+    """Return the headers of the episodes of a data set that Shapechanger exported.
+
+    Args:
+        section: Shapechanger's part of the metadata.
+        where: The file that it is in.
+
+    Raises:
+        DemosError: If another version wrote them.
+    """
+    fields = cast("dict[str, Any]", section) if isinstance(section, dict) else {}
+    headers = fields.get("episodes")
+    if fields.get("format") != 1 or not isinstance(headers, list):
+        raise DemosError(
+            f"{where} was written by another version of Shapechanger: this one reads format 1 only."
+        )
+    plain = cast("list[Any]", headers)
+    if not all(isinstance(header, dict) for header in plain):
+        raise DemosError(f"{where} has a header that is not a JSON object.")
+    return plain
+
+
 def cannot_read(path: Path, error: OSError) -> DemosError:
-    """Return the error to raise when a file cannot be read.
-
-    Args:
-        path: The file.
-        error: What the system said.
-    """
+    """Return the error to raise when a file cannot be read."""
     return DemosError(f"{path} cannot be read: {error.strerror or error}.")
-
-
-class Pictures:
-    """Reader of JPEGs that must be intact and of one size.
-
-    Args:
-        size: Width and height in pixels; None to take those of the first picture.
-
-    Attributes:
-        size: Width and height in pixels; None before the first picture.
-    """
-
-    def __init__(self, size: tuple[int, int] | None = None) -> None:
-        self.size = size
-        self._first = ""
-
-    def read(self, path: Path) -> bytes:
-        """Return the bytes of a picture.
-
-        Raises:
-            DemosError: If it cannot be read or decoded, is too large, or has another size.
-        """
-        try:
-            jpeg = read_file(path, MAX_PICTURE_BYTES)
-        except OSError as error:
-            raise cannot_read(path, error) from error
-        self.check(jpeg, str(path))
-        return jpeg
-
-    def check(self, jpeg: bytes, name: str) -> None:
-        """Refuse a picture that is damaged or of another size.
-
-        Args:
-            jpeg: Its bytes.
-            name: How to name the picture in errors.
-
-        Raises:
-            DemosError: If it is damaged or of another size.
-        """
-        size = picture_size(jpeg, name)
-        if self.size is None:
-            self.size, self._first = size, name
-        if size != self.size:
-            wanted = f"like {self._first}" if self._first else "like the others"
-            raise DemosError(
-                f"The picture {name} has {size[0]} x {size[1]} pixels, and not "
-                f"{self.size[0]} x {self.size[1]} {wanted}: a data set has one size."
-            )
-        decode_picture(jpeg, name)

@@ -33,13 +33,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import Driver, EpisodeHeader
+from shapechanger.demos.exchange.exporting import require_alike, value_names
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.recorded import (
-    ExchangeEpisode,
-    ExchangeStep,
-    require_alike,
-    value_names,
-)
+from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep
 from shapechanger.demos.exchange.video import VideoWriter
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError

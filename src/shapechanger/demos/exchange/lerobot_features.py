@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.demos.exchange import lerobot_export as names
-from shapechanger.demos.exchange.importing import ImportContext
+from shapechanger.demos.exchange.format import ImportContext
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Feature, Layout

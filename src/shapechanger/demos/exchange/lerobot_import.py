@@ -24,12 +24,11 @@ from shapechanger.demos.episodes import DRIVERS, Driver, EpisodeHeader, Step
 from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
 from shapechanger.demos.exchange import lerobot_export as names
 from shapechanger.demos.exchange.files import (
-    Pictures,
     library,
     parse_json_object,
     read_text,
 )
-from shapechanger.demos.exchange.importing import ImportContext
+from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ImportContext
 from shapechanger.demos.exchange.lerobot_features import (
     DatasetFeature,
     ImportedFeatures,
@@ -45,7 +44,7 @@ from shapechanger.demos.exchange.lerobot_tables import (
     rows_at,
     table_rows,
 )
-from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep
+from shapechanger.demos.exchange.pictures import Pictures
 from shapechanger.demos.exchange.video import read_pictures
 from shapechanger.demos.jpeg import encode_picture
 from shapechanger.errors import DemosError, UnknownName

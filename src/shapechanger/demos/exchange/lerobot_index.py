@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.exchange import lerobot_export as names
-from shapechanger.demos.exchange.importing import ImportContext, few
+from shapechanger.demos.exchange.format import ImportContext, few
 from shapechanger.demos.exchange.lerobot_tables import (
     UnpacksToTooMuch,
     fill_place,

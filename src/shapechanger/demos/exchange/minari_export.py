@@ -1,24 +1,4 @@
-"""Export of recordings as Minari datasets.
-
-An observation is the picture, the state, or a dictionary of both. A picture is stored as the JPEG
-that was recorded, which Minari decodes on reading; it is not encoded again. Pictures below 32
-pixels, which Minari does not store as JPEG, are stored as pixels, with the JPEG beside them. Minari
-needs one observation more than there are steps, so the last one is repeated.
-
-The infos of a step, by name:
-
-- `applied`, `wanted`: as the action; `has_applied`, `has_wanted`: whether they are known.
-- `driver`, `stop_reason`: text.
-- `captured_ns`, `decided_ns`, `wall_ns`: times; `UNKNOWN_NS` if unknown.
-- `frame`: index of the picture in the episode, from 0; the same for steps that share one.
-- `rewarded`: whether the reward is known; it is NaN if not.
-- `more`: JSON of everything else: `terms`, `marks`, `dropped`.
-
-The headers of the episodes, the layouts and the rate are in `metadata.json`.
-
-Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
-encodes each picture again at JPEG quality 75, and needs the whole episode in memory.
-"""
+"""Export of recordings as Minari datasets; `minari` describes what they hold."""
 
 from __future__ import annotations
 
@@ -26,7 +6,7 @@ import copy
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import chain, islice
@@ -38,8 +18,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from shapechanger.demos.exchange.files import Pictures, library
-from shapechanger.demos.exchange.recorded import ExchangeEpisode, ExchangeStep, require_alike
+from shapechanger.demos.exchange.columns import fields_of, name_in
+from shapechanger.demos.exchange.exporting import require_alike
+from shapechanger.demos.exchange.files import library
+from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext
+from shapechanger.demos.exchange.minari_spaces import stored_as_jpeg
+from shapechanger.demos.exchange.pictures import Pictures
 from shapechanger.demos.jpeg import decode_picture, is_grey, picture_size
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
@@ -48,70 +32,24 @@ DATA: Final = "data"
 METADATA: Final = "metadata.json"
 MAIN: Final = "main_data.hdf5"
 
-IMAGE: Final = "image"
-STATE: Final = "state"
-JPEG: Final = "jpeg"
-
-HEADERS: Final = "shapechanger"
-"""Key of Shapechanger's own section in `metadata.json`."""
-
-HEADERS_FORMAT: Final = 1
-"""Version of that section."""
-
-TIMES: Final = ("captured_ns", "decided_ns", "wall_ns")
+OURS: Final = "shapechanger"
+"""Key of our own section in `metadata.json`."""
 
 UNKNOWN_NS: Final = -(2**63)
 """Placeholder for an unknown time, ns."""
 
-_MIN_JPEG_PIXELS: Final = 32
-_BRIGHTEST: Final = 255
+FRAME: Final = "infos/frame"
+JPEG: Final = "infos/jpeg"
+CUT_OFF: Final = "infos/cut_off"
+OBSERVATIONS: Final = "observations"
+
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 256  # Steps in memory at once.
-_OBSERVATIONS: Final = "observations"
+_FLAGS: Final = fields_of("flag")
+_TIMES: Final = fields_of("time")
 
 
-def data_folder(folder: Path) -> Path | None:
-    """Return the folder with the files of a dataset: `data`, or `folder` itself; None for none."""
-    for place in (folder / DATA, folder):
-        if (place / METADATA).is_file():
-            return place
-    return None
-
-
-def is_minari(folder: Path) -> bool:
-    """Return whether a folder is a Minari dataset."""
-    return data_folder(folder) is not None
-
-
-def stored_as_jpeg(space: spaces.Space[Any]) -> bool:
-    """Return whether Minari stores a space as JPEG: `is_image_space` of its minari_storage.py."""
-    if not isinstance(space, spaces.Box):
-        return False
-    box = cast("Any", space)
-    return (
-        len(box.shape) in {2, 3}
-        and min(box.shape[:2]) >= _MIN_JPEG_PIXELS
-        and box.dtype == np.uint8
-        and bool(np.all(box.low == 0))
-        and bool(np.all(box.high == _BRIGHTEST))
-    )
-
-
-def require_dataset_name(folder: Path) -> None:
-    """Refuse a folder that Minari could not load by its name.
-
-    Raises:
-        DemosError: If the name does not end in a version.
-    """
-    if not _NAME.fullmatch(folder.name):
-        better = re.sub(r"[^\w-]+", "-", folder.name).strip("-") or "drive"
-        raise DemosError(
-            f"Minari loads a dataset by its name, which must end in a version: call it "
-            f"{folder.with_name(f'{better}-v0')}, not {folder}."
-        )
-
-
-def write_minari(episodes: Sequence[ExchangeEpisode], folder: Path, name: str) -> int:
+def write_minari(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
     """Write episodes into an existing folder, as one dataset.
 
     Episodes without steps are left out, because Minari does not support them. Neither Minari's own
@@ -120,58 +58,59 @@ def write_minari(episodes: Sequence[ExchangeEpisode], folder: Path, name: str) -
     Args:
         episodes: The episodes, with one layout, one rate and one picture size.
         folder: Where to write.
-        name: Name of the dataset, with its version.
+        context: Its `out` is the name of the dataset, which ends in a version.
 
     Returns:
         Number of steps written.
 
     Raises:
-        DemosError: If the episodes differ, a step lacks a picture that others have, or there are
-            neither pictures nor states.
+        DemosError: If the name has no version, the episodes differ, a step lacks a picture that
+            others have, or there are neither pictures nor states.
         MissingExtra: If Minari or h5py is not installed.
     """
+    name = context.out.name
+    if not _NAME.fullmatch(name):
+        better = re.sub(r"[^\w-]+", "-", name).strip("-") or "drive"
+        raise DemosError(
+            f"Minari loads a dataset by its name, which must end in a version: call it "
+            f"{context.out.with_name(f'{better}-v0')}, not {context.out}."
+        )
     h5py = library("h5py")
     storages = library("minari.dataset.minari_storage")
     require_alike(episodes, "a Minari dataset")
-    begun = [(episode, rows) for episode in episodes if (rows := _begun(episode.rows)) is not None]
+    begun = [
+        (one, first, rows) for one in episodes if (first := next(rows := iter(one.rows), None))
+    ]
     if not begun:
         raise DemosError("There are no steps to export.")
-    first, (row, _) = begun[0]
-    observed = _observed(first, row)
-    actions = Layout.from_json(first.header.action_layout)
+    observed = _observed(*begun[0][:2])
     storage = storages.MinariStorage.new(
         # Minari cannot measure the size of a relative folder.
         (folder / DATA).absolute(),
         observation_space=observed.space,
-        action_space=_box(actions),
+        action_space=_box(Layout.from_json(begun[0][0].header.action_layout)),
         data_format="hdf5",
     )
     total, drivers = 0, set[str]()
     with h5py.File(folder / DATA / MAIN, "a", track_order=True) as file:
-        for number, (episode, (row, rest)) in enumerate(begun):
+        for number, (episode, first, rest) in enumerate(begun):
             group = file.create_group(f"episode_{number}")
-            columns = _EpisodeColumns(group, episode.name, observed, actions.size)
-            rows = chain((row,), rest)
+            columns = _EpisodeColumns(group, episode, observed)
+            rows = chain((first,), rest)
             while chunk := list(islice(rows, _CHUNK)):
                 columns.add(chunk)
                 drivers.update(row.step.driver for row in chunk)
+            columns.close()
             group.attrs["id"] = number
-            group.attrs["total_steps"] = columns.close()
+            group.attrs["total_steps"] = columns.steps
             if episode.header.seed is not None:
                 group.attrs["seed"] = episode.header.seed
             total += columns.steps
     storage.update_metadata(
-        _metadata(name, [episode for episode, _ in begun], drivers)
+        _metadata(name, [episode for episode, *_ in begun], drivers)
         | {"total_episodes": len(begun), "total_steps": total, "dataset_size": storage.get_size()}
     )
     return total
-
-
-def _begun(rows: Iterable[ExchangeStep]) -> tuple[ExchangeStep, Iterator[ExchangeStep]] | None:
-    """Return the first row and an iterator over the others; None if there is none."""
-    iterator = iter(rows)
-    first = next(iterator, None)
-    return None if first is None else (first, iterator)
 
 
 def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str]) -> dict[str, Any]:
@@ -188,31 +127,19 @@ def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str])
         "action_layout": plain["action_layout"],
         "observation_layout": plain["state_layout"],
         "control_hz": header.control_hz,
-        HEADERS: {
-            "format": HEADERS_FORMAT,
+        OURS: {
+            "format": 1,
             "episodes": [e.header.to_json() | {"outcome": e.outcome} for e in episodes],
         },
     }
-    if (spec := _env_spec(episodes)) is not None:
-        found["env_spec"] = spec
-    people = {episode.header.driver for episode in episodes if episode.header.driver}
-    if people:
+    envs = [(episode.header.env, episode.header.env_kwargs) for episode in episodes]
+    if header.env in gym.registry and all(env == envs[0] for env in envs):
+        spec = copy.deepcopy(gym.spec(header.env))  # For Minari's `recover_environment`.
+        spec.kwargs.update(header.env_kwargs)
+        found["env_spec"] = spec.to_json()
+    if people := {episode.header.driver for episode in episodes if episode.header.driver}:
         found["author"] = people
     return found
-
-
-def _env_spec(episodes: Sequence[ExchangeEpisode]) -> str | None:
-    """Return the spec of the env of all episodes as JSON, for Minari's `recover_environment`.
-
-    None if they were recorded in several envs or without one, or if no env has this id here.
-    """
-    envs = [(episode.header.env, episode.header.env_kwargs) for episode in episodes]
-    env_id, arguments = envs[0]
-    if env_id not in gym.registry or any(env != envs[0] for env in envs):
-        return None
-    spec = copy.deepcopy(gym.spec(env_id))
-    spec.kwargs.update(arguments)
-    return spec.to_json()
 
 
 def _box(layout: Layout) -> spaces.Box:
@@ -220,88 +147,65 @@ def _box(layout: Layout) -> spaces.Box:
     return spaces.Box(layout.low, layout.high, dtype=np.float64)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class _Observed:
-    """Return the observation of a step.
+    """The observation of each step: the space of its state and of its picture, if any."""
 
-    Attributes:
-        state: Layout of the state; None without a state.
-        size: Width and height of the picture in pixels; None without pictures.
-        grey: Whether pictures have no colours.
-    """
-
-    state: Layout | None = None
-    size: tuple[int, int] | None = None
-    grey: bool = False
-
-    @property
-    def picture(self) -> spaces.Box | None:
-        """Space of the pictures; None without pictures."""
-        if self.size is None:
-            return None
-        width, height = self.size
-        shape = (height, width) if self.grey else (height, width, 3)
-        return spaces.Box(0, 255, shape, np.uint8)
+    state: spaces.Box | None
+    picture: spaces.Box | None
+    is_grey: bool
+    size: tuple[int, int] | None
 
     @property
     def space(self) -> spaces.Space[Any]:
         """Space of the observations."""
-        picture = self.picture
-        state = None if self.state is None else _box(self.state)
-        if picture is not None and state is not None:
-            return spaces.Dict({IMAGE: picture, STATE: state})
-        return cast("spaces.Space[Any]", picture if state is None else state)
+        if self.picture is not None and self.state is not None:
+            return spaces.Dict({"image": self.picture, "state": self.state})
+        return cast("spaces.Space[Any]", self.picture if self.state is None else self.state)
 
-    def column(self, part: str) -> str:
-        """Return the place of a part of the observations in the file."""
-        both = self.size is not None and self.state is not None
-        return f"{_OBSERVATIONS}/{part}" if both else _OBSERVATIONS
+    def column(self, field: str) -> str:
+        """Return the place of the "frame" or the "state" in the file."""
+        both = self.picture is not None and self.state is not None
+        return name_in("minari", field) if both else OBSERVATIONS
 
 
 def _observed(episode: ExchangeEpisode, row: ExchangeStep) -> _Observed:
-    """Return what the first step observes, and therefore all must."""
+    """Return the observation of the first step, and therefore of all."""
     header = episode.header
-    state = Layout.from_json(header.state_layout) if header.state_layout else None
+    state = _box(Layout.from_json(header.state_layout)) if header.state_layout else None
+    if row.jpeg is None and header.image_size is not None:
+        raise DemosError(
+            f"The first step of {episode.name} has no picture, but Minari needs one at every "
+            "step: drop the steps before the first picture, or export to csv."
+        )
+    if row.jpeg is None and state is None:
+        raise DemosError(
+            f"{episode.name} has neither pictures nor a state, so it has no observations for "
+            "Minari: export it to csv."
+        )
     if row.jpeg is None:
-        if header.image_size is not None:
-            raise DemosError(
-                f"The first step of {episode.name} has no picture, but Minari needs one at every "
-                "step: drop the steps before the first picture, or export to csv."
-            )
-        if state is None:
-            raise DemosError(
-                f"{episode.name} has neither pictures nor a state, so it has no observations for "
-                "Minari: export it to csv."
-            )
-        return _Observed(state=state)
+        return _Observed(state, None, is_grey=False, size=None)
     where = f"of the first step of {episode.name}"
-    return _Observed(
-        state=state,
-        size=header.image_size or picture_size(row.jpeg, where),
-        grey=is_grey(row.jpeg, where),
-    )
+    width, height = header.image_size or picture_size(row.jpeg, where)
+    grey = is_grey(row.jpeg, where)
+    shape = (height, width) if grey else (height, width, 3)
+    return _Observed(state, spaces.Box(0, 255, shape, np.uint8), grey, (width, height))
 
 
 class _EpisodeColumns:
-    """Columns of one episode.
-
-    Args:
-        group: An open, empty `h5py.Group`.
-        name: How to name the episode in errors.
-        observed: What each step observes.
-        actions: Number of values in an action.
+    """Columns of one episode, in an empty `h5py.Group`.
 
     Attributes:
         steps: Number of steps written.
     """
 
-    def __init__(self, group: Any, name: str, observed: _Observed, actions: int) -> None:
+    def __init__(self, group: Any, episode: ExchangeEpisode, observed: _Observed) -> None:
         self.steps = 0
         self._group = group
-        self._name = name
+        self._name = episode.name
         self._observed = observed
         self._as_jpeg = observed.picture is not None and stored_as_jpeg(observed.picture)
-        self._unknown = (math.nan,) * actions
+        self._unknown = (math.nan,) * episode.header.action_size
         self._pictures = Pictures(observed.size)
         self._picture: bytes | None = None
         self._pixels: NDArray[np.uint8] | None = None
@@ -317,49 +221,51 @@ class _EpisodeColumns:
             DemosError: If one has no picture, or one that does not fit.
         """
         steps = [row.step for row in rows]
-        if self._observed.size is not None:
+        if self._observed.picture is not None:
             self._add_pictures(rows)
         if self._observed.state is not None:
-            self._append(self._observed.column(STATE), [step.state for step in steps], np.float64)
+            self._append(self._observed.column("state"), [s.state for s in steps], np.float64)
+        self._append(name_in("minari", "action"), [step.action for step in steps], np.float64)
         rewards = [math.nan if step.reward is None else step.reward for step in steps]
-        self._append("actions", [step.action for step in steps], np.float64)
-        self._append("rewards", rewards, np.float64)
-        self._append("terminations", [step.terminated for step in steps], np.bool_)
-        self._append("truncations", [step.truncated for step in steps], np.bool_)
+        self._append(name_in("minari", "reward"), rewards, np.float64)
         self._append("infos/rewarded", [step.reward is not None for step in steps], np.bool_)
-        for name in ("applied", "wanted"):
-            values = [getattr(step, name) for step in steps]
+        for field in _FLAGS:
+            self._append(name_in("minari", field), [getattr(s, field) for s in steps], np.bool_)
+        for field in ("applied", "wanted"):
+            values = [getattr(step, field) for step in steps]
             known = [self._unknown if value is None else value for value in values]
-            self._append(f"infos/{name}", known, np.float64)
-            self._append(f"infos/has_{name}", [value is not None for value in values], np.bool_)
-        for name in TIMES:
-            times = [getattr(step, name) for step in steps]
+            self._append(name_in("minari", field), known, np.float64)
+            self._append(f"infos/has_{field}", [value is not None for value in values], np.bool_)
+        for field in _TIMES:
+            times = [getattr(step, field) for step in steps]
             known = [UNKNOWN_NS if time is None else time for time in times]
-            self._append(f"infos/{name}", known, np.int64)
-        text = self._text
-        self._append("infos/driver", [step.driver for step in steps], text)
-        # HDF5 cannot store NUL in a text.
-        self._append("infos/stop_reason", [s.stop_reason.replace("\0", "") for s in steps], text)
-        self._append("infos/more", [_more(row) for row in rows], text)
+            self._append(name_in("minari", field), known, np.int64)
+        texts = {
+            "driver": [step.driver for step in steps],
+            # HDF5 cannot store NUL in a text.
+            "stop_reason": [step.stop_reason.replace("\0", "") for step in steps],
+            "terms": [_more(row) for row in rows],
+        }
+        for field, words in texts.items():
+            self._append(name_in("minari", field), words, self._text)
         self._ends = steps[-1].terminated or steps[-1].truncated
         self.steps += len(rows)
 
-    def close(self) -> int:
-        """Write the last observation and the end of the episode; return the number of steps.
+    def close(self) -> None:
+        """Write the last observation and the end of the episode.
 
         An episode without an end is truncated at its last step: a learner must not take the next
         episode for its continuation.
         """
-        for part, there in ((IMAGE, self._observed.size), (STATE, self._observed.state)):
+        for field, there in (("frame", self._observed.picture), ("state", self._observed.state)):
             if there is not None:
-                column = self._group[self._observed.column(part)]
+                column = self._group[self._observed.column(field)]
                 last = column[-1]
                 column.resize(len(column) + 1, axis=0)
                 column[-1] = last
-        self._append("infos/cut_off", [not self._ends], np.bool_)
+        self._append(CUT_OFF, [not self._ends], np.bool_)
         if not self._ends:
-            self._group["truncations"][-1] = True
-        return self.steps
+            self._group[name_in("minari", "truncated")][-1] = True
 
     def _add_pictures(self, rows: Sequence[ExchangeStep]) -> None:
         jpegs: list[NDArray[np.uint8]] = []
@@ -369,14 +275,15 @@ class _EpisodeColumns:
             where = f"of step {number} of {self._name}"
             if row.jpeg is not None:
                 self._pictures.check(row.jpeg, where)
-                if is_grey(row.jpeg, where) != self._observed.grey:
+                if is_grey(row.jpeg, where) != self._observed.is_grey:
+                    kind = "coloured" if self._observed.is_grey else "grey"
                     raise DemosError(
-                        f"The picture {where} is {'coloured' if self._observed.grey else 'grey'}, "
-                        "and the first one is not: a Minari dataset has pictures of one kind."
+                        f"The picture {where} is {kind}, and the first one is not: a Minari "
+                        "dataset has pictures of one kind."
                     )
                 self._picture, self._frame = row.jpeg, self._frame + 1
                 if not self._as_jpeg:
-                    self._pixels = decode_picture(row.jpeg, where, grey=self._observed.grey)
+                    self._pixels = decode_picture(row.jpeg, where, grey=self._observed.is_grey)
             if self._picture is None:
                 raise DemosError(
                     f"There is no picture {where}, but Minari needs one: drop the step."
@@ -385,11 +292,11 @@ class _EpisodeColumns:
             frames.append(self._frame)
             if self._pixels is not None:
                 pixels.append(self._pixels)
-        self._append("infos/frame", frames, np.int64)
-        column = self._observed.column(IMAGE)
+        self._append(FRAME, frames, np.int64)
+        column = self._observed.column("frame")
         if not self._as_jpeg:
             self._append(column, pixels, np.uint8)
-        self._append(column if self._as_jpeg else f"infos/{JPEG}", jpegs, self._blob)
+        self._append(column if self._as_jpeg else JPEG, jpegs, self._blob)
 
     def _append(self, name: str, values: Sequence[Any], dtype: Any) -> None:
         """Append values to a column, which is created if it is missing."""

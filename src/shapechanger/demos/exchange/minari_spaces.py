@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, cast
@@ -12,18 +12,24 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from shapechanger.demos.exchange.files import library, parse_json
-from shapechanger.demos.exchange.importing import ImportContext
-from shapechanger.demos.exchange.minari_files import MAX_UNPACKED
+from shapechanger.demos.exchange.files import (
+    MAX_FEATURES,
+    MAX_UNPACKED,
+    MAX_VALUES,
+    UNIT_UNKNOWN,
+    library,
+    parse_json,
+)
+from shapechanger.demos.exchange.format import ImportContext
 from shapechanger.demos.jpeg import MAX_PIXELS
 from shapechanger.errors import DemosError, MissingExtra
 from shapechanger.layout import Feature, Layout
 
-_UNIT_UNKNOWN: Final = "?"
-_MAX_FEATURES: Final = 512  # A larger space becomes one array feature.
-_MAX_VALUES: Final = 1 << 17  # Of a layout.
 _MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not a picture.
+_MIN_JPEG: Final = 32
+_BRIGHTEST: Final = 255
 _CHANNELS: Final = (1, 3)
+_DEEP: Final = (np.uint16, np.int16, np.uint32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,30 +52,24 @@ class Leaf:
 
 def is_imported(leaf: Leaf, context: ImportContext) -> bool:
     """Return whether a part of an observation is numbers; others are reported."""
-    space = leaf.space
+    space, shape = leaf.space, leaf.space.shape or ()
     about = f"{leaf.name or 'the observation'} ({space})"
-    if not isinstance(
-        space, spaces.Box | spaces.Discrete | spaces.MultiDiscrete | spaces.MultiBinary
-    ):
+    numbers = spaces.Box | spaces.Discrete | spaces.MultiDiscrete | spaces.MultiBinary
+    if not isinstance(space, numbers):
         context.note(f"The observation {about} is not imported.")
         return False
-    shape = space.shape or ()
-    deep = isinstance(space, spaces.Box) and cast("Any", space).dtype in (
-        np.uint16,
-        np.int16,
-        np.uint32,
-    )
+    deep = isinstance(space, spaces.Box) and cast("Any", space).dtype in _DEEP
     if deep and len(shape) in {2, 3} and min(shape[:2]) >= _MIN_PICTURE:
         context.leave_out("observation", "with pictures of an unknown kind or of depth", about)
-        return False
-    if math.prod(shape) > _MAX_VALUES:
-        context.leave_out("observation", f"of more than {_MAX_VALUES} values", about)
-        return False
-    return True
+    elif math.prod(shape) > MAX_VALUES:
+        context.leave_out("observation", f"of more than {MAX_VALUES} values", about)
+    else:
+        return True
+    return False
 
 
-def read_space(metadata: dict[str, Any], name: str, path: Path) -> spaces.Space[Any]:
-    """Return a space of the metadata.
+def read_leaves(metadata: dict[str, Any], name: str, path: Path) -> list[Leaf]:
+    """Return the leaves of a space of the metadata.
 
     Args:
         metadata: Content of the metadata file.
@@ -89,7 +89,7 @@ def read_space(metadata: dict[str, Any], name: str, path: Path) -> spaces.Space[
     if _largest(parse_json(text, f"The {name} in {path}")) > MAX_UNPACKED:
         raise DemosError(f"The {name} in {path} claims more than {MAX_UNPACKED} values.")
     try:
-        return library("minari.serialization").deserialize_space(text)
+        return list(_leaves(library("minari.serialization").deserialize_space(text)))
     except MissingExtra:
         raise
     except Exception as error:  # Its errors for invalid text are not documented.
@@ -108,44 +108,32 @@ def _largest(space: Any) -> int:
     return own + sum(_largest(value) for key, value in fields.items() if key != "shape")
 
 
-def leaves_of(space: spaces.Space[Any], path: tuple[str, ...] = ()) -> Iterator[Leaf]:
+def _leaves(space: spaces.Space[Any], path: tuple[str, ...] = ()) -> Iterator[Leaf]:
     """Yield the leaves of a tree of spaces, in the order and with the keys of Minari's files."""
+    parts: dict[str, spaces.Space[Any]] = {}
     if isinstance(space, spaces.Dict):
-        parts = cast("dict[str, spaces.Space[Any]]", cast("Any", space).spaces)
-        for key, inner in parts.items():
-            yield from leaves_of(inner, (*path, key))
+        parts = cast("Any", space).spaces
     elif isinstance(space, spaces.Tuple):
-        for number, inner in enumerate(
-            cast("tuple[spaces.Space[Any], ...]", cast("Any", space).spaces)
-        ):
-            yield from leaves_of(inner, (*path, f"_index_{number}"))
+        parts = {f"_index_{n}": inner for n, inner in enumerate(cast("Any", space).spaces)}
     else:
         yield Leaf(path, space)
+    for key, inner in parts.items():
+        yield from _leaves(inner, (*path, key))
 
 
-def layout_of(leaves: list[Leaf], what: str) -> Layout:
-    """Return a layout for the values of some leaves, in order.
-
-    Args:
-        leaves: The leaves.
-        what: What they belong to, "action" or "observation".
-    """
+def layout_of(leaves: Sequence[Leaf], what: str) -> Layout:
+    """Return a layout for the values of leaves, of an "action" or "observation", in order."""
     features: list[Feature] = []
     for leaf in leaves:
         low, high = _bounds(leaf, what)
         name = leaf.name or what
-        if low.size == 1:
-            features.append(Feature(name, _UNIT_UNKNOWN, float(low[0]), float(high[0])))
-        elif low.size > _MAX_FEATURES:
-            block = (int(low.size),)
-            features.append(
-                Feature(name, _UNIT_UNKNOWN, float(low.min()), float(high.max()), shape=block)
-            )
-        else:
-            features += [
-                Feature(f"{name}/{number}", _UNIT_UNKNOWN, float(lowest), float(highest))
-                for number, (lowest, highest) in enumerate(zip(low, high, strict=True))
-            ]
+        if low.size > MAX_FEATURES:
+            least, most = float(low.min()), float(high.max())
+            features.append(Feature(name, UNIT_UNKNOWN, least, most, shape=(int(low.size),)))
+            continue
+        for number, (least, most) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+            numbered = name if low.size == 1 else f"{name}/{number}"
+            features.append(Feature(numbered, UNIT_UNKNOWN, least, most))
     return Layout(tuple(features))
 
 
@@ -160,8 +148,7 @@ def _bounds(leaf: Leaf, what: str) -> tuple[NDArray[np.float64], NDArray[np.floa
         case spaces.MultiDiscrete():
             low, high = space.start.ravel(), (space.start + space.nvec - 1).ravel()
         case spaces.MultiBinary():
-            low = np.zeros(space.shape).ravel()
-            high = np.ones(space.shape).ravel()
+            low, high = np.zeros(space.shape).ravel(), np.ones(space.shape).ravel()
         case _:
             raise DemosError(
                 f"The {what} has {leaf.name or 'a space'!r} of the type {type(space).__name__}, "
@@ -193,3 +180,16 @@ def picture_size(space: spaces.Space[Any]) -> tuple[int, int] | None:
 def colours_first(shape: tuple[int, ...]) -> bool:
     """Return whether the first of three axes is that of the colours."""
     return shape[0] in _CHANNELS and shape[2] not in _CHANNELS
+
+
+def stored_as_jpeg(space: spaces.Space[Any]) -> bool:
+    """Return whether Minari stores a space as JPEG: `is_image_space` of its minari_storage.py."""
+    if not isinstance(space, spaces.Box):
+        return False
+    box = cast("Any", space)
+    return (
+        len(box.shape) in {2, 3}
+        and min(box.shape[:2]) >= _MIN_JPEG
+        and box.dtype == np.uint8
+        and bool(np.all(box.low == 0) and np.all(box.high == _BRIGHTEST))
+    )

@@ -17,8 +17,7 @@ from typing import Final
 import numpy as np
 
 from shapechanger.demos.episodes.records import longest_period_s
-from shapechanger.demos.exchange.importing import ImportContext, counted, few
-from shapechanger.demos.exchange.recorded import DEFAULT_HZ
+from shapechanger.demos.exchange.format import DEFAULT_HZ, ImportContext, counted, few
 
 _NS_PER_S: Final = 1e9
 _NS_PER_MS: Final = 1e6

@@ -1,4 +1,4 @@
-"""HDF5 files of Minari datasets of strangers, which may claim more than they hold."""
+"""HDF5 files of strangers, which may claim more than they hold."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ import math
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from shapechanger.demos.exchange.files import library
+from shapechanger.demos.exchange.files import MAX_UNPACKED, library
 from shapechanger.errors import DemosError
-
-MAX_UNPACKED: Final = 64 << 20
-"""Bytes in memory at once. A picture of `MAX_PIXELS` has 48 MiB."""
 
 
 @contextmanager
@@ -37,26 +34,23 @@ def _row_bytes(column: Any) -> int:
 
 
 def chunk_of(columns: Iterable[Any], most: int) -> int:
-    """Return how many steps to read at once, so that they fit into `MAX_UNPACKED` or are one.
-
-    Args:
-        columns: The datasets to read from.
-        most: Largest number of steps.
-    """
+    """Return how many entries of columns to read at once: at most as many as fit, at least one."""
     return max(1, min(most, MAX_UNPACKED // max(1, sum(map(_row_bytes, columns)))))
 
 
-def column(file: Any, name: str, where: Path, length: int | None = None) -> Any:
-    """Return a dataset in an HDF5 file.
+def column(file: Any, name: str, length: int = 0) -> Any:
+    """Return a dataset in an HDF5 file; no link is followed.
 
     Args:
         file: An open `h5py.File`.
         name: Path of the dataset in the file.
-        where: Path of the file, for errors.
-        length: Minimum number of entries; None for any number.
+        length: Minimum number of entries.
+
+    Raises:
+        DemosError: If it is missing, elsewhere, too short, or unpacks to too much.
     """
     h5py = library("h5py")
-    found: Any = file
+    where, found = file.filename, file
     for part in name.split("/"):
         link = found.get(part, getlink=True) if isinstance(found, h5py.Group) else None
         if isinstance(link, h5py.ExternalLink):
@@ -76,17 +70,17 @@ def column(file: Any, name: str, where: Path, length: int | None = None) -> Any:
             f"{where}: {name!r} unpacks to {unpacked} bytes at once, more than the limit of "
             f"{MAX_UNPACKED}."
         )
-    if length is not None and (not found.shape or found.shape[0] < length):
+    if not found.shape or found.shape[0] < length:
         have = found.shape[0] if found.shape else 0
         raise DemosError(f"{where}: {name!r} has {have} entries, but {length} are needed.")
     return found
 
 
-def infos_of(file: Any, group: str) -> list[str]:
-    """Return the names of the infos of an episode; no link is followed."""
+def names_in(file: Any, *groups: str) -> list[str]:
+    """Return the names in a group of groups; no link is followed."""
     h5py = library("h5py")
     found: Any = file
-    for part in (group, "infos"):
+    for part in groups:
         if not isinstance(found.get(part, getlink=True), h5py.HardLink):
             return []
         found = found[part]

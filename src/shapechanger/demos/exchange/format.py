@@ -1,13 +1,53 @@
-"""Options and findings of an import: what is left out and why, and what contradicts itself."""
+"""Everything that a format is made of: its declaration, episodes between formats, and findings."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
+from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.errors import DemosError
 
+DEFAULT_HZ: Final = 20.0
+"""Steps per second of an episode without any information on its rate, Hz."""
+
 _MAX_NAMED: Final = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExchangeStep:
+    """One step between two formats.
+
+    Attributes:
+        step: The step; its index and the name of its frame are ignored.
+        jpeg: Its picture; None for that of the step before, or without a camera.
+        marks: Texts of its marks.
+        dropped: Why the step is excluded; None if it is not.
+    """
+
+    step: Step
+    jpeg: bytes | None
+    marks: tuple[str, ...] = ()
+    dropped: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExchangeEpisode:
+    """One episode between two formats.
+
+    Attributes:
+        header: Its metadata.
+        rows: Its steps in order; they can be iterated once, at any time.
+        name: How to name the episode in errors.
+        outcome: How it ended; "" if unspecified.
+    """
+
+    header: EpisodeHeader
+    rows: Iterable[ExchangeStep]
+    name: str
+    outcome: str = ""
 
 
 class ImportContext:
@@ -70,9 +110,6 @@ class ImportContext:
     def require_whole(self, source: object) -> None:
         """Refuse a source of which something is left out, or which contradicts itself.
 
-        Args:
-            source: How to name the source.
-
         Raises:
             DemosError: If there is such a finding; it names all of them.
         """
@@ -85,6 +122,52 @@ class ImportContext:
             )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportContext:
+    """Options of an export.
+
+    Attributes:
+        out: The folder that the user asked for; a writer gets another one, which is moved there.
+        task: What the robot does, in words; "" if not given.
+        images: Whether to store pictures as they were recorded, in place of video.
+        rewarded: Whether all steps have a reward.
+    """
+
+    out: Path
+    task: str = ""
+    images: bool = False
+    rewarded: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """Declaration of a format, which a module binds to a name and an entry point names.
+
+    Attributes:
+        name: Its name on the command line.
+        title: Its name in sentences.
+        sign: Files by which a folder of the format is known, such as "steps.csv".
+        detect: Returns whether a folder has the format; None if it cannot be imported.
+        read: Yields the episodes of a folder, and tells the context what it leaves out.
+        write: Writes episodes into an existing folder and returns the number of steps; None if the
+            format cannot be exported.
+        options: Options that it takes: "camera" and "hz" on import; "task", "images" and "dropped"
+            (excluded steps, marked as such) on export.
+        consecutive: Whether each step follows the one before, so that an export splits episodes.
+        timed: Whether it keeps the times of steps.
+    """
+
+    name: str
+    title: str
+    sign: str = ""
+    detect: Callable[[Path], bool] | None = None
+    read: Callable[[Path, ImportContext], Iterator[ExchangeEpisode]] | None = None
+    write: Callable[[Sequence[ExchangeEpisode], Path, ExportContext], int] | None = None
+    options: frozenset[str] = frozenset()
+    consecutive: bool = False
+    timed: bool = True
+
+
 def counted(number: int, what: str) -> str:
     """Format a count, such as "1 record" or "2 records"."""
     return f"{number} {what}{'' if number == 1 else 's'}"
@@ -95,3 +178,12 @@ def few(names: Sequence[object]) -> str:
     shown = ", ".join(map(str, names[:_MAX_NAMED]))
     more = len(names) - _MAX_NAMED
     return f"{shown}, and {more} more" if more > 0 else shown
+
+
+def kept_steps(rows: Iterable[ExchangeStep]) -> Iterator[tuple[Step, bytes | None]]:
+    """Yield the steps that are not excluded, each with its picture, even where it is shared."""
+    picture: bytes | None = None
+    for row in rows:
+        picture = picture if row.jpeg is None else row.jpeg
+        if row.dropped is None:
+            yield row.step, picture

@@ -1,56 +1,20 @@
-"""Common representation of all formats: an episode whose steps are read one by one."""
+"""Episodes of a recording for export: one by one, split where steps do not follow each other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from datetime import datetime, timedelta
 from itertools import pairwise
 from typing import Final
 
 from shapechanger.demos.episodes import Episode, EpisodeHeader, Step
 from shapechanger.demos.episodes.records import longest_period_s
+from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, Format
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
-DEFAULT_HZ: Final = 20.0
-"""Steps per second of an episode without any information on its rate, Hz."""
-
 _NS_PER_S: Final = 1e9
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExchangeStep:
-    """One step between two formats.
-
-    Attributes:
-        step: The step; its index and the name of its frame are ignored.
-        jpeg: Its picture; None for that of the step before, or without a camera.
-        marks: Texts of its marks.
-        dropped: Why the step is excluded; None if it is not.
-    """
-
-    step: Step
-    jpeg: bytes | None
-    marks: tuple[str, ...] = ()
-    dropped: str | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExchangeEpisode:
-    """One episode between two formats.
-
-    Attributes:
-        header: Its metadata.
-        rows: Its steps in order; they can be iterated once, at any time.
-        name: How to name the episode in errors.
-        outcome: How it ended; "" if unspecified.
-    """
-
-    header: EpisodeHeader
-    rows: Iterable[ExchangeStep]
-    name: str
-    outcome: str = ""
 
 
 def exchange_episode(
@@ -63,91 +27,76 @@ def exchange_episode(
         dropped: Whether to include excluded steps.
         part: Indices of the steps to include; None for all.
     """
+    rows = _rows(episode, dropped=dropped, part=part)
     return ExchangeEpisode(
-        header=episode.header,
-        rows=_rows(episode, dropped=dropped, part=part),
-        name=episode.path.name,
-        outcome=episode.outcome,
+        header=episode.header, rows=rows, name=episode.path.name, outcome=episode.outcome
     )
 
 
-class ConsecutiveParts:
-    """Split episodes for formats that take each step for the successor of the one before.
-
-    An episode is split where steps are excluded or missing, and at pauses.
+def consecutive_parts(
+    episodes: Sequence[Episode], form: Format, *, dropped: bool = False
+) -> tuple[list[ExchangeEpisode], list[str]]:
+    """Split episodes where steps are excluded or missing, and at pauses.
 
     Args:
-        format: How to name the format.
+        episodes: The episodes.
+        form: A format that takes each step for the successor of the one before.
+        dropped: Whether to include excluded steps.
+
+    Returns:
+        The parts, and what differs from the recording, as sentences.
     """
-
-    def __init__(self, format: str) -> None:
-        self._format = format
-        self._episodes = self._parts = self._missing = 0
-        self._pauses_s: list[float] = []
-        self._off_s: list[float] = []
-
-    def of(self, episode: Episode, *, dropped: bool = False) -> list[ExchangeEpisode]:
-        """Return the parts of an episode; the arguments are those of `exchange_episode`."""
+    parts: list[ExchangeEpisode] = []
+    off_s: list[float] = []
+    pauses_s: list[float] = []
+    whole = missing = 0
+    for episode in episodes:
         steps = episode.steps if dropped else episode.kept
-        if not steps:
-            return []
+        whole += bool(steps)
         longest_s = longest_period_s(episode.header.control_hz)
-        starts = [0]
+        starts = [0] if steps else []
         for number, (one, two) in enumerate(pairwise(steps), 1):
             passed_s = _passed_s(one, two)
             if two.index != one.index + 1:
-                self._missing += 1
+                missing += 1
             elif passed_s is not None and passed_s > longest_s:
-                self._pauses_s.append(passed_s)
+                pauses_s.append(passed_s)
             else:
                 continue
             starts.append(number)
-        self._episodes += 1
-        self._parts += len(starts)
-        parts: list[ExchangeEpisode] = []
         for start, end in pairwise([*starts, len(steps)]):
             indexes = range(steps[start].index, steps[end - 1].index + 1)
             part = exchange_episode(episode, dropped=dropped, part=indexes)
             header = replace(part.header, created=_started(episode, steps[start]))
             outcome = part.outcome if end == len(steps) else ""
             parts.append(replace(part, header=header, outcome=outcome))
-            self._measure(steps[start:end], episode.header)
-        return parts
-
-    def notes(self, *, timed: bool) -> list[str]:
-        """Return what differs from the recording, as sentences.
-
-        Args:
-            timed: Whether the format keeps the times of steps.
-        """
-        found: list[str] = []
-        if self._parts > self._episodes:
-            where: list[str] = []
-            if self._missing:
-                where.append(f"excluded or missing steps ({self._missing} times)")
-            if self._pauses_s:
-                where.append(f"pauses ({len(self._pauses_s)}, up to {max(self._pauses_s):.4g} s)")
-            found.append(
-                f"Episodes are split at {' and '.join(where)}, because {self._format} takes each "
-                f"step for the successor of the one before: {self._episodes} became {self._parts}."
-            )
-        if self._off_s and not timed:
-            found.append(
-                f"{self._format} takes the time of a step to be its number divided by the rate, "
-                f"which is off by more than half a period in {len(self._off_s)} of {self._parts} "
-                f"episodes, by up to {max(self._off_s):.4g} s."
-            )
-        return found
-
-    def _measure(self, steps: Sequence[Step], header: EpisodeHeader) -> None:
-        """Note by how much the times of consecutive steps differ from those by the rate."""
-        since_s = [_passed_s(steps[0], step) for step in steps]
-        off_s = max(
-            abs(at_s - number / header.control_hz) if at_s is not None else 0.0
-            for number, at_s in enumerate(since_s)
+            off_s.append(_off_s(steps[start:end], episode.header))
+    notes: list[str] = []
+    if len(parts) > whole:
+        where = [f"excluded or missing steps ({missing} times)"] if missing else []
+        if pauses_s:
+            where.append(f"pauses ({len(pauses_s)}, up to {max(pauses_s):.4g} s)")
+        notes.append(
+            f"Episodes are split at {' and '.join(where)}, because {form.title} takes each "
+            f"step for the successor of the one before: {whole} became {len(parts)}."
         )
-        if off_s > 0.5 / header.control_hz:
-            self._off_s.append(off_s)
+    if (late_s := [by_s for by_s in off_s if by_s > 0.0]) and not form.timed:
+        notes.append(
+            f"{form.title} takes the time of a step to be its number divided by the rate, "
+            f"which is off by more than half a period in {len(late_s)} of {len(parts)} "
+            f"episodes, by up to {max(late_s):.4g} s."
+        )
+    return parts, notes
+
+
+def _off_s(steps: Sequence[Step], header: EpisodeHeader) -> float:
+    """Return how far times are off those by the rate, s; 0 for less than half a period."""
+    since_s = [_passed_s(steps[0], step) for step in steps]
+    off_s = max(
+        abs(at_s - number / header.control_hz) if at_s is not None else 0.0
+        for number, at_s in enumerate(since_s)
+    )
+    return off_s if off_s > 0.5 / header.control_hz else 0.0
 
 
 def _passed_s(one: Step, two: Step) -> float | None:
@@ -166,15 +115,6 @@ def _started(episode: Episode, first: Step) -> str:
     except (ValueError, OverflowError):
         return episode.header.created
     return began.isoformat(timespec="milliseconds")
-
-
-def kept_steps(rows: Iterable[ExchangeStep]) -> Iterator[tuple[Step, bytes | None]]:
-    """Yield the steps that are not excluded, each with its picture, even where it is shared."""
-    picture: bytes | None = None
-    for row in rows:
-        picture = picture if row.jpeg is None else row.jpeg
-        if row.dropped is None:
-            yield row.step, picture
 
 
 def value_names(layout: Layout) -> list[str]:

@@ -1,0 +1,193 @@
+"""Export of recordings as MCAP, one file for each episode, for players such as Foxglove.
+
+```
+/camera    foxglove.CompressedImage   the JPEG as recorded, once for the steps that share it
+/state     shapechanger.State         values by name; those that nothing measured are left out
+/action    shapechanger.Action        the decided action, by name
+/applied, /wanted                     likewise, where they are known
+/reward    shapechanger.Reward        the reward and its terms
+/step      shapechanger.Step          number, driver, ends, stop reason, marks, why it was dropped
+```
+
+Messages are JSON, and their schemas state the units. Log times are those of the robot's clock, ns:
+of the capture for pictures and states, of the decision for actions, and never moved. Where a time
+is unknown, the step follows the one before at the rate of the episode, or precedes the first one
+with a time. The header of the episode is the metadata
+`shapechanger`. Format: mcap.dev/spec.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, cast
+
+from shapechanger.demos.exchange.files import library
+from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext, Format
+from shapechanger.layout import Layout
+
+_NS_PER_S: Final = 10**9
+_TEXT: Final = {"type": "string"}
+_WHOLE: Final = {"type": "integer"}
+_NUMBER: Final = {"type": "number"}
+# Foxglove's own, by which its panels know a picture: github.com/foxglove/foxglove-sdk.
+_IMAGE: Final = {
+    "timestamp": {"type": "object", "properties": {"sec": _WHOLE, "nsec": _WHOLE}},
+    "frame_id": _TEXT,
+    "data": {"type": "string", "contentEncoding": "base64"},
+    "format": _TEXT,
+}
+_STEP: Final = {
+    **{name: _WHOLE for name in ("step", "wall_ns")},
+    **{name: _TEXT for name in ("driver", "stop_reason", "dropped")},
+    **{name: {"type": "boolean"} for name in ("terminated", "truncated")},
+    "marks": {"type": "array", "items": _TEXT},
+}
+_REWARD: Final = {
+    "reward": _NUMBER,
+    "terms": {"type": "object", "additionalProperties": _NUMBER},
+}
+
+
+def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
+    """Write episodes, each to a file of its own; return the number of steps."""
+    steps = 0
+    for number, episode in enumerate(episodes, 1):
+        with (folder / f"episode-{number:04d}.mcap").open("wb") as file:
+            writer = library("mcap.writer").Writer(file)
+            writer.start(profile="", library="shapechanger")
+            steps += _write_episode(episode, writer)
+            header = json.dumps(episode.header.to_json(), ensure_ascii=False)
+            about = {"header": _text(header), "outcome": _text(episode.outcome)}
+            writer.add_metadata("shapechanger", about)
+            writer.finish()
+    return steps
+
+
+def _write_episode(episode: ExchangeEpisode, writer: Any) -> int:
+    """Write the messages of an episode; return its number of steps."""
+    header = episode.header
+    actions = Layout.from_json(header.action_layout)
+    states = Layout.from_json(header.state_layout) if header.state_layout else None
+    schemas = dict.fromkeys(("action", "applied", "wanted"), ("Action", _properties(actions)))
+    schemas |= {"step": ("Step", _STEP), "reward": ("Reward", _REWARD)}
+    if states is not None:
+        schemas["state"] = ("State", _properties(states))
+    channels = {
+        topic: _channel(writer, topic, f"shapechanger.{name}", properties)
+        for topic, (name, properties) in schemas.items()
+    }
+    if header.image_size is not None:
+        channels["camera"] = _channel(writer, "camera", "foxglove.CompressedImage", _IMAGE)
+    steps = 0
+    for row, seen_ns in _timed(episode):
+        steps += 1
+        for topic, (message, at_ns) in _messages(row, seen_ns, actions, states).items():
+            writer.add_message(
+                channel_id=channels[topic],
+                log_time=at_ns,
+                publish_time=at_ns,
+                data=json.dumps(message, allow_nan=False).encode(),
+            )
+    return steps
+
+
+def _timed(episode: ExchangeEpisode) -> Iterator[tuple[ExchangeStep, int]]:
+    """Yield the steps, each with the time of its observation, ns."""
+    period_ns = round(_NS_PER_S / episode.header.control_hz)
+    waiting: list[ExchangeStep] = []  # Of unknown time, before the first step of a known one.
+    at_ns = -period_ns
+    for row in episode.rows:
+        clock_ns = row.step.clock_ns
+        known = clock_ns is not None and clock_ns >= 0  # MCAP has no negative times.
+        if at_ns < 0 and not known and episode.header.clock != "none":
+            waiting.append(row)
+            continue
+        at_ns = cast("int", clock_ns) if known else max(0, at_ns + period_ns)
+        for number, earlier in enumerate(waiting):
+            yield earlier, max(0, at_ns - (len(waiting) - number) * period_ns)
+        waiting.clear()
+        yield row, at_ns
+    for number, row in enumerate(waiting):
+        yield row, number * period_ns
+
+
+def _messages(
+    row: ExchangeStep, seen_ns: int, actions: Layout, states: Layout | None
+) -> dict[str, tuple[Mapping[str, Any], int]]:
+    """Return the messages of a step by topic, each with its time, ns."""
+    step = row.step
+    acted_ns = max(seen_ns, step.decided_ns or 0)
+    found: dict[str, tuple[Mapping[str, Any], int]] = {}
+    if row.jpeg is not None:
+        sec, nsec = divmod(seen_ns, _NS_PER_S)
+        picture = {"timestamp": {"sec": sec, "nsec": nsec}, "frame_id": "camera"}
+        picture |= {"data": base64.b64encode(row.jpeg).decode(), "format": "jpeg"}
+        found["camera"] = picture, seen_ns
+    if states is not None:
+        found["state"] = _by_name(states, step.state), seen_ns
+    for name in ("action", "applied", "wanted"):
+        values = getattr(step, name)
+        if values is not None:
+            found[name] = _by_name(actions, values), acted_ns
+    if step.reward is not None:
+        terms = {name: _known(value) for name, value in step.terms.items()}
+        found["reward"] = {"reward": _known(step.reward), "terms": terms}, acted_ns
+    about: dict[str, Any] = {"step": step.index, "driver": step.driver}
+    about |= {"terminated": step.terminated, "truncated": step.truncated}
+    more = {"stop_reason": step.stop_reason or None, "wall_ns": step.wall_ns}
+    more |= {"marks": list(row.marks) or None, "dropped": row.dropped}
+    about |= {name: value for name, value in more.items() if value is not None}
+    found["step"] = about, acted_ns
+    return found
+
+
+def _channel(writer: Any, topic: str, name: str, properties: Mapping[str, Any]) -> int:
+    schema = {"title": name, "type": "object", "properties": properties}
+    return writer.register_channel(
+        topic=f"/{topic}",
+        message_encoding="json",
+        schema_id=writer.register_schema(
+            name=name, encoding="jsonschema", data=json.dumps(schema).encode()
+        ),
+    )
+
+
+def _properties(layout: Layout) -> dict[str, Any]:
+    """Return the JSON schema of each feature, with its unit and range as description."""
+    found: dict[str, Any] = {}
+    for feature in layout:
+        bounds = (feature.low, feature.high)
+        ends = ("" if math.isinf(bound) else f"{bound:g}" for bound in bounds)
+        about = {"description": f"[{feature.unit}] {' to '.join(ends)}".rstrip()}
+        kind = {"type": "array", "items": _NUMBER} if feature.shape else _NUMBER
+        found[feature.name] = about | kind
+    return found
+
+
+def _by_name(layout: Layout, values: Sequence[float]) -> dict[str, Any]:
+    """Return values by the name of their feature; a number that is not finite is left out."""
+    found: dict[str, Any] = {}
+    for feature, place in zip(layout, layout.slices.values(), strict=True):
+        part = [_known(value) for value in values[place]]
+        if feature.shape:
+            found[feature.name] = part
+        elif part[0] is not None:
+            found[feature.name] = part[0]
+    return found
+
+
+def _known(value: float) -> float | None:
+    """Return a number as JSON can hold it: null if it is not finite."""
+    return value if math.isfinite(value) else None
+
+
+def _text(value: str) -> str:
+    """Replace characters that have no UTF-8 encoding."""
+    return value.encode(errors="replace").decode()
+
+
+FORMAT: Final = Format(name="mcap", title="MCAP", write=_write, options=frozenset({"dropped"}))
