@@ -8,7 +8,7 @@ dataset.py     episodes as NumPy arrays
 statistics.py  summaries and distributions for reports
 merging.py     copy episodes of several recordings into one
 overlay.py     draw an action below its picture
-exchange/      import and export: csv, minari, tub, 2017
+exchange/      import and export: csv, minari, tub, lerobot, mcap
 cloning/       behaviour cloning
 ```
 """

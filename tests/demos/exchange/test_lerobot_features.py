@@ -13,7 +13,7 @@ from PIL import Image
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ImportContext, export_recording, import_recording
-from shapechanger.demos.exchange.lerobot_import import read_lerobot
+from shapechanger.demos.exchange.lerobot import FORMAT
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 from tests.demos.exchange.lerobot_set import CAMERA, SIZE, VIDEO, pairs_of, write_set, write_video
@@ -67,11 +67,11 @@ FADED = np.dstack([plain(5), np.full((SIZE, SIZE), 128, np.uint8)])
 @pytest.mark.parametrize(
     ("image", "reason"),
     [
-        (png(DEPTH.astype(np.uint16)), "16 bits a value, like that of a depth camera"),
-        (png(DEPTH.astype(np.float32), "TIFF"), "neither JPEG nor PNG"),
-        (png(plain(5), "WEBP"), "neither JPEG nor PNG"),
+        (png(DEPTH.astype(np.uint16)), "more than 8 bits a value, like that of a depth camera"),
+        (png(DEPTH.astype(np.float32), "TIFF"), "not JPEG, PNG or BMP"),
+        (png(plain(5), "WEBP"), "not JPEG, PNG or BMP"),
         (png(FADED), "partly transparent"),
-        (png(np.zeros((8, 16, 3), np.uint8)), "of 16 x 8 pixels, and not 32 x 32"),
+        (png(np.zeros((8, 16, 3), np.uint8)), "has 16 x 8 pixels, and not 32 x 32"),
         pytest.param(png(plain(5))[:60], "a damaged picture", id="cut PNG"),
         (picture(0, SIZE, SIZE)[:200], "cannot be taken"),
         (picture(0, 16, 8), "cannot be taken.*16 x 8"),
@@ -101,7 +101,7 @@ def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
 
     folder = write_set(tmp_path / "set", rows=spoil, **stored(images))
     context = ImportContext()
-    rows = [list(episode.rows) for episode in read_lerobot(folder, context)]
+    rows = [list(episode.rows) for episode in FORMAT.read(folder, context)]
     assert [[row.jpeg is not None for row in episode] for episode in rows] == [
         [True, False, False, False, True, False, False],
         [True, False, False, False] * 2,

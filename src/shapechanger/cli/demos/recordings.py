@@ -386,7 +386,7 @@ class Export:
 
     def run(self) -> None:
         """Export and print a summary."""
-        from shapechanger.demos.exchange import export_recording
+        from shapechanger.demos.exchange import export_recording, formats
 
         done = export_recording(
             self.data, self.out, self.to, dropped=self.dropped, task=self.task, images=self.images
@@ -396,7 +396,8 @@ class Export:
             f"{counted(done.episodes, 'episode')}"
         )
         if done.left_out:
-            where = "; --dropped includes them" if done.format in {"minari", "csv", "mcap"} else ""
+            marks = "dropped" in formats()[done.format].options
+            where = "; --dropped includes them" if marks else ""
             say(f"left out {done.left_out} dropped steps{where}")
         for note in done.notes:
             say(f"note: {note}")

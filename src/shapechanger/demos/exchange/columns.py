@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Final, Literal
+from dataclasses import dataclass
+from typing import Final, Literal, cast
 
 from shapechanger.layout import Feature
 
@@ -25,104 +25,43 @@ class Column:
     field: str
     kind: Kind
     names: Mapping[str, str]
-    aliases: Mapping[str, float] = field(default_factory=dict[str, float])
+    aliases: Mapping[str, float]
 
 
-def _column(
-    field: str, kind: Kind, aliases: Mapping[str, float] | None = None, **names: str
-) -> Column:
-    return Column(field, kind, names, aliases or {})
+_FORMATS: Final = ("csv", "minari", "lerobot", "tub", "mcap")
+_NAMES: Final = """
+step        | index   | step        |                    | frame_index               | _index          | /step
+frame       | picture | frame       | observations/image | observation.images.camera | cam/image_array | /camera
+driver      | text    | driver      | infos/driver       |                           | user/mode       | /step
+action      | action  | action/     | actions            | action                    | user/, pilot/   | /action
+applied     | action  | applied/    | infos/applied      |                           |                 | /applied
+wanted      | action  | wanted/     | infos/wanted       |                           | pilot/          | /wanted
+state       | state   | state/      | observations/state | observation.state         | other numbers   | /state
+captured_ns | time    | captured_ns | infos/captured_ns  | timestamp                 | _timestamp_ms   | log time
+decided_ns  | time    | decided_ns  | infos/decided_ns   |                           |                 | log time
+wall_ns     | time    | wall_ns     | infos/wall_ns      |                           | _timestamp_ms   | /step
+reward      | number  | reward      | rewards            | next.reward               |                 | /reward
+terms       | json    | terms       | infos/more         |                           |                 | /reward
+terminated  | flag    | terminated  | terminations       | next.terminated           |                 | /step
+truncated   | flag    | truncated   | truncations        | next.done                 |                 | /step
+stop_reason | text    | stop_reason | infos/stop_reason  |                           |                 | /step
+marks       | json    | marks       | infos/more         |                           |                 | /step
+dropped     | text    | dropped     | infos/more         |                           |                 | /step
+"""  # noqa: E501
+_ALIASES: Final[dict[str, dict[str, float]]] = {
+    "frame": dict.fromkeys(("file", "image", "picture", "filename"), 1.0),
+    "captured_ns": {"timestamp": 1e9, "time": 1e9, "timestamp_ms": 1e6, "milliseconds": 1e6},
+    "terminated": {"done": 1.0},
+}
 
 
-COLUMNS: Final = (
-    _column("step", "index", csv="step", lerobot="frame_index", tub="_index", mcap="step"),
-    _column(
-        "frame",
-        "picture",
-        dict.fromkeys(("file", "image", "picture", "filename"), 1.0),
-        csv="frame",
-        minari="observations/image",
-        lerobot="observation.images.camera",
-        tub="cam/image_array",
-        mcap="/camera",
-    ),
-    _column("driver", "text", csv="driver", minari="infos/driver", tub="user/mode", mcap="/step"),
-    _column(
-        "action",
-        "action",
-        csv="action/",
-        minari="actions",
-        lerobot="action",
-        tub="user/, pilot/",
-        mcap="/action",
-    ),
-    _column("applied", "action", csv="applied/", minari="infos/applied", mcap="/applied"),
-    _column(
-        "wanted",
-        "action",
-        csv="wanted/",
-        minari="infos/wanted",
-        tub="pilot/",
-        mcap="/wanted",
-    ),
-    _column(
-        "state",
-        "state",
-        csv="state/",
-        minari="observations/state",
-        lerobot="observation.state",
-        tub="other numbers",
-        mcap="/state",
-    ),
-    _column(
-        "captured_ns",
-        "time",
-        {"timestamp": 1e9, "time": 1e9, "time_s": 1e9, "timestamp_ms": 1e6, "milliseconds": 1e6},
-        csv="captured_ns",
-        minari="infos/captured_ns",
-        lerobot="timestamp",
-        tub="_timestamp_ms",
-        mcap="log time",
-    ),
-    _column("decided_ns", "time", csv="decided_ns", minari="infos/decided_ns", mcap="log time"),
-    _column(
-        "wall_ns",
-        "time",
-        csv="wall_ns",
-        minari="infos/wall_ns",
-        tub="_timestamp_ms",
-        mcap="/step",
-    ),
-    _column(
-        "reward",
-        "number",
-        csv="reward",
-        minari="rewards",
-        lerobot="next.reward",
-        mcap="/reward",
-    ),
-    _column("terms", "json", csv="terms", minari="infos/more", mcap="/reward"),
-    _column(
-        "terminated",
-        "flag",
-        {"done": 1.0},
-        csv="terminated",
-        minari="terminations",
-        lerobot="next.terminated",
-        mcap="/step",
-    ),
-    _column(
-        "truncated",
-        "flag",
-        csv="truncated",
-        minari="truncations",
-        lerobot="next.done",
-        mcap="/step",
-    ),
-    _column("stop_reason", "text", csv="stop_reason", minari="infos/stop_reason", mcap="/step"),
-    _column("marks", "json", csv="marks", minari="infos/more", mcap="/step"),
-    _column("dropped", "text", csv="dropped", minari="infos/more", mcap="/step"),
-)
+def _column(line: str) -> Column:
+    field, kind, *names = (cell.strip() for cell in line.split("|"))
+    named = {form: name for form, name in zip(_FORMATS, names, strict=True) if name}
+    return Column(field, cast("Kind", kind), named, _ALIASES.get(field, {}))
+
+
+COLUMNS: Final = tuple(map(_column, _NAMES.strip().splitlines()))
 """All columns of a step, in the order of `steps.csv`."""
 
 BY_FIELD: Final = {column.field: column for column in COLUMNS}
@@ -148,9 +87,8 @@ def name_in(form: str, field: str) -> str:
 
 def as_markdown() -> str:
     """Return the table for the documentation."""
-    forms = ("csv", "minari", "lerobot", "tub", "mcap")
-    lines = [("Field", *forms), ("---",) * (1 + len(forms))]
+    lines = [("Field", *_FORMATS), ("---",) * (1 + len(_FORMATS))]
     for column in COLUMNS:
-        named = (f"`{name}`" if (name := column.names.get(form)) else "" for form in forms)
+        named = (f"`{name}`" if (name := column.names.get(form)) else "" for form in _FORMATS)
         lines.append((f"`{column.field}`", *named))
     return "\n".join(f"| {' | '.join(cells)} |".replace("|  |", "| |") for cells in lines)

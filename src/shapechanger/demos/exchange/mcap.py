@@ -72,7 +72,9 @@ def _write_episode(episode: ExchangeEpisode, writer: Any) -> int:
     header = episode.header
     actions = Layout.from_json(header.action_layout)
     states = Layout.from_json(header.state_layout) if header.state_layout else None
-    schemas = dict.fromkeys(("action", "applied", "wanted"), ("Action", _properties(actions)))
+    schemas: dict[str, tuple[str, Mapping[str, Any]]] = {
+        topic: ("Action", _properties(actions)) for topic in ("action", "applied", "wanted")
+    }
     schemas |= {"step": ("Step", _STEP), "reward": ("Reward", _REWARD)}
     if states is not None:
         schemas["state"] = ("State", _properties(states))

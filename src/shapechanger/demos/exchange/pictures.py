@@ -48,11 +48,16 @@ class Pictures:
     def __init__(self, size: tuple[int, int] | None = None) -> None:
         self.size = size
 
-    def check(self, jpeg: bytes, name: str) -> None:
+    def check(self, jpeg: bytes, name: str, *, decode: bool = True) -> None:
         """Refuse a picture that is damaged or of another size.
 
+        Args:
+            jpeg: Its bytes.
+            name: How to name it in errors.
+            decode: Whether to decode it, because others encoded it.
+
         Raises:
-            DemosError: If it is; `name` names it.
+            DemosError: If it is.
         """
         size = picture_size(jpeg, name)
         self.size = self.size or size
@@ -61,7 +66,8 @@ class Pictures:
                 f"The picture {name} has {size[0]} x {size[1]} pixels, and not "
                 f"{self.size[0]} x {self.size[1]} like the others: a data set has one size."
             )
-        decode_picture(jpeg, name)
+        if decode:
+            decode_picture(jpeg, name)
 
 
 def as_jpeg(data: bytes, name: object) -> bytes:

@@ -40,7 +40,7 @@ from shapechanger.demos.exchange.tub_files import (
     NS_PER_MS,
     NS_PER_S,
     V1_TIME,
-    Record,
+    TubRecord,
     Tub,
     is_tub,
     read_files,
@@ -177,7 +177,7 @@ def _state_layout(inputs: Mapping[str, str]) -> Layout | None:
     return Layout(tuple(Feature(name, UNIT_UNKNOWN) for name in names)) if names else None
 
 
-def _driven(record: Record, state: Layout | None, context: ImportContext) -> Record | None:
+def _driven(record: TubRecord, state: Layout | None, context: ImportContext) -> TubRecord | None:
     """Return a record with its step; None, with a finding, if it has no valid action."""
     mode = record.fields.get(_MODE, _PERSON_DRIVES)
     by_person = mode == _PERSON_DRIVES
@@ -205,7 +205,7 @@ def _driven(record: Record, state: Layout | None, context: ImportContext) -> Rec
     return replace(record, step=Step(action=action, driver=driver, wanted=wanted, state=sensed))
 
 
-def _pair(record: Record, names: Sequence[str]) -> tuple[float, float] | None:
+def _pair(record: TubRecord, names: Sequence[str]) -> tuple[float, float] | None:
     """Return two numbers from -1 to 1; None for anything else."""
     values = [record.fields.get(name) for name in names]
     for value in values:
@@ -223,11 +223,11 @@ def _sensed(value: Any) -> float:
 
 
 def _with_pictures(
-    records: Sequence[Record], images: Path, camera: str, context: ImportContext
-) -> tuple[list[Record], tuple[int, int] | None]:
+    records: Sequence[TubRecord], images: Path, camera: str, context: ImportContext
+) -> tuple[list[TubRecord], tuple[int, int] | None]:
     """Return the records whose pictures can be imported, and the size of these."""
     shown = Counter(str(record.fields.get(camera)) for record in records)
-    found: list[Record] = []
+    found: list[TubRecord] = []
     offsets: dict[int, int] = {}
     for record in records:
         number, name = record.number, record.fields.get(camera)
@@ -255,10 +255,10 @@ def _with_pictures(
     return [record for record, is_good in zip(found, good, strict=True) if is_good], size
 
 
-def _drives(records: Sequence[Record], *, restarts: bool) -> Iterator[list[Record]]:
+def _drives(records: Sequence[TubRecord], *, restarts: bool) -> Iterator[list[TubRecord]]:
     """Yield the records of each session, and of each start of the car if times restart with it."""
     for _, session in groupby(records, key=lambda record: record.session):
-        drive: list[Record] = []
+        drive: list[TubRecord] = []
         for record in session:
             before_ns = drive[-1].time_ns if drive else None
             now_ns = record.time_ns
@@ -269,7 +269,7 @@ def _drives(records: Sequence[Record], *, restarts: bool) -> Iterator[list[Recor
         yield drive
 
 
-def _times_ns(drive: Sequence[Record], context: ImportContext) -> list[int]:
+def _times_ns(drive: Sequence[TubRecord], context: ImportContext) -> list[int]:
     """Return the time of each record, ns; an empty list if one is unknown."""
     times = [record.time_ns for record in drive if record.time_ns is not None]
     if 0 < len(times) < len(drive):
@@ -280,7 +280,7 @@ def _times_ns(drive: Sequence[Record], context: ImportContext) -> list[int]:
     return times if len(times) == len(drive) else []
 
 
-def _steps(records: Sequence[Record], *, timed: bool, is_unix: bool) -> Iterator[ExchangeStep]:
+def _steps(records: Sequence[TubRecord], *, timed: bool, is_unix: bool) -> Iterator[ExchangeStep]:
     for record in records:
         at_ns = record.time_ns if timed else None
         step = replace(
@@ -403,7 +403,7 @@ def _write_catalogs(folder: Path, records: Sequence[dict[str, Any]], created_s: 
         paths.append(f"catalog_{number}.catalog")
         _write_lines(folder / paths[-1], lines)
         beside = f"{paths[-1]}_manifest"
-        kept = {"created_at": created_s, "path": beside, "start_index": start}
+        kept: dict[str, Any] = {"created_at": created_s, "path": beside, "start_index": start}
         kept["line_lengths"] = [len(line) + 1 for line in lines]
         _write_lines(folder / beside, [json.dumps(kept, sort_keys=True)])
     return paths

@@ -51,7 +51,7 @@ _MAX_NS: Final = 1 << 61  # Half of what a step can hold: version 1 adds two tim
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class TubRecord:
     """A record with its `_index` or the number of its file; its time and picture if known."""
 
     fields: dict[str, Any]
@@ -70,7 +70,7 @@ class Tub:
     """
 
     inputs: dict[str, str]
-    records: list[Record]
+    records: list[TubRecord]
     images: Path
     start_ns: int | None
     is_unix: bool
@@ -171,10 +171,10 @@ def _read_catalog(
 
 def _with_numbers(
     rows: Sequence[tuple[int, dict[str, Any]]], context: ImportContext
-) -> list[Record]:
+) -> list[TubRecord]:
     """Return records in the order of their `_index`, without those whose number is unclear."""
     has_index = any("_index" in fields for _, fields in rows)
-    records: list[Record] = []
+    records: list[TubRecord] = []
     for position, fields in rows:
         number = fields.get("_index") if has_index else position
         if isinstance(number, bool) or not isinstance(number, int):
@@ -182,14 +182,14 @@ def _with_numbers(
             continue
         session = fields.get("_session_id")
         time_ns = _in_ns(fields.get("_timestamp_ms"), NS_PER_MS)
-        records.append(Record(fields, number, time_ns, "" if session is None else str(session)))
+        records.append(TubRecord(fields, number, time_ns, "" if session is None else str(session)))
     falls = [(a.number, b.number) for a, b in pairwise(records) if b.number < a.number]
     if falls:
         context.warn(
             f"The _index falls in {counted(len(falls), 'place')}, first from {falls[0][0]} to "
             f"{falls[0][1]}: the records are read in its order."
         )
-    unique: list[Record] = []
+    unique: list[TubRecord] = []
     ordered = sorted(records, key=lambda record: record.number)
     for number, group in groupby(ordered, key=lambda record: record.number):
         first, *others = group
@@ -211,7 +211,7 @@ def _note_deleted(count: int, context: ImportContext) -> None:
 
 
 def _report_missing(
-    records: Sequence[Record], deleted: set[int], count: Any, context: ImportContext
+    records: Sequence[TubRecord], deleted: set[int], count: Any, context: ImportContext
 ) -> None:
     """Report numbers that the manifest has and no record."""
     numbers = {record.number for record in records}
@@ -243,7 +243,7 @@ def _read_v1(folder: Path, context: ImportContext) -> Tub:
     start_ns = _in_ns(meta.get("start"), NS_PER_S)
     names = _numbered(folder, _RECORD_NAME)
     _note_deleted(len(deleted & names.keys()), context)
-    records: list[Record] = []
+    records: list[TubRecord] = []
     for number in names.keys() - deleted:
         record_path = folder / names[number]
         if not is_inside(folder, names[number]):
@@ -255,7 +255,7 @@ def _read_v1(folder: Path, context: ImportContext) -> Tub:
         time_ns = _in_ns(cast("dict[str, Any]", fields).get(V1_TIME), NS_PER_MS)
         if time_ns is not None:
             time_ns += start_ns or 0
-        records.append(Record(cast("dict[str, Any]", fields), number, time_ns))
+        records.append(TubRecord(cast("dict[str, Any]", fields), number, time_ns))
     return Tub(
         inputs=_typed(meta.get("inputs", []), meta.get("types", []), path),
         records=sorted(records, key=lambda record: record.number),

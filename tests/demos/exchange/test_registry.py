@@ -1,0 +1,104 @@
+"""A format is one file and an entry point, also outside of this package."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from shapechanger.cli import main
+from shapechanger.demos.exchange import formats
+from shapechanger.demos.exchange.columns import as_markdown
+from shapechanger.errors import DemosError
+from tests.demos.exchange.small import all_of
+
+DOCS = Path(__file__).parents[3] / "docs/exchange.md"
+
+FORMAT = """
+from shapechanger.demos.episodes import EpisodeHeader, Step
+from shapechanger.demos.exchange import ExchangeEpisode, ExchangeStep, Format
+from shapechanger.layout import Feature, Layout
+
+LAYOUT = Layout((Feature("speed", "m/s"),))
+
+
+def read(folder, context):
+    header = EpisodeHeader(action_layout=LAYOUT.to_json(), control_hz=context.hz or 10.0)
+    rows = []
+    for line in (folder / "speeds.txt").read_text().split():
+        try:
+            step = Step(action=(float(line),), driver="person")
+        except ValueError:
+            context.leave_out("line", "that is not a number", line)
+            continue
+        rows.append(ExchangeStep(step=step, jpeg=None))
+    yield ExchangeEpisode(header=header, rows=rows, name=str(folder))
+
+
+def write(episodes, folder, context):
+    speeds = [str(row.step.action[0]) for episode in episodes for row in episode.rows]
+    (folder / "speeds.txt").write_text("\\n".join(speeds))
+    return len(speeds)
+
+
+def detect(folder):
+    return (folder / "speeds.txt").is_file()
+
+
+FORMAT = Format(
+    name="speeds", title="Speeds", sign="speeds.txt", detect=detect, read=read, write=write,
+    options=frozenset({"hz"}),
+)
+"""
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return a folder with an installed package of one file, and its entry point."""
+    place = tmp_path / "site"
+    about = place / "speeds_format-1.0.dist-info"
+    about.mkdir(parents=True)
+    (place / "speeds_format.py").write_text(FORMAT)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: speeds-format\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[shapechanger.formats]\nspeeds = speeds_format:FORMAT")
+    monkeypatch.syspath_prepend(str(place))
+    formats.cache_clear()
+    yield place
+    formats.cache_clear()
+    sys.modules.pop("speeds_format", None)
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_format_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It is detected, read and written by the commands, which know nothing of it."""
+    source = tmp_path / "drive"
+    source.mkdir()
+    (source / "speeds.txt").write_text("0.5\n1.5\nfast\n")
+    command = ["demos", "import", str(source), "--out", str(tmp_path / "data"), "--hz", "5"]
+    with pytest.raises(SystemExit) as ended:
+        main(command)
+    assert ended.value.code == 3
+    output = capsys.readouterr()
+    assert "(speeds): 1 episode, 2 steps, 0 pictures" in output.out
+    assert output.err == "left out 1 line that is not a number: fast\n"
+    (episode,) = all_of(tmp_path / "data")
+    assert [step.action for step in episode.steps] == [(0.5,), (1.5,)]
+    assert episode.header.control_hz == 5.0
+    again = tmp_path / "again"
+    main(["demos", "export", str(tmp_path / "data"), "--out", str(again), "--to", "speeds"])
+    assert (again / "speeds.txt").read_text() == "0.5\n1.5"
+
+
+def test_a_format_of_a_name_that_is_taken(installed: Path) -> None:
+    """One name means one format."""
+    path = installed / "speeds_format.py"
+    path.write_text(path.read_text().replace('name="speeds"', 'name="csv"'))
+    with pytest.raises(DemosError, match="must name a Format of another name than tub, minari"):
+        formats()
+
+
+def test_the_columns_are_documented() -> None:
+    """The documentation shows the table that the formats use."""
+    assert as_markdown() in DOCS.read_text()
