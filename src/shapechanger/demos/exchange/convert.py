@@ -136,7 +136,9 @@ def export_recording(
             "or leave the excluded steps out."
         )
     if (task or images) and not form.options >= {"task", "images"}:
-        raise DemosError(f"Tasks and the choice of images are of lerobot, and not of {format}.")
+        raise DemosError(
+            f"Tasks and the choice of images are of {_with_option('task')}, and not of {format}."
+        )
     read = [read_episode(path) for path in episodes_of(data)]
     if not any(episode.steps if dropped else episode.kept for episode in read):
         raise DemosError(f"There is nothing to export: {data} has no steps that are kept.")
@@ -160,10 +162,10 @@ def export_recording(
     return Exported(format, len(episodes), steps, total - steps, tuple(notes))
 
 
-def _with_option(option: str) -> str:
-    """Return the names of the formats with an option, such as "minari, csv or mcap"."""
-    *most, last = (name for name, form in formats().items() if option in form.options)
-    return f"{', '.join(most)} or {last}" if most else last
+def _with_option(option: str, word: str = "or") -> str:
+    """Return the names of the formats with an option, such as "csv, mcap or minari"."""
+    *most, last = sorted(name for name, form in formats().items() if option in form.options)
+    return f"{', '.join(most)} {word} {last}" if most else last
 
 
 def import_episodes(
@@ -255,7 +257,8 @@ def _read(path: Path, format: str, context: ImportContext) -> tuple[str, Iterato
             raise DemosError(f"{path} is not {format}: expected {_expected()}; or omit --format.")
     form = formats()[format]
     if context.camera and "camera" not in form.options:
-        raise DemosError(f"A camera is chosen in lerobot and tub, and {path} is {format}.")
+        known = _with_option("camera", "and")
+        raise DemosError(f"A camera is chosen in {known}, and {path} is {format}.")
     if context.hz is not None:
         if "hz" not in form.options:
             raise DemosError(f"The format {format} states the rate itself: leave out --hz.")

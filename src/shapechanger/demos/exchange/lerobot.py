@@ -345,7 +345,7 @@ def _rows(
     shown: bytes | None = None
     try:
         for number, (row, picture) in enumerate(pictures):
-            frame, left_from = frames[number], number + 1
+            frame, left_from = int(frames[number]), number + 1
             fault = picture if isinstance(picture, str) else ""
             if not fault and not np.isfinite(row[_ACTION]).all():
                 fault = "with an action that is not finite"

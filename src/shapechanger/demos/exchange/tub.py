@@ -40,8 +40,8 @@ from shapechanger.demos.exchange.tub_files import (
     NS_PER_MS,
     NS_PER_S,
     V1_TIME,
-    TubRecord,
     Tub,
+    TubRecord,
     is_tub,
     read_files,
 )

@@ -244,7 +244,7 @@ def _read_v1(folder: Path, context: ImportContext) -> Tub:
     names = _numbered(folder, _RECORD_NAME)
     _note_deleted(len(deleted & names.keys()), context)
     records: list[TubRecord] = []
-    for number in names.keys() - deleted:
+    for number in sorted(names.keys() - deleted):
         record_path = folder / names[number]
         if not is_inside(folder, names[number]):
             raise DemosError(f"{record_path} is a link that leaves the folder.")
@@ -258,7 +258,7 @@ def _read_v1(folder: Path, context: ImportContext) -> Tub:
         records.append(TubRecord(cast("dict[str, Any]", fields), number, time_ns))
     return Tub(
         inputs=_typed(meta.get("inputs", []), meta.get("types", []), path),
-        records=sorted(records, key=lambda record: record.number),
+        records=records,
         images=folder,
         start_ns=start_ns,
         is_unix=start_ns is not None,
