@@ -245,7 +245,11 @@ def register_all() -> None:
     reach, track = FINGER_ENVS.values()
     for env_id, entry_point, limit in (
         (REMOTE_FINGER, "shapechanger.finger.remote:RemoteFingerEnv", reach.episode_steps),
-        (REMOTE_FINGER_TRACK, "shapechanger.finger.remote:RemoteFingerTrackEnv", track.episode_steps),
+        (
+            REMOTE_FINGER_TRACK,
+            "shapechanger.finger.remote:RemoteFingerTrackEnv",
+            track.episode_steps,
+        ),
         (REMOTE_VEHICLE, "shapechanger.remote.env:RemoteVehicleEnv", None),
         (REMOTE_WAYPOINT, "shapechanger.vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):

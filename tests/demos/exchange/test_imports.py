@@ -58,6 +58,22 @@ def test_a_table_of_others(tmp_path: Path) -> None:
     assert snapshot(folder) == before
 
 
+def test_a_table_of_others_is_split_where_time_jumps(tmp_path: Path) -> None:
+    """A pause and a clock that was set back each begin an episode, and are reported by size."""
+    (tmp_path / "table").mkdir()
+    times = [100.0, 100.1, 100.2, 103.5, 103.6, 90.0, 90.1]
+    lines = "".join(f"{n / 10},{at}\n\n" for n, at in enumerate(times))  # And blank lines.
+    (tmp_path / "table/steps.csv").write_text(f"steering,timestamp\n{lines}")
+    done = import_recording(tmp_path / "table", tmp_path / "data")
+    assert done.notes == ("A new episode begins after 1 pause, of 3.3 s at most and 3.3 s in all.",)
+    assert done.warnings == (
+        "Time runs backwards by up to 13.6 s at line 12: a new episode begins there.",
+    )
+    episodes = all_of(tmp_path / "data")
+    assert [len(episode.steps) for episode in episodes] == [3, 2, 2]
+    assert {episode.header.control_hz for episode in episodes} == {10.0}
+
+
 def test_a_table_of_others_with_states(tmp_path: Path) -> None:
     """A prefix says which columns are the state; others are named."""
     (tmp_path / "table").mkdir()

@@ -42,7 +42,7 @@ from shapechanger.demos.exchange.format import (
     ImportContext,
 )
 from shapechanger.demos.exchange.pictures import Pictures
-from shapechanger.demos.exchange.times import TimedDrive, choose_rates
+from shapechanger.demos.exchange.times import TimedDrive, choose_rates, split_at_jumps
 from shapechanger.demos.jpeg import picture_size
 from shapechanger.errors import DemosError, LayoutError, UnknownName
 from shapechanger.layout import Feature, Layout
@@ -188,9 +188,10 @@ def _read_others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpiso
         return
     times = [line.step.captured_ns for line in parsed if line.step.captured_ns is not None]
     timed = len(times) == len(parsed)
-    drive = TimedDrive(times if timed else [], range(len(parsed)), "line 2")
+    drive = TimedDrive(times if timed else (), [line.number for line in parsed], "line 2")
     (hz,), believed = choose_rates([drive], context)
     if not (timed and believed):
+        drive = replace(drive, times_ns=())
         parsed = [replace(line, step=replace(line.step, captured_ns=None)) for line in parsed]
     size = None
     if shown := next((line.frame for line in parsed if line.frame), ""):
@@ -209,8 +210,12 @@ def _read_others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpiso
         clock="real" if timed and believed else "none",
         source="csv",
     )
-    rows = _with_pictures(parsed, folder, header, context)
-    yield ExchangeEpisode(header=header, rows=rows, name=str(folder))
+    names = [line.where.rpartition(", ")[2] for line in parsed]
+    (places,) = split_at_jumps([drive], [names], [hz], context)
+    for place in places:
+        rows = _with_pictures(parsed[place], folder, header, context)
+        name = f"{folder}, from {names[place.start]}"
+        yield ExchangeEpisode(header=header, rows=rows, name=name)
 
 
 def _known_name(name: str) -> tuple[str, float]:
@@ -226,8 +231,9 @@ def _known_name(name: str) -> tuple[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """A line of a table, and how to name it in errors."""
+    """A line of a table, its number among them, and how to name it in errors."""
 
+    number: int
     step: Step
     frame: str
     where: str
@@ -292,7 +298,7 @@ class _Table:
         if self.factors is None:
             _require_columns(table[0][1] if table else [], self.names, str(path))
         before = -1
-        for line, cells in table[1:]:
+        for position, (line, cells) in enumerate(table[1:]):
             where = f"{path}, line {line}"
             try:
                 if len(cells) != len(self.names):
@@ -301,12 +307,12 @@ class _Table:
                         f"{where} has {len(cells)} cells instead of {len(self.names)}{hint}."
                     )
                 row = _Row(dict(zip(self.names, cells, strict=True)), where, separator)
-                number = before + 1 if self.factors else row.number("step", int)
+                number = row.number("step", int) if self.factors is None else position
                 if number is None:
                     raise DemosError(f"{where}: step is empty.")
                 if number <= before:
                     raise DemosError(f"{where}: step {number} comes after step {before}.")
-                found = row.line(self.columns, self.factors or {})
+                found = row.line(number, self.columns, self.factors or {})
             except DemosError as error:
                 _leave_out(context, error, where)
                 continue
@@ -337,7 +343,9 @@ class _Row:
     where: str
     separator: str
 
-    def line(self, columns: dict[str, list[str]], factors: Mapping[str, float]) -> _Line:
+    def line(
+        self, number: int, columns: dict[str, list[str]], factors: Mapping[str, float]
+    ) -> _Line:
         """Return the parsed line; a table of others, which has factors, may lack columns."""
         driver = self.cells.get("driver") or ("person" if factors else "")
         if driver not in DRIVERS:
@@ -370,7 +378,7 @@ class _Row:
         marks = tuple(map(str, fields.pop("marks") or ()))
         dropped = fields.pop("dropped")
         step = Step(driver=driver, **fields)
-        return _Line(step, self.cells.get("frame", ""), self.where, marks, dropped)
+        return _Line(number, step, self.cells.get("frame", ""), self.where, marks, dropped)
 
     def number(self, name: str, kind: type[_N]) -> _N | None:
         """Return the number in a column; None for an empty cell."""

@@ -136,53 +136,46 @@ def nominal_hz(measured: float) -> float:
     return float(f"{measured:.4g}")
 
 
-class TimeReport:
-    """Splits drives where time jumps, and collects the jumps for one report.
+def split_at_jumps(
+    drives: Sequence[TimedDrive],
+    names: Sequence[Sequence[str]],
+    rates: Sequence[float],
+    context: ImportContext,
+) -> list[list[slice]]:
+    """Split drives at each long pause, and wherever time runs backwards, and report all jumps.
 
     Args:
+        drives: The drives; those without times stay whole.
+        names: How to name each record of each drive.
+        rates: Steps per second of each drive.
         context: Findings of the import.
     """
-
-    def __init__(self, context: ImportContext) -> None:
-        self._context = context
-        self._pauses_s: list[float] = []
-        self._backwards: list[tuple[float, str]] = []
-
-    def split(self, times_ns: Sequence[int], names: Sequence[str], hz: float) -> list[slice]:
-        """Split a drive at each long pause, and wherever time runs backwards.
-
-        Args:
-            times_ns: Time of each record, ns.
-            names: How to name each record.
-            hz: Steps per second.
-        """
-        longest = longest_period_s(hz) * _NS_PER_S
+    pauses_s: list[float] = []
+    backwards: list[tuple[float, str]] = []
+    found: list[list[slice]] = []
+    for drive, named, hz in zip(drives, names, rates, strict=True):
         starts = [0]
-        for number, (now, later) in enumerate(pairwise(times_ns), 1):
-            if later < now:
-                self._backwards.append(((now - later) / _NS_PER_S, names[number]))
-            elif later - now > longest:
-                self._pauses_s.append((later - now) / _NS_PER_S)
+        for number, (now, later) in enumerate(pairwise(drive.times_ns), 1):
+            passed_s = (later - now) / _NS_PER_S
+            if passed_s < 0.0:
+                backwards.append((-passed_s, named[number]))
+            elif passed_s > longest_period_s(hz):
+                pauses_s.append(passed_s)
             else:
                 continue
             starts.append(number)
-        return [slice(first, last) for first, last in pairwise([*starts, len(times_ns)])]
-
-    def finish(self) -> None:
-        """Report all jumps."""
-        if self._pauses_s:
-            count = len(self._pauses_s)
-            self._context.note(
-                f"A new episode begins after {counted(count, 'pause')}, of "
-                f"{_seconds(max(self._pauses_s))} at most and {_seconds(sum(self._pauses_s))} in "
-                "all."
-            )
-        if self._backwards:
-            size_s, _ = max(self._backwards)
-            self._context.warn(
-                f"Time runs backwards by up to {_seconds(size_s)} at "
-                f"{few([name for _, name in self._backwards])}: a new episode begins there."
-            )
+        found.append([slice(*ends) for ends in pairwise([*starts, len(named)])])
+    if pauses_s:
+        context.note(
+            f"A new episode begins after {counted(len(pauses_s), 'pause')}, of "
+            f"{_seconds(max(pauses_s))} at most and {_seconds(sum(pauses_s))} in all."
+        )
+    if backwards:
+        context.warn(
+            f"Time runs backwards by up to {_seconds(max(backwards)[0])} at "
+            f"{few([name for _, name in backwards])}: a new episode begins there."
+        )
+    return found
 
 
 def iso_time(unix_ns: int) -> str:

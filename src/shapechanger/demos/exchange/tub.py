@@ -32,7 +32,7 @@ from shapechanger.demos.exchange.format import (
     kept_steps,
 )
 from shapechanger.demos.exchange.pictures import check_pictures, read_picture
-from shapechanger.demos.exchange.times import TimedDrive, TimeReport, choose_rates, iso_time
+from shapechanger.demos.exchange.times import TimedDrive, choose_rates, iso_time, split_at_jumps
 from shapechanger.demos.exchange.tub_files import (
     IMAGES,
     LOOP_HZ,
@@ -80,16 +80,18 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         return
     parts = list(_drives(records, restarts=not tub.is_unix))
     times = [_times_ns(part, context) for part in parts]
+    names = [[str(record.number) for record in part] for part in parts]
     drives = [
         TimedDrive(known, [record.number for record in part], f"record {part[0].number}")
         for part, known in zip(parts, times, strict=True)
     ]
     rates, believed = choose_rates(drives, context, tub.stated_hz)
-    report = TimeReport(context)
-    for part, known, hz in zip(parts, times, rates, strict=True):
+    if not believed:
+        drives = [replace(drive, times_ns=()) for drive in drives]
+    places = split_at_jumps(drives, names, rates, context)
+    for part, known, hz, split in zip(parts, times, rates, places, strict=True):
         timed = bool(known) and believed
-        names = [str(record.number) for record in part]
-        for place in report.split(known, names, hz) if timed else [slice(None)]:
+        for place in split:
             began_ns = known[place][0] if timed and tub.is_unix else tub.start_ns
             header = EpisodeHeader(
                 action_layout=_ACTIONS.to_json(),
@@ -107,7 +109,6 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
                 rows=_steps(part[place], timed=timed, is_unix=tub.is_unix),
                 name=f"{folder}, from record {part[place][0].number}",
             )
-    report.finish()
 
 
 def _columns(tub: Tub) -> dict[str, str]:
