@@ -86,6 +86,7 @@ def _pipe(folder: Path) -> None:
         (_edit("2.jpg", lambda jpeg: jpeg + bytes(17 << 20)), "bytes, more than the limit"),
         (_edit("2.jpg", lambda jpeg: picture(1, 48, 32)), "48 x 32 pixels, and not 40 x 32"),
         (_table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,x,1.0"), "must be a number, got 'x'"),
+        (_table(b"0.0,0.0,0.0,1.0", b"0.0,nan,0.0,1.0"), "line 3: the action is not finite"),
         (_table(b"0.0,0.0,0.0,1.0", b"0.0,0.0,0.0"), "line 3 has 5 cells instead of 6"),
         (_table(b"0.0,0.0,0.0,1.0", b",,,"), "line 3: the action is empty"),
         (_table(b"\n2.jpg", b"\n../2.jpg"), "leaves the folder"),

@@ -370,6 +370,8 @@ class _Row:
                     pass
         if fields["action"] is None:
             raise DemosError(f"{self.where}: the action is empty.")
+        if not all(map(math.isfinite, fields["action"])):
+            raise DemosError(f"{self.where}: the action is not finite.")
         if fields["state"] is None:
             fields["state"] = (math.nan,) * len(columns["state"])
         fields["stop_reason"] = fields["stop_reason"] or ""
