@@ -356,7 +356,7 @@ def _driven(job: tuple[str, str, int, bool]) -> list[DriveResult]:
     if kept.exists():
         return [DriveResult(**one) for one in json.loads(kept.read_bytes())]
     policy = taught_source(source, seed)
-    with closing(WaypointEnv(target, full_robot=whole, courses="held-out", put_back=True)) as env:
+    with closing(WaypointEnv(target, sensed=whole, courses="held-out", put_back=True)) as env:
         drives = [drive(env, policy.predict, course=course) for course in COURSES]
     kept.write_text(json.dumps([asdict(one) for one in drives]), encoding="utf-8")
     return drives

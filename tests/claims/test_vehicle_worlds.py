@@ -68,15 +68,24 @@ def test_rendering_does_not_change_the_drive() -> None:
 def _compare(*, image: bool) -> None:
     """Drive both cars, and compare their poses after each action."""
     served = _drive_served(_actions(), image)
-    with closing(VehicleEnv("car", image=image)) as env:
-        _, info = env.reset(options={"course": _COURSE, "start": _START})
-        driven = [info["pose"]]
+    profile = load_profile(find_profile("lab-car"))
+    with (
+        closing(MujocoWorld("car", seed=_COURSE)) as world,
+        closing(InProcessRobot(profile, world, pictures=image)) as robot,
+    ):
+        robot.start(lambda: world.place(_START))
+        driven = [_place(world)]
         for action in _actions():
-            driven.append(env.step(np.array(action, np.float32))[4]["pose"])
-        progress = env.world.progress_m
+            robot.step(action)
+            driven.append(_place(world))
+        progress = world.progress_m
     assert progress > 2.0
     assert [(one.x, one.y, one.heading) for one in served] == driven
     assert served[-1].truth["progress_m"] == progress
+
+
+def _place(world: MujocoWorld) -> tuple[float, float, float]:
+    return world.pose.x, world.pose.y, world.pose.heading
 
 
 def _drive_served(actions: Sequence[Sequence[float]], image: bool) -> list[Whereabouts]:

@@ -233,12 +233,12 @@ def register_all() -> None:
         vector_entry_point="shapechanger.envs.vector.entry_points:OwnRobot",
     )
     for envs, kind, limit in (
-        (VEHICLE_ENVS, "VehicleEnv", _EPISODE_STEPS),
-        (RANGES_ENVS, "RangesEnv", _RANGES_STEPS),
-        (WAYPOINT_ENVS, "WaypointEnv", _EPISODE_STEPS),
+        (VEHICLE_ENVS, "vehicle:VehicleEnv", _EPISODE_STEPS),
+        (RANGES_ENVS, "ranges:RangesEnv", _RANGES_STEPS),
+        (WAYPOINT_ENVS, "waypoints:WaypointEnv", _EPISODE_STEPS),
     ):
         for env_id, (vehicle, _) in envs.items():
-            entry_point = f"shapechanger.vehicles.envs:{kind}"
+            entry_point = f"shapechanger.vehicles.envs.{kind}"
             _register(env_id, entry_point, limit, kwargs={"vehicle": vehicle})
     for env_id, task in FINGER_ENVS.items():
         _register(env_id, task.entry_point, task.episode_steps)

@@ -142,6 +142,11 @@ class MujocoWorld:
         return self._contacts.bumped
 
     @property
+    def travelled_m(self) -> float:
+        """Distance that the wheels rolled, m; backward counts down."""
+        return self._travelled_m
+
+    @property
     def progress_m(self) -> float:
         """Distance along the course since the vehicle was placed, m; backwards counts down."""
         return self._progress.update(*self._motion[:2])

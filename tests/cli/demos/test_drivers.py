@@ -18,7 +18,7 @@ from shapechanger.demos.drivers import Act, CorrectedPilot
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 from shapechanger.vehicles.envs import RangesEnv
-from shapechanger.vehicles.envs.base import DrivingEnv
+from shapechanger.vehicles.envs.drive import DriveEnv
 from tests.demos.corridor_env import CorridorEnv, Shows
 
 
@@ -62,7 +62,7 @@ def test_a_corrected_policy_uses_the_expert_of_the_env(tmp_path: Path) -> None:
     assert pilot.decide(env.reset(seed=0)[0]).driver == "policy"
 
 
-def _corrected(env: DrivingEnv, change: Act, steps: int) -> tuple[CorrectedPilot, set[str]]:
+def _corrected(env: DriveEnv, change: Act, steps: int) -> tuple[CorrectedPilot, set[str]]:
     """Let the expert drive with changed actions, corrected by itself; return marks too."""
     expert, remarks = env.expert(), set[str]()
     pilot = corrected_pilot(env, lambda seen: change(expert(seen)), env.demonstrator(0))

@@ -41,8 +41,8 @@ def _profile(folder: Path, camera: CameraPlan, vehicle: str = "car") -> Path:
     return path
 
 
-def _waypoints(folder: Path, camera: CameraPlan, *, full_robot: bool) -> NDArray[np.uint8]:
-    env = WaypointEnv("car", robot=_profile(folder, camera), full_robot=full_robot)
+def _waypoints(folder: Path, camera: CameraPlan, *, sensed: bool) -> NDArray[np.uint8]:
+    env = WaypointEnv("car", robot=_profile(folder, camera), sensed=sensed)
     with closing(env):
         return env.reset(options={"course": 11, "start": 11})[0]
 
@@ -88,8 +88,8 @@ def _agree(seen: Callable[[Path, CameraPlan], NDArray[np.uint8]], folder: Path) 
 @pytest.mark.parametrize(
     "seen",
     [
-        lambda folder, camera: _waypoints(folder, camera, full_robot=False),
-        lambda folder, camera: _waypoints(folder, camera, full_robot=True),
+        lambda folder, camera: _waypoints(folder, camera, sensed=False),
+        lambda folder, camera: _waypoints(folder, camera, sensed=True),
         _ranges,
         _twin(course_place("corridor", "car")),
     ],
@@ -115,15 +115,15 @@ def test_frames_have_the_size_of_the_profile(tmp_path: Path) -> None:
             assert env.observation_space.shape == expected
 
 
-@pytest.mark.parametrize("full_robot", [False, True])
-def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path, full_robot: bool) -> None:
+@pytest.mark.parametrize("sensed", [False, True])
+def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path, sensed: bool) -> None:
     """The error names the profile, what is missing and ways out."""
     profile = _profile(tmp_path, CameraPlan("v4l2", (160, 120), pitch_deg=0.0, fovy_deg=41.0))
     message = (
         r"car.toml: .* 41 degrees misses 20 % .* wider frames, of its whole sensor, or a wider"
     )
     with pytest.raises(ProfileError, match=message):
-        WaypointEnv("car", robot=profile, full_robot=full_robot)
+        WaypointEnv("car", robot=profile, sensed=sensed)
 
 
 @pytest.mark.gl

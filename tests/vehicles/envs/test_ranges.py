@@ -20,7 +20,7 @@ from shapechanger.vehicles.envs.demonstrators import (
     LEAST_THROTTLE,
     leave_rest,
 )
-from shapechanger.vehicles.envs.ranges import OutputShaper
+from shapechanger.vehicles.envs.limits import MeanOutputs
 
 _COURSE = {"course": 2, "start": 2}
 _STEPS = 60
@@ -129,7 +129,7 @@ def test_outputs_follow_the_guards_limits() -> None:
         (OutputPlan("drive", "hbridge", "wheels", {"throttle": 1.0}),),
         limits=LimitPlan(bump_hold_ms=100),
     )
-    shaper = OutputShaper(plan)
+    shaper = MeanOutputs(plan)
     # Five ticks of 10 ms, at 0, 0.04, ... 0.16.
     assert shaper.outputs((1.0,), False, 5)["wheels"] == pytest.approx(0.08)
     for _ in range(4):

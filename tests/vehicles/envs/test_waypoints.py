@@ -199,17 +199,17 @@ def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
     ("sensors", "missing"),
     [(("wheel",), "speed"), (("motion",), "yaw_rate"), (("wheel", "motion"), "speed and yaw_rate")],
 )
-def test_a_full_robot_without_its_sensors_is_refused(
+def test_sensed_waypoints_without_the_sensors_are_refused(
     tmp_path: Path, sensors: tuple[str, ...], missing: str
 ) -> None:
-    """Waypoints of the full robot need its own measurements, and the error names them."""
+    """With `sensed`, waypoints need measurements, and the error names the missing ones."""
     text = find_profile("lab-car").read_text(encoding="utf-8")
     for sensor in sensors:
         text = re.sub(rf"^\[sensor\.{sensor}\]\n(?:[^\[\n].*\n|\n)*", "", text, flags=re.MULTILINE)
     path = tmp_path / "car.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ProfileError, match=f"car.toml has no sensor of {missing}, which waypoints"):
-        WaypointEnv("car", robot=path, full_robot=True)
+        WaypointEnv("car", robot=path, sensed=True)
 
 
 def test_the_measured_response_matches_the_geometry() -> None:
@@ -242,9 +242,9 @@ def test_following_true_waypoints_has_no_collisions(env_id: str, vehicle: str) -
 
 @pytest.mark.gl
 @pytest.mark.usefixtures("gl")
-def test_the_full_robot_follows_waypoints() -> None:
-    """The whole robot follows waypoints by its own sensors."""
-    with closing(WaypointEnv("car", full_robot=True, put_back=True)) as env:
+def test_a_car_follows_waypoints_by_its_sensors() -> None:
+    """With `sensed`, speed is measured by the encoder."""
+    with closing(WaypointEnv("car", sensed=True, put_back=True)) as env:
         env.reset(options=_COURSE)
         guide = env.demonstrator(0)
         for _ in range(60):

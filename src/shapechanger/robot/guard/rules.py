@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.limits import aimed, clipped, slewed
+from shapechanger.robot.guard.limits import MotionReflexes, aimed, clipped, slewed
 from shapechanger.robot.guard.log import shortened
 from shapechanger.robot.guard.messages import Order
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, StopPlan
-from shapechanger.robot.guard.reflexes import Bump, Propulsion, RobotHealth, Stall
+from shapechanger.robot.guard.reflexes import RobotHealth
 from shapechanger.robot.guard.sensors import SensedState, Sensing
 
 _NS_PER_MS = 1_000_000
@@ -226,14 +226,9 @@ class Rules:
         self._period_ns = round(1e9 / plan.tick_hz)
         self._stale_ns = plan.limits.camera_stale_ms * 1_000_000
         self._freshness = Freshness(plan.limits.deadline_ms)
-        self._propulsion = Propulsion(plan.actions)
-        self._bump = Bump(plan.limits.bump_hold_ms)
-        self._stall = Stall(plan.limits.stall_s, plan.limits.stall_throttle)
+        self._reflexes = MotionReflexes(plan)
         self._health = RobotHealth(plan)
-        self._measures_distance = any(s.measures == "distance" for s in plan.sensors)
         self._disarming = tuple(s.name for s in plan.sensors if s.measures in _DISARMING)
-        self._is_near = False
-        self._is_far = True
         self._is_pressed = False
         self._command: Order | None = None
         self._expiry_ns = 0
@@ -252,13 +247,13 @@ class Rules:
     @property
     def direction(self) -> float:
         """Return the sign of the propulsion: 1 forward, -1 backward, 0 neither."""
-        push = self._propulsion.push(self._done)
+        push = self._reflexes.propulsion.push(self._done)
         return float((push > 0.0) - (push < 0.0))
 
     @property
     def bumps(self) -> int:
         """Return the number of bumps."""
-        return self._bump.count
+        return self._reflexes.bump.count
 
     def offer(self, order: Order, now_ns: int) -> str:
         """Process an order.
@@ -323,13 +318,8 @@ class Rules:
             sensing: Readings of all sensors.
             now_ns: Robot's time, ns.
         """
-        quantities = sensing.quantities
-        limit_m = self._plan.limits.stop_distance_m
-        self._is_near = limit_m > 0.0 and quantities.get("distance", limit_m) < limit_m
-        is_heard = "distance" in quantities and not sensing.silent
-        self._is_far = limit_m <= 0.0 or not self._measures_distance or is_heard
-        self._bump.sense(quantities, now_ns)
-        self._stall.sense(quantities, self._propulsion.push(self._done), now_ns)
+        silent = bool(sensing.silent)
+        self._reflexes.sense(sensing.quantities, silent, self._done, now_ns)
         self._health.sense(sensing, now_ns)
         # Faulty servos have released, and an intermittent magnet is loose: a person has to inspect
         # them and arm again.
@@ -338,9 +328,9 @@ class Rules:
                 self.disarm(sensing.failures[name])
         self.senses.complete(
             sensing,
-            speed=self._propulsion.speed(self._done),
-            stalled=self._stall.way != 0,
-            watches_stall=self._stall.watches,
+            speed=self._reflexes.propulsion.speed(self._done),
+            stalled=self._reflexes.stall.way != 0,
+            watches_stall=self._reflexes.stall.watches,
         )
 
     def tick(self, now_ns: int) -> OutputDecision:
@@ -374,8 +364,8 @@ class Rules:
             times.append(self._expiry_ns)
         if self._stale_ns and self._frame_ns is not None:
             times.append(self._frame_ns + self._stale_ns)
-        if self._bump.until_ns is not None:
-            times.append(self._bump.until_ns)
+        if self._reflexes.bump.until_ns is not None:
+            times.append(self._reflexes.bump.until_ns)
         if self._stopping is not None and (end_ns := self._stopping.next_ns(now_ns)) is not None:
             times.append(end_ns)
         return min(time_ns for time_ns in times if time_ns > now_ns)
@@ -432,7 +422,7 @@ class Rules:
         if self._stopping is None:
             plan = self._plan
             self._stopping = Stopping(plan.stop, plan.actions, self._applied, now_ns)
-        self._stall.ask(0.0)
+        self._reflexes.stall.ask(0.0)
         self._applied = self._stopping.values(now_ns)
         return OutputDecision(self._applied, self._stopping.releases(now_ns), reason, 0, None)
 
@@ -441,8 +431,7 @@ class Rules:
         actions = self._plan.actions
         aims = [aimed(a, value) for a, value in zip(actions, command.values, strict=True)]
         clips = any(map(clipped, actions, command.values))
-        self._stall.ask(self._propulsion.push(aims))
-        reason = self._hold_back(aims, now_ns)
+        aims, reason = self._reflexes.hold_back(aims, now_ns)
         if clips:
             reason = f"{reason} {_CLIPPED}".lstrip()
         self._applied = tuple(
@@ -450,27 +439,6 @@ class Rules:
             for a, now, aim in zip(actions, self._applied, aims, strict=True)
         )
         return OutputDecision(self._applied, False, reason, command.session, command.seq)
-
-    def _hold_back(self, aims: list[float], now_ns: int) -> str:
-        """Remove what a reflex forbids from the targets, and return why."""
-        forward: list[str] = []
-        if self._bump.blocks(now_ns):
-            forward.append("Not forward: the bumper touched something.")
-        if self._is_near:
-            forward.append("Not forward: something is near.")
-        if not self._is_far:
-            forward.append("Not forward: the distance ahead is not known.")
-        if self._stall.way > 0:
-            forward.append("Not forward: it pushes and does not move.")
-        backward = ["Not backward: it pushes and does not move."] if self._stall.way < 0 else []
-        reasons: list[str] = []
-        for i in self._propulsion.forward:
-            rest = self._plan.actions[i].rest
-            for words, drops in ((forward, aims[i] > rest), (backward, aims[i] < rest)):
-                if words and drops:
-                    aims[i] = rest
-                    reasons += words
-        return " ".join(dict.fromkeys(reasons))
 
     def _rest_at_once(self, now_ns: int) -> Stopping:
         actions = self._plan.actions

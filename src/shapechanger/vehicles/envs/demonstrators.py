@@ -147,7 +147,7 @@ class TeacherDemonstrator(Demonstrator):
 class ExpertDriver:
     """Expert that drives on the present course of a world.
 
-    It counts in periods of 1/20 s. `DrivingEnv.expert` makes it for robots with this control rate.
+    It counts in periods of 1/20 s. `DriveEnv.expert` makes it for robots with this control rate.
 
     Args:
         world: The world of the vehicle.

@@ -13,23 +13,16 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.drive import DriveReward
 from shapechanger.contract.world import STANDING_MPS
-from shapechanger.errors import SpaceMismatch
 from shapechanger.layout import Feature, Layout
-from shapechanger.robot.guard.limits import (
-    aimed,
-    bump_blocks,
-    bump_ends_ns,
-    forward_actions,
-    slewed,
-)
-from shapechanger.robot.guard.plan import GuardPlan, output_values
-from shapechanger.vehicles.envs.base import Courses, CourseSampler, DrivingEnv, resolve_profile
 from shapechanger.vehicles.envs.demonstrators import (
     BEARINGS_DEG,
     FARTHEST_M,
     leave_rest,
     observe_ranges,
 )
+from shapechanger.vehicles.envs.drive import DriveEnv
+from shapechanger.vehicles.envs.limits import MeanOutputs
+from shapechanger.vehicles.envs.setup import Courses, CourseSampler, resolve_profile
 from shapechanger.vehicles.world import MujocoWorld
 
 COLLISION_REWARD: Final = -3.0
@@ -46,66 +39,7 @@ _FASTEST_TURN: Final = 15.0  # rad/s
 _COURSES: Final = range(48)
 
 
-class OutputShaper:
-    """Turns commands into outputs as a robot's guard does: caps, levels, slew, bumper's reflex.
-
-    It calls the guard's own functions, at the guard's own rate. What it leaves out: deadlines,
-    which a simulated command never misses, stalls, and the resolution of pulses and sensors.
-
-    Args:
-        plan: Plan of the guard.
-    """
-
-    def __init__(self, plan: GuardPlan) -> None:
-        self._plan = plan
-        self.tick_s = 1.0 / plan.tick_hz
-        self._tick_ns = round(1e9 / plan.tick_hz)
-        self._forward = forward_actions(plan.actions)
-        self.reset()
-
-    def reset(self) -> None:
-        """Bring all actions to rest."""
-        self.applied = tuple(action.rest for action in self._plan.actions)
-        self._now_ns = 0
-        self._block_ends_ns: int | None = None
-
-    def outputs(
-        self, values: tuple[float, ...], bumped: bool, ticks: int
-    ) -> Mapping[str, float | None]:
-        """Return the mean output of each part over a control period.
-
-        Args:
-            values: The command, one value for each action.
-            bumped: Whether the bumper is pressed.
-            ticks: Ticks of the guard in the period.
-        """
-        hold_ms = self._plan.limits.bump_hold_ms
-        self._block_ends_ns = bump_ends_ns(bumped, self._now_ns, self._block_ends_ns, hold_ms)
-        actions = self._plan.actions
-        aims = [aimed(action, value) for action, value in zip(actions, values, strict=True)]
-        if bump_blocks(bumped, self._now_ns, self._block_ends_ns):
-            for i in self._forward:
-                aims[i] = min(aims[i], actions[i].rest)
-        self._now_ns += ticks * self._tick_ns
-        target = tuple(aims)
-        total = [0.0] * len(self._plan.outputs)
-        left = ticks
-        while left:
-            # Once at the target, the rest of the period is alike.
-            alike = left if self.applied == target else 1
-            left -= alike
-            values_now = output_values(self._plan, self.applied)
-            total = [one + alike * now for one, now in zip(total, values_now, strict=True)]
-            if alike == 1:
-                self.applied = tuple(
-                    slewed(action, now, aim, self.tick_s)
-                    for action, now, aim in zip(actions, self.applied, target, strict=True)
-                )
-        outputs = self._plan.outputs
-        return {out.part: one / ticks for out, one in zip(outputs, total, strict=True)}
-
-
-class RangesEnv(DrivingEnv):
+class RangesEnv(DriveEnv):
     """Drive fast without collisions, seeing distances all around the front.
 
     The task, the vehicle and the courses of `shapechanger/Car-v1`, on the true state of the world:
@@ -185,7 +119,7 @@ class RangesEnv(DrivingEnv):
             fovy_deg=seen.fovy_deg,
             coarse=True,
         )
-        self._shaper = OutputShaper(profile.guard_plan())
+        self._shaper = MeanOutputs(profile.guard_plan())
         self._ticks = round(1.0 / (profile.control_hz * self._shaper.tick_s))
         self._period_s = 1.0 / profile.control_hz
         weights = {"collision": COLLISION_REWARD, **(reward or {})}
@@ -233,7 +167,7 @@ class RangesEnv(DrivingEnv):
         self._bumped = False
         self._progress_m = 0.0
         self._needs_reset = False
-        return self._observe(), self._info()
+        return self._observe(), self._truth(self._progress_m)
 
     def step(
         self, action: NDArray[np.float32]
@@ -246,14 +180,10 @@ class RangesEnv(DrivingEnv):
         """
         if self._needs_reset:
             raise gym.error.ResetNeeded("Call reset() before the first step.")
-        values = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        if values.shape != (2,) or not np.isfinite(values).all():
-            raise SpaceMismatch(
-                f"An action of a vehicle is steering and throttle, got {np.asarray(action)}."
-            )
+        values = self._values(action)
         world, shaper = self._world, self._shaper
         progress, collisions = self._progress_m, world.collisions
-        command = tuple(leave_rest(values, world.inputs().stands).tolist())
+        command = tuple(leave_rest(np.array(values), world.inputs().stands).tolist())
         world.advance(self._period_s, shaper.outputs(command, self._bumped, self._ticks))
         collided = world.collisions > collisions
         self._bumped = world.bumped  # Before it is put back: a robot's reflex outlasts the contact.
@@ -269,20 +199,10 @@ class RangesEnv(DrivingEnv):
         nearest = float(seen[: len(BEARINGS_DEG)].min())
         terms["reward_near"] = -_NEAR_COST * self._period_s * max(0.0, 1.0 - nearest / _NEAR_M)
         terminated = self._reward.ends(collided)
-        info = self._info() | terms
+        info = self._truth(self._progress_m) | terms
         info["reward_terms"] = terms
         return seen, sum(terms.values()), terminated, False, info
 
     def _observe(self) -> NDArray[np.float32]:
         seen = observe_ranges(self._world)
         return np.minimum(np.maximum(seen, self._low, out=seen), self._high, out=seen)
-
-    def _info(self) -> dict[str, Any]:
-        world, pose = self._world, self._world.pose
-        return {
-            "progress": self._progress_m,
-            "collisions": world.collisions,
-            "pose": (pose.x, pose.y, pose.heading),
-            "course": world.seed,
-            "standing": world.inputs().stands,
-        }

@@ -22,11 +22,12 @@ from shapechanger.robot.profile.profile import Profile
 from shapechanger.vehicles.bodies import vehicle_model
 from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
 from shapechanger.vehicles.courses.course import FLOODED
-from shapechanger.vehicles.envs.base import Courses, DrivingEnv, resolve_profile
 from shapechanger.vehicles.envs.demonstrators import Demonstrator, course_expert
-from shapechanger.vehicles.envs.env import VehicleEnv
+from shapechanger.vehicles.envs.drive import DriveEnv
 from shapechanger.vehicles.envs.ranges import RangesEnv
+from shapechanger.vehicles.envs.setup import Courses, resolve_profile
 from shapechanger.vehicles.envs.shift import certify_vehicles
+from shapechanger.vehicles.envs.vehicle import VehicleEnv
 from shapechanger.vehicles.waypoints import (
     ACTION_LAYOUT,
     AHEAD_M,
@@ -67,7 +68,7 @@ def _rectifier_of(profile: Profile, camera: CameraPlan) -> Rectifier:
 
 @lru_cache(maxsize=32)
 def _response_of(
-    vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, full_robot: bool
+    vehicle: str, world: str | None, robot: str | os.PathLike[str] | None, sensed: bool
 ) -> SteeringResponse:
     """Measure the response of a simulated vehicle, once in a process.
 
@@ -75,22 +76,22 @@ def _response_of(
         ProfileError: If the robot does not measure its speed and its rate of turn.
     """
     common: dict[str, Any] = {"world": world, "robot": robot, "courses": (0,), "put_back": True}
-    env = VehicleEnv(vehicle, image=False, **common) if full_robot else RangesEnv(vehicle, **common)
+    env = VehicleEnv(vehicle, image=False, **common) if sensed else RangesEnv(vehicle, **common)
     try:
         places = env.observation_layout.slices
         missing = [name for name in ("speed", "yaw_rate") if name not in places]
         if missing:
             raise ProfileError(
                 f"{resolve_profile(vehicle, robot)[0].path} has no sensor of "
-                f"{' and '.join(missing)}, which waypoints need on the full robot: add it to the "
-                "profile, or leave out full_robot."
+                f"{' and '.join(missing)}, which waypoints with sensed=True need: add it to the "
+                "profile, or leave out sensed."
             )
         return measure_response(env, places["speed"].start, places["yaw_rate"].start)
     finally:
         env.close()
 
 
-class WaypointEnv(DrivingEnv):
+class WaypointEnv(DriveEnv):
     """The driving task with a camera and an action that are the same for all vehicles.
 
     A policy that learned in one vehicle drives another one as it is: pictures are warped to one
@@ -106,14 +107,15 @@ class WaypointEnv(DrivingEnv):
     The rectified frame, RGB, `uint8`, shape (48, 80, 3).
 
     ## Reward, start, end and info
-    Those of `RangesEnv`, or of `VehicleEnv` with `full_robot`.
+    Those of `RangesEnv`, or of `VehicleEnv` with `sensed`.
 
     Args:
         vehicle: "car", "tank", "boat" or "truck".
         world: "corridor", "yard", "harbour" or "flooded-corridor"; None for the corridor, flooded
             for a boat, so that vehicles differ in their bodies alone.
         robot: Path or name of a profile; None for `lab-` followed by the vehicle.
-        full_robot: Whether the robot is emulated, as in `VehicleEnv`.
+        sensed: Whether speed and reward are those that the sensors of `VehicleEnv` measure, instead
+            of the true ones; its physics takes shorter steps, too.
         courses: "training" or "held-out" for the courses that `reset` samples, or their seeds.
         randomise: Whether `reset` samples light, textures and the camera's pose too. Pictures are
             warped as if the camera were in its place, so a policy sees the error of the pose.
@@ -140,7 +142,7 @@ class WaypointEnv(DrivingEnv):
         *,
         world: str | None = None,
         robot: str | os.PathLike[str] | None = None,
-        full_robot: bool = False,
+        sensed: bool = False,
         courses: Courses = "training",
         randomise: bool = False,
         put_back: bool = False,
@@ -155,10 +157,10 @@ class WaypointEnv(DrivingEnv):
             "world": world, "robot": robot, "courses": courses, "randomise": randomise,
             "put_back": put_back,
         }  # fmt: skip
-        self.response = _response_of(vehicle, world, robot, full_robot)
+        self.response = _response_of(vehicle, world, robot, sensed)
         self._env: VehicleEnv | RangesEnv = (
             VehicleEnv(vehicle, state=True, **common)
-            if full_robot
+            if sensed
             else RangesEnv(vehicle, camera=True, **common)
         )
         self.parts, self._world, self._draw = self._env.parts, self._env.world, self._env._draw
@@ -170,7 +172,7 @@ class WaypointEnv(DrivingEnv):
         self._speed = 0.0
         places = self._env.observation_layout.slices
         self._speed_at = places["speed"].start
-        if full_robot:
+        if sensed:
             self._speed_at -= places["camera/image"].stop
 
     def reset(

@@ -1,12 +1,10 @@
-"""Car, tank, boat and truck as Gymnasium envs: a whole robot, on simulated pins, in MuJoCo."""
+"""Car, tank, boat and truck as Gymnasium envs that see a camera's image and a robot's sensors."""
 
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Mapping, Sequence
-from importlib.util import find_spec
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -14,32 +12,43 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.contract.drive import DriveReward
-from shapechanger.errors import MissingExtra, RenderError, UnknownName
-from shapechanger.layout import Layout
-from shapechanger.link.messages import Observation, Welcome
-from shapechanger.remote.inbox import Received
-from shapechanger.remote.observations import RobotSpaces, StepMeter, View
-from shapechanger.twin.in_process import InProcessRobot
-from shapechanger.vehicles.envs.base import (
-    Courses,
-    CourseSampler,
-    DrivingEnv,
-    Steering,
-    resolve_profile,
-)
+from shapechanger.errors import RenderError, UnknownName
+from shapechanger.layout import Element, Feature, Layout
 from shapechanger.vehicles.envs.demonstrators import TeacherDemonstrator
+from shapechanger.vehicles.envs.drive import DriveEnv
+from shapechanger.vehicles.envs.limits import SensedVehicle
+from shapechanger.vehicles.envs.setup import Courses, CourseSampler, Steering, resolve_profile
 from shapechanger.vehicles.envs.shift import certify_vehicles
 from shapechanger.vehicles.world import MujocoWorld
 
 _MODES: Final = ("rgb_array",)
+_ABSENT: Final = "absent"
+_APPLIED: Final = "/applied"
 
 
-class VehicleEnv(DrivingEnv):
+class RobotFacts(NamedTuple):
+    """Facts of a simulated robot for recordings.
+
+    Attributes:
+        robot: Name of its profile.
+        body: Kind of vehicle.
+        camera_pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
+        camera_fovy_deg: Vertical field of view, degrees; None if unknown.
+    """
+
+    robot: str
+    body: str
+    camera_pitch_deg: float | None
+    camera_fovy_deg: float | None
+
+
+class VehicleEnv(DriveEnv):
     """Drive fast without collisions, with a camera that looks ahead.
 
-    The robot is defined by a profile and runs its own guard and drivers on simulated pins: caps,
-    slew, reflexes and sensors are those of the robot on the bench. `shapechanger/RemoteVehicle-v1`
-    is the same task on hardware, or over the link.
+    The robot is defined by a profile: its caps, slew, reflexes and sensors act as on the bench, by
+    the guard's own functions. Pins, chips and the link are left out; a robot's twin emulates them,
+    and drives to the same place. `shapechanger/RemoteVehicle-v1` is the same task on hardware, on a
+    twin, or over the link.
 
     ## Action space
     `Box(-1, 1, (2,), float32)`: `[steering, throttle]`; -1 steers left, +1 drives forward. It acts
@@ -121,8 +130,6 @@ class VehicleEnv(DrivingEnv):
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
-        if find_spec("gpiozero") is None:  # The drivers import it when they open their pins.
-            raise MissingExtra("gpiozero", "robot")
         if render_mode is not None and render_mode not in _MODES:
             raise UnknownName("render mode", render_mode, _MODES)
         self.render_mode = render_mode
@@ -138,37 +145,35 @@ class VehicleEnv(DrivingEnv):
             lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )
         self.parts = frozenset(output.part for output in profile.outputs)
-        self._robot = InProcessRobot(profile, self._world, pictures=image)
-        welcome = self._robot.welcome
-        self._senses = RobotSpaces(welcome, camera.size, image, state)
-        self._puts_back = put_back
+        self.welcome = RobotFacts(profile.name, profile.body, camera.pitch_deg, camera.fovy_deg)
         ends = {"collision_ends_episode": 0.0} if put_back else {}
-        self._reward = DriveReward.from_weights({**welcome.reward, **(reward or {}), **ends})
-        self._meter = StepMeter(self._senses)
-        self.observation_space = self._senses.observation_space
-        self.action_space = self._senses.action_space
-        self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
-        self._last: Observation | None = None
-
-    @property
-    def welcome(self) -> Welcome:
-        """Description of the robot, as it gives it to a client."""
-        return self._robot.welcome
-
-    @property
-    def action_layout(self) -> Layout:
-        """Name, unit and range of each number of the action."""
-        return self._senses.action_layout
-
-    @property
-    def observation_layout(self) -> Layout:
-        """Name, unit and range of each number of the observation; a frame is `camera/image`."""
-        return self._senses.observation_layout
-
-    @property
-    def newest_jpeg(self) -> bytes | None:
-        """The JPEG frame of the newest observation, as the robot sent it; None without one."""
-        return None if self._last is None or not self._senses.has_image else self._last.frame
+        self._reward = DriveReward.from_weights({**profile.reward, **(reward or {}), **ends})
+        self._puts_back = put_back
+        self._vehicle = SensedVehicle(profile.guard_plan(), self._world)
+        self._period_ns = round(1e9 / profile.control_hz)
+        self._has_image, self._has_state = image, state or not image
+        self._state = profile.state_layout()
+        self._applied_at = {
+            f"{action.name}{_APPLIED}": i for i, action in enumerate(profile.actions)
+        }
+        self.action_layout = profile.action_layout()
+        wide, high = camera.size
+        pixels = Feature(
+            "camera/image", "1", 0.0, 255, Element("camera", "camera"), (high, wide, 3)
+        )
+        self.observation_layout = Layout(
+            ((pixels,) if image else ()) + (self._state.features if self._has_state else ())
+        )
+        state_space, self.action_space = (
+            gym.spaces.Box(layout.low.astype(np.float32), layout.high.astype(np.float32))
+            for layout in (self._state, self.action_layout)
+        )
+        image_space = gym.spaces.Box(0, 255, (high, wide, 3), np.uint8)
+        self.observation_space: gym.Space[Any] = state_space if not image else image_space
+        if image and state:
+            self.observation_space = gym.spaces.Dict({"image": image_space, "state": state_space})
+        self.metadata = {**self.metadata, "render_fps": profile.control_hz}
+        self._needs_reset = True
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -188,36 +193,46 @@ class VehicleEnv(DrivingEnv):
         super().reset(seed=seed)
         drawn = self._lay_out(options)
         self._world.zero_odometer()  # So that no episode depends on earlier ones.
-        last = self._robot.start(lambda: self._world.place(drawn.start))
+        self._world.place(drawn.start)
+        self._vehicle.start()
+        # A robot sends its first observation after one period, too.
+        self._vehicle.advance(self._period_ns, None)
         self._require_free(drawn)
-        self._meter.start(last)
-        self._last = last
-        view = self._view(last)
-        return view.observation, self._info(last, view)
+        self._touched = bool(self._touches())
+        self._needs_reset = False
+        seen, absent = self._observe()
+        return seen, self._info(absent)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take one step of one control period.
 
         Raises:
-            SpaceMismatch: If the action does not fit the robot.
+            SpaceMismatch: If the action is not two finite numbers.
             ResetNeeded: If `reset` was never called.
         """
-        before = self._last
-        if before is None:
+        if self._needs_reset:
             raise gym.error.ResetNeeded("Call reset() before the first step.")
-        values, collisions = self._senses.values(action), self._world.collisions
-        seen, bumped = self._robot.step(values)
-        measured = self._meter.measure(before, seen, bumped)
-        terms = self._reward.terms(*measured)
-        terminated = self._reward.ends(measured.collided)
-        self._last = seen
-        view = self._view(seen)
-        info = self._info(seen, view) | terms
+        values, vehicle = self._values(action), self._vehicle
+        collisions, bumps = self._world.collisions, vehicle.bumps
+        vehicle.advance(self._period_ns, values)
+        touches = self._touches()
+        hits = bool(touches) or vehicle.bumps > bumps
+        collided = None if touches is None else hits and not self._touched
+        self._touched = hits
+        stall = vehicle.quantities.get("stall")
+        terms = self._reward.terms(
+            vehicle.quantities.get("speed"),
+            collided,
+            None if stall is None else bool(stall),
+            self._period_ns / 1e9,
+        )
+        seen, absent = self._observe()
+        info = self._info(absent) | terms
         info["reward_terms"] = terms
-        info["refused"] = self._robot.refused
+        # After the observation, as a person would do who has seen the collision.
         if self._puts_back and self._world.collisions > collisions:
             self._world.put_back()
-        return view.observation, sum(terms.values()), terminated, False, info
+        return seen, sum(terms.values()), self._reward.ends(collided), False, info
 
     @property
     def teacher_env(self) -> str:
@@ -245,32 +260,42 @@ class VehicleEnv(DrivingEnv):
         Raises:
             RenderError: If `reset` was never called.
         """
-        if self.render_mode and self._last is None:
+        if self.render_mode and self._needs_reset:
             raise RenderError("Call reset() before render().")
         return super().render()
 
-    def close(self) -> None:
-        """Release the pins and the renderer."""
-        self._robot.close()
-        super().close()
+    def _observe(self) -> tuple[Any, tuple[str, ...]]:
+        """Return the observation, and the names of the state's features without a measurement."""
+        quantities, applied = self._vehicle.quantities, self._vehicle.applied
+        state, absent = np.empty(self._state.size, np.float32), list[str]()
+        for i, feature in enumerate(self._state.features):
+            place = self._applied_at.get(feature.name)
+            value = quantities.get(feature.name) if place is None else applied[place]
+            if value is None:
+                absent.append(feature.name)
+            state[i] = feature.middle if value is None else value
+        if not self._has_image:
+            return state, tuple(absent)
+        image = self._world.picture()
+        return {"image": image, "state": state} if self._has_state else image, tuple(absent)
 
-    def _view(self, seen: Observation) -> View:
-        return self._senses.view(Received(seen, time.monotonic(), seen.frame))
+    def _touches(self) -> float | None:
+        """Return whether sensors say that it touches something, 0 or 1; None if none can say."""
+        quantities = self._vehicle.quantities
+        return quantities.get("collision", quantities.get("bump"))
 
-    def _info(self, seen: Observation, view: View) -> dict[str, Any]:
-        pose = self._world.pose
-        return {
-            "action_applied": np.array(seen.action_applied, np.float32),
-            "stop_reason": seen.stop_reason,
-            "armed": seen.armed,
-            "emergency": seen.emergency,
-            "absent": view.absent,
-            "reward_sources": self._meter.sources(seen),
-            "progress": self._world.progress_m,
-            "collisions": self._world.collisions,
-            "pose": (pose.x, pose.y, pose.heading),
-            "course": self._world.seed,
-            "standing": self._world.inputs().stands,
-            "captured_ns": seen.captured_ns,
-            "decided_ns": seen.command_ns,
+    def _info(self, absent: tuple[str, ...]) -> dict[str, Any]:
+        vehicle = self._vehicle
+        sources = {name: vehicle.sources.get(name, _ABSENT) for name in ("speed", "stall")}
+        touch = vehicle.sources.get("collision", vehicle.sources.get("bump", _ABSENT))
+        return self._truth(self._world.progress_m) | {
+            "action_applied": np.array(vehicle.applied, np.float32),
+            "stop_reason": vehicle.reason,
+            "refused": "",
+            "armed": True,
+            "emergency": False,
+            "absent": absent,
+            "reward_sources": sources | {"collision": touch},
+            "captured_ns": vehicle.now_ns,
+            "decided_ns": vehicle.now_ns - self._period_ns,
         }

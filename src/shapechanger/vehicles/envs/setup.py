@@ -1,19 +1,15 @@
-"""Base of the vehicle envs: their arguments, and sampling of courses, starts and looks."""
+"""Arguments of the vehicle envs: profiles, frame sizes, and courses, starts and looks."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, cast
 
-import gymnasium as gym
 import numpy as np
-from gymnasium.utils import EzPickle
-from numpy.typing import NDArray
 
 from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError, check_seed
 from shapechanger.robot.cameras.camera import CameraPlan
@@ -23,9 +19,6 @@ from shapechanger.vehicles.bodies import require_fit, vehicle_model
 from shapechanger.vehicles.cameras.camera import CameraJitter
 from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
 from shapechanger.vehicles.courses.look import Look
-from shapechanger.vehicles.envs.demonstrators import Demonstrator, ExpertDriver, VehicleDemonstrator
-from shapechanger.vehicles.expert.traits import PERIOD_S
-from shapechanger.vehicles.world import MujocoWorld
 
 Steering = Literal["proportional", "bang"]
 """Steering angles: any, or only full left, straight and full right, as in 2017."""
@@ -185,106 +178,3 @@ class CourseSampler:
             look,
             camera,
         )
-
-
-class DrivingEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
-    """Base of the vehicle envs: a world, and the courses that its episodes are on.
-
-    Attributes:
-        parts: The parts that the robot's outputs move, such as "wheels" and "steering".
-    """
-
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
-    parts: frozenset[str]
-    _world: MujocoWorld
-    _draw: CourseSampler
-
-    @property
-    def world(self) -> MujocoWorld:
-        """The simulated world, with its ground truth."""
-        return self._world
-
-    def hold_out(self) -> None:
-        """Sample held-out courses from the next reset on."""
-        self._draw.hold_out()
-
-    def expert(self) -> ExpertDriver:
-        """Return the expert that knows the whole course, without mistakes.
-
-        Raises:
-            ProfileError: If the robot has another control rate than the expert.
-        """
-        self._require_rate_of_expert()
-        return ExpertDriver(self._world)
-
-    def demonstrator(self, seed: int) -> Demonstrator:
-        """Return an expert that knows the whole course and recovers from its own mistakes.
-
-        Args:
-            seed: Seed of the mistakes.
-
-        Raises:
-            ProfileError: If the robot has another control rate than the expert.
-        """
-        self._require_rate_of_expert()
-        return VehicleDemonstrator(self._world, seed)
-
-    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the camera's picture, shape (height, width, 3); None without a render mode."""
-        return self._world.picture() if self.render_mode else None
-
-    @property
-    def reach(self) -> float:
-        """Distance from the middle of the vehicle to its farthest point, m."""
-        return self._world.reach
-
-    def picture(
-        self, width: int = 480, height: int = 360, reach: float | None = None
-    ) -> NDArray[np.uint8]:
-        """Return a picture of the vehicle in its world from outside, shape (height, width, 3).
-
-        Args:
-            width: Width in pixels.
-            height: Height in pixels.
-            reach: Radius in view around the middle of the vehicle, m; None for its own reach.
-
-        Raises:
-            RenderError: If the size is out of range, or nothing can be drawn here.
-        """
-        return self._world.outside(width, height, reach)
-
-    def close(self) -> None:
-        """Release the renderer, if there is one."""
-        self._world.close()
-
-    def _require_rate_of_expert(self) -> None:
-        """Check that the robot takes an action when an expert chooses one.
-
-        Raises:
-            ProfileError: If its control rate is another.
-        """
-        rate = self.metadata["render_fps"]
-        if not math.isclose(rate * PERIOD_S, 1.0):
-            raise ProfileError(
-                f"This robot has control_hz = {rate:g}, and the experts that demonstrate driving "
-                f"choose {1.0 / PERIOD_S:g} actions a second: set control_hz = {1.0 / PERIOD_S:g}."
-            )
-
-    def _lay_out(self, options: Mapping[str, Any] | None) -> EpisodeSetup:
-        """Sample the next episode, and lay out its course."""
-        drawn = self._draw.draw(self.np_random, self._world.course.world, options or {})
-        if drawn.course != self._world.seed or drawn.look is not None:
-            self._world.lay_out(drawn.course, drawn.look, drawn.camera)
-        return drawn
-
-    def _require_free(self, drawn: EpisodeSetup) -> None:
-        """Check that the vehicle touches nothing at the start.
-
-        Raises:
-            WorldError: If it does.
-        """
-        if self._world.touches:
-            raise WorldError(
-                f"The {self._world.vehicle.name} is stuck at start {drawn.start} of course "
-                f"{drawn.course}: choose another."
-            )

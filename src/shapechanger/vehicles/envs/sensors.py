@@ -1,0 +1,255 @@
+"""Sensors of a profile as functions of a simulated world, with the rates and steps of the parts.
+
+They measure as the drivers in `shapechanger.robot.drivers` do from the chips of a twin. No sensor
+has noise beyond its steps. A CPU temperature is not simulated and stays absent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any, Final, Protocol
+
+from shapechanger.robot.guard.plan import SensorPlan
+from shapechanger.vehicles.world import MujocoWorld
+
+_STANDS_AFTER_S: Final = 0.5  # An encoder without an edge for this long stands.
+_EDGES_PER_COUNT: Final = 4
+# HC-SR04: a ping at least every 60 ms takes 0.45 ms; without an echo it gives up after 38 ms.
+_CYCLE_NS: Final = 60_000_000
+_PING_NS: Final = 450_000
+_NO_ECHO_S: Final = 0.038
+_NEAREST_M: Final = 0.02
+_FARTHEST_M: Final = 4.0
+_SOUND_M_PER_S: Final = 343.2
+# MPU-6050 at 4 g and 500 deg/s; the zero of its gyroscope follows its readings at rest.
+_M_PER_S2: Final = 9.80665 / 8192.0
+_RAD_PER_S: Final = math.radians(1.0) / 65.5
+_MOST_ZERO_RAD_PER_S: Final = math.radians(25.0)
+_ZERO_SHARE: Final = 0.02
+# INA219: read ten times a second, in steps of 4 mV.
+_BATTERY_NS: Final = 100_000_000
+_V_PER_STEP: Final = 0.004
+
+
+class _Sensor(Protocol):
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """Return readings keyed by quantity.
+
+        Args:
+            now_ns: Time, ns.
+            direction: Sign of the propulsion.
+        """
+        ...
+
+
+class WheelEncoder:
+    """Speed from the times of the last edges of an encoder: one count, or two edges of one channel.
+
+    Args:
+        settings: Settings of the driver `encoder`.
+        world: The world, whose vehicle rolls.
+        now_ns: Time, ns.
+    """
+
+    def __init__(self, settings: dict[str, Any], world: MujocoWorld, now_ns: int) -> None:
+        count_m: float = settings["wheel_m"] / settings["counts_per_turn"]
+        self._two_channels: bool = settings["b"] >= 0
+        # Both edges of a single channel are passed, and rising ones counted.
+        self._pitch_m = count_m / (_EDGES_PER_COUNT if self._two_channels else 2)
+        self._edge_m = self._pitch_m if self._two_channels else count_m
+        self._world = world
+        self._travelled_m, self._read_ns = world.travelled_m, now_ns
+        self._position = math.floor(self._travelled_m / self._pitch_m)
+        most = _EDGES_PER_COUNT + 1 if self._two_channels else 2
+        self._edges: deque[tuple[float, int]] = deque(maxlen=most)
+        self._last_edge_ns = 0
+        self._speed = 0.0
+        self._sign = 1.0
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """Return the "speed", m/s, positive forward; called at each tick of the guard."""
+        if direction != 0.0:
+            self._sign = math.copysign(1.0, direction)
+        if self._roll(now_ns, self._world.travelled_m):
+            self._last_edge_ns = now_ns
+            self._speed = self._mean_speed()
+        else:  # The next edge is not here yet, which bounds the speed.
+            since_s = (now_ns - self._last_edge_ns) / 1e9
+            if since_s > _STANDS_AFTER_S:
+                self._speed = 0.0
+            elif since_s > 0.0:
+                most = self._edge_m / since_s
+                self._speed = min(max(self._speed, -most), most)
+        return {"speed": self._speed if self._two_channels else self._speed * self._sign}
+
+    def _roll(self, now_ns: int, travelled_m: float) -> bool:
+        """Add the edges since the last reading, with their times; return whether there were any."""
+        before_m, self._travelled_m = self._travelled_m, travelled_m
+        before_ns, self._read_ns = self._read_ns, now_ns
+        target = math.floor(travelled_m / self._pitch_m)
+        step = 1 if target > self._position else -1
+        counted = False
+        while self._position != target:
+            edge_m = max(self._position, self._position + step) * self._pitch_m
+            share = min(max((edge_m - before_m) / (travelled_m - before_m or 1.0), 0.0), 1.0)
+            self._position += step
+            if not self._two_channels and self._position % 2 == 0:
+                continue
+            at_s = (before_ns + round(share * (now_ns - before_ns))) / 1e9
+            way = step if self._two_channels else 1
+            # Edges before a reversal or a stop do not count towards the current speed.
+            if self._edges and (way != self._edges[-1][1] or at_s - self._edges[-1][0] > 0.5):
+                self._edges.clear()
+            self._edges.append((at_s, way))
+            counted = True
+        return counted
+
+    def _mean_speed(self) -> float:
+        edges = self._edges
+        if len(edges) < 2 or edges[-1][0] <= edges[0][0]:
+            return 0.0
+        moved_m = sum(way for _, way in list(edges)[1:]) * self._edge_m
+        return moved_m / (edges[-1][0] - edges[0][0])
+
+
+class _Bumper:
+    def __init__(self, world: MujocoWorld) -> None:
+        self._world = world
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        return {"bump": float(self._world.bumped)}
+
+
+class _Sonar:
+    """Distance ahead; the echo of a ping is there at a later reading."""
+
+    def __init__(self, most_m: float, distance_m: Callable[[], float]) -> None:
+        self._most_m = most_m
+        self._distance_m = distance_m
+        self._pinged_ns: int | None = None
+        self._echo: tuple[int, float] | None = None
+        self._measured: dict[str, float] = {}
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        if self._echo is not None and now_ns >= self._echo[0]:
+            self._measured = {"distance": min(self._echo[1] * _SOUND_M_PER_S / 2.0, self._most_m)}
+            self._echo = None
+        if self._pinged_ns is None or now_ns - self._pinged_ns >= _CYCLE_NS:
+            self._pinged_ns = now_ns
+            distance_m = self._distance_m()
+            echo_s = _NO_ECHO_S
+            if distance_m <= _FARTHEST_M:
+                echo_s = 2.0 * max(distance_m, _NEAREST_M) / _SOUND_M_PER_S
+            self._echo = now_ns + _PING_NS + round(echo_s * 1e9), echo_s
+        return self._measured
+
+
+class _Inertia:
+    def __init__(self, world: MujocoWorld) -> None:
+        self._world = world
+        self._zero: float | None = None
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        seen = self._world.inputs()
+        rate = _stepped(seen.yaw_rate, _RAD_PER_S)
+        if direction == 0.0 and abs(rate) < _MOST_ZERO_RAD_PER_S:
+            zero = rate if self._zero is None else self._zero
+            self._zero = zero + (rate - zero) * _ZERO_SHARE
+        return {
+            "acceleration_x": _stepped(seen.acceleration_x, _M_PER_S2),
+            "acceleration_y": _stepped(seen.acceleration_y, _M_PER_S2),
+            "yaw_rate": rate - (self._zero or 0.0),
+        }
+
+
+class _Battery:
+    def __init__(self, world: MujocoWorld) -> None:
+        self._world = world
+        self._read_ns: int | None = None
+        self._volts = 0.0
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        if self._read_ns is None or now_ns - self._read_ns >= _BATTERY_NS:
+            self._read_ns = now_ns
+            self._volts = round(self._world.inputs().battery_v / _V_PER_STEP) * _V_PER_STEP
+        return {"battery": self._volts}
+
+
+# Quantities whose sensors are read at each tick: reflexes act on them, or they depend on it.
+_AT_EACH_TICK: Final = ("speed", "bump", "distance")
+
+
+class SimulatedSensors:
+    """All sensors of a profile that a world moves.
+
+    Args:
+        plans: The sensors.
+        world: The world.
+        now_ns: Time, ns.
+
+    Attributes:
+        sources: Name of the sensor behind each quantity that was read.
+    """
+
+    def __init__(self, plans: Sequence[SensorPlan], world: MujocoWorld, now_ns: int) -> None:
+        opened = [(plan, _opened(plan, world, now_ns)) for plan in plans]
+        self._fast, self._slow = (
+            [
+                (plan.name, sensor)
+                for plan, sensor in opened
+                if sensor is not None and (plan.measures in _AT_EACH_TICK) == is_fast
+            ]
+            for is_fast in (True, False)
+        )
+        self.sources: dict[str, str] = {}
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """Return readings for the reflexes, keyed by quantity; of two speeds the smaller.
+
+        Args:
+            now_ns: Time, ns; call it at each tick.
+            direction: Sign of the propulsion.
+        """
+        quantities: dict[str, float] = {}
+        if direction == 0.0:
+            self.complete(quantities, now_ns, direction)  # The zero of a gyroscope follows.
+        for name, sensor in self._fast:
+            for quantity, value in sensor.read(now_ns, direction).items():
+                if quantity == "speed" and abs(value) >= abs(quantities.get(quantity, math.inf)):
+                    continue
+                quantities[quantity], self.sources[quantity] = value, name
+        return quantities
+
+    def complete(self, quantities: dict[str, float], now_ns: int, direction: float) -> None:
+        """Add the readings of the other sensors.
+
+        Args:
+            quantities: Readings of the same tick; extended in place.
+            now_ns: Time, ns.
+            direction: Sign of the propulsion.
+        """
+        for name, sensor in self._slow:
+            for quantity, value in sensor.read(now_ns, direction).items():
+                quantities[quantity], self.sources[quantity] = value, name
+
+
+def _opened(plan: SensorPlan, world: MujocoWorld, now_ns: int) -> _Sensor | None:
+    match plan.driver:
+        case "encoder":
+            return WheelEncoder(plan.settings, world, now_ns)
+        case "switch":
+            return _Bumper(world)
+        case "hcsr04":
+            return _Sonar(plan.settings["max_m"], world.distance_m)
+        case "mpu6050":
+            return _Inertia(world)
+        case "ina219":
+            return _Battery(world)
+        case _:
+            return None
+
+
+def _stepped(value: float, step: float) -> float:
+    return max(-32768, min(32767, round(value / step))) * step
