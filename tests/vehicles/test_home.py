@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from shapechanger.vehicles.bodies import VEHICLES
+from shapechanger.vehicles.courses import WORLDS
 from shapechanger.vehicles.courses.course import FLOODED, HOME
-from shapechanger.vehicles.courses.layout import WORLDS
 
 
 def test_every_vehicle_is_at_home_somewhere() -> None:

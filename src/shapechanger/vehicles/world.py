@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.world import RESTING_V, Pose, Readings
 from shapechanger.errors import WorldError
-from shapechanger.vehicles.bodies import SIM_DT, Motion, add_vehicle, vehicle_model
+from shapechanger.vehicles.bodies import SIM_DT, add_vehicle, vehicle_model
+from shapechanger.vehicles.bodies.model import ContactTracker
 from shapechanger.vehicles.bodies.parts import CameraMount, aim_camera
 from shapechanger.vehicles.cameras.camera import (
     CameraJitter,
@@ -23,19 +24,13 @@ from shapechanger.vehicles.cameras.camera import (
     move_camera,
 )
 from shapechanger.vehicles.cameras.corruptions import find_corruption
+from shapechanger.vehicles.courses import lay_out, start_pose
 from shapechanger.vehicles.courses.course import HOME, Course, require_element
-from shapechanger.vehicles.courses.layout import lay_out, start_pose
 from shapechanger.vehicles.courses.look import Look
 from shapechanger.vehicles.courses.scene import add_course
 from shapechanger.vehicles.expert.line import CourseProgress
 from shapechanger.vehicles.expert.path import CoursePath, plan_path_for
 from shapechanger.vehicles.expert.traits import traits_of
-
-BUMPER_SPREAD: Final = math.radians(60.0)
-"""Largest bearing, rad, from the middle of the vehicle, at which a contact presses the bumper."""
-
-APART_S: Final = 0.5
-"""Contacts that follow one another within this time, s, belong to the same collision."""
 
 PORTRAITS_RAD: Final = tuple(
     math.radians(degrees) for degrees in (125.0, -125.0, 150.0, -150.0, 55.0, -55.0, 25.0, -25.0)
@@ -502,61 +497,3 @@ def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
 def _planned(vehicle: str, world: str, seed: int) -> CoursePath:
     """Return a path around a course for a vehicle."""
     return plan_path_for(lay_out(world, seed), traits_of(vehicle))
-
-
-class ContactTracker:
-    """Tracks contacts of a vehicle with walls and obstacles.
-
-    Args:
-        model: Model whose vehicle geoms are named "vehicle/...", and its walls and obstacles
-            "world/wall/..." and "world/thing/...".
-
-    Attributes:
-        collisions: Number of collisions since `reset`.
-        bumped: Whether a contact presses the front bumper.
-        touches: Whether there is any contact.
-    """
-
-    def __init__(self, model: mujoco.MjModel) -> None:
-        names = [model.geom(i).name for i in range(model.ngeom)]
-        self._hull = np.array([name.startswith("vehicle/") for name in names])
-        self._solid = np.array([name.startswith(("world/wall", "world/thing")) for name in names])
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget all contacts and collisions."""
-        self.collisions = 0
-        self.release()
-
-    def release(self) -> None:
-        """Forget the current contacts, so that the next one is a new collision."""
-        self.bumped = self.touches = False
-        self._since_s = math.inf
-
-    def follow(self, data: mujoco.MjData, motion: Motion, dt_s: float) -> None:
-        """Update from the contacts of a simulation step.
-
-        Args:
-            data: State after the step.
-            motion: Pose of the vehicle.
-            dt_s: Length of the step, s.
-        """
-        self._since_s += dt_s
-        self.bumped = self.touches = False
-        if data.ncon == 0:
-            return
-        pairs = data.contact.geom
-        if not self._solid[pairs].any():
-            return  # Usual case: only the wheels touch the ground.
-        first, second = pairs[:, 0], pairs[:, 1]
-        hits = (self._hull[first] & self._solid[second]) | (self._hull[second] & self._solid[first])
-        hits &= data.contact.dist <= 0.0
-        if not hits.any():
-            return
-        self.touches = True
-        if self._since_s > APART_S:
-            self.collisions += 1
-        self._since_s = 0.0
-        for x, y, _ in data.contact.pos[hits]:
-            bearing = math.atan2(y - motion.y, x - motion.x) - motion.heading
-            self.bumped |= abs(math.remainder(bearing, math.tau)) <= BUMPER_SPREAD

@@ -10,6 +10,7 @@ import pytest
 from scipy import ndimage
 
 from shapechanger.errors import UnknownName, WorldError
+from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT, Course, Obstacle
 from shapechanger.vehicles.courses.geometry import (
     any_crossing,
@@ -18,7 +19,6 @@ from shapechanger.vehicles.courses.geometry import (
     obstacle_gap,
     wall_segments,
 )
-from shapechanger.vehicles.courses.layout import lay_out
 from tests.vehicles.courses.raster import occupancy
 
 _SEEDS = [*range(20), *HELD_OUT[:20]]
@@ -253,12 +253,12 @@ def test_unknown_worlds_and_seeds_are_refused() -> None:
 
 def test_a_layout_that_never_fits_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     """The search for a layout gives up with an error."""
-    from shapechanger.vehicles.courses import layout
+    from shapechanger.vehicles import courses
 
     def never(rng: np.random.Generator, seed: int) -> Course | None:
         return None
 
-    monkeypatch.setattr(layout, "_MAKERS", {"yard": never})
+    monkeypatch.setattr(courses, "_MAKERS", {"yard": never})
     with pytest.raises(WorldError, match="No yard with seed 3"):
         lay_out("yard", 3)
 

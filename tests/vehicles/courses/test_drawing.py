@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from shapechanger.vehicles.cameras.camera import OnboardCamera
-from shapechanger.vehicles.courses import paint
+from shapechanger.vehicles.courses import textures
 from shapechanger.vehicles.courses.course import Course, Wall
 from shapechanger.vehicles.courses.look import Look
 from shapechanger.vehicles.courses.scene import add_course
@@ -55,10 +55,12 @@ def quarters(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         image[:32, :32, 1] = image[:32, 32:, 0] = image[32:, :, 2] = 1.0
         return image
 
-    monkeypatch.setattr(paint, "PAINTERS", MappingProxyType({**paint.PAINTERS, "window": painted}))
-    paint.texture.cache_clear()
+    monkeypatch.setattr(
+        textures, "PAINTERS", MappingProxyType({**textures.PAINTERS, "window": painted})
+    )
+    textures.texture.cache_clear()
     yield
-    paint.texture.cache_clear()
+    textures.texture.cache_clear()
 
 
 @pytest.mark.usefixtures("quarters")

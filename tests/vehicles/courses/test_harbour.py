@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import Course, Obstacle
 from shapechanger.vehicles.courses.harbour import (
     BANK_M,
@@ -18,7 +19,6 @@ from shapechanger.vehicles.courses.harbour import (
     fittings,
     moored,
 )
-from shapechanger.vehicles.courses.layout import lay_out
 from shapechanger.vehicles.courses.look import Look
 from shapechanger.vehicles.courses.quad_mesh import QuadMesh
 from shapechanger.vehicles.courses.surfaces import Surfaces

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shapechanger.vehicles.courses import WORLDS, lay_out
 from shapechanger.vehicles.courses.course import Course, Obstacle, Surface, Wall
 from shapechanger.vehicles.courses.geometry import distances_to_segments, wall_segments
-from shapechanger.vehicles.courses.layout import WORLDS, lay_out
 from tests.vehicles.courses.raster import occupancy
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapechanger.vehicles.courses import WORLDS, lay_out, start_pose
 from shapechanger.vehicles.courses.course import HELD_OUT, Obstacle
 from shapechanger.vehicles.courses.geometry import distances_from_obstacle, wall_segments
-from shapechanger.vehicles.courses.layout import WORLDS, lay_out, start_pose
 
 
 @pytest.mark.parametrize("world", WORLDS)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import UnknownName
-from shapechanger.vehicles.courses.paint import PAINTERS, clouds, texture
+from shapechanger.vehicles.courses.paint import clouds
+from shapechanger.vehicles.courses.textures import PAINTERS, texture
 
 _TILED = (
     "floor",

@@ -9,7 +9,7 @@ import pytest
 
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
-from shapechanger.vehicles.envs.setup import CourseSampler
+from shapechanger.vehicles.envs.drive import CourseSampler
 
 
 def _courses(draw: CourseSampler, n: int = 500) -> list[int]:

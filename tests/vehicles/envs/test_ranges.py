@@ -20,7 +20,7 @@ from shapechanger.vehicles.envs.demonstrators import (
     LEAST_THROTTLE,
     leave_rest,
 )
-from shapechanger.vehicles.envs.limits import MeanOutputs
+from shapechanger.vehicles.envs.ranges import MeanOutputs
 
 _COURSE = {"course": 2, "start": 2}
 _STEPS = 60

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.expert.path import ClearanceField
+from shapechanger.vehicles.courses.geometry import ClearanceField
 
 SIZES = {"car": (0.40, 0.20), "tank": (0.32, 0.24), "truck": (0.50, 0.20), "boat": (0.60, 0.20)}
 TOP = {"car": 2.0, "tank": 1.0, "truck": 1.5, "boat": 1.2}

@@ -10,9 +10,10 @@ import pytest
 from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName
 from shapechanger.vehicles.bodies import VEHICLES
+from shapechanger.vehicles.courses import lay_out, start_pose
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.courses.layout import lay_out, start_pose
-from shapechanger.vehicles.expert import CourseExpert, CourseProgress, Disturbance
+from shapechanger.vehicles.envs.demonstrators import Disturbance
+from shapechanger.vehicles.expert import CourseExpert, CourseProgress
 from shapechanger.vehicles.expert.traits import TRAITS
 from tests.vehicles.expert.courses import ring
 from tests.vehicles.expert.kinematic import SIZES, TOP, Kinematic

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import WorldError
+from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import Course, Obstacle
-from shapechanger.vehicles.courses.layout import lay_out
+from shapechanger.vehicles.courses.geometry import FAR_M, ClearanceField
 from shapechanger.vehicles.expert import CoursePath, plan_path
 from shapechanger.vehicles.expert.line import ClosedLine
-from shapechanger.vehicles.expert.path import FAR_M, ClearanceField, plan_path_for
+from shapechanger.vehicles.expert.path import plan_path_for
 from shapechanger.vehicles.expert.traits import TRAITS
 from tests.vehicles.expert.courses import ring
 

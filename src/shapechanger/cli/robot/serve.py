@@ -413,7 +413,7 @@ def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:
     try:
         from shapechanger.vehicles.bodies import VEHICLES, require_fit
         from shapechanger.vehicles.cameras.corruptions import find_corruption
-        from shapechanger.vehicles.courses.layout import WORLDS
+        from shapechanger.vehicles.courses import WORLDS
         from shapechanger.vehicles.twin import course_place
     except ModuleNotFoundError as error:
         raise MissingExtra(error.name or "mujoco", "sim") from error

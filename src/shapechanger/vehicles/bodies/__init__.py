@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from shapechanger.vehicles.bodies.fleet import (
-    SIM_DT,
-    VEHICLES,
-    add_vehicle,
-    require_fit,
-    vehicle_model,
-)
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+from typing import Final
+
+import mujoco
+
+from shapechanger.errors import ProfileError, UnknownName
+from shapechanger.vehicles.bodies.boat import BOAT
+from shapechanger.vehicles.bodies.car import CAR
 from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs, VehicleModel
+from shapechanger.vehicles.bodies.tank import TANK
+from shapechanger.vehicles.bodies.truck import TRUCK
+from shapechanger.vehicles.bodies.visuals import Paint
 
 __all__ = [
     "SIM_DT",
@@ -22,3 +27,86 @@ __all__ = [
     "require_fit",
     "vehicle_model",
 ]
+
+SIM_DT: Final = 0.005
+"""Simulation step, s, at which all vehicles are stable."""
+
+VEHICLES: Final[Mapping[str, VehicleModel]] = MappingProxyType(
+    {model.name: model for model in (CAR, TANK, TRUCK, BOAT)}
+)
+"""Vehicle models by name."""
+
+
+def vehicle_model(name: str) -> VehicleModel:
+    """Find a vehicle model by name.
+
+    Raises:
+        UnknownName: If no vehicle has this name.
+    """
+    if name not in VEHICLES:
+        raise UnknownName("vehicle", name, VEHICLES)
+    return VEHICLES[name]
+
+
+def add_vehicle(
+    spec: mujoco.MjSpec, name: str, light: tuple[float, float, float] = (1.0, 1.0, 1.0)
+) -> VehicleModel:
+    """Add a vehicle at the origin of a model, and set the step and solver options that it needs.
+
+    Args:
+        spec: Model to extend.
+        name: Name of the vehicle.
+        light: Red, green and blue of the light on it, each 0 to 1, for views from outside.
+
+    Raises:
+        UnknownName: If no vehicle has this name.
+    """
+    model = vehicle_model(name)
+    spec.option.timestep = SIM_DT
+    # Back EMF and servos act as damping, which this integrator treats implicitly.
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # The elliptic cone lets wheels slip alike in all directions; the impedance ratio keeps a
+    # vehicle at rest from creeping.
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10.0
+    model.build(spec, Paint(spec, light))
+    # Poses of what never moves are then computed once, not in each step. The vehicle itself never
+    # sleeps, so that its motion is the same.
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    for body in spec.worldbody.bodies:
+        body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
+    return model
+
+
+def require_fit(name: str, parts: Collection[str]) -> None:
+    """Check that a robot's parts fit a vehicle.
+
+    Args:
+        name: Name of the vehicle.
+        parts: Parts that the robot's outputs drive, such as "wheels" and "steering".
+
+    Raises:
+        UnknownName: If no vehicle has this name.
+        ProfileError: If a part is missing, or the vehicle does not have it.
+    """
+    model = vehicle_model(name)
+    given = frozenset(parts)
+    foreign = given - model.parts - model.optional_parts
+    if foreign:
+        raise ProfileError(
+            f"A {name} has no {_listed(foreign, 'or')}. It is driven by {_choices(model)}."
+        )
+    driving = given - model.optional_parts
+    if driving not in model.drives:
+        raise ProfileError(
+            f"The robot drives {_listed(driving, 'and') or 'nothing'}; "
+            f"a {name} is driven by {_choices(model)}."
+        )
+
+
+def _choices(model: VehicleModel) -> str:
+    return ", or by ".join(_listed(drive, "and") for drive in model.drives)
+
+
+def _listed(names: Collection[str], word: str) -> str:
+    return f" {word} ".join(f"{name!r}" for name in sorted(names))

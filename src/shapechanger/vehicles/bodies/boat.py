@@ -437,15 +437,8 @@ def _bodywork() -> Mapping[str, Faces]:
             ("glass", block((x, y - 0.003, 0.078), (x + 0.032, y + 0.0025, 0.099)))
             for x in (-0.155, -0.110, -0.065, -0.020)
         ]
-        posts = [
-            (-0.26, 0.079),
-            (-0.19, 0.088),
-            (-0.10, 0.091),
-            (0.0, 0.089),
-            (0.09, 0.082),
-            (0.18, 0.058),
-            (0.26, 0.024),
-        ]
+        along = (-0.26, -0.19, -0.10, 0.0, 0.09, 0.18, 0.26)
+        posts = zip(along, (0.079, 0.088, 0.091, 0.089, 0.082, 0.058, 0.024), strict=True)
         tops = [(x, side * w, 0.088 + 0.03 * max(0.0, x)) for x, w in posts]
         parts += [("steel", rod((x, v, 0.055), (x, v, h), 0.0013, 5)) for x, v, h in tops]
         parts += [("steel", rod(a, b, 0.0013, 5)) for a, b in pairwise(tops)]

@@ -1,13 +1,15 @@
-"""Interfaces of a vehicle: its model, and the vehicle in a running simulation."""
+"""Interfaces of a vehicle: its model, the vehicle in a running simulation, and its contacts."""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import mujoco
+import numpy as np
 
 from shapechanger.vehicles.bodies.parts import CameraMount, DcMotor
 from shapechanger.vehicles.bodies.visuals import Paint
@@ -207,3 +209,68 @@ class VehicleModel:
     def parts(self) -> frozenset[str]:
         """All parts that have an effect."""
         return frozenset[str]().union(*self.drives)
+
+
+BUMPER_SPREAD: Final = math.radians(60.0)
+"""Largest bearing, rad, from the middle of the vehicle, at which a contact presses the bumper."""
+
+APART_S: Final = 0.5
+"""Contacts that follow one another within this time, s, belong to the same collision."""
+
+
+class ContactTracker:
+    """Tracks contacts of a vehicle with walls and obstacles.
+
+    Args:
+        model: Model whose vehicle geoms are named "vehicle/...", and its walls and obstacles
+            "world/wall/..." and "world/thing/...".
+
+    Attributes:
+        collisions: Number of collisions since `reset`.
+        bumped: Whether a contact presses the front bumper.
+        touches: Whether there is any contact.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        names = [model.geom(i).name for i in range(model.ngeom)]
+        self._hull = np.array([name.startswith("vehicle/") for name in names])
+        self._solid = np.array([name.startswith(("world/wall", "world/thing")) for name in names])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all contacts and collisions."""
+        self.collisions = 0
+        self.release()
+
+    def release(self) -> None:
+        """Forget the current contacts, so that the next one is a new collision."""
+        self.bumped = self.touches = False
+        self._since_s = math.inf
+
+    def follow(self, data: mujoco.MjData, motion: Motion, dt_s: float) -> None:
+        """Update from the contacts of a simulation step.
+
+        Args:
+            data: State after the step.
+            motion: Pose of the vehicle.
+            dt_s: Length of the step, s.
+        """
+        self._since_s += dt_s
+        self.bumped = self.touches = False
+        if data.ncon == 0:
+            return
+        pairs = data.contact.geom
+        if not self._solid[pairs].any():
+            return  # Usual case: only the wheels touch the ground.
+        first, second = pairs[:, 0], pairs[:, 1]
+        hits = (self._hull[first] & self._solid[second]) | (self._hull[second] & self._solid[first])
+        hits &= data.contact.dist <= 0.0
+        if not hits.any():
+            return
+        self.touches = True
+        if self._since_s > APART_S:
+            self.collisions += 1
+        self._since_s = 0.0
+        for x, y, _ in data.contact.pos[hits]:
+            bearing = math.atan2(y - motion.y, x - motion.x) - motion.heading
+            self.bumped |= abs(math.remainder(bearing, math.tau)) <= BUMPER_SPREAD

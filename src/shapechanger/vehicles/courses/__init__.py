@@ -1,1 +1,103 @@
-"""Courses: laid out as values (`layout`), and drawn as surfaces with light (`scene`)."""
+"""Courses: laid out from a seed here, as values of `course`, and drawn by `scene`."""
+
+from __future__ import annotations
+
+import dataclasses
+import zlib
+from collections.abc import Callable, Mapping
+from functools import partial
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.contract.world import Pose
+from shapechanger.errors import UnknownName, WorldError
+from shapechanger.vehicles.courses.channel import HARBOUR, YARD, open_course
+from shapechanger.vehicles.courses.corridor import corridor
+from shapechanger.vehicles.courses.course import FLOODED, Course
+from shapechanger.vehicles.courses.geometry import distances_from_obstacle, turn_angles
+
+_MAKERS: Final[Mapping[str, Callable[[np.random.Generator, int], Course | None]]] = (
+    MappingProxyType(
+        {
+            "corridor": corridor,
+            "yard": partial(open_course, YARD),
+            "harbour": partial(open_course, HARBOUR),
+        }
+    )
+)
+
+WORLDS: Final = (*_MAKERS, FLOODED)
+"""Kinds of course."""
+
+_ATTEMPTS: Final = 500
+
+
+def lay_out(world: str, seed: int) -> Course:
+    """Lay out the course of a seed, which is the same on every machine.
+
+    Args:
+        world: One of `WORLDS`.
+        seed: Seed, >= 0; see `TRAINING` and `HELD_OUT` in `shapechanger.vehicles.courses.course`.
+
+    Raises:
+        UnknownName: If the world is unknown.
+        WorldError: If the seed is negative, or no random layout fits.
+    """
+    if world == FLOODED:
+        return dataclasses.replace(lay_out("corridor", seed), world=world)
+    if world not in _MAKERS:
+        raise UnknownName("world", world, WORLDS)
+    if seed < 0:
+        raise WorldError(f"Seeds of courses count from 0, got {seed}.")
+    rng = np.random.default_rng([zlib.crc32(world.encode()), seed])
+    for _ in range(_ATTEMPTS):
+        course = _MAKERS[world](rng, seed)
+        if course is not None:
+            return course
+    raise WorldError(
+        f"No {world} with seed {seed} can be laid out: all {_ATTEMPTS} attempts were too tight."
+    )
+
+
+_BEHIND_M: Final = 1.0
+_AHEAD_M: Final = 2.0
+_BESIDE_M: Final = 0.35
+_STRAIGHT_RAD: Final = 0.35
+
+
+def start_pose(course: Course, seed: int) -> Pose:
+    """Draw a free pose on the route, in driving direction.
+
+    There is no obstacle within 0.35 m of the route from 1 m behind to 2 m ahead, and the metre
+    behind is nearly straight, so that a trailer fits too.
+
+    Args:
+        course: The course.
+        seed: Seed of the draw.
+    """
+    route = course.route
+    free = np.ones(len(route), dtype=bool)
+    ahead = np.roll(route, -1, axis=0)
+    steps = np.concatenate([route, ahead], axis=1)
+    for obstacle in course.obstacles:
+        free &= distances_from_obstacle(obstacle, steps) > _BESIDE_M
+    behind, before = (round(reach / course.spacing) for reach in (_BEHIND_M, _AHEAD_M))
+    bend = _sums(turn_angles(route), behind, 0)
+    places = np.flatnonzero((_sums(~free, behind, before) < 0.5) & (np.abs(bend) < _STRAIGHT_RAD))
+    # Without any such place, the first point of the route: obstacles keep away from it.
+    i = int(places[int(np.random.default_rng(seed).integers(len(places)))]) if len(places) else 0
+    dx, dy = ahead[i] - route[i - 1]
+    return Pose(float(route[i, 0]), float(route[i, 1]), float(np.arctan2(dy, dx)))
+
+
+def _sums(
+    values: NDArray[np.float64] | NDArray[np.bool_], behind: int, before: int
+) -> NDArray[np.float64]:
+    """Sums over windows along a closed line, from `behind` values behind to `before` ahead."""
+    whole = np.concatenate([values[-behind:], values, values[:before]])
+    sums = np.concatenate([[0.0], np.cumsum(whole)])
+    window = behind + before + 1
+    return sums[window:] - sums[:-window]

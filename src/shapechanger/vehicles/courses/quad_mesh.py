@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.vehicles.bodies.shapes import Faces, moved, normals, shading
-from shapechanger.vehicles.courses.paint import CELLS, ROWS
+from shapechanger.vehicles.courses.textures import CELLS, ROWS
 
 Array = NDArray[np.float64]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import WorldError, check_seed
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.expert import CourseExpert, Disturbance
-from shapechanger.vehicles.expert.traits import traits_of
+from shapechanger.vehicles.expert import CourseExpert
+from shapechanger.vehicles.expert.traits import PERIOD_S, traits_of
 from shapechanger.vehicles.world import MujocoWorld
 
 BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
@@ -40,6 +41,61 @@ CLONES: Final[Mapping[str, Path]] = MappingProxyType(
 
 Each was cloned from ten minutes of its expert's driving; `clones/README.md` is their model card.
 """
+
+
+WANDER_S: Final = 0.6
+"""Correlation time of the wandering, s."""
+
+JERKS_PER_S: Final = 0.25
+"""Mean rate of jerks, 1/s."""
+
+JERK_S: Final = (0.15, 0.5)
+"""Shortest and longest duration of a jerk, s."""
+
+
+THROTTLE_SD: Final = 0.1
+"""Standard deviation of the wandering of the throttle."""
+
+
+class Disturbance:
+    """Noise on a demonstrator's actions, so that demonstrations show how to correct errors.
+
+    The vehicle executes the result of `applied`, and the demonstrator's own action is recorded (M.
+    Laskey et al., "DART: Noise Injection for Robust Imitation Learning", CoRL 2017). There are two
+    kinds: slow wandering (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion",
+    Physical Review 36, 1930) and rare jerks of the steering.
+
+    Args:
+        seed: Seed of the noise.
+        sway: Standard deviation of the wandering of the steering; jerks steer by up to three times
+            as much.
+    """
+
+    def __init__(self, seed: int, sway: float) -> None:
+        self._size = np.array((sway, THROTTLE_SD))
+        self._rng = np.random.default_rng(seed)
+        self._wander = np.zeros(2)
+        self._jerk, self._jerk_s = 0.0, 0.0
+
+    def applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Add noise to an action, (2,), and clip it to -1 to 1."""
+        # The exact discretization, for any period.
+        keep = math.exp(-PERIOD_S / WANDER_S)
+        fresh = self._size * math.sqrt(1 - keep**2)
+        self._wander = keep * self._wander + fresh * self._rng.standard_normal(2)
+        noise = self._wander + np.array((self._jerked(), 0.0))
+        return np.clip(action + noise, -1.0, 1.0).astype(np.float32)
+
+    def _jerked(self) -> float:
+        """Steering of the current jerk; 0 without one."""
+        self._jerk_s -= PERIOD_S
+        if self._jerk_s > 0:
+            return self._jerk
+        if self._rng.random() < JERKS_PER_S * PERIOD_S:
+            self._jerk = float(3 * self._size[0] * self._rng.uniform(-1, 1))
+            self._jerk_s = float(self._rng.uniform(*JERK_S))
+            return self._jerk
+        return 0.0
 
 
 class Demonstrator(ABC):

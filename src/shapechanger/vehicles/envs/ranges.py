@@ -14,15 +14,21 @@ from numpy.typing import NDArray
 from shapechanger.contract.drive import DriveReward
 from shapechanger.contract.world import STANDING_MPS
 from shapechanger.layout import Feature, Layout
+from shapechanger.robot.guard.limits import (
+    aimed,
+    bump_blocks,
+    bump_ends_ns,
+    forward_actions,
+    slewed,
+)
+from shapechanger.robot.guard.plan import GuardPlan, output_values
 from shapechanger.vehicles.envs.demonstrators import (
     BEARINGS_DEG,
     FARTHEST_M,
     leave_rest,
     observe_ranges,
 )
-from shapechanger.vehicles.envs.drive import DriveEnv
-from shapechanger.vehicles.envs.limits import MeanOutputs
-from shapechanger.vehicles.envs.setup import Courses, CourseSampler, resolve_profile
+from shapechanger.vehicles.envs.drive import Courses, CourseSampler, DriveEnv, resolve_profile
 from shapechanger.vehicles.world import MujocoWorld
 
 COLLISION_REWARD: Final = -3.0
@@ -37,6 +43,68 @@ _FASTEST_MPS: Final = 5.0
 _FASTEST_TURN: Final = 15.0  # rad/s
 # Courses to train on. The models of this many stay compiled (`worlds.simulation`).
 _COURSES: Final = range(48)
+
+
+class MeanOutputs:
+    """Mean outputs of a control period, without sensors and without the steps of outputs.
+
+    It leaves out deadlines, which a simulated command never misses, and stalls.
+
+    Args:
+        plan: Plan of the guard.
+
+    Attributes:
+        applied: Value of each action at the end of the last period.
+        tick_s: Period of the guard, s.
+    """
+
+    def __init__(self, plan: GuardPlan) -> None:
+        self._plan = plan
+        self.tick_s = 1.0 / plan.tick_hz
+        self._tick_ns = round(1e9 / plan.tick_hz)
+        self._forward = forward_actions(plan.actions)
+        self.reset()
+
+    def reset(self) -> None:
+        """Bring all actions to rest."""
+        self.applied = tuple(action.rest for action in self._plan.actions)
+        self._now_ns = 0
+        self._block_ends_ns: int | None = None
+
+    def outputs(
+        self, values: tuple[float, ...], bumped: bool, ticks: int
+    ) -> Mapping[str, float | None]:
+        """Return the mean output of each part over a control period.
+
+        Args:
+            values: The command, one value for each action.
+            bumped: Whether the bumper is pressed.
+            ticks: Ticks of the guard in the period.
+        """
+        hold_ms = self._plan.limits.bump_hold_ms
+        self._block_ends_ns = bump_ends_ns(bumped, self._now_ns, self._block_ends_ns, hold_ms)
+        actions = self._plan.actions
+        aims = [aimed(action, value) for action, value in zip(actions, values, strict=True)]
+        if bump_blocks(bumped, self._now_ns, self._block_ends_ns):
+            for i in self._forward:
+                aims[i] = min(aims[i], actions[i].rest)
+        self._now_ns += ticks * self._tick_ns
+        target = tuple(aims)
+        total = [0.0] * len(self._plan.outputs)
+        left = ticks
+        while left:
+            # Once at the target, the rest of the period is alike.
+            alike = left if self.applied == target else 1
+            left -= alike
+            values_now = output_values(self._plan, self.applied)
+            total = [one + alike * now for one, now in zip(total, values_now, strict=True)]
+            if alike == 1:
+                self.applied = tuple(
+                    slewed(action, now, aim, self.tick_s)
+                    for action, now, aim in zip(actions, self.applied, target, strict=True)
+                )
+        outputs = self._plan.outputs
+        return {out.part: one / ticks for out, one in zip(outputs, total, strict=True)}
 
 
 class RangesEnv(DriveEnv):

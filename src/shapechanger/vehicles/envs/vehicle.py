@@ -15,9 +15,14 @@ from shapechanger.contract.drive import DriveReward
 from shapechanger.errors import RenderError, UnknownName
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.vehicles.envs.demonstrators import TeacherDemonstrator
-from shapechanger.vehicles.envs.drive import DriveEnv
-from shapechanger.vehicles.envs.limits import SensedVehicle
-from shapechanger.vehicles.envs.setup import Courses, CourseSampler, Steering, resolve_profile
+from shapechanger.vehicles.envs.drive import (
+    Courses,
+    CourseSampler,
+    DriveEnv,
+    Steering,
+    resolve_profile,
+)
+from shapechanger.vehicles.envs.sensed import SensedVehicle
 from shapechanger.vehicles.envs.shift import certify_vehicles
 from shapechanger.vehicles.world import MujocoWorld
 

@@ -23,9 +23,8 @@ from shapechanger.vehicles.bodies import vehicle_model
 from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
 from shapechanger.vehicles.courses.course import FLOODED
 from shapechanger.vehicles.envs.demonstrators import Demonstrator, course_expert
-from shapechanger.vehicles.envs.drive import DriveEnv
+from shapechanger.vehicles.envs.drive import Courses, DriveEnv, resolve_profile
 from shapechanger.vehicles.envs.ranges import RangesEnv
-from shapechanger.vehicles.envs.setup import Courses, resolve_profile
 from shapechanger.vehicles.envs.shift import certify_vehicles
 from shapechanger.vehicles.envs.vehicle import VehicleEnv
 from shapechanger.vehicles.waypoints import (

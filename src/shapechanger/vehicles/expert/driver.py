@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
 from shapechanger.vehicles.courses.course import Course
+from shapechanger.vehicles.courses.geometry import ClearanceField
 from shapechanger.vehicles.expert.path import (
-    ClearanceField,
     CoursePath,
     plan_path_for,
     speed_profile,

@@ -19,69 +19,9 @@ from scipy.interpolate import CubicSpline
 
 from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.courses.geometry import arc_lengths, wall_segments
+from shapechanger.vehicles.courses.geometry import ClearanceField, arc_lengths
 from shapechanger.vehicles.expert.line import ClosedLine
 from shapechanger.vehicles.expert.traits import Traits
-
-FAR_M: Final = 2.5
-"""Largest distance that is computed, m; larger ones are reported as this."""
-
-_CHUNK: Final = 256
-
-
-class ClearanceField:
-    """Distances from the walls and obstacles of a course, seen from above.
-
-    Args:
-        course: The course.
-    """
-
-    def __init__(self, course: Course) -> None:
-        walls = wall_segments(course.walls)
-        self._start, self._end = walls[:, :2], walls[:, 2:]
-        self._obstacles = course.obstacles
-
-    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of each point from the nearest wall or obstacle, m, (N,).
-
-        It is at most `FAR_M`, and 0 inside an obstacle. It is fast if neighbours in the array are
-        close to each other.
-
-        Args:
-            points: Points, m, (N, 2).
-        """
-        parts = [self._near(points[i : i + _CHUNK]) for i in range(0, len(points), _CHUNK)]
-        return np.concatenate([np.empty(0), *parts])
-
-    def _near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distances of points that are close together."""
-        low, high = points.min(axis=0) - FAR_M, points.max(axis=0) + FAR_M
-        start, end = self._start, self._end
-        near = (np.maximum(start, end) >= low) & (np.minimum(start, end) <= high)
-        start, end = start[near.all(axis=1)], end[near.all(axis=1)]
-        step = (end - start)[:, None]
-        away = points - start[:, None]  # (walls, points, 2)
-        share = np.einsum("wpj,wpj->wp", away, np.broadcast_to(step, away.shape))
-        squared = np.maximum(np.einsum("wpj,wpj->wp", step, step), 1e-12)
-        away -= np.clip(share / squared, 0.0, 1.0)[:, :, None] * step
-        squared = np.einsum("wpj,wpj->wp", away, away)
-        found = np.sqrt(squared.min(axis=0, initial=FAR_M**2))
-        for thing in self._obstacles:
-            reach = thing.length + thing.width
-            here = np.array((thing.x, thing.y))
-            if (here + reach < low).any() or (here - reach > high).any():
-                continue
-            dx, dy = (points - here).T
-            if thing.is_round:
-                off = np.hypot(dx, dy) - thing.length / 2
-            else:
-                cos, sin = np.cos(thing.yaw), np.sin(thing.yaw)
-                along = np.abs(cos * dx + sin * dy) - thing.length / 2
-                across = np.abs(cos * dy - sin * dx) - thing.width / 2
-                off = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
-            found = np.minimum(found, np.maximum(off, 0.0))
-        return found
-
 
 STATION_M: Final = 0.2
 OFFSET_M: Final = 0.1

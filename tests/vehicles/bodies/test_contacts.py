@@ -8,7 +8,7 @@ import mujoco
 import pytest
 
 from shapechanger.vehicles.bodies import Motion
-from shapechanger.vehicles.world import APART_S, BUMPER_SPREAD, ContactTracker
+from shapechanger.vehicles.bodies.model import APART_S, BUMPER_SPREAD, ContactTracker
 
 _DT = 0.01
 # A movable ball of 0.1 m, a wall with its face at x = 1 m, and the ground.
