@@ -99,8 +99,8 @@ def fast() -> list[Row]:
         ratio = statistics.median(ratios[1:])  # The first round warms up.
         rows.append(
             Row(
-                f"{vehicle}: time of a step of {vehicle.capitalize()}-v1 without an image, in steps "
-                f"of {vehicle.capitalize()}Ranges-v1, one core",
+                f"{vehicle}: time of a step of {vehicle.capitalize()}-v1 without an image, in "
+                f"steps of {vehicle.capitalize()}Ranges-v1, one core",
                 f"{ratio:.1f}",
                 f"{min(ratios[1:]):.1f} to {max(ratios[1:]):.1f} in {ROUNDS} rounds of {STEPS}; "
                 f"MuJoCo's own steps are {100 * share:.0f} % of the time of the ranges env",

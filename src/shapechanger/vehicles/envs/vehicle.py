@@ -31,7 +31,7 @@ _ABSENT: Final = "absent"
 _APPLIED: Final = "/applied"
 
 
-class RobotFacts(NamedTuple):
+class SimulatedRobot(NamedTuple):
     """Facts of a simulated robot for recordings.
 
     Attributes:
@@ -150,7 +150,7 @@ class VehicleEnv(DriveEnv):
             lenses=(lenses,) if isinstance(lenses, str) else tuple(lenses),
         )
         self.parts = frozenset(output.part for output in profile.outputs)
-        self.welcome = RobotFacts(profile.name, profile.body, camera.pitch_deg, camera.fovy_deg)
+        self.welcome = SimulatedRobot(profile.name, profile.body, camera.pitch_deg, camera.fovy_deg)
         ends = {"collision_ends_episode": 0.0} if put_back else {}
         self._reward = DriveReward.from_weights({**profile.reward, **(reward or {}), **ends})
         self._puts_back = put_back
