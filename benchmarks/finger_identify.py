@@ -15,7 +15,7 @@ import shapechanger  # noqa: F401 - Registers the ids.
 from benchmarks.row import Row
 from shapechanger.finger.anatomy import JOINTS
 from shapechanger.finger.identify import FingerLog, IdentifiedFinger, identify
-from shapechanger.finger.identify.babble import record_babble
+from shapechanger.finger.identify.log import record_babble
 from shapechanger.finger.parameters import FingerParameters
 
 _SECONDS = 10.0

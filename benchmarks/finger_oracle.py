@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 
 from benchmarks.row import Row
-from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.controller import FingerController
 from shapechanger.finger.tensions import DRIVES
 
 TARGETS: Final = 1000
@@ -55,7 +55,7 @@ def reached(mode: str, targets: int, **arguments: Any) -> tuple[list[bool], list
     distances: list[float] = []
     with gym.make("shapechanger/Finger-v1", actions=mode, **arguments) as env:
         inner: Any = env.unwrapped
-        act = FingerOracle(inner.observation_layout, mode)
+        act = FingerController(inner.observation_layout, mode)
         for i in range(targets):
             observation, info = env.reset(seed=FIRST_SEED + i)
             act.reset()
@@ -73,7 +73,7 @@ def tracked_mm(hz: float, seed: int) -> float:
     path = {"kind": "circle", "radius": 0.012, "hz": hz}
     with gym.make("shapechanger/FingerTrack-v1", path=path) as env:
         inner: Any = env.unwrapped
-        act = FingerOracle(inner.observation_layout)
+        act = FingerController(inner.observation_layout)
         observation, info = env.reset(seed=seed)
         ended = False
         while not ended:

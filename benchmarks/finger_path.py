@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import shapechanger  # noqa: F401 - Registers the ids.
 from benchmarks.row import Row
 from shapechanger.finger.identify import FingerLog, identify
-from shapechanger.finger.identify.babble import record_babble
+from shapechanger.finger.identify.log import record_babble
 from shapechanger.finger.identify.motion import Window
 from shapechanger.finger.identify.result import replay
 from shapechanger.finger.parameters import FingerParameters

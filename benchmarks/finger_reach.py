@@ -14,8 +14,8 @@ from scipy.optimize import minimize
 import shapechanger  # noqa: F401 - Registers the ids.
 from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, PHALANX_LENGTH_M
-from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST
+from shapechanger.finger.controller import FingerController
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.model import build_finger
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
@@ -140,10 +140,10 @@ class Statics:
         return joint_torque(self._model, self._data, angles, np.zeros(4), np.zeros(4))
 
     def _error(self, x: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-        return (fingertip(x[:4], PHALANX_LENGTH_M) - target) / _ERROR_M
+        return (fingertip(x[:4]) - target) / _ERROR_M
 
     def _slope(self, x: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-        per_angle = fingertip_jacobian(x[:4], PHALANX_LENGTH_M) / _ERROR_M
+        per_angle = fingertip_jacobian(x[:4]) / _ERROR_M
         return np.concatenate([2.0 * per_angle.T @ self._error(x, target), np.zeros(len(x) - 4)])
 
     def _missing(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -188,7 +188,7 @@ def held_by_controller(finger: FingerParameters, first_seed: int, targets: int) 
     reached: list[bool] = []
     with gym.make("shapechanger/Finger-v1", parameters=finger) as env:
         inner: Any = env.unwrapped
-        act = FingerOracle(inner.observation_layout, parameters=finger, gain=_GAIN)
+        act = FingerController(inner.observation_layout, parameters=finger, gain=_GAIN)
         for i in range(targets):
             observation, info = env.reset(seed=first_seed + i)
             act.reset()

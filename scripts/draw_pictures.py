@@ -30,7 +30,7 @@ from shapechanger.cli.transfer import Transfer
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.files import read_json
-from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.controller import FingerController
 from shapechanger.finger.policies import POLICIES
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.references import reference_policy
@@ -127,7 +127,7 @@ def _finger() -> Picture:
     made = EnvRef("shapechanger/FingerTrack-v1", {"path": {"kind": "circle", "radius": 0.018}})
     wide, high = _SIZE
     env = cast("Any", made.make(render_mode="rgb_array", width=wide, height=high))
-    act = FingerOracle(env.unwrapped.observation_layout)
+    act = FingerController(env.unwrapped.observation_layout)
     observation, _ = env.reset(seed=1)
     frames: list[Picture] = []
     for step in range(100):

@@ -14,7 +14,7 @@ from benchmarks import run
 from benchmarks.finger_gap import rows_of
 from benchmarks.finger_reach import Statics
 from benchmarks.row import Row, asked
-from shapechanger.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.finger.anatomy import JOINT_REST
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.task import fingertip
 from shapechanger.transfer.learners.evaluation import Evaluation
@@ -68,7 +68,7 @@ def test_a_wrong_name_in_only_gets_the_nearest(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.filterwarnings("ignore:Values in x were outside:RuntimeWarning")  # SciPy 1.15.
 def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
     """Tensions hold a straight knuckle above a bent finger, and do not bring it there."""
-    hook = fingertip(np.radians([0.0, 0.0, 85.0, 55.0]), PHALANX_LENGTH_M)
+    hook = fingertip(np.radians([0.0, 0.0, 85.0, 55.0]))
     tensions = {
         share: tuple(share * most for most in NOMINAL.most_tension) for share in (0.4, 0.56)
     }
@@ -84,7 +84,7 @@ def test_friction_keeps_a_weak_finger_from_a_hook() -> None:
     assert weak.distance(hook) > 1e-3
     assert rubbing.distance(hook) < 1e-4
     assert rubbing.distance_coming_from_rest(hook) > 4e-3
-    assert rubbing.distance_coming_from_rest(fingertip(JOINT_REST, PHALANX_LENGTH_M)) < 1e-4
+    assert rubbing.distance_coming_from_rest(fingertip(JOINT_REST)) < 1e-4
 
 
 def test_rows_of_a_study_that_has_not_ended_name_their_fingers() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import shapechanger  # noqa: F401 - Registers the ids.
-from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.controller import FingerController
 from shapechanger.finger.policies import POLICIES
 from shapechanger.finger.tensions import DRIVES
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
@@ -46,24 +46,24 @@ def _ends(act: Any, env: str, episodes: int, **arguments: Any) -> list[dict[str,
     return infos
 
 
-def _oracle(env: str, mode: str, **arguments: Any) -> FingerOracle:
+def _controller(env: str, mode: str, **arguments: Any) -> FingerController:
     with contextlib.closing(gym.make(env, actions=mode, **arguments)) as made:
         layout: Any = made.get_wrapper_attr("observation_layout")
-        return FingerOracle(layout, mode)
+        return FingerController(layout, mode)
 
 
 @pytest.mark.parametrize("mode", DRIVES)
-def test_the_oracle_reaches_every_target(mode: str) -> None:
+def test_the_controller_reaches_every_target(mode: str) -> None:
     """In each action mode, the median error is below 0.1 mm."""
-    infos = _ends(_oracle(FINGER, mode), FINGER, 20, actions=mode)
+    infos = _ends(_controller(FINGER, mode), FINGER, 20, actions=mode)
     assert all(info["is_success"] for info in infos)
     assert np.median([info["distance"] for info in infos]) < 1e-4
 
 
-def test_the_oracle_follows_a_circle() -> None:
+def test_the_controller_follows_a_circle() -> None:
     """A circle of 12 mm at 1 Hz is followed within 3 mm RMS."""
     path = {**_CIRCLE, "hz": 1.0}
-    infos = _ends(_oracle(TRACK, "impedance"), TRACK, 2, path=path)
+    infos = _ends(_controller(TRACK, "impedance"), TRACK, 2, path=path)
     assert max(info["rms"] for info in infos) < 3e-3
 
 
@@ -76,11 +76,11 @@ def test_the_shipped_policy_reaches() -> None:
 
 
 def test_the_shipped_policy_follows() -> None:
-    """Its RMS error on a circle at 0.5 Hz is at most twice that of the oracle."""
+    """Its RMS error on a circle at 0.5 Hz is at most twice that of the controller."""
     policy = load_policy(POLICIES["track"])
     assert policy.card.env.id == TRACK
     infos = _ends(_Policy(policy), TRACK, 3, path=_CIRCLE)
-    knows = _ends(_oracle(TRACK, "impedance"), TRACK, 3, path=_CIRCLE)
+    knows = _ends(_controller(TRACK, "impedance"), TRACK, 3, path=_CIRCLE)
     errors = [np.mean([info["rms"] for info in some]) for some in (infos, knows)]
     assert errors[0] <= 2.0 * errors[1]
 

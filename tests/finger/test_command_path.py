@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, UnknownName
-from shapechanger.finger.command_path import slewed
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
-from shapechanger.finger.plant import CONTROL_DT, FingerPlant
+from shapechanger.finger.plant import FingerPlant, slewed
 from shapechanger.finger.tensions import drive_of
 from shapechanger.robot.guard.limits import slewed as slewed_by_guard
 from shapechanger.robot.guard.plan import ActionPlan
@@ -27,7 +26,7 @@ def _tensions(
     parameters: FingerParameters, commands: list[float], actions: str = "tension"
 ) -> NDArray[np.float64]:
     """Return the tensions of the first tendon, N, after each millisecond of some commands."""
-    plant = FingerPlant(parameters, drive_of(actions, NOMINAL), CONTROL_DT)
+    plant = FingerPlant(parameters, drive_of(actions, NOMINAL))
     rng = np.random.default_rng(0)
     plant.place(np.array([0.4, 0.0, 0.6, 0.2]), rng)
     seen: list[float] = []
@@ -151,4 +150,4 @@ def test_an_unknown_value_is_refused() -> None:
 def test_rates_that_do_not_fit_are_refused(path: CommandPath, words: str) -> None:
     """Computations must fit into a command, and simulation steps into a tick."""
     with pytest.raises(FingerError, match=words):
-        FingerPlant(_RIG.replace(path=path), drive_of("tension", NOMINAL), CONTROL_DT)
+        FingerPlant(_RIG.replace(path=path), drive_of("tension", NOMINAL))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.controller import FingerController
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.finger.tensions import DRIVES
@@ -20,20 +20,20 @@ _ARRIVES = 60
 def _reached(actions: str, episodes: int, **arguments: Any) -> tuple[int, list[float]]:
     """Return the number of successes and the final distances, m."""
     env = FingerReachEnv(actions=actions, **arguments)
-    oracle = FingerOracle(env.observation_layout, actions)
+    controller = FingerController(env.observation_layout, actions)
     successes, distances = 0, []
     for seed in range(episodes):
         seen, info = env.reset(seed=seed)
-        oracle.reset()
+        controller.reset()
         for _ in range(_ARRIVES):
-            seen, _, _, _, info = env.step(oracle(seen))
+            seen, _, _, _, info = env.step(controller(seen))
         successes += info["is_success"]
         distances.append(info["distance"])
     return successes, distances
 
 
 @pytest.mark.parametrize("actions", DRIVES)
-def test_the_oracle_reaches_every_target(actions: str) -> None:
+def test_the_controller_reaches_every_target(actions: str) -> None:
     """All 40 targets are reached in each mode, with a median distance below 0.1 mm."""
     successes, distances = _reached(actions, 40)
     assert successes == 40
@@ -41,15 +41,15 @@ def test_the_oracle_reaches_every_target(actions: str) -> None:
 
 
 @pytest.mark.parametrize("actions", DRIVES)
-def test_the_oracle_follows_a_circle(actions: str) -> None:
+def test_the_controller_follows_a_circle(actions: str) -> None:
     """A circle of 12 mm at 1 Hz is followed within 3 mm RMS."""
     env = FingerTrackEnv(actions=actions, path={"kind": "circle", "radius": 0.012, "hz": 1.0})
-    oracle = FingerOracle(env.observation_layout, actions)
+    controller = FingerController(env.observation_layout, actions)
     for seed in range(2):
         seen, info = env.reset(seed=seed)
-        oracle.reset()
+        controller.reset()
         for _ in range(125):
-            seen, _, _, _, info = env.step(oracle(seen))
+            seen, _, _, _, info = env.step(controller(seen))
         assert info["rms"] < 0.003
         assert info["is_success"]
 
@@ -61,22 +61,22 @@ def test_a_wrong_model_is_less_accurate() -> None:
     env = FingerReachEnv(parameters=other)
     found = {}
     for name, believed in (("wrong", NOMINAL), ("right", other)):
-        oracle = FingerOracle(env.observation_layout, parameters=believed)
+        controller = FingerController(env.observation_layout, parameters=believed)
         distances = []
         for seed in range(5):
             seen, info = env.reset(seed=seed)
-            oracle.reset()
+            controller.reset()
             for _ in range(_ARRIVES):
-                seen, _, _, _, info = env.step(oracle(seen))
+                seen, _, _, _, info = env.step(controller(seen))
             distances.append(info["distance"])
         found[name] = float(np.median(distances))
     assert found["right"] < 1e-4 < found["wrong"]
 
 
-def test_actions_of_the_oracle_are_valid() -> None:
+def test_actions_of_the_controller_are_valid() -> None:
     """Actions are in the action space for distant targets, and deterministic."""
     env = FingerReachEnv()
     seen, _ = env.reset(seed=0, options={"target": (0.3, 0.3, 0.3)})
-    first, second = (FingerOracle(env.observation_layout)(seen) for _ in range(2))
+    first, second = (FingerController(env.observation_layout)(seen) for _ in range(2))
     np.testing.assert_array_equal(first, second)
     assert env.action_space.contains(first)

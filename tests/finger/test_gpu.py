@@ -16,13 +16,12 @@ from shapechanger.envs.warp import WarpVectorEnv
 from shapechanger.envs.warp.devices import as_torch
 from shapechanger.envs.warp.noise import uniforms
 from shapechanger.errors import FingerError, UnknownName, VectorEnvError
-from shapechanger.finger.anatomy import PHALANX_LENGTH_M
-from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.controller import FingerController
 from shapechanger.finger.gap import GAPS, Gap
 from shapechanger.finger.model import build_finger
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
 from shapechanger.finger.paths import from_callable
-from shapechanger.finger.plant import CONTROL_DT, JointVelocities
+from shapechanger.finger.plant import JointVelocities
 from shapechanger.finger.postures import draw_posture, draw_start
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.finger.task import fingertip
@@ -206,11 +205,11 @@ def test_an_episode_from_the_same_start_is_the_same(kind: str) -> None:
 def test_success_is_ten_steps_near_the_target() -> None:
     """A finger that comes to its target and stays succeeds in the same step as on a CPU."""
     worlds, alone = many("plain")
-    oracle = FingerOracle(worlds.observation_layout)
+    controller = FingerController(worlds.observation_layout)
     observation, _ = start_alike(worlds, alone, 0)[0]
     seen: list[bool] = []
     for _ in range(40):
-        actions = np.tile(oracle(observation), (len(alone), 1))
+        actions = np.tile(controller(observation), (len(alone), 1))
         results = worlds.step(actions)
         observation = results[0][0].numpy()
         seen.append(bool(require_equal(results, alone, actions)["is_success"][0]))
@@ -238,7 +237,7 @@ def test_starts_and_targets_have_the_distribution_of_the_cpu() -> None:
         observations, infos = worlds.reset()
         found.append(torch.cat([observations[:, :4], infos["target"]], dim=1))
     rng = np.random.default_rng(0)
-    places = [fingertip(draw_posture(rng), PHALANX_LENGTH_M) for _ in range(4000)]
+    places = [fingertip(draw_posture(rng)) for _ in range(4000)]
     starts = [draw_start(rng) for _ in range(4000)]
     expected = np.concatenate([starts, places], axis=1)
     rows = torch.cat(found).numpy()
@@ -274,13 +273,13 @@ def test_noisy_sensors() -> None:
     assert errors.std() == pytest.approx(0.1, rel=0.12)
     assert seen[..., 8:15].min() >= 0.0
     for finger in range(2):
-        velocities = JointVelocities(CONTROL_DT)
+        velocities = JointVelocities()
         for step in range(len(seen)):
             angles = seen[step, finger, :4]
             np.testing.assert_allclose(
                 seen[step, finger, 4:8], velocities.of(angles), rtol=1e-4, atol=1e-4
             )
-            places = fingertip(angles, PHALANX_LENGTH_M)
+            places = fingertip(angles)
             np.testing.assert_allclose(seen[step, finger, 29:32], places, atol=1e-6)
 
 

@@ -21,13 +21,13 @@ def test_fingertips_of_balanced_postures_are_reached() -> None:
     rng = np.random.default_rng(0)
     for _ in range(150):
         posture = draw_posture(rng)
-        place = fingertip(posture, PHALANX_LENGTH_M)
+        place = fingertip(posture)
         near = np.clip(posture + rng.uniform(-0.2, 0.2, 4), _LOW, _HIGH)
         for start in (None, near):
             angles, off = angles_for(place, start)
             assert _is_within(angles)
             assert off < 1e-5
-            found = fingertip(angles, PHALANX_LENGTH_M)
+            found = fingertip(angles)
             assert off == pytest.approx(np.linalg.norm(place - found), abs=1e-12)
 
 
@@ -37,7 +37,7 @@ def test_points_of_any_posture_are_reached() -> None:
     postures = rng.uniform(_LOW, _HIGH, (80, 4))
     postures[::4] = np.where(rng.random((20, 4)) < 0.5, _LOW, _HIGH)
     for posture in postures:
-        angles, off = angles_for(fingertip(posture, PHALANX_LENGTH_M))
+        angles, off = angles_for(fingertip(posture))
         assert _is_within(angles)
         assert off < 1e-5
 
@@ -59,9 +59,7 @@ def test_the_error_of_unreachable_points_is_correct(
     """The reported distance is that of the angles, and at least the true minimum."""
     angles, off = angles_for(np.array(place))
     assert _is_within(angles)
-    assert off == pytest.approx(
-        np.linalg.norm(fingertip(angles, PHALANX_LENGTH_M) - place), abs=1e-12
-    )
+    assert off == pytest.approx(np.linalg.norm(fingertip(angles) - place), abs=1e-12)
     assert off >= 1e-3 * least_mm - 1e-9
 
 
@@ -70,6 +68,6 @@ def test_angles_are_continuous() -> None:
     rng = np.random.default_rng(1)
     for _ in range(30):
         posture = draw_posture(rng)
-        place = fingertip(posture, PHALANX_LENGTH_M)
+        place = fingertip(posture)
         angles, _ = angles_for(place + rng.uniform(-1e-4, 1e-4, 3), posture)
         assert np.degrees(np.abs(angles - posture)).max() < 3.0

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from shapechanger.finger.anatomy import JOINT_REST
-from shapechanger.finger.drawing import polyline, tendon_legend
-from shapechanger.finger.visuals import TENDON_COLOURS
+from shapechanger.finger.visuals import TENDON_COLOURS, polyline, tendon_legend
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 

@@ -13,10 +13,9 @@ from shapechanger.errors import BadAction, FingerError, UnknownName
 from shapechanger.finger.anatomy import (
     JOINT_RANGE,
     JOINT_REST,
-    PHALANX_LENGTH_M,
     TENDONS,
 )
-from shapechanger.finger.controller import FingerOracle
+from shapechanger.finger.controller import FingerController
 from shapechanger.finger.gap import GAPS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.postures import angles_for
@@ -58,12 +57,12 @@ def test_success_needs_ten_steps_at_the_target() -> None:
     """Success is ten consecutive steps within 5 mm, and ends when the fingertip leaves."""
     env = FingerReachEnv()
     env.reset(seed=0)
-    oracle = FingerOracle(env.observation_layout)
+    controller = FingerController(env.observation_layout)
     seen, info = env.reset(options={"posture": _REST, "target": _REST})
     assert info["distance"] < 1e-9
     assert not info["is_success"]
     for step in range(1, 13):
-        seen, _, _, _, info = env.step(oracle(seen))
+        seen, _, _, _, info = env.step(controller(seen))
         assert info["distance"] < 0.005
         assert info["is_success"] == (step >= 10)
     while info["distance"] < 0.005:
@@ -111,16 +110,16 @@ def test_goal_rewards_match_compute_reward() -> None:
     env = FingerReachEnv(goal=True)
     plain = FingerReachEnv()
     plain.reset(seed=0)
-    oracle = FingerOracle(plain.observation_layout)
+    controller = FingerController(plain.observation_layout)
     achieved, desired, rewards = [], [], []
     for seed in range(2):
         seen, _ = env.reset(seed=seed)
-        oracle.reset()
+        controller.reset()
         for _ in range(25):
             flat = gym.spaces.flatten(env.observation_space, seen)
             by_name = dict(zip(env.observation_layout.names, flat, strict=True))
             ordered = [by_name.get(name, 0.0) for name in plain.observation_layout.names]
-            seen, reward, _, _, info = env.step(oracle(np.array(ordered)))
+            seen, reward, _, _, info = env.step(controller(np.array(ordered)))
             assert reward == info["reward_goal"]
             assert reward == env.compute_reward(seen["achieved_goal"], seen["desired_goal"], info)
             achieved.append(seen["achieved_goal"])
@@ -179,7 +178,7 @@ def test_options_set_start_and_target() -> None:
     other = env.reset(options={"posture": [0.5, 0.1, 0.6, 0.3]})[1]
     assert (info["target"] != other["target"]).all()
     info = env.reset(options={"target": _REST})[1]
-    np.testing.assert_allclose(info["target"], fingertip(JOINT_REST, PHALANX_LENGTH_M))
+    np.testing.assert_allclose(info["target"], fingertip(JOINT_REST))
     assert (env.plant.angles != JOINT_REST).all()
     info = env.reset(options={"target": (0.05, 0.01, -0.04)})[1]
     np.testing.assert_array_equal(info["target"], (0.05, 0.01, -0.04))

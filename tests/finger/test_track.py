@@ -12,7 +12,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 
 from shapechanger.errors import PathError, UnknownName
-from shapechanger.finger.anatomy import JOINT_REST, PHALANX_LENGTH_M
+from shapechanger.finger.anatomy import JOINT_REST
 from shapechanger.finger.paths import KINDS, circle, from_callable, from_csv
 from shapechanger.finger.postures import angles_for
 from shapechanger.finger.task import fingertip
@@ -110,7 +110,7 @@ def test_the_start_angles_are_on_the_path() -> None:
     """The fingertip of the start angles is the first point of the path."""
     path = circle(phase=1.0)
     angles = require_reachable(path)
-    place = fingertip(angles, PHALANX_LENGTH_M)
+    place = fingertip(angles)
     np.testing.assert_allclose(place, path.at(0.0), atol=1e-5)
 
 

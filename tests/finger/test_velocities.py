@@ -14,7 +14,7 @@ from shapechanger.finger.tensions import drive_of
 
 def test_velocities_have_a_lag_of_40_ms() -> None:
     """The error of a constant speed shrinks by exp(-1/2) per period of 20 ms."""
-    velocities = JointVelocities(0.020)
+    velocities = JointVelocities()
     found = [velocities.of(np.array([0.02 * i, -0.04 * i])) for i in range(4)]
     left = [math.exp(-i / 2) for i in range(4)]
     np.testing.assert_allclose(found, [[1.0 - x, -2.0 * (1.0 - x)] for x in left], atol=1e-12)
@@ -24,7 +24,7 @@ def test_velocities_have_a_lag_of_40_ms() -> None:
 
 def test_inputs_are_copied() -> None:
     """Changing the given array later has no effect."""
-    velocities, angles = JointVelocities(0.020), np.zeros(1)
+    velocities, angles = JointVelocities(), np.zeros(1)
     first = velocities.of(angles)
     angles[:] = 1.0
     second = velocities.of(angles)
@@ -35,8 +35,8 @@ def test_inputs_are_copied() -> None:
 def test_noisy_joints_have_filtered_velocities() -> None:
     """Simulated fingers with joint noise use the filter of rigs."""
     noisy = NOMINAL.replace(joint_noise=0.01)
-    plant = FingerPlant(noisy, drive_of("tension", noisy), 0.020)
-    velocities, rng = JointVelocities(0.020), np.random.default_rng(0)
+    plant = FingerPlant(noisy, drive_of("tension", noisy))
+    velocities, rng = JointVelocities(), np.random.default_rng(0)
     senses = plant.place(JOINT_REST, rng)
     for _ in range(5):
         np.testing.assert_array_equal(senses.velocities, velocities.of(senses.angles))

@@ -11,7 +11,7 @@ import pytest
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import RobotError, StudyError
-from shapechanger.finger.identify import babble
+from shapechanger.finger.identify import result
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.reports.verdict import arm_rows, caveats
@@ -41,7 +41,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[A
     out = tmp_path_factory.mktemp("gap") / "study"
     task = TransferTask(FINGER, REAL_LIKE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(babble, "identify_env", identified)
+        patch.setattr(result, "identify_env", identified)
         plan = tiny_plan(task=task, arms=_EVERY, source_steps=64)
         return run_study(plan, out, executor=Serial()), out, moved
 

@@ -121,7 +121,7 @@ class RecordFinger:
     def run(self) -> None:
         """Record and print a summary."""
         from shapechanger.finger.identify import save_log
-        from shapechanger.finger.identify.babble import record_babble
+        from shapechanger.finger.identify.log import record_babble
 
         require_seed(self.seed)
         require_seed(self.finger_seed)
@@ -191,13 +191,11 @@ class ExportFinger:
 def _parameters(given: str) -> FingerParameters:
     """Return a set of parameters by name, or from a file."""
     from shapechanger.demos.episodes.files import read_file
-    from shapechanger.finger.parameters import PARAMETER_SETS, FingerParameters
+    from shapechanger.finger.parameters import PARAMETER_SETS, FingerParameters, named_set
 
-    if given in PARAMETER_SETS:
-        return PARAMETER_SETS[given]
     path = Path(given)
-    if not path.suffix and not path.exists():
-        raise UnknownName("set of finger parameters", given, PARAMETER_SETS)
+    if given in PARAMETER_SETS or not (path.suffix or path.exists()):
+        return named_set(given)
     try:
         return FingerParameters.from_json(read_file(path, _MOST_BYTES))
     except OSError as error:

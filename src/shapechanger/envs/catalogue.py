@@ -80,14 +80,14 @@ FINGER_ENVS: Final[Mapping[str, TaskEntry]] = MappingProxyType(
             "finger of seven tendons: reach a point",
             "ppo-finger",
             100,
-            "shapechanger.finger.gpu_reader",
+            "shapechanger.finger.gpu",
         ),
         "shapechanger/FingerTrack-v1": TaskEntry(
             "shapechanger.finger.track:FingerTrackEnv",
             "finger of seven tendons: follow a path",
             "ppo-finger",
             250,
-            "shapechanger.finger.gpu_reader",
+            "shapechanger.finger.gpu",
         ),
     }
 )

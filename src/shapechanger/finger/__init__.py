@@ -1,9 +1,9 @@
 """A human index finger of four joints, pulled by seven tendons: simulated, on a rig, or its twin.
 
 Begin with `anatomy` (joints, tendons, sources of all numbers), `parameters` (what differs between
-fingers) and `reach` (the env `Finger-v1`; `track` follows `paths`). `gap` draws fingers like those
-of a rig, `identify` finds a finger's parameters from a log, `remote` runs the same tasks on a rig,
-`twin` simulates one, and `gpu` steps many fingers at once.
+fingers) and `reach` (the env `Finger-v1`; `track` follows `paths`). `controller` moves one, `gap`
+draws fingers like those of a rig, `identify` finds a finger's parameters from a log, `remote` runs
+the same tasks on a rig, `twin` simulates one, and `gpu` steps many fingers at once.
 """
 
 from __future__ import annotations

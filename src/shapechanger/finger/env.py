@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+from abc import abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
 import msgspec
@@ -16,8 +17,7 @@ from shapechanger.contract.measure import Measure
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.renderer import Renderer, body_reach, draw
 from shapechanger.errors import FingerError, UnknownName, check_seed
-from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, MOST_TENSION_N, TENDONS
-from shapechanger.finger.drawing import tendon_legend
+from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.gap import (
     Gap,
     geared_around,
@@ -26,11 +26,12 @@ from shapechanger.finger.gap import (
     with_gears,
 )
 from shapechanger.finger.model import FingerFigure
-from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters
+from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters, named_set
 from shapechanger.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.finger.postures import draw_start
-from shapechanger.finger.task import FingerSenses, FingertipReward, features_of_senses
+from shapechanger.finger.task import FingerSenses, FingertipReward
 from shapechanger.finger.tensions import drive_of
+from shapechanger.finger.visuals import tendon_legend
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.rendering import choose_gl, require_screen
 
@@ -86,7 +87,9 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         "render_fps": round(1.0 / CONTROL_DT),
     }
     observation_layout: Layout
+    _options: tuple[str, ...] = ("posture",)
     _spec: EnvSpec | None = None
+    _target: NDArray[np.float64]
 
     def __init__(
         self,
@@ -144,7 +147,7 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         """Simulate a finger with these parameters from here on."""
         self.parameters = parameters
         self.drive = drive_of(self._actions, NOMINAL)
-        self.plant = FingerPlant(parameters, self.drive, CONTROL_DT)
+        self.plant = FingerPlant(parameters, self.drive)
         self._most = np.array(parameters.most_tension)
         self.plant.place(JOINT_REST, np.random.default_rng(0))  # Until the first reset.
 
@@ -158,39 +161,59 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             self._use(self._gap.draw(self.np_random))
         given = (options or {}).get("posture")
         angles = draw_start(self.np_random) if given is None else check_posture(given)
-        self._senses = self.plant.place(angles, self.np_random)
+        self._senses = self._start_at(angles)
         return self._senses
 
-    _options: tuple[str, ...] = ("posture",)
-
-    def _act(self, action: Any) -> FingerSenses:
-        """Apply an action, and return the measurements after it."""
-        if self._senses is None:
-            raise gym.error.ResetNeeded("Call reset() before the first step.")
-        checked = check_action(self, action)
-        before = self._senses.commands
-        self._senses = self._move(np.clip(np.asarray(checked, np.float64), -1.0, 1.0))
-        self._change = self._senses.commands - before
-        return self._senses
+    def _start_at(self, angles: NDArray[np.float64]) -> FingerSenses:
+        """Start at rest with these angles, rad, (4,)."""
+        return self.plant.place(angles, self.np_random)
 
     def _move(self, command: NDArray[np.float64]) -> FingerSenses:
         """Apply a command, -1 to 1, (7,), for one control period."""
         return self.plant.act(command, self.np_random)
 
-    def _terms(self, place: NDArray[np.float64]) -> tuple[float, dict[str, float]]:
-        """Return the distance of the fingertip from its target, m, and the terms of the reward."""
-        distance = float(np.linalg.norm(self.plant.fingertip - place))
-        effort, change = float(np.mean(self._pulled**2)), float(np.mean(self._change**2))
-        return distance, self._reward.terms(distance, effort, change, CONTROL_DT)
+    def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take one step.
 
-    def _stepped(
-        self, observation: Any, info: dict[str, Any], terms: dict[str, float]
-    ) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Return the result of a step, whose reward is the sum of `terms`."""
-        more: dict[str, Any] = {SMOOTHNESS.key: 1.0 - 0.5 * float(np.abs(self._change).mean())}
+        Raises:
+            BadAction: If the action has another shape or is not finite; nothing has moved then.
+            ResetNeeded: If `reset` was never called.
+        """
+        if self._senses is None:
+            raise gym.error.ResetNeeded("Call reset() before the first step.")
+        checked = check_action(self, action)
+        before = self._senses.commands
+        senses = self._senses = self._move(np.clip(np.asarray(checked, np.float64), -1.0, 1.0))
+        self._change = senses.commands - before
+        self._advance()
+        terms = self._terms(senses)
+        info = {**self._info(), **terms}
+        info[SMOOTHNESS.key] = 1.0 - 0.5 * float(np.abs(self._change).mean())
         if self.plant.diverged:
-            more["diverged"] = True
-        return observation, sum(terms.values()), False, False, {**info, **terms, **more}
+            info["diverged"] = True
+        return self._observation(senses), sum(terms.values()), False, False, info
+
+    @abstractmethod
+    def _advance(self) -> None:
+        """Note that the finger has moved for one control period."""
+
+    @abstractmethod
+    def _observation(self, senses: FingerSenses) -> Any:
+        """Return the observation of the task."""
+
+    @abstractmethod
+    def _info(self) -> dict[str, Any]:
+        """Return the entries of `info` that the task has at the start too."""
+
+    def _terms(self, senses: FingerSenses) -> dict[str, float]:
+        """Return the terms of the reward, whose sum it is, by name."""
+        effort, change = float(np.mean(self._pulled**2)), float(np.mean(self._change**2))
+        return self._reward.terms(self._distance, effort, change, CONTROL_DT)
+
+    @property
+    def _distance(self) -> float:
+        """True distance of the fingertip from its target, m."""
+        return float(np.linalg.norm(self.plant.fingertip - self._target))
 
     def render(self) -> Any:
         """Return a frame of `render_mode`; None without one.
@@ -303,17 +326,12 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             MissingExtra: If `mujoco.sysid` is not installed.
         """
         # An optimiser, which an env that only steps does not need.
-        from shapechanger.finger.identify.babble import identify_env
+        from shapechanger.finger.identify.result import identify_env
 
         found = identify_env(self, self._actions, seed)
         if found.path is None:
             return {"parameters": msgspec.to_builtins(found)}
         return {"gap": msgspec.to_builtins(geared_around(found)), "reward": _CALM}
-
-    def _sense_features(self) -> list[Feature]:
-        return features_of_senses(
-            JOINTS, JOINT_RANGE, TENDONS, [float(most) for most in MOST_TENSION_N]
-        )
 
 
 FingerLike = FingerParameters | Mapping[str, Any] | str
@@ -327,31 +345,23 @@ def as_finger(value: FingerLike | None) -> FingerParameters:
         UnknownName: If there is no such set or parameter.
         FingerError: If the parameters contradict themselves, or the tendons cannot balance a joint.
     """
-    given = _parameters(value)
+    given: Any = NOMINAL if value is None else value
+    if isinstance(given, str):
+        if not given.lstrip().startswith("{"):
+            return named_set(given)
+        given = FingerParameters.from_json(given)
+    elif isinstance(given, Mapping):
+        named = cast("Mapping[str, Any]", given)
+        known = FingerParameters.__struct_fields__
+        for name in named:
+            if name not in known:
+                raise UnknownName("parameter of a finger", name, known)
+        given = NOMINAL.replace(**named)
+    if not isinstance(given, FingerParameters):
+        raise FingerError(f"Parameters of a finger must be numbers by name or JSON, got {given!r}.")
     if given not in PARAMETER_SETS.values():
         require_balance(given)
     return given
-
-
-def _parameters(value: FingerLike | None) -> FingerParameters:
-    if value is None:
-        return NOMINAL
-    if isinstance(value, FingerParameters):
-        return value
-    if isinstance(value, str):
-        if value.lstrip().startswith("{"):
-            return FingerParameters.from_json(value)
-        if value not in PARAMETER_SETS:
-            raise UnknownName("set of finger parameters", value, PARAMETER_SETS)
-        return PARAMETER_SETS[value]
-    given: Any = value  # May be anything where nothing checks types.
-    if not isinstance(given, Mapping):
-        raise FingerError(f"Parameters of a finger must be numbers by name or JSON, got {given!r}.")
-    known = FingerParameters.__struct_fields__
-    for name in value:
-        if name not in known:
-            raise UnknownName("parameter of a finger", name, known)
-    return NOMINAL.replace(**value)
 
 
 def check_posture(value: Any) -> NDArray[np.float64]:
@@ -365,7 +375,7 @@ def check_posture(value: Any) -> NDArray[np.float64]:
     if angles.shape != (len(JOINTS),) or not ((angles >= low) & (angles <= high)).all():
         raise FingerError(
             f"A posture must be four angles in rad, {', '.join(JOINTS)}, within "
-            f"{_rounded(low)} and {_rounded(high)}; got {value}."
+            f"{low.round(3).tolist()} and {high.round(3).tolist()}; got {value}."
         )
     return angles
 
@@ -376,7 +386,3 @@ def as_numbers(value: Any) -> NDArray[np.float64]:
         return np.asarray(value, np.float64)
     except (TypeError, ValueError):
         return np.empty(0)
-
-
-def _rounded(angles: NDArray[np.float64]) -> list[float]:
-    return [round(float(angle), 3) for angle in angles]

@@ -77,9 +77,9 @@ class Gap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     def __post_init__(self) -> None:
         if not 0.0 <= self.arm_error < 1.0:
             raise FingerError(f"arm_error must be 0 to below 1, got {self.arm_error}.")
-        for name, value in msgspec.structs.asdict(self).items():
-            if name in ("arm_error", "around"):
-                continue
+        ranges = msgspec.structs.asdict(self)
+        del ranges["arm_error"], ranges["around"]
+        for name, value in ranges.items():
             if not 0.0 <= value[0] <= value[1] < math.inf:
                 raise FingerError(f"{name}: the range {value} is empty, infinite or below zero.")
             if name in _LOGARITHMIC and not value[0] > 0.0:
@@ -237,10 +237,7 @@ def geared_around(found: FingerParameters) -> Gap:
 
 
 def require_balance(parameters: FingerParameters) -> None:
-    """Require tendons that can pull against one another at every joint.
-
-    Args:
-        parameters: The finger.
+    """Require tendons that can pull against one another at every joint of a finger.
 
     Raises:
         FingerError: If there is a torque that no tensions give; the message names the joint.

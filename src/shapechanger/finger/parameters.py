@@ -24,24 +24,10 @@ from shapechanger.finger.anatomy import (
     TENDONS,
 )
 
-# Time constant between a command and its force. Chosen.
-_MOTOR_LAG_S: Final = 0.020
-# Mass of a motor without gears and its spool, at the tendon. Chosen. That of geared servos is a
-# hundred times as large and more.
-_MOTOR_KG: Final = 0.010
-# N·s/m. Chosen.
-_TENDON_DAMPING: Final = 2.0
 # Tolerance of a ratio that must be whole.
 _WHOLE: Final = 1e-6
 
 Arms = tuple[tuple[float, float, float, float], ...]
-
-
-def _plain(numbers: NDArray[np.float64]) -> tuple[Any, ...]:
-    """Nested tuples of an array."""
-    if numbers.ndim > 1:
-        return tuple(_plain(row) for row in numbers)
-    return tuple(float(number) for number in numbers)
 
 
 class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -89,12 +75,7 @@ class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @classmethod
     def from_mapping(cls, given: Mapping[str, Any]) -> CommandPath:
-        """Create a path from values by name.
-
-        Raises:
-            UnknownName: If there is no such name.
-            FingerError: If a value is malformed.
-        """
+        """Create a path from values by name; raise UnknownName or FingerError for others."""
         for name in given:
             if name not in cls.__struct_fields__:
                 raise UnknownName("parameter of a command path", str(name), cls.__struct_fields__)
@@ -138,12 +119,12 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     joint_stiffness: tuple[float, ...] = tuple(JOINT_STIFFNESS.tolist())
     joint_damping: tuple[float, ...] = tuple(JOINT_DAMPING.tolist())
     joint_friction: tuple[float, ...] = tuple(JOINT_FRICTION.tolist())
-    tendon_damping: float = _TENDON_DAMPING
+    tendon_damping: float = 2.0  # Chosen.
     tendon_friction: float = 0.0
     tendon_stiffness: float | None = None
     backlash: float = 0.0
-    motor_kg: float = _MOTOR_KG
-    motor_lag: float = _MOTOR_LAG_S
+    motor_kg: float = 0.010  # Chosen, without gears; geared servos have a hundred times more.
+    motor_lag: float = 0.020  # Chosen.
     command_delay: float = 0.0
     joint_noise: float = 0.0
     tension_noise: float = 0.0
@@ -160,14 +141,15 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
                 raise FingerError("backlash needs a tendon_stiffness: a stiff tendon has none.")
             numbers["tendon_stiffness"] = 1.0
         sizes = {"moment_arms": (len(TENDONS), len(JOINTS)), "most_tension": (len(TENDONS),)}
+        sizes |= dict.fromkeys(
+            ("joint_stiffness", "joint_damping", "joint_friction"), (len(JOINTS),)
+        )
         for name, value in numbers.items():
             try:
                 given = np.asarray(value, np.float64)
             except (TypeError, ValueError) as error:
                 raise FingerError(f"{name} must hold numbers, got {value!r}.") from error
-            shape = sizes.get(name, (len(JOINTS),) if name.startswith("joint_") else ())
-            if name == "joint_noise":
-                shape = ()
+            shape = sizes.get(name, ())
             if given.shape != shape:
                 raise FingerError(f"{name}: the shape must be {shape}, got {given.shape}.")
             if not np.isfinite(given).all():
@@ -175,7 +157,9 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
             if name != "moment_arms" and given.min() < 0.0:
                 raise FingerError(f"{name}: the numbers must not be below zero, got {value}.")
             if shape:  # Tuples compare, and become JSON.
-                msgspec.structs.force_setattr(self, name, _plain(given))
+                plain: list[Any] = given.tolist()
+                rows = plain if given.ndim == 1 else map(tuple, plain)
+                msgspec.structs.force_setattr(self, name, tuple(rows))
         for name in ("motor_kg", "motor_lag"):
             if not numbers[name] > 0.0:
                 raise FingerError(f"{name} must be above zero, got {numbers[name]}.")
@@ -194,6 +178,13 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     def gives(self) -> bool:
         """Return whether the tendons stretch."""
         return self.tendon_stiffness is not None
+
+    @property
+    def taut(self) -> float:
+        """Travel of a motor from a slack tendon to its least tension, m; 0 for stiff tendons."""
+        if self.tendon_stiffness is None:
+            return 0.0
+        return self.backlash + self.least_tension / self.tendon_stiffness
 
     def replace(self, **changes: Any) -> FingerParameters:
         """A copy with some parameters replaced.
@@ -229,3 +220,10 @@ PARAMETER_SETS: Final[Mapping[str, FingerParameters]] = MappingProxyType(
 )
 """Other sets of parameters, by name. No tensions balance the moment arms of "an-1983"; see
 `anatomy.AN_1983_ARMS`."""
+
+
+def named_set(name: str) -> FingerParameters:
+    """Return a set of parameters; raise UnknownName if there is none of this name."""
+    if name not in PARAMETER_SETS:
+        raise UnknownName("set of finger parameters", name, PARAMETER_SETS)
+    return PARAMETER_SETS[name]

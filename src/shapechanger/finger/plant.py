@@ -1,4 +1,7 @@
-"""The simulated finger: takes commands and returns measurements."""
+"""The simulated finger: takes commands and returns measurements.
+
+On a rig's command path, tensions are computed at a rate, held, and sent with a limited slew.
+"""
 
 from __future__ import annotations
 
@@ -9,26 +12,23 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.finger.anatomy import JOINTS, PHALANX_LENGTH_M, TENDONS
-from shapechanger.finger.command_path import HeldTensions, hold_controls
+from shapechanger.errors import FingerError
+from shapechanger.finger.anatomy import JOINTS, TENDONS
 from shapechanger.finger.model import FINGERTIP, TARGET, build_finger
-from shapechanger.finger.parameters import FingerParameters
+from shapechanger.finger.parameters import CommandPath, FingerParameters
 from shapechanger.finger.task import FingerSenses, fingertip
 from shapechanger.finger.tensions import TendonDrive
 
+CONTROL_DT: Final = 0.020
+"""Duration of one action, s."""
 # Time constant of the smoothing of velocities, s: two control periods.
 _LAG_S: Final = 0.040
 
 
 class JointVelocities:
-    """Estimates joint velocities from measured angles by smoothed differences.
+    """Estimates joint velocities from angles, measured once per `CONTROL_DT`, by differences."""
 
-    Args:
-        period_s: Time between two measurements, s.
-    """
-
-    def __init__(self, period_s: float) -> None:
-        self._period_s = period_s
+    def __init__(self) -> None:
         self._angles: NDArray[np.float64] | None = None
         self._velocities = np.zeros(0)
 
@@ -41,26 +41,22 @@ class JointVelocities:
         if self._angles is None:
             self._velocities = np.zeros_like(angles)
         else:
-            self._velocities = smoothed(self._velocities, self._angles, angles, self._period_s)
+            self._velocities = smoothed(self._velocities, self._angles, angles)
         self._angles = angles.copy()
         return self._velocities
 
 
-def smoothed(velocities: Any, former: Any, angles: Any, period_s: float) -> Any:
+def smoothed(velocities: Any, former: Any, angles: Any) -> Any:
     """Return smoothed velocities after new angles, rad/s, as arrays or tensors of any shape.
 
     Args:
         velocities: Those of the former angles, rad/s.
-        former: The former angles, rad.
+        former: Angles of the control period before, rad.
         angles: The new angles, rad.
-        period_s: Time between them, s.
     """
-    speed = (angles - former) / period_s
-    return velocities + (1.0 - math.exp(-period_s / _LAG_S)) * (speed - velocities)
+    speed = (angles - former) / CONTROL_DT
+    return velocities + (1.0 - math.exp(-CONTROL_DT / _LAG_S)) * (speed - velocities)
 
-
-CONTROL_DT: Final = 0.020
-"""Duration of one action, s."""
 
 _N_JOINTS: Final = len(JOINTS)
 _N_TENDONS: Final = len(TENDONS)
@@ -71,8 +67,7 @@ class FingerPlant:
 
     Args:
         parameters: Parameters of the finger.
-        drive: Meaning of its commands.
-        control_dt: Duration of a command, s; a whole number of simulation steps.
+        drive: Meaning of its commands, each of which lasts `CONTROL_DT`.
 
     Attributes:
         model: The compiled model.
@@ -80,7 +75,7 @@ class FingerPlant:
         held: What its commands become on their path; None without one.
     """
 
-    def __init__(self, parameters: FingerParameters, drive: TendonDrive, control_dt: float) -> None:
+    def __init__(self, parameters: FingerParameters, drive: TendonDrive) -> None:
         self.parameters = parameters
         self.model: mujoco.MjModel = build_finger(parameters, drive).compile()
         self.data = mujoco.MjData(self.model)
@@ -88,16 +83,16 @@ class FingerPlant:
         self._warnings: NDArray[np.int32] = cast("Any", self.data.warning).number
         self._drive = drive
         timestep = self.model.opt.timestep
-        self._frame_skip = round(control_dt / timestep)
+        self._frame_skip = round(CONTROL_DT / timestep)
         self.held: HeldTensions | None = None
         if parameters.path is not None:
-            self.held = HeldTensions(parameters.path, parameters, drive, control_dt, timestep)
+            self.held = HeldTensions(parameters.path, parameters, drive, CONTROL_DT, timestep)
         self._arms = parameters.arms
         self._tip = self.data.site_xpos[self.model.site(FINGERTIP).id]
         self._command = np.zeros(_N_TENDONS)
         self._angles = np.zeros(_N_JOINTS)
         self._velocities = np.zeros(_N_JOINTS)
-        self._differences = JointVelocities(control_dt)
+        self._differences = JointVelocities()
 
     @property
     def fingertip(self) -> NDArray[np.float64]:
@@ -121,17 +116,14 @@ class FingerPlant:
     def place(self, angles: NDArray[np.float64], rng: np.random.Generator) -> FingerSenses:
         """Start at rest with these angles, rad, (4,), and every tendon just taut.
 
-        Args:
-            angles: Joint angles, rad, (4,).
-            rng: Source of measurement noise.
+        `rng` makes the noise of the measurements.
         """
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         data.qpos[:_N_JOINTS] = angles
         least = self.parameters.least_tension
-        if self.parameters.tendon_stiffness is not None:
-            taut = self.parameters.backlash + least / self.parameters.tendon_stiffness
-            data.qpos[_N_JOINTS:] = self._arms @ angles + taut
+        if self.parameters.gives:
+            data.qpos[_N_JOINTS:] = self._arms @ angles + self.parameters.taut
         length = -self._arms @ angles
         command = self._drive.command(np.full(_N_TENDONS, least), length, np.zeros(_N_TENDONS))
         self._command = np.clip(command, -1.0, 1.0)
@@ -146,12 +138,7 @@ class FingerPlant:
         return self._senses(rng)
 
     def act(self, command: NDArray[np.float64], rng: np.random.Generator) -> FingerSenses:
-        """Apply a command for one control period.
-
-        Args:
-            command: -1 to 1, (7,).
-            rng: Source of measurement noise.
-        """
+        """Apply a command, -1 to 1, (7,), for one control period; `rng` makes the noise."""
         self._command = np.clip(np.asarray(command, np.float64), -1.0, 1.0)
         if self.held is None:
             self.data.ctrl[:] = self._command
@@ -185,5 +172,121 @@ class FingerPlant:
                 -self.data.qpos[_N_JOINTS:] if self.parameters.gives else -self._arms @ self.angles
             ),
             commands=self._command,
-            fingertip=fingertip(self._angles, PHALANX_LENGTH_M),
+            fingertip=fingertip(self._angles),
         )
+
+
+_N: Final = len(JOINTS)
+# Tolerance of a ratio that must be whole.
+_WHOLE: Final = 1e-6
+
+
+class HeldTensions:
+    """Simulates a finger whose commands take a path, in place of a drive in each simulation step.
+
+    Args:
+        path: The path.
+        parameters: Parameters of the finger.
+        drive: Meaning of the commands.
+        control_dt: Duration of a command, s.
+        timestep: Duration of a simulation step, s.
+
+    Attributes:
+        computations: How often tensions are computed per command.
+        ticks: How often they are sent per computation.
+        steps: Simulation steps per tick.
+
+    Raises:
+        FingerError: If a command does not last a whole number of computations, or a tick a whole
+            number of simulation steps.
+    """
+
+    def __init__(
+        self,
+        path: CommandPath,
+        parameters: FingerParameters,
+        drive: TendonDrive,
+        control_dt: float,
+        timestep: float,
+    ) -> None:
+        self.computations = round(control_dt * path.control_hz)
+        self.steps = round(1.0 / (path.tick_hz * timestep))
+        if abs(self.computations - control_dt * path.control_hz) > _WHOLE or not self.computations:
+            raise FingerError(
+                f"control_hz of a path must be a multiple of {1.0 / control_dt:g}, the commands "
+                f"per second, got {path.control_hz:g}."
+            )
+        if abs(self.steps * path.tick_hz * timestep - 1.0) > _WHOLE:
+            raise FingerError(
+                f"tick_hz of a path must divide {1.0 / timestep:g}, the simulation steps per "
+                f"second, got {path.tick_hz:g}."
+            )
+        self.ticks = round(path.tick_hz / path.control_hz)
+        self._path, self._drive = path, drive
+        self._arms, self._gives = parameters.arms, parameters.gives
+        self._least = parameters.least_tension
+        self._range = np.array(parameters.most_tension) - self._least
+        self._now = np.zeros(len(self._range))
+
+    def start(self, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Start with these tensions, N, (7,), and return the controls that hold them, (7,)."""
+        self._now = self._share(tensions)
+        return self._controls()
+
+    def advance(
+        self, model: mujoco.MjModel, data: mujoco.MjData, command: NDArray[np.float64]
+    ) -> None:
+        """Simulate one command, -1 to 1, (7,), in a model whose controls are tensions."""
+        for _ in range(self.computations):
+            if self._gives:  # Winding up by 1 m shortens a tendon by 1 m.
+                length, speed = -data.qpos[_N:], -data.qvel[_N:]
+            else:
+                length, speed = -self._arms @ data.qpos[:_N], -self._arms @ data.qvel[:_N]
+            aim = self._share(self._drive.tension(command, length, speed))
+            for _ in range(self.ticks):
+                self._now = slewed(self._path, self._now, aim)
+                data.ctrl[:] = self._controls()
+                mujoco.mj_step(model, data, self.steps)
+
+    def _share(self, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.clip((tensions - self._least) / self._range, 0.0, 1.0)
+
+    def _controls(self) -> NDArray[np.float64]:
+        share = self._now
+        if self._path.tension_step > 0.0:
+            steps = np.floor((self._least + share * self._range) / self._path.tension_step)
+            share = self._share(steps * self._path.tension_step)
+        return 2.0 * share - 1.0
+
+
+def hold_controls(
+    model: mujoco.MjModel, data: mujoco.MjData, controls: NDArray[np.float64]
+) -> None:
+    """Set controls, -1 to 1, (7,), that have acted for long, and act until delayed ones arrive."""
+    data.ctrl[:] = controls
+    data.act[:] = controls
+    for i, held in enumerate(controls):
+        if model.actuator_history[i, 0] > 0:  # A new history holds zeros.
+            samples = np.full((model.actuator_history[i, 0], 1), held)
+            mujoco.mj_initCtrlHistory(model, data, i, None, samples)
+
+
+def slewed(
+    path: CommandPath, now: NDArray[np.float64], aim: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the tensions of the next tick, as `shapechanger.robot.guard.limits.slewed` does.
+
+    All tensions, also those of `now` and those that are the `aim`, are shares of their ranges, 0 to
+    1, (n,).
+    """
+    rise, fall = slews(path)
+    return np.clip(aim, now - fall, now + rise)
+
+
+def slews(path: CommandPath) -> tuple[float, float]:
+    """Return the largest rise and fall of a tension per tick, as shares of its range."""
+    rise, fall = (
+        math.inf if slew is None else slew / path.tick_hz
+        for slew in (path.slew_per_s, path.slew_down_per_s)
+    )
+    return rise, fall

@@ -15,7 +15,6 @@ from shapechanger.finger.anatomy import (
     DIP_BY_PIP,
     JOINT_RANGE,
     JOINT_REST,
-    PHALANX_LENGTH_M,
 )
 from shapechanger.finger.model import build_finger
 from shapechanger.finger.parameters import NOMINAL
@@ -66,15 +65,7 @@ def draw_start(rng: np.random.Generator) -> NDArray[np.float64]:
 def moving_torque(
     angles: NDArray[np.float64], speed: NDArray[np.float64], acceleration: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the joint torques that a motion of the nominal finger needs, N·m, (4,).
-
-    They overcome inertia, weight, passive tissue and friction.
-
-    Args:
-        angles: rad, (4,).
-        speed: rad/s, (4,).
-        acceleration: rad/s², (4,).
-    """
+    """Return the torques, N·m, that a motion of the nominal finger needs; see `joint_torque`."""
     model = _nominal()
     if not hasattr(_own, "data"):
         _own.data = mujoco.MjData(model)
@@ -88,7 +79,9 @@ def joint_torque(
     speed: NDArray[np.float64],
     acceleration: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the same for any finger whose tendons do not stretch.
+    """Return the torques, N·m, (4,), that a motion of a finger with stiff tendons needs.
+
+    They overcome inertia, weight, passive tissue and friction.
 
     Args:
         model: Model of the finger.
@@ -171,7 +164,7 @@ def _search(
     q = np.clip(start, low, high)
     coupling = np.array([[0.0, 0.0, -DIP_BY_PIP, 1.0]])
     preference = _PREFERENCE
-    error = place - fingertip(q, PHALANX_LENGTH_M)
+    error = place - fingertip(q)
     damping, settled = _DAMPING, False
     for step in range(_STEPS):
         if step == _STEPS // 3 or settled:
@@ -181,7 +174,7 @@ def _search(
         off = coupling @ q
         beyond = off - np.clip(off, -DIP_BAND, DIP_BAND)
         weight = preference if beyond.any() else 0.0
-        rows = [fingertip_jacobian(q, PHALANX_LENGTH_M), weight * coupling, damping * np.eye(4)]
+        rows = [fingertip_jacobian(q), weight * coupling, damping * np.eye(4)]
         goal = [error, -weight * beyond, np.zeros(4)]
         free = np.ones(4, bool)
         change = np.zeros(4)
@@ -196,7 +189,7 @@ def _search(
             free &= ~stuck
         settled = float(np.abs(change).max()) < _SETTLED_RAD
         next_q = np.clip(q + np.clip(change, -_MOST_STEP_RAD, _MOST_STEP_RAD), low, high)
-        next_error = place - fingertip(next_q, PHALANX_LENGTH_M)
+        next_error = place - fingertip(next_q)
         # Out of reach, full steps oscillate around the closest angles.
         if preference == 0.0 and next_error @ next_error > error @ error:
             damping *= _GROWS

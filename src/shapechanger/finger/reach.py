@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.measure import RETURN, SUCCESS
 from shapechanger.errors import FingerError
-from shapechanger.finger.anatomy import PHALANX_LENGTH_M
 from shapechanger.finger.env import SMOOTHNESS, FingerEnv, as_numbers
 from shapechanger.finger.postures import draw_posture
-from shapechanger.finger.task import FingerSenses, fingertip, place_features
+from shapechanger.finger.task import FingerSenses, features_of_senses, fingertip, place_features
 from shapechanger.layout import Element, Feature, Layout
 
 _TARGET: Final = Element("task", "target")
@@ -73,7 +72,7 @@ class FingerReachEnv(FingerEnv):
         self._has_goal = goal
         self._target = np.zeros(3)
         self._steps_near = 0
-        senses = self._sense_features()
+        senses = features_of_senses()
         target = place_features("target", _TARGET)
         if goal:
             achieved = [Feature(f"achieved/{axis}", "m", element=_TARGET) for axis in "xyz"]
@@ -108,29 +107,20 @@ class FingerReachEnv(FingerEnv):
         """
         super().reset(seed=seed)
         given = (options or {}).get("target")
-        target = fingertip(draw_posture(self.np_random), PHALANX_LENGTH_M)
+        target = fingertip(draw_posture(self.np_random))
         self._target = target if given is None else _target(given)
         senses = self._place(options)
         self.plant.mark(self._target)
         self._steps_near = 0
-        distance = float(np.linalg.norm(self.plant.fingertip - self._target))
-        return self._observation(senses), self._info(distance)
+        return self._observation(senses), self._info()
 
-    def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Take one step.
+    def _advance(self) -> None:
+        self._steps_near = self._steps_near + 1 if self._distance <= TOLERANCE_M else 0
 
-        Raises:
-            BadAction: If the action has another shape or is not finite; nothing has moved then.
-            ResetNeeded: If `reset` was never called.
-        """
-        senses = self._act(action)
-        distance, terms = self._terms(self._target)
-        self._steps_near = self._steps_near + 1 if distance <= TOLERANCE_M else 0
-        info = self._info(distance)
-        if self._has_goal:
-            reached = self.compute_reward(senses.fingertip, self._target, info)
-            terms = {"reward_goal": float(reached)}
-        return self._stepped(self._observation(senses), info, terms)
+    def _terms(self, senses: FingerSenses) -> dict[str, float]:
+        if not self._has_goal:
+            return super()._terms(senses)
+        return {"reward_goal": float(self.compute_reward(senses.fingertip, self._target, None))}
 
     def compute_reward(
         self, achieved_goal: NDArray[np.float64], desired_goal: NDArray[np.float64], info: object
@@ -154,10 +144,10 @@ class FingerReachEnv(FingerEnv):
             }
         return np.concatenate([senses.numbers(), self._target, self._target - senses.fingertip])
 
-    def _info(self, distance: float) -> dict[str, Any]:
+    def _info(self) -> dict[str, Any]:
         return {
             "is_success": self._steps_near >= HELD_STEPS,
-            "distance": distance,
+            "distance": self._distance,
             "target": self._target.copy(),
         }
 
@@ -169,7 +159,7 @@ def _unbounded(size: int) -> gym.spaces.Box:
 def _target(value: Any) -> NDArray[np.float64]:
     given = as_numbers(value)
     if given.shape == (4,):
-        given = fingertip(given, PHALANX_LENGTH_M)
+        given = fingertip(given)
     if given.shape != (3,) or not np.isfinite(given).all():
         raise FingerError(f"A target must be three finite numbers, m, or four angles; got {value}.")
     return given

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from contextlib import ExitStack, closing
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Final, cast
 
@@ -13,19 +15,18 @@ from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.errors import FingerError, RobotRefused, UnknownName, check_seed
-from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
-from shapechanger.finger.env import FingerEnv, check_posture
+from shapechanger.finger.anatomy import JOINTS, TENDONS
+from shapechanger.finger.env import FingerEnv
 from shapechanger.finger.gap import GAPS, with_gears
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
 from shapechanger.finger.paths import PathSource
 from shapechanger.finger.plant import CONTROL_DT
-from shapechanger.finger.postures import draw_start
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.finger.rig import LengthApproach, RigSenses, StartApproach
 from shapechanger.finger.task import FingerSenses
 from shapechanger.finger.track import FingerTrackEnv
 from shapechanger.link.messages import Pace
-from shapechanger.remote.env import KNOWN_ROBOT, OnReset, RemoteVehicleEnv
+from shapechanger.remote.env import KNOWN_ROBOT, RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.twin.robot import Operator, RunningRobot, run_robot
 
@@ -50,8 +51,8 @@ _OWN_TIMEOUT_S: Final = 30.0
 _DRIVING: Final = ("reward", "frame", "captured_ns")
 
 
-class OnRig(FingerEnv):
-    """Perform a task of the finger on a rig; mixed into the env of the task.
+class RigMixin(FingerEnv):
+    """Mixin that performs a task of the finger on a rig.
 
     The simulation is never stepped: it mirrors the rig, for rendering and rewards.
 
@@ -59,8 +60,6 @@ class OnRig(FingerEnv):
         robot: Name of a known rig, or its address as HOST or HOST:PORT. A twin of the profile
             "finger" that is served on this machine is known under that name.
         task: Arguments of the task's own env.
-        key: The rig's key, for an address.
-        fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
         pace: As for `RemoteVehicleEnv`; None for "lockstep" with a twin's own clock, else
             "realtime".
         twin: A twin that this env serves itself instead of connecting to `robot`: "nominal", or the
@@ -69,9 +68,6 @@ class OnRig(FingerEnv):
         tendon_stiffness: Stiffness of the rig's tendons, N/m, to correct lengths for their stretch.
             The default is the twin's.
         twin_folder: Folder of a twin on this machine, for its true state; "" for none.
-        on_reset: As for `RemoteVehicleEnv`.
-        on_waiting: As for `RemoteVehicleEnv`.
-        reset_timeout_s: Time limit of a reset, s.
         timeout_s: Silence of the rig after which the link is lost, s; None for 2 s, or 30 s with
             its own twin, whose clock waits for a busy machine.
         actions: What an action commands; see `shapechanger.finger.tensions.DRIVES`.
@@ -79,6 +75,8 @@ class OnRig(FingerEnv):
         render_mode: "human", "rgb_array" or "depth_array": the finger as measured.
         width: Width of frames, pixels.
         height: Height of frames, pixels.
+        **access: More arguments of `RemoteVehicleEnv`: `key` and `fingerprint`, for an address;
+            `on_reset`, `on_waiting` and `reset_timeout_s`.
 
     Raises:
         UnknownName: If no rig of this name is known, or there is no such mode of action or weight.
@@ -94,22 +92,18 @@ class OnRig(FingerEnv):
         robot: str,
         task: Mapping[str, Any],
         *,
-        key: str = "",
-        fingerprint: str = "",
         pace: Pace | None = None,
         twin: str = "",
         finger_seed: int | None = None,
         tendon_stiffness: float = 20e3,
         twin_folder: str = "",
-        on_reset: OnReset = "operator",
-        on_waiting: Callable[[str], object] | None = None,
-        reset_timeout_s: float = 60.0,
         timeout_s: float | None = None,
         actions: str = "impedance",
         reward: Mapping[str, float] | None = None,
         render_mode: str | None = None,
         width: int = 480,
         height: int = 480,
+        **access: Any,
     ) -> None:
         super().__init__(
             **task,
@@ -119,56 +113,50 @@ class OnRig(FingerEnv):
             width=width,
             height=height,
         )
-        self._twin, self._finger_seed = twin, finger_seed
-        self._true_tip: NDArray[np.float64] | None = None
-        self._true_angles: NDArray[np.float64] | None = None
+        self._twin, self._finger_seed, self._seed = twin, finger_seed, None
+        self._truth: dict[str, NDArray[np.float64]] = {}
+        self._rig_info: dict[str, Any] = {}
+        self._command = np.zeros(len(TENDONS))
         self._own: RunningRobot | None = None
-        if twin or finger_seed is not None:
-            self._own = serve_twin(twin, finger_seed)
-            known = self._own.known
-            robot, key, fingerprint = known.address, known.key, known.fingerprint
-            twin_folder = str(self._own.folder)
-        access: dict[str, Any] = {
-            "robot": robot,
-            "key": key,
-            "fingerprint": fingerprint,
-            "state": True,
-            "image": False,
-            "on_reset": on_reset,
-            "on_waiting": on_waiting,
-            "reset_timeout_s": reset_timeout_s,
-            "timeout_s": timeout_s or (_TIMEOUT_S if self._own is None else _OWN_TIMEOUT_S),
-        }
         self._operator: Operator | None = None
-        try:
-            self._rig = _connected(access, pace)
-        except BaseException as error:
-            self._end_twin()
-            if isinstance(error, UnknownName) and error.kind == KNOWN_ROBOT:
-                raise UnknownName(error.kind, error.name, error.known, _WITHOUT_A_RIG) from None
-            raise
-        try:
-            welcome = self._rig.welcome
+        with ExitStack() as opened:
+            if twin or finger_seed is not None:
+                self._own = opened.enter_context(closing(serve_twin(twin, finger_seed)))
+                known = self._own.known
+                robot = known.address
+                access |= {"key": known.key, "fingerprint": known.fingerprint}
+                twin_folder = str(self._own.folder)
+            connect = partial(
+                RemoteVehicleEnv,
+                robot,
+                state=True,
+                image=False,
+                timeout_s=timeout_s or (_TIMEOUT_S if self._own is None else _OWN_TIMEOUT_S),
+                **access,
+            )
+            try:
+                rig = connect(pace=pace or "lockstep")
+                if pace is None and rig.welcome.clock == "real":
+                    rig.close()
+                    rig = connect(pace="realtime")
+            except UnknownName as error:
+                if error.kind == KNOWN_ROBOT:
+                    raise UnknownName(error.kind, error.name, error.known, _WITHOUT_A_RIG) from None
+                raise
+            self._rig = opened.enter_context(closing(rig))
+            name = rig.welcome.robot
             self._rig_senses = RigSenses(
-                welcome.robot,
-                self._rig.action_layout,
-                self._rig.observation_layout,
-                tendon_stiffness,
-                CONTROL_DT,
+                name, rig.action_layout, rig.observation_layout, tendon_stiffness
             )
             if self._rig_senses.controls_length and actions != "length":
                 raise FingerError(
-                    f'{welcome.robot} controls lengths, so actions must be "length", not '
-                    f'{actions!r}; control = "tension" in its profile allows all modes.'
+                    f'{name} controls lengths, so actions must be "length", not {actions!r}; '
+                    'control = "tension" in its profile allows all modes.'
                 )
             if twin_folder:
-                self._operator = Operator(str(Path(twin_folder) / "board.socket"))
-        except BaseException:
-            self.close()
-            raise
-        self._rig_info: dict[str, Any] = {}
-        self._command = np.zeros(len(MOMENT_ARMS))
-        self._seed: int | None = None
+                operator = Operator(str(Path(twin_folder) / "board.socket"))
+                self._operator = opened.enter_context(closing(operator))
+            self._opened = opened.pop_all()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -184,9 +172,11 @@ class OnRig(FingerEnv):
             LinkError: If it cannot be reached in time.
         """
         self._seed = seed
-        self._rest()
+        if self._own is not None and self._operator is not None:
+            for name in TENDONS:  # Cool the servos of its own twin; those of a rig cool in pauses.
+                self._operator.break_servo(name, "")
         observation, info = super().reset(seed=seed, options=options)
-        return observation, self._finger_info() | info | self._truth(info)
+        return observation, self._with_rig(info)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take one step.
@@ -196,28 +186,13 @@ class OnRig(FingerEnv):
             ResetNeeded: If `reset` was never called, or the link was lost.
         """
         observation, reward, terminated, _, info = super().step(action)
-        info = self._finger_info() | info | self._truth(info)
+        info = self._with_rig(info)
         return observation, float(reward), terminated, bool(info["truncated_because"]), info
 
-    def _rest(self) -> None:
-        """Cool the servos of its own twin; those of a rig cool in pauses."""
-        if self._own is not None and self._operator is not None:
-            for name in TENDONS:
-                self._operator.break_servo(name, "")
-
     def close(self) -> None:
-        """Stop and release the rig, and free the renderer."""
+        """Stop and release the rig, end its own twin, and free the renderer."""
         super().close()
-        self._rig.close()
-        if self._operator is not None:
-            self._operator.close()
-            self._operator = None
-        self._end_twin()
-
-    def _end_twin(self) -> None:
-        if self._own is not None:
-            self._own.close()
-            self._own = None
+        self._opened.close()
 
     @property
     def exclusive(self) -> bool:
@@ -252,109 +227,84 @@ class OnRig(FingerEnv):
             )
         )
 
-    def _place(self, options: dict[str, Any] | None) -> FingerSenses:
+    def _start_at(self, angles: NDArray[np.float64]) -> FingerSenses:
         """Arm the rig, and bring the finger to its start."""
-        for name in options or {}:
-            if name not in self._options:
-                raise UnknownName("option of reset", name, self._options)
-        given = (options or {}).get("posture")
-        start = draw_start(self.np_random) if given is None else check_posture(given)
+        rig = self._rig_senses
         state, self._rig_info = self._rig.reset(seed=self._seed)
-        self._command = np.zeros(len(MOMENT_ARMS))
-        self._rig_senses.forget()
+        self._command = np.zeros(len(TENDONS))
+        rig.forget()
         senses = self._sense(state)
         for _ in range(round(_SLACK_S / CONTROL_DT)):
-            if self._rig_senses.fits(senses):
+            if not rig.misfit(senses):
                 break
-            senses = self._pull_on_the_way(self._rig_senses.least)
-        self._rig_senses.require_fit(senses)
-        way = StartApproach(start, self._rig_senses.least, self._rig_senses.most)
-        by_length = LengthApproach(start)
+            senses = self._on_the_way(rig.values(rig.least))
+        if misfit := rig.misfit(senses):
+            raise RobotRefused(misfit)
+        way, by_length = StartApproach(angles, rig.least, rig.most), LengthApproach(angles)
         for _ in range(round(_START_S / CONTROL_DT)):
             if way.off(senses) < _START_OFF_RAD:
                 break
-            if self._rig_senses.controls_length:
-                senses = self._on_the_way(self._rig_senses.length_values(by_length.lengths(senses)))
+            if rig.controls_length:
+                senses = self._on_the_way(rig.length_values(by_length.lengths(senses)))
             else:
-                senses = self._pull_on_the_way(way.tensions(senses))
+                senses = self._on_the_way(rig.values(way.tensions(senses)))
         # The command for the present tensions, as in simulation.
-        least = np.clip(senses.tensions, self._rig_senses.least, self._rig_senses.most)
-        command = self.drive.command(least, senses.lengths, self._rig_senses.speeds)
+        tensions = np.clip(senses.tensions, rig.least, rig.most)
+        command = self.drive.command(tensions, senses.lengths, rig.speeds)
         self._command = np.clip(command, -1.0, 1.0)
-        self._senses = dataclasses.replace(senses, commands=self._command)
-        return self._senses
+        return dataclasses.replace(senses, commands=self._command)
 
     def _move(self, command: NDArray[np.float64]) -> FingerSenses:
         """Convert a command to tensions or lengths, and pull for one control period."""
         self._command = command
-        if self._rig_senses.controls_length:
+        rig = self._rig_senses
+        if rig.controls_length:
             # The length at which the drive pulls with nothing but the least tension.
             still = self.drive.tension(command, np.zeros(len(command)), np.zeros(len(command)))
-            lengths = (self._rig_senses.least - still) / self.drive.stiffness
-            return self._send(self._rig_senses.length_values(lengths))
+            return self._send(rig.length_values((rig.least - still) / self.drive.stiffness))
         lengths = cast("FingerSenses", self._senses).lengths
-        return self._pull(self.drive.tension(command, lengths, self._rig_senses.speeds))
-
-    def _pull(self, tensions: NDArray[np.float64]) -> FingerSenses:
-        """Command tensions, N, (7,), for one control period."""
-        return self._send(self._rig_senses.values(tensions))
+        return self._send(rig.values(self.drive.tension(command, lengths, rig.speeds)))
 
     def _send(self, values: NDArray[np.float32]) -> FingerSenses:
         """Send a command of the rig for one control period."""
         state, _, _, _, self._rig_info = self._rig.step(values)
         return self._sense(state)
 
-    def _pull_on_the_way(self, tensions: NDArray[np.float64]) -> FingerSenses:
-        """Command tensions before an episode; see `_on_the_way`."""
-        return self._on_the_way(self._rig_senses.values(tensions))
-
     def _on_the_way(self, values: NDArray[np.float32]) -> FingerSenses:
-        """Send a command of the rig before an episode.
-
-        Raises:
-            RobotRefused: If the rig stops.
-        """
+        """Send a command before an episode; raise RobotRefused if the rig stops."""
         senses = self._send(values)
         if because := self._rig_info["truncated_because"]:
             raise RobotRefused(f"The finger did not come to its start: {because}")
         return senses
 
     def _sense(self, state: NDArray[Any]) -> FingerSenses:
-        absent: tuple[str, ...] = self._rig_info["absent"]
-        senses = self._rig_senses.read(state, absent, self._command)
+        """Read a state of the rig, and show it, or the true one of its own twin, in the plant."""
+        senses = self._rig_senses.read(state, self._rig_info["absent"], self._command)
+        if self._operator is not None:
+            truth = self._operator.where().truth
+            self._truth = {
+                "tip": np.array([truth[f"fingertip/{axis}"] for axis in "xyz"]),
+                "angles": np.array([truth[f"{name}/angle"] for name in JOINTS]),
+            }
         data = self.plant.data
-        self._read_truth()
-        judged = self._own is not None and self._true_angles is not None
-        data.qpos[:] = self._true_angles if judged else senses.angles
+        judged = self._own is not None
+        data.qpos[:] = self._truth["angles"] if judged else senses.angles
         data.qvel[:] = senses.velocities
         mujoco.mj_kinematics(self.plant.model, data)
         data.actuator_force[:] = -senses.tensions
         return senses
 
-    def _finger_info(self) -> dict[str, Any]:
-        """Return the entries of the rig's info that concern a finger."""
-        info = {n: v for n, v in self._rig_info.items() if not n.startswith(_DRIVING)}
-        return {"truncated_because": ""} | info
-
-    def _read_truth(self) -> None:
-        """Read the true state from the twin."""
-        if self._operator is None:
-            return
-        truth = self._operator.where().truth
-        self._true_tip = np.array([truth[f"fingertip/{axis}"] for axis in "xyz"])
-        self._true_angles = np.array([truth[f"{name}/angle"] for name in JOINTS])
-
-    def _truth(self, info: dict[str, Any]) -> dict[str, Any]:
-        """Return the info of the true state, next to the target in the info of the task."""
-        if self._true_tip is None or self._true_angles is None:
-            return {}
-        return {
-            "true_distance": float(np.linalg.norm(self._true_tip - info["target"])),
-            "true_angles": self._true_angles.copy(),
-        }
+    def _with_rig(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Return an info of the task with those of the rig, and with the true state of a twin."""
+        of_rig = {n: v for n, v in self._rig_info.items() if not n.startswith(_DRIVING)}
+        info = {"truncated_because": "", **of_rig, **info}
+        if self._truth:
+            distance = np.linalg.norm(self._truth["tip"] - info["target"])
+            info |= {"true_distance": float(distance), "true_angles": self._truth["angles"].copy()}
+        return info
 
 
-class RemoteFingerEnv(OnRig, FingerReachEnv):
+class RemoteFingerEnv(RigMixin, FingerReachEnv):
     """Bring the fingertip of a real finger, or of its twin, to a point that it can reach.
 
     ## Action and observation space, reward
@@ -383,12 +333,12 @@ class RemoteFingerEnv(OnRig, FingerReachEnv):
     `twin_folder` or `twin` also `true_distance`, m, and `true_angles`, rad, (4,), of the twin.
 
     Args:
-        robot: Name of a known rig, or its address; see `OnRig`.
+        robot: Name of a known rig, or its address; see `RigMixin`.
         goal: Whether observations are Dicts with goals.
-        **rig: Arguments of `OnRig`.
+        **rig: Arguments of `RigMixin`.
 
     Raises:
-        UnknownName, LinkError, RobotRefused: As `OnRig`.
+        UnknownName, LinkError, RobotRefused: As `RigMixin`.
     """
 
     def __init__(self, robot: str = "finger", *, goal: bool = False, **rig: Any) -> None:
@@ -396,7 +346,7 @@ class RemoteFingerEnv(OnRig, FingerReachEnv):
         EzPickle.__init__(self, robot, goal=goal, **rig)
 
 
-class RemoteFingerTrackEnv(OnRig, FingerTrackEnv):
+class RemoteFingerTrackEnv(RigMixin, FingerTrackEnv):
     """Follow a point that moves along a known path with a real finger, or its twin.
 
     ## Action and observation space, reward
@@ -414,27 +364,18 @@ class RemoteFingerTrackEnv(OnRig, FingerTrackEnv):
     As `FingerTrack-v1`, and the entries of a rig as in `RemoteFinger-v1`.
 
     Args:
-        robot: Name of a known rig, or its address; see `OnRig`.
+        robot: Name of a known rig, or its address; see `RigMixin`.
         path: As for `FingerTrack-v1`.
-        **rig: Arguments of `OnRig`.
+        **rig: Arguments of `RigMixin`.
 
     Raises:
         PathError: If it is not a path, or the nominal finger cannot follow it.
-        UnknownName, LinkError, RobotRefused: As `OnRig`.
+        UnknownName, LinkError, RobotRefused: As `RigMixin`.
     """
 
     def __init__(self, robot: str = "finger", *, path: PathSource = "circle", **rig: Any) -> None:
         super().__init__(robot, {"path": path}, **rig)
         EzPickle.__init__(self, robot, path=path, **rig)
-
-
-def _connected(access: dict[str, Any], pace: Pace | None) -> RemoteVehicleEnv:
-    """Connect to the rig, by default at the pace of its clock."""
-    rig = RemoteVehicleEnv(**access, pace=pace or "lockstep")
-    if pace is None and rig.welcome.clock == "real":
-        rig.close()
-        rig = RemoteVehicleEnv(**access, pace="realtime")
-    return rig
 
 
 def serve_twin(twin: str, finger_seed: int | None) -> RunningRobot:

@@ -13,7 +13,6 @@ from shapechanger.finger.anatomy import (
     JOINTS,
     LEAST_TENSION_N,
     MOMENT_ARMS,
-    PHALANX_LENGTH_M,
     TENDONS,
 )
 from shapechanger.finger.plant import CONTROL_DT, JointVelocities
@@ -41,7 +40,6 @@ class RigSenses:
         action_layout: Layout of the rig's commands.
         state_layout: Layout of its state.
         tendon_stiffness: Stiffness of its tendons, N/m.
-        control_dt: Time between two readings, s.
 
     Attributes:
         has_encoders: Whether it has encoders at all four joints.
@@ -59,7 +57,6 @@ class RigSenses:
         action_layout: Layout,
         state_layout: Layout,
         tendon_stiffness: float,
-        control_dt: float,
     ) -> None:
         actions = {feature.name: feature for feature in action_layout}
         lacks = [name for name in TENDONS if name not in actions]
@@ -101,35 +98,26 @@ class RigSenses:
         encoders = [f"{name}/angle" for name in JOINTS]
         self.has_encoders = all(name in state_layout for name in encoders)
         self._encoders = [self._starts[name] for name in encoders] if self.has_encoders else []
-        self._differences = JointVelocities(control_dt)
+        self._differences = JointVelocities()
 
     def forget(self) -> None:
         """Start over at rest, without earlier measurements."""
         self._differences.forget()
 
-    def fits(self, senses: FingerSenses) -> bool:
-        """Return whether the lengths fit a posture; with slack tendons they do not."""
-        return bool(np.abs(self._misfit(senses)).max() <= _MISFIT_M)
+    def misfit(self, senses: FingerSenses) -> str:
+        """Return why the lengths fit no posture, with the worst tendon; empty if they do.
 
-    def require_fit(self, senses: FingerSenses) -> None:
-        """Refuse lengths that fit no posture, as after a servo has lost power and its turns.
-
-        Raises:
-            RobotRefused: If they fit no posture; the message names the worst tendon.
+        Lengths fit none with slack tendons, and after a servo has lost power and its turns.
         """
-        off = self._misfit(senses)
-        worst = int(np.argmax(np.abs(off)))
-        if not self.fits(senses):
-            raise RobotRefused(
-                f"The lengths of the tendons fit no posture of a finger; {TENDONS[worst]} is off "
-                f"by {1e3 * abs(off[worst]):.0f} mm. Servos lose count of their turns without "
-                "power: find the zeros with `shapechanger robot home`."
-            )
-
-    def _misfit(self, senses: FingerSenses) -> NDArray[np.float64]:
-        """Return how much longer each tendon is than its angles require, m, (7,)."""
-        wound = -MOMENT_ARMS @ senses.angles
-        return senses.lengths + self._compliance * senses.tensions - wound
+        longer = senses.lengths + self._compliance * senses.tensions + MOMENT_ARMS @ senses.angles
+        worst = int(np.argmax(np.abs(longer)))
+        if abs(longer[worst]) <= _MISFIT_M:
+            return ""
+        return (
+            f"The lengths of the tendons fit no posture of a finger; {TENDONS[worst]} is off "
+            f"by {1e3 * abs(longer[worst]):.0f} mm. Servos lose count of their turns without "
+            "power: find the zeros with `shapechanger robot home`."
+        )
 
     def length_values(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the command of a rig that controls lengths, clipped to their range.
@@ -176,7 +164,7 @@ class RigSenses:
             tensions=tensions,
             lengths=lengths,
             commands=commands,
-            fingertip=fingertip(angles, PHALANX_LENGTH_M),
+            fingertip=fingertip(angles),
         )
 
 

@@ -15,43 +15,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import UnknownName
+from shapechanger.finger.anatomy import (
+    JOINT_RANGE,
+    JOINTS,
+    MOST_TENSION_N,
+    PHALANX_LENGTH_M,
+    TENDONS,
+)
 from shapechanger.layout import Element, Feature
 
 
-def fingertip(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray[np.float64]:
-    """Return the place of the fingertip, m, shape (..., 3).
-
-    Args:
-        angles: rad, (..., 4).
-        phalanges: Lengths of the proximal, middle and distal phalanx, m.
-    """
+def fingertip(angles: ArrayLike) -> NDArray[np.float64]:
+    """Return the place of the fingertip, m, shape (..., 3), at angles, rad, shape (..., 4)."""
     bent = directions(np.asarray(angles, np.float64))
-    place = tip_at([np.cos(a) for a in bent], [np.sin(a) for a in bent], phalanges)
-    return np.stack(place, axis=-1)
+    return np.stack(tip_at([np.cos(a) for a in bent], [np.sin(a) for a in bent]), axis=-1)
 
 
 def directions(angles: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the angles that place the fingertip, rad, each of shape (...).
+    """Return the angles that place the fingertip, rad, of an array or a tensor of shape (..., 4).
 
-    Args:
-        angles: Array or tensor, rad, (..., 4).
-
-    Returns:
-        Flexion and abduction of the knuckle, and the directions of the middle and the distal
-        phalanx from the proximal one.
+    They are flexion and abduction of the knuckle, and the directions of the middle and the distal
+    phalanx from the proximal one, each of shape (...).
     """
     return angles[..., 0], angles[..., 1], angles[..., 2], angles[..., 2] + angles[..., 3]
 
 
-def tip_at(cos: Sequence[Any], sin: Sequence[Any], phalanges: Sequence[float]) -> tuple[Any, ...]:
-    """Return the place of the fingertip, m, as arrays or tensors x, y and z of shape (...).
-
-    Args:
-        cos: Cosines of what `directions` returns.
-        sin: Their sines.
-        phalanges: Lengths of the proximal, middle and distal phalanx, m.
-    """
-    along, down = _in_plane(cos, sin, phalanges)
+def tip_at(cos: Sequence[Any], sin: Sequence[Any]) -> tuple[Any, Any, Any]:
+    """Return x, y and z of the fingertip, m, from the cosines and sines of `directions`."""
+    along, down = _in_plane(cos, sin)
     ahead = along * cos[1]
     return (
         ahead * cos[0] - down * sin[0],
@@ -60,22 +51,16 @@ def tip_at(cos: Sequence[Any], sin: Sequence[Any], phalanges: Sequence[float]) -
     )
 
 
-def fingertip_jacobian(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray[np.float64]:
-    """Return the Jacobian of the fingertip's place, m/rad, shape (..., 3, 4).
-
-    Args:
-        angles: rad, (..., 4).
-        phalanges: Lengths of the proximal, middle and distal phalanx, m.
-    """
-    q = np.asarray(angles, np.float64)
-    bent = directions(q)
+def fingertip_jacobian(angles: ArrayLike) -> NDArray[np.float64]:
+    """Return the Jacobian of the fingertip, m/rad, (..., 3, 4), at angles, rad, (..., 4)."""
+    bent = directions(np.asarray(angles, np.float64))
     flexion, abduction, middle, both = bent
-    along, down = _in_plane([np.cos(a) for a in bent], [np.sin(a) for a in bent], phalanges)
+    along, down = _in_plane([np.cos(a) for a in bent], [np.sin(a) for a in bent])
     zero = np.zeros_like(flexion)
     # (d along, d down) by each angle, and the part that abduction turns sideways.
-    end_along, end_down = -phalanges[2] * np.sin(both), phalanges[2] * np.cos(both)
-    middle_along = end_along - phalanges[1] * np.sin(middle)
-    middle_down = end_down + phalanges[1] * np.cos(middle)
+    end_along, end_down = -PHALANX_LENGTH_M[2] * np.sin(both), PHALANX_LENGTH_M[2] * np.cos(both)
+    middle_along = end_along - PHALANX_LENGTH_M[1] * np.sin(middle)
+    middle_down = end_down + PHALANX_LENGTH_M[1] * np.cos(middle)
     cos, sin = np.cos(flexion), np.sin(flexion)
     ahead = along * np.cos(abduction)
     aside = -along * np.sin(abduction)
@@ -92,11 +77,9 @@ def fingertip_jacobian(angles: ArrayLike, phalanges: Sequence[float]) -> NDArray
     return np.stack(columns, axis=-1)
 
 
-def _in_plane(
-    cos: Sequence[Any], sin: Sequence[Any], phalanges: Sequence[float]
-) -> tuple[Any, Any]:
+def _in_plane(cos: Sequence[Any], sin: Sequence[Any]) -> tuple[Any, Any]:
     """Return the tip's distance along the proximal phalanx and towards the palm, m."""
-    proximal, middle, distal = phalanges
+    proximal, middle, distal = PHALANX_LENGTH_M
     along = proximal + middle * cos[2] + distal * cos[3]
     return along, middle * sin[2] + distal * sin[3]
 
@@ -185,32 +168,23 @@ class FingerSenses:
         return np.concatenate([*joints, *tendons, self.fingertip])
 
 
-def features_of_senses(
-    joint_names: Sequence[str],
-    joint_range: NDArray[np.float64],
-    tendon_names: Sequence[str],
-    most_tension: Sequence[float],
-) -> list[Feature]:
+def features_of_senses() -> list[Feature]:
     """Return a feature for each number of `FingerSenses.numbers`.
 
-    Args:
-        joint_names: Joints in the order of the angles.
-        joint_range: Lowest and highest angle of each joint, rad, (4, 2).
-        tendon_names: Tendons in the order of the tensions.
-        most_tension: Largest tension of each tendon, N.
+    Ranges of angles are those of the anatomy, and ranges of tensions end at the largest of the
+    nominal finger.
     """
-    joints = [(name, Element("joint", name)) for name in joint_names]
-    tendons = [(name, Element("tendon", name)) for name in tendon_names]
-    ranges = joint_range.tolist()
+    joints = [(name, Element("joint", name)) for name in JOINTS]
+    tendons = [(name, Element("tendon", name)) for name in TENDONS]
     return [
         *(
             Feature(f"{name}/angle", "rad", low, high, element)
-            for (name, element), (low, high) in zip(joints, ranges, strict=True)
+            for (name, element), (low, high) in zip(joints, JOINT_RANGE.tolist(), strict=True)
         ),
         *(Feature(f"{name}/velocity", "rad/s", element=element) for name, element in joints),
         *(
             Feature(f"{name}/tension", "N", 0.0, most, element)
-            for (name, element), most in zip(tendons, most_tension, strict=True)
+            for (name, element), most in zip(tendons, MOST_TENSION_N.tolist(), strict=True)
         ),
         *(Feature(f"{name}/length", "m", element=element) for name, element in tendons),
         *(Feature(f"{name}/command", "1", -1.0, 1.0, element) for name, element in tendons),
@@ -219,10 +193,5 @@ def features_of_senses(
 
 
 def place_features(name: str, element: Element) -> list[Feature]:
-    """Return the three features of a place, `name/x` to `name/z`, m.
-
-    Args:
-        name: Name of the place.
-        element: The element that it belongs to.
-    """
+    """Return the three features of a place of an element, `name/x` to `name/z`, m."""
     return [Feature(f"{name}/{axis}", "m", element=element) for axis in "xyz"]

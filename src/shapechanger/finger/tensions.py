@@ -67,12 +67,9 @@ class TendonDrive:
         length: NDArray[np.float64],
         speed: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Tensions of a command, N, (7,), before clipping.
+        """Tensions, N, of a command, -1 to 1, at lengths, m, and their rates, m/s, (7,) each.
 
-        Args:
-            command: Command, -1 to 1, (7,).
-            length: Lengths, m, (7,).
-            speed: Rates of the lengths, m/s, (7,).
+        They are not clipped.
         """
         pulled = self.stiffness * length + self.damping * speed
         return (self.offset + self.gain * command) * self._strength(length, speed) + pulled
@@ -83,12 +80,9 @@ class TendonDrive:
         length: NDArray[np.float64],
         speed: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Command that gives a tension, (7,); it may lie outside -1 to 1.
+        """Command that gives tensions, N, at lengths, m, and their rates, m/s, (7,) each.
 
-        Args:
-            tension: Tensions, N, (7,).
-            length: Lengths, m, (7,).
-            speed: Rates of the lengths, m/s, (7,).
+        It may lie outside -1 to 1.
         """
         pulled = self.stiffness * length + self.damping * speed
         # A muscle too short to pull has no such command; the largest is the nearest.
@@ -190,11 +184,7 @@ def co_contraction(arms: ArrayLike) -> NDArray[np.float64] | None:
 
 
 def spans_all_torques(arms: ArrayLike) -> bool:
-    """Return whether non-negative tensions can give every torque.
-
-    Args:
-        arms: Moment arms, m, (tendons, joints).
-    """
+    """Return whether non-negative tensions with moment arms, m, can give every torque."""
     r = np.asarray(arms, np.float64)
     return bool(np.linalg.matrix_rank(r) == r.shape[1]) and co_contraction(r) is not None
 

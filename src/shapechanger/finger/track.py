@@ -16,9 +16,7 @@ from shapechanger.finger.anatomy import (
     LEAST_TENSION_N,
     MOMENT_ARMS,
     MOST_TENSION_N,
-    PHALANX_LENGTH_M,
 )
-from shapechanger.finger.drawing import polyline
 from shapechanger.finger.env import FingerEnv
 from shapechanger.finger.paths import (
     FingertipPath,
@@ -31,8 +29,9 @@ from shapechanger.finger.paths import (
 )
 from shapechanger.finger.plant import CONTROL_DT
 from shapechanger.finger.postures import angles_for, draw_posture, moving_torque
-from shapechanger.finger.task import FingerSenses, fingertip, place_features
+from shapechanger.finger.task import FingerSenses, features_of_senses, fingertip, place_features
 from shapechanger.finger.tensions import tensions_for_torque
+from shapechanger.finger.visuals import polyline
 from shapechanger.layout import Element, Feature, Layout
 
 _CHECK_HZ: Final = 50.0
@@ -44,13 +43,7 @@ _LOOKS: Final = 20
 
 
 def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
-    """Require that the nominal finger can follow a path.
-
-    Args:
-        path: The path in the finger's frame, m.
-
-    Returns:
-        Its first angles, rad, (4,).
+    """Require that the nominal finger can follow a path, and return its first angles, rad, (4,).
 
     Raises:
         PathError: If a point is out of reach, or the tendons are too weak for the motion; the
@@ -120,7 +113,7 @@ _RANDOM_PATHS_LOOKS: Final = 32
 def draw_path(rng: np.random.Generator) -> tuple[FingertipPath, NDArray[np.float64]]:
     """Sample a circle, figure eight or line in the finger's reach, and its first angles, rad."""
     while True:
-        centre = fingertip(draw_posture(rng), PHALANX_LENGTH_M)
+        centre = fingertip(draw_posture(rng))
         size = rng.uniform(*_SIZE)
         hz = rng.uniform(*_SPEED) / (2.0 * math.pi * size)
         hz = min(max(hz, _SLOWEST_HZ), _FASTEST_HZ)
@@ -207,23 +200,21 @@ class FingerTrackEnv(FingerEnv):
     def __init__(self, *, path: PathSource = "circle", **arguments: Any) -> None:
         super().__init__(**arguments)
         EzPickle.__init__(self, path=path, **arguments)
-        self._is_random = path == RANDOM
-        self._path: FingertipPath = as_path("circle" if self._is_random else path)
+        self.path_is_random = path == RANDOM
+        self._path: FingertipPath = as_path("circle" if self.path_is_random else path)
         self._begin = require_reachable(self._path)
         self._t = 0.0
         self._look()
         # Places of the fingertip, m, for frames.
         self._trail = deque([self.plant.fingertip], _TRAIL_STEPS)
-        self._squares = 0.0
-        self._counted = 0
-        self._steps = 0
+        self._squares, self._steps = 0.0, 0
         ahead = [
             Feature(f"ahead_{round(1e3 * s)}ms/d{axis}", "m", element=_TARGET)
             for s in PREVIEW_S
             for axis in "xyz"
         ]
         features = [
-            *self._sense_features(),
+            *features_of_senses(),
             *place_features("target", _TARGET),
             *(Feature(f"target/d{axis}", "m", element=_TARGET) for axis in "xyz"),
             *ahead,
@@ -235,11 +226,6 @@ class FingerTrackEnv(FingerEnv):
     def path(self) -> FingertipPath:
         """The present path."""
         return self._path
-
-    @property
-    def path_is_random(self) -> bool:
-        """Whether each reset draws another path."""
-        return self._is_random
 
     def start_angles(self, t: float) -> NDArray[np.float64]:
         """Return the angles at which an episode starts at a time of the path, s; rad, (4,)."""
@@ -265,42 +251,28 @@ class FingerTrackEnv(FingerEnv):
         if given is not None and not (isinstance(given, str) and given == RANDOM):
             path = as_path(given)
             self._path, self._begin = path, require_reachable(path)
-            self._is_random = False
-        elif given is not None or self._is_random:
-            self._is_random = True
+            self.path_is_random = False
+        elif given is not None or self.path_is_random:
+            self.path_is_random = True
             self._path, self._begin = draw_path(self.np_random)
         # An open path is followed from its beginning.
         self._t = self.np_random.uniform(0.0, self._path.duration_s) if self._path.closed else 0.0
         senses = self._place({"posture": self.start_angles(self._t), **(options or {})})
-        self._squares, self._counted, self._steps = 0.0, 0, 0
+        self._squares, self._steps = 0.0, 0
         self._look()
-        self.plant.mark(self._points[0])
+        self.plant.mark(self._target)
         self._trail.clear()
         self._trail.append(self.plant.fingertip)
-        distance = float(np.linalg.norm(self.plant.fingertip - self._points[0]))
-        return self._observation(senses), self._info(distance)
+        return self._observation(senses), self._info()
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
-        """Take one step.
-
-        Raises:
-            BadAction: If the action has another shape or is not finite; nothing has moved then.
-            ResetNeeded: If `reset` was never called.
-        """
-        senses = self._act(action)
+    def _advance(self) -> None:
         self._t += CONTROL_DT
         self._steps += 1
         self._look()
-        point = self._points[0]
-        distance, terms = self._terms(point)
         if self._steps > SETTLING_STEPS:
-            self._squares += distance**2
-            self._counted += 1
-        self.plant.mark(point)
+            self._squares += self._distance**2
+        self.plant.mark(self._target)
         self._trail.append(self.plant.fingertip)
-        return self._stepped(self._observation(senses), self._info(distance), terms)
 
     def _markers(self) -> list[dict[str, Any]]:
         """Return the path and the trail of the fingertip."""
@@ -310,17 +282,18 @@ class FingerTrackEnv(FingerEnv):
 
     def _look(self) -> None:
         """Compute the present and coming points of the path."""
-        self._points = self._path.at(self._t + SEEN_S)
+        self._target, *self._ahead = self._path.at(self._t + SEEN_S)
 
     def _observation(self, senses: FingerSenses) -> NDArray[np.float64]:
-        offsets = (self._points[1:] - senses.fingertip).ravel()
-        return np.concatenate([senses.numbers(), self._points[1], offsets])
+        offsets = (np.array(self._ahead) - senses.fingertip).ravel()
+        return np.concatenate([senses.numbers(), self._ahead[0], offsets])
 
-    def _info(self, distance: float) -> dict[str, Any]:
-        rms = math.sqrt(self._squares / self._counted) if self._counted else math.inf
+    def _info(self) -> dict[str, Any]:
+        counted = self._steps - SETTLING_STEPS
+        rms = math.sqrt(self._squares / counted) if counted > 0 else math.inf
         return {
             "is_success": rms < FOLLOWS_M,
-            "distance": distance,
+            "distance": self._distance,
             "rms": rms,
-            "target": self._points[0].copy(),
+            "target": self._target.copy(),
         }

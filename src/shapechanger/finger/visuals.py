@@ -1,16 +1,20 @@
-"""Visual anatomy of the finger: bones, skin, and tendons on their anatomical routes.
+"""Visuals of the finger: its anatomy, and a legend, paths and trails in frames.
 
-It has no mass, collisions or forces; the finger is moved by the fixed tendons of
-`shapechanger.finger.model`.
+The anatomy, bones, skin, and tendons on their anatomical routes, has no mass, collisions or forces;
+the finger is moved by the fixed tendons of `shapechanger.finger.model`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
 from shapechanger.finger.anatomy import PHALANGES, PHALANX_LENGTH_M, TENDONS
 
@@ -18,7 +22,7 @@ _HAND: Final = "hand"
 """Name of the hand's body; its axes are those of the finger, at the knuckle."""
 
 
-class Through(NamedTuple):
+class ViaSite(NamedTuple):
     """A point of a bone that a tendon passes.
 
     Attributes:
@@ -34,7 +38,7 @@ class Through(NamedTuple):
     z: float
 
 
-class Over(NamedTuple):
+class WrapGeom(NamedTuple):
     """The back of a joint, which a tendon wraps around when it bends.
 
     Attributes:
@@ -44,11 +48,11 @@ class Over(NamedTuple):
     joint: str
 
 
-TendonRoute = tuple[Through | Over, ...]
+TendonRoute = tuple[ViaSite | WrapGeom, ...]
 
 
 def _on(body: str, *points: tuple[float, float, float]) -> TendonRoute:
-    return tuple(Through(body, *point) for point in points)
+    return tuple(ViaSite(body, *point) for point in points)
 
 
 _P, _M, _D = "proximal", "middle", "distal"
@@ -58,11 +62,11 @@ def _extensor(y: float) -> TendonRoute:
     """Route over the knuckle and the middle of the hood to the base of the distal phalanx."""
     return (
         *_on(_HAND, (-58.0, 1.8 * y, 7.0), (-12.0, y, 7.0)),
-        Over("MCP"),
+        WrapGeom("MCP"),
         *_on(_P, (12.0, y, 6.2), (36.0, 0.7 * y, 5.8)),
-        Over("PIP"),
+        WrapGeom("PIP"),
         *_on(_M, (8.0, 0.7 * y, 5.2), (20.0, 0.5 * y, 4.6)),
-        Over("DIP"),
+        WrapGeom("DIP"),
         *_on(_D, (4.5, 0.4 * y, 3.8)),
     )
 
@@ -71,9 +75,9 @@ def _to_the_hood(side: float) -> TendonRoute:
     """Route from the side of the proximal phalanx into the hood, and on as its lateral band."""
     return (
         *_on(_P, (9.0, 7.0 * side, -3.5), (30.0, 5.0 * side, 3.6)),
-        Over("PIP"),
+        WrapGeom("PIP"),
         *_on(_M, (7.0, 3.2 * side, 4.7), (20.0, 1.6 * side, 4.4)),
-        Over("DIP"),
+        WrapGeom("DIP"),
         *_on(_D, (4.5, 1.2 * side, 3.6)),
     )
 
@@ -160,11 +164,7 @@ def route_names(tendon: str) -> list[str]:
 
 
 def add_anatomy(spec: mujoco.MjSpec) -> None:
-    """Add bones, tendons, a nail and a light background to a finger of `build_finger`.
-
-    Args:
-        spec: Model to extend.
-    """
+    """Add bones, tendons, a nail and a light background to a finger of `build_finger`."""
     _add_scene(spec)
     hand = _add_hand(spec)
     bodies = {_HAND: hand} | {name: spec.body(name) for name in PHALANGES}
@@ -172,9 +172,7 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
         spec.geom(name).rgba = _SKIN
     # Each bone spans from its joint to the next; the last one ends below the flesh of the
     # fingertip.
-    metacarpal = spec.geom(METACARPAL)
-    begin = float(metacarpal.fromto[0])
-    spans = [(begin, 0.0)]
+    spans = [(float(spec.geom(METACARPAL).fromto[0]), 0.0)]
     for length, head in zip(PHALANX_LENGTH_M, _HEADS, strict=False):
         spans.append((head + _CARTILAGE, length))
     spans[-1] = (spans[-1][0], PHALANX_LENGTH_M[-1] - 1.5 * _HEADS[-1])
@@ -282,9 +280,76 @@ def _add_course(
 ) -> None:
     tendon = spec.add_tendon(name=name, rgba=[*colour, 1.0], width=THINNEST_M)
     for i, stop in enumerate(course):
-        if isinstance(stop, Through):
+        if isinstance(stop, ViaSite):
             place = [1e-3 * stop.x, 1e-3 * stop.y, 1e-3 * stop.z]
             site = bodies[stop.body].add_site(name=f"{name}/{i}", pos=place, group=_HIDDEN)
             tendon.wrap_site(site.name)
         else:
             tendon.wrap_geom(stop.joint, f"{stop.joint}/back")
+
+
+# Narrower frames have no legend, pixels: its names would not be legible.
+_NARROWEST: Final = 240
+_SMALLEST_FONT: Final = 9.0
+# Height of the font over that of the frame. With the bars, the legend stays above a raised finger.
+_FONT: Final = 1.0 / 36.0
+_INK: Final = (40, 40, 40)
+_EMPTY: Final = (205, 210, 218)
+
+
+def tendon_legend(frame: NDArray[np.uint8], pulled: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return a frame with the name, colour and tension of each tendon along its top.
+
+    Args:
+        frame: The frame, (height, width, 3).
+        pulled: Tension of each tendon over its largest, 0 to 1, (7,), shown as a bar.
+    """
+    height, width = frame.shape[:2]
+    if width < _NARROWEST:
+        return frame
+    picture = Image.fromarray(frame)
+    draw = ImageDraw.Draw(picture)
+    size = max(_SMALLEST_FONT, _FONT * height)
+    font = ImageFont.load_default(size)
+    gap, column = 0.4 * size, width / len(TENDON_COLOURS)
+    bar = column - 2.0 * gap
+    top, bottom = gap + 1.2 * size, gap + 1.75 * size
+    for i, (name, colour) in enumerate(TENDON_COLOURS.items()):
+        left = i * column + gap
+        draw.text((left, 0.5 * gap), name, fill=_INK, font=font)
+        draw.rectangle((left, top, left + bar, bottom), fill=_EMPTY)
+        filled = bar * float(np.clip(pulled[i], 0.0, 1.0))
+        paint = tuple(round(255 * part) for part in colour)
+        draw.rectangle((left, top, left + filled, bottom), fill=paint)
+    return np.array(picture)
+
+
+def polyline(
+    points: NDArray[np.float64], radius: float, rgba: tuple[float, float, float, float]
+) -> list[dict[str, Any]]:
+    """Return markers of Gymnasium's viewers that connect points.
+
+    Args:
+        points: The points, m, (n, 3).
+        radius: Radius of the line, m.
+        rgba: Red, green, blue and opacity, 0 to 1.
+    """
+    markers: list[dict[str, Any]] = []
+    for start, end in pairwise(points):
+        along = end - start
+        length = float(np.linalg.norm(along))
+        if length <= 0.0:
+            continue
+        turn, axes = np.empty(4), np.empty(9)
+        mujoco.mju_quatZ2Vec(turn, along / length)
+        mujoco.mju_quat2Mat(axes, turn)
+        markers.append(
+            {
+                "type": mujoco.mjtGeom.mjGEOM_CAPSULE,
+                "pos": 0.5 * (start + end),
+                "size": np.array([radius, radius, 0.5 * length]),
+                "mat": axes,
+                "rgba": np.array(rgba),
+            }
+        )
+    return markers

@@ -10,7 +10,7 @@ import numpy as np
 
 import shapechanger  # noqa: F401 - Registers the ids.
 from shapechanger.finger.identify import FingerLog
-from shapechanger.finger.identify.babble import record_babble
+from shapechanger.finger.identify.log import record_babble
 from shapechanger.finger.parameters import FingerParameters
 
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
+import gymnasium as gym
 import numpy as np
 import pytest
 
-from shapechanger.errors import UnknownName
+import shapechanger  # noqa: F401 - Registers the ids.
+from shapechanger.errors import FingerError, LayoutError, UnknownName
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINTS
-from shapechanger.finger.identify.babble import FingerBabble
+from shapechanger.finger.controller import FingerBabble
+from shapechanger.finger.identify import FingerLog, result
+from shapechanger.finger.identify.log import record_babble
+from shapechanger.finger.parameters import NOMINAL
 from shapechanger.layout import Feature, Layout
 from tests.finger.identify.logs import recorded
 
@@ -46,3 +54,33 @@ def test_another_layout_is_refused() -> None:
     """The error names the missing angle."""
     with pytest.raises(UnknownName, match="MCP_flexion/angle"):
         FingerBabble(Layout((Feature("thigh/angle", "rad"),)))
+
+
+@pytest.mark.parametrize(
+    ("env", "error", "words"),
+    [
+        (("shapechanger/Finger-v1", {"goal": True}), FingerError, "omit `goal`"),
+        (("Pendulum-v1", {}), LayoutError, "Pendulum-v1 publishes no observation_layout"),
+        (("shapechanger/Finger-v1", {}), FingerError, r"ended after 2\.0 s of 3 s\.$"),
+    ],
+)
+def test_envs_that_give_no_log_are_refused(
+    env: tuple[str, dict[str, Any]], error: type[Exception], words: str
+) -> None:
+    """Goals, an env without names and one that ends too early are refused with the reason."""
+    with gym.make(env[0], **env[1]) as made, pytest.raises(error, match=words):
+        record_babble(made, 3.0)
+
+
+def test_an_env_is_identified_by_ten_seconds_of_its_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`identify_env` records with the seed and the mode of action, and returns the parameters."""
+    taken: list[FingerLog] = []
+
+    def identified(log: FingerLog) -> SimpleNamespace:
+        taken.append(log)
+        return SimpleNamespace(parameters=NOMINAL)
+
+    monkeypatch.setattr(result, "identify", identified)
+    with gym.make("shapechanger/Finger-v1", max_episode_steps=-1, actions="tension") as env:
+        assert result.identify_env(env, "tension", 0) is NOMINAL
+    assert [(log.seconds, log.actions) for log in taken] == [(pytest.approx(10.0), "tension")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shapechanger.finger.anatomy import JOINT_RANGE, JOINTS, MOST_TENSION_N, TENDONS
+from shapechanger.finger.anatomy import JOINT_RANGE, MOST_TENSION_N
 from shapechanger.finger.task import FingerSenses, features_of_senses
 
 
@@ -18,7 +18,7 @@ def test_numbers_match_their_features() -> None:
         commands=np.arange(40.0, 47.0),
         fingertip=np.arange(50.0, 53.0),
     )
-    features = features_of_senses(JOINTS, JOINT_RANGE, TENDONS, MOST_TENSION_N.tolist())
+    features = features_of_senses()
     found = {f.name: n for f, n in zip(features, senses.numbers(), strict=True)}
     assert len(found) == 32
     assert found["PIP_flexion/angle"] == 2.0
@@ -31,7 +31,7 @@ def test_numbers_match_their_features() -> None:
 
 def test_features_have_units_and_bounds() -> None:
     """Angles, tensions, commands and positions have units, bounds and elements."""
-    features = features_of_senses(JOINTS, JOINT_RANGE, TENDONS, MOST_TENSION_N.tolist())
+    features = features_of_senses()
     by_name = {f.name: f for f in features}
     angle = by_name["PIP_flexion/angle"]
     assert (angle.unit, angle.low, angle.high) == ("rad", *JOINT_RANGE[2])

@@ -10,15 +10,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, cast
 
+import gymnasium as gym
 import msgspec
 import numpy as np
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
-from shapechanger.errors import FingerError, OutputError, UnknownName
+from shapechanger.errors import FingerError, LayoutError, OutputError, UnknownName
 from shapechanger.finger.anatomy import JOINTS, TENDONS
+from shapechanger.finger.controller import FingerBabble, places_of
 from shapechanger.finger.parameters import FingerParameters
+from shapechanger.finger.plant import CONTROL_DT
 from shapechanger.finger.tensions import DRIVES
+from shapechanger.layout import Layout
 
 SIGNALS: Final = {
     "t": 0,
@@ -28,6 +32,7 @@ SIGNALS: Final = {
     "lengths": len(TENDONS),
 }
 """Arrays of a log and their numbers of columns; 0 marks a one-dimensional array."""
+_SETTINGS: Final = ("actions", "control_dt", "source", "motors")
 
 # Longest step between two rows, in control periods. Clocks jitter; a missing row is a gap.
 _LONGEST_STEP: Final = 1.5
@@ -179,16 +184,8 @@ def save_log(log: FingerLog, path: str | os.PathLike[str]) -> None:
     Raises:
         OutputError: If the file cannot be written.
     """
-    header = _Header(
-        format=_FORMAT,
-        version=_VERSION,
-        actions=log.actions,
-        control_dt=log.control_dt,
-        joints=JOINTS,
-        tendons=TENDONS,
-        source=log.source,
-        motors=log.motors,
-    )
+    own: dict[str, Any] = {key: getattr(log, key) for key in _SETTINGS}
+    header = _Header(format=_FORMAT, version=_VERSION, joints=JOINTS, tendons=TENDONS, **own)
     arrays = {name: getattr(log, name) for name in SIGNALS}
     encoded = np.frombuffer(msgspec.json.encode(header), np.uint8)
     try:
@@ -207,12 +204,14 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
         UnknownName: If its mode of action is unknown.
     """
     place = Path(path)
-    name = place.name
+    name, is_archive = place.name, None
     # Opening a pipe waits for a writer, and a device may never end.
     if place.exists() and not (place.is_file() or place.is_dir()):
         raise FingerError(f"{name} cannot be read: it is not a regular file.")
     try:
         with place.open("rb") as raw:  # NumPy leaves a damaged file open.
+            is_archive = raw.read(2) == b"PK"
+            raw.seek(0)
             loaded: Any = np.load(raw, allow_pickle=False)
             if not isinstance(loaded, NpzFile):
                 raise ValueError("one array, not an archive of arrays")
@@ -228,7 +227,13 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
     except FingerError:  # A ValueError, too.
         raise
     except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
-        raise FingerError(_unreadable(place)) from error
+        if is_archive is None:
+            reason = f"cannot be read: {getattr(error, 'strerror', error)}."
+        elif is_archive:
+            reason = "is cut short or damaged; record it again."
+        else:
+            reason = "is not a finger log; `shapechanger finger record` writes one."
+        raise FingerError(f"{name} {reason}") from error
     header = _read_header(name, read)
     missing = [key for key in SIGNALS if key not in read]
     if missing:
@@ -239,25 +244,7 @@ def load_log(path: str | os.PathLike[str]) -> FingerLog:
         raise FingerError(f"{name} is not a finger log: its arrays must hold numbers.") from error
     if arrays["t"].ndim != 1:
         raise FingerError(f"{name} is not a finger log: t must have one dimension.")
-    return FingerLog(
-        **arrays,
-        actions=header.actions,
-        control_dt=header.control_dt,
-        source=header.source,
-        motors=header.motors,
-    )
-
-
-def _unreadable(path: Path) -> str:
-    """Reason why NumPy could not read a file."""
-    try:
-        with path.open("rb") as file:
-            is_archive = file.read(2) == b"PK"
-    except OSError as error:
-        return f"{path.name} cannot be read: {error.strerror}."
-    if is_archive:
-        return f"{path.name} is cut short or damaged; record it again."
-    return f"{path.name} is not a finger log; `shapechanger finger record` writes one."
+    return FingerLog(**arrays, **{key: getattr(header, key) for key in _SETTINGS})
 
 
 def _read_header(name: str, read: dict[str, Any]) -> _Header:
@@ -283,3 +270,58 @@ def _read_header(name: str, read: dict[str, Any]) -> _Header:
                 f"but the finger has {', '.join(known)}."
             )
     return header
+
+
+def record_babble(
+    env: gym.Env[Any, Any], seconds: float, seed: int = 0, actions: str = "impedance"
+) -> FingerLog:
+    """Record a log of a finger that `FingerBabble` moves.
+
+    Args:
+        env: Any env with the layout of a finger, simulated or on a bench, without a time limit.
+        seconds: Duration, s.
+        seed: Seed of the motions and of the env.
+        actions: What an action of the env commands.
+
+    Raises:
+        LayoutError: If the env has no `observation_layout`.
+        UnknownName: If its layout is not that of a finger.
+        FingerError: If its observations are not a vector, or it ends too early.
+    """
+    if not isinstance(env.observation_space, gym.spaces.Box):
+        raise FingerError("Recording a finger needs Box observations: omit `goal`.")
+    name = env.spec.id if env.spec else type(env.unwrapped).__name__
+    layout = getattr(env.unwrapped, "observation_layout", None)
+    if not isinstance(layout, Layout):
+        raise LayoutError(
+            f"{name} publishes no observation_layout, so its observations have no names."
+        )
+    control_dt = 1.0 / float(env.metadata.get("render_fps") or 1.0 / CONTROL_DT)
+    babble = FingerBabble(layout, actions, seed, control_dt)
+    angles = places_of(layout, JOINTS, "angle")
+    tensions, lengths, commands = (
+        places_of(layout, TENDONS, kind) for kind in ("tension", "length", "command")
+    )
+    observation, _ = env.reset(seed=seed)
+    rows: list[NDArray[np.float64]] = [np.array(observation, np.float64)]
+    for step in range(round(seconds / control_dt)):
+        observation, _, terminated, truncated, info = env.step(babble(observation))
+        if terminated or truncated or info.get("diverged"):
+            because = str(info.get("truncated_because") or "").rstrip(".")
+            raise FingerError(
+                f"The env ended after {(step + 1) * control_dt:.1f} s of {seconds:g} s"
+                + (f": {because}." if because else ".")
+            )
+        rows.append(np.array(observation, np.float64))
+    seen = np.array(rows)
+    return FingerLog(
+        t=np.asarray(control_dt * np.arange(len(seen)), np.float64),
+        commands=seen[:, commands],
+        angles=seen[:, angles],
+        tensions=seen[:, tensions],
+        lengths=seen[:, lengths],
+        actions=actions,
+        control_dt=control_dt,
+        source=name,
+        motors=getattr(env.unwrapped, "motors", None),
+    )

@@ -123,22 +123,12 @@ def cut_windows(
 
 
 def steps_per_period(control_dt: float, timestep: float) -> int:
-    """Whole number of simulation steps per control period, each no longer than `timestep`.
-
-    Args:
-        control_dt: Control period, s.
-        timestep: Longest step, s.
-    """
+    """Whole number of simulation steps per control period, s, none longer than `timestep`, s."""
     return math.ceil(control_dt / timestep - 1e-6)
 
 
 def with_motors(motors: Motors, known: FingerParameters | None) -> FingerParameters:
-    """The nominal finger with the motors of a known finger, or else with the fitted ones.
-
-    Args:
-        motors: Fit of the tensions.
-        known: Finger with known motors; None if nothing is known about them.
-    """
+    """The nominal finger with the motors of a known finger, or for None with the fitted ones."""
     nominal = NOMINAL.replace(motor_lag=motors.lag)
     if known is None:
         most = motors.strength * np.array(NOMINAL.most_tension)
@@ -165,10 +155,7 @@ class Dynamics:
 
 
 def fit_dynamics(
-    log: FingerLog,
-    kinematics: Kinematics,
-    motors: Motors,
-    last: int | None = None,
+    log: FingerLog, kinematics: Kinematics, motors: Motors, last: int | None = None
 ) -> Dynamics:
     """Fit joint and friction parameters to a log.
 
@@ -219,12 +206,7 @@ class _MotionFit:
     """
 
     def __init__(
-        self,
-        sysid: Any,
-        log: FingerLog,
-        kinematics: Kinematics,
-        motors: Motors,
-        last: int | None,
+        self, sysid: Any, log: FingerLog, kinematics: Kinematics, motors: Motors, last: int | None
     ) -> None:
         self._sysid = sysid
         self._arms = kinematics.arms
@@ -257,10 +239,8 @@ class _MotionFit:
 
     def parameters(self) -> Any:
         """Initial parameters and their bounds, as `mujoco.sysid` takes them."""
-        found = self._sysid.ParameterDict()
-        zero = np.zeros(len(FACTORS))
-        bounds = zero - _MAX_LOG_FACTOR, zero + _MAX_LOG_FACTOR
-        found.add(self._sysid.Parameter("factors", zero, *bounds))
+        found, ends = self._sysid.ParameterDict(), np.full(len(FACTORS), _MAX_LOG_FACTOR)
+        found.add(self._sysid.Parameter("factors", np.zeros(len(FACTORS)), -ends, ends))
         return found
 
     def residual(self, x: NDArray[np.float64], parameters: Any, **more: Any) -> Any:
@@ -272,12 +252,7 @@ class _MotionFit:
     def covariance(
         self, x: NDArray[np.float64], jacobian: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Sandwich estimate of the parameters' covariance, with windows as independent clusters.
-
-        Args:
-            x: Parameters at the optimum.
-            jacobian: Jacobian of the residuals there.
-        """
+        """Sandwich estimate of the covariance at an optimum; windows are independent clusters."""
         parts, _, _ = self.residual(x, self.parameters())
         bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
         filling = np.eye(len(x)) / _PRIOR_SD**2
@@ -327,11 +302,8 @@ class _MotionFit:
             # One more than there are steps: the last one is not simulated.
             steps = (len(window.angles) - 1) * self._skip + 1
             at = window.start + step * np.arange(steps)
-            if self._path is None:
-                acting = commands.delayed(window.start, step, steps, delay)
-            else:
-                acting = measured_at(at)
-            controls.append(series(at, acting))
+            late = None if self._path else commands.delayed(window.start, step, steps, delay)
+            controls.append(series(at, measured_at(at) if late is None else late))
             times = window.start + log.control_dt * np.arange(len(window.angles))
             measured.append(series(times, window.angles, columns))
         names = [f"{window.start:.1f} s" for window in windows]

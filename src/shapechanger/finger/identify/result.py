@@ -9,22 +9,23 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
+import gymnasium as gym
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.finger.anatomy import JOINTS, TENDONS
-from shapechanger.finger.command_path import HeldTensions, hold_controls
 from shapechanger.finger.identify.kinematics import (
     ARMS,
     Kinematics,
     fit_kinematics,
     interval_quantile,
 )
-from shapechanger.finger.identify.log import FingerLog, require_informative
+from shapechanger.finger.identify.log import FingerLog, record_babble, require_informative
 from shapechanger.finger.identify.motion import (
+    FACTORS,
     MOTOR_KG,
     Dynamics,
     Window,
@@ -36,6 +37,7 @@ from shapechanger.finger.identify.motion import (
 from shapechanger.finger.identify.motors import CommandSignal, Motors, fit_motors
 from shapechanger.finger.model import build_finger
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.plant import HeldTensions, hold_controls
 from shapechanger.finger.tensions import drive_of
 
 # Share of the log that the motion is fitted to; the rest is for validation.
@@ -75,6 +77,8 @@ _UNITS: Final = {
     "joint_damping": "N·m·s/rad",
     "tendon_friction": "N",
 }
+# Duration of the motions of `identify_env`, s.
+_SECONDS: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,6 +221,21 @@ def identify(
     )
 
 
+def identify_env(env: gym.Env[Any, Any], actions: str, seed: int) -> FingerParameters:
+    """Move a finger for ten seconds, and identify its parameters.
+
+    Args:
+        env: Env of the finger, without a time limit.
+        actions: What its actions command.
+        seed: Seed of the motions.
+
+    Raises:
+        FingerError: If the motions do not suffice, or observations are not a vector.
+        MissingExtra: If `mujoco.sysid` is not installed.
+    """
+    return identify(record_babble(env, _SECONDS, seed, actions)).parameters
+
+
 def replay(log: FingerLog, parameters: FingerParameters, window: Window) -> NDArray[np.float64]:
     """Simulate a finger under the commands of a log.
 
@@ -295,10 +314,7 @@ def _estimates(
         name = f"moment_arms/{TENDONS[i]}/{JOINTS[j]}"
         found.append(_around(name, "m", value, reach * sd, NOMINAL.moment_arms[i][j]))
     found.append(_stiffness_estimate(kinematics, reach))
-    nominal = {"tendon_friction": NOMINAL.tendon_friction}
-    for j, joint in enumerate(JOINTS):
-        nominal[f"joint_stiffness/{joint}"] = NOMINAL.joint_stiffness[j]
-        nominal[f"joint_damping/{joint}"] = NOMINAL.joint_damping[j]
+    nominal = {**FACTORS, "tendon_friction": NOMINAL.tendon_friction}
     for name, value in dynamics.values.items():
         kind = name.split("/")[0]
         error = _MODEL_ERROR.get(name, _MODEL_ERROR[kind])

@@ -11,8 +11,15 @@ time is in seconds. The env checks whether a finger reaches a path.
 
 from __future__ import annotations
 
-from shapechanger.finger.paths.path import FASTEST_MPS, FingertipPath, sample
-from shapechanger.finger.paths.shapes import circle, curve_3d, figure_eight, line
+from shapechanger.finger.paths.path import (
+    FASTEST_MPS,
+    FingertipPath,
+    circle,
+    curve_3d,
+    figure_eight,
+    line,
+    sample,
+)
 from shapechanger.finger.paths.sources import KINDS, PathSource, as_path, from_callable, from_csv
 
 __all__ = [

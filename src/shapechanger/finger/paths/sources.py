@@ -22,10 +22,13 @@ from shapechanger.finger.paths.path import (
     FingertipPath,
     Points,
     Times,
+    circle,
+    curve_3d,
+    figure_eight,
+    line,
     positive,
     too_fast,
 )
-from shapechanger.finger.paths.shapes import circle, curve_3d, figure_eight, line
 
 # Checked time of an endless function, s; rate and number of the checked points.
 _CHECKED_S: Final = 10.0
@@ -289,7 +292,7 @@ def as_path(value: PathSource) -> FingertipPath:
     if isinstance(given, PurePath):
         raise PathError(f"A path file must end in {_FILE}, got {str(given)!r}.")
     if isinstance(given, str):
-        return _maker(given)()
+        return _with_settings({_KIND: given})
     if isinstance(given, Mapping):
         return _with_settings(dict(cast("Mapping[Any, Any]", given)))
     if callable(given):
@@ -307,15 +310,11 @@ def _with_settings(settings: dict[Any, Any]) -> FingertipPath:
             f"{settings!r}."
         )
     kind = str(settings.pop(_KIND))
-    maker = _maker(kind)
+    if kind not in _MAKERS:
+        raise UnknownName("path", kind, KINDS)
+    maker = _MAKERS[kind]
     known = tuple(inspect.signature(maker).parameters)
     for name in settings:
         if name not in known:
             raise UnknownName(f"setting of {kind!r}", str(name), known)
     return maker(**settings)
-
-
-def _maker(kind: str) -> Callable[..., FingertipPath]:
-    if kind not in _MAKERS:
-        raise UnknownName("path", kind, KINDS)
-    return _MAKERS[kind]
