@@ -20,17 +20,19 @@ import numpy as np
 
 import shapechanger
 from benchmarks.row import Row, asked
-from shapechanger.cli.robot.faults import FAULTS, Fault
-from shapechanger.cli.robot.trial import Trial
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile
+from shapechanger.twin.check.bench import Bench
+from shapechanger.twin.check.faults import FAULTS, Fault
+from shapechanger.twin.check.trial import Trial
 from tests.robots import CAR
 
 TRIALS: Final = 100
 KEPT: Final = Path("results", "robot-faults")
+PILOT: Final = "shapechanger.vehicles.remote.full_throttle"
 BARE: Final = "guard and supervisor killed"
 # Code that the time to stop depends on.
-_CODE: Final = ("cli/robot", "link", "remote", "robot", "twin")
+_CODE: Final = ("cli/robot", "vehicles/remote", "link", "remote", "robot", "twin")
 
 
 class _Tried(msgspec.Struct, frozen=True):
@@ -92,7 +94,8 @@ def _tried(profile: Path, name: str, one_shot: bool, trials: int, folder: Path) 
         trial: Trial | None = None
         while sum(one.drove for one in found) < trials and len(found) < 2 * trials:
             if trial is None:
-                trial = opened.enter_context(Trial(load_profile(profile), one_shot=one_shot))
+                bench = Bench(load_profile(profile), one_shot=one_shot)
+                trial = opened.enter_context(Trial(bench, pilot=PILOT))
             try:
                 tried = _as_tried(trial, fault)
             except RobotError:  # The driver lost the link or never drove: start another robot.

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from shapechanger.layout import Layout
 from shapechanger.link.messages import Observation
 from shapechanger.remote.client import RobotClient
-from shapechanger.twin.oracle import propelled
+from shapechanger.twin.judge import propelled
 from shapechanger.twin.robot import Operator, RunningRobot
 from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.wiring import TwinWiring

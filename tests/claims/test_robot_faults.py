@@ -12,8 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.faults import FAULTS
-from shapechanger.cli.robot.trial import Trial
+from shapechanger.twin.check.bench import Bench
+from shapechanger.twin.check.faults import FAULTS
+from shapechanger.twin.check.trial import Trial
 from shapechanger.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 
@@ -28,6 +29,7 @@ below 1 ms. The board dates what it makes itself, when it tells the guard.
 """
 
 TRIALS = 2
+PILOT = "shapechanger.vehicles.remote.full_throttle"
 
 # Runs at the guard's priority and sleeps for 1 ms at a time. A line asks it for its longest delay.
 _WITNESS = """
@@ -86,7 +88,7 @@ def witness() -> Iterator[Witness]:
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
     """A robot for all faults, replaced when a fault ends it."""
-    with Trial(write_profile(tmp_path_factory.mktemp("faults"))) as made:
+    with Trial(write_profile(tmp_path_factory.mktemp("faults")), pilot=PILOT) as made:
         yield made
 
 
@@ -128,7 +130,7 @@ def test_without_the_one_shot_pins_keep_their_level(tmp_path: Path) -> None:
     """The documented weakness: without processes and hardware protection, power stays on."""
     # Keep the robot after the trial, to inspect it.
     fault = replace(FAULTS["guard and supervisor killed"], then="goes on")
-    with Trial(write_profile(tmp_path), one_shot=False) as trial:
+    with Trial(Bench(write_profile(tmp_path), one_shot=False)) as trial:
         result = trial.run(fault)
         levels = frozen(read_ledger(trial.ledger_path), (22, 27))
     assert result.drove

@@ -60,10 +60,10 @@ def test_heavy_packages_are_not_installed(
     assert found.stdout.strip() == "[]"
 
 
-def test_doctor(program: Path, variables: dict[str, str], tmp_path: Path) -> None:
-    """The doctor reports what is missing, and that packages are installed."""
+def test_check(program: Path, variables: dict[str, str], tmp_path: Path) -> None:
+    """The check reports what is missing, and that packages are installed."""
     done = subprocess.run(
-        [str(program), "robot", "doctor", "car"],
+        [str(program), "robot", "check", "car", "--wiring"],
         check=False,
         capture_output=True,
         text=True,

@@ -12,7 +12,7 @@ import pytest
 
 from shapechanger.cli import main
 from shapechanger.cli.doctor import examine_machine
-from shapechanger.robot.setup.doctor import Finding
+from shapechanger.robot.check.check import Finding
 
 REQUIREMENTS = (
     "core-package>=2",
@@ -45,9 +45,9 @@ def test_an_extra_that_is_not_installed_is_named_with_its_command() -> None:
 def test_versions_out_of_range_are_to_be_mended() -> None:
     """A package that is too old or too new."""
     results = findings({"core-package": "1.9", "learner": "3.0"})
-    assert results["core"].level == "missing"
+    assert results["core"].level == "bad"
     assert "core-package is 1.9 and not >=2" in results["core"].sentence
-    assert results["extra learn"].level == "missing"
+    assert results["extra learn"].level == "bad"
 
 
 def test_packages_of_another_system_are_not_asked_for() -> None:
@@ -66,7 +66,7 @@ def test_pins_that_may_not_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert findings({}, tmp_path)["pins"].level == "good"
     monkeypatch.setattr("os.access", lambda path, mode: False)
     refused = findings({}, tmp_path)["pins"]
-    assert refused.level == "missing"
+    assert refused.level == "bad"
     assert "usermod -aG gpio" in refused.sentence
 
 
@@ -75,7 +75,7 @@ def test_a_renderer_that_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> No
     died = SimpleNamespace(returncode=-11, stdout="", stderr="")
     monkeypatch.setattr(subprocess, "run", lambda *command, **options: died)
     assert findings({"mujoco": "4.0.0"})["pictures"] == Finding(
-        "pictures", "missing", "exit status -11"
+        "pictures", "bad", "exit status -11"
     )
 
 
@@ -83,7 +83,7 @@ def test_the_reason_of_a_renderer_is_passed_on(monkeypatch: pytest.MonkeyPatch) 
     """`MUJOCO_GL` has a value that MuJoCo does not know."""
     monkeypatch.setenv("MUJOCO_GL", "vulkan")
     drawn = findings({"mujoco": "4.0.0"})["pictures"]
-    assert drawn.level == "missing"
+    assert drawn.level == "bad"
     assert drawn.sentence.startswith("With MUJOCO_GL=vulkan nothing can be drawn: set it to one of")
 
 
@@ -93,21 +93,23 @@ def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
     """The development environment has all extras, and draws."""
     main(["doctor"])
     lines = capsys.readouterr().out.splitlines()
-    assert f"good     machine: shapechanger {version('shapechanger')}" in lines[0]
-    assert any(line.startswith("good     pictures: Drew 480 x 480 with") for line in lines)
-    assert not any("MISSING" in line for line in lines)
+    assert any(
+        line.startswith(f"good  machine: shapechanger {version('shapechanger')}") for line in lines
+    )
+    assert any(line.startswith("good  pictures: Drew 480 x 480 with") for line in lines)
+    assert not any("BAD" in line for line in lines)
 
 
 def test_something_to_mend_is_an_exit_status(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Scripts can rely on it."""
-    broken: list[Any] = [Finding("core", "missing", "Gone.")]
+    broken: list[Any] = [Finding("core", "bad", "Gone.")]
     monkeypatch.setattr("shapechanger.cli.doctor.examine_machine", lambda: broken)
     with pytest.raises(SystemExit) as stop:
         main(["doctor"])
     assert stop.value.code == 1
-    assert "1 of 1 to fix." in capsys.readouterr().out
+    assert "0 good, 1 bad, 0 not measured." in capsys.readouterr().out
 
 
 def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -179,7 +179,7 @@ def test_flags_and_help_are_options(
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Here no disk is always full.")
 def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
     """No traceback, neither on write nor at interpreter exit."""
-    code = COMMAND.format(arguments=["robot", "doctor", "car", "--port", "0"])
+    code = COMMAND.format(arguments=["robot", "check", "car", "--wiring", "--port", "0"])
     with open("/dev/full", "w") as full:
         done = subprocess.run(
             [sys.executable, "-c", code],

@@ -12,9 +12,9 @@ from typing import Final
 
 import pytest
 
-from shapechanger.cli.robot.trial_driver import Driver
 from shapechanger.remote.known_robots import KnownRobot
-from shapechanger.twin.oracle import propelled
+from shapechanger.twin.check.driver import Driver
+from shapechanger.twin.judge import propelled
 from shapechanger.twin.robot import RunningRobot, run_robot
 from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.wiring import TwinWiring

@@ -12,7 +12,7 @@ import pytest
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.messages import Order, encode
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
-from shapechanger.twin.oracle import ExpectedCommand, propelled, time_to_rest, unauthorised
+from shapechanger.twin.judge import ExpectedCommand, propelled, time_to_rest, unauthorised
 from shapechanger.twin.robot import Operator
 from shapechanger.twin.signals import read_ledger
 from shapechanger.twin.start import start_board

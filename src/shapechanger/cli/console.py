@@ -5,8 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
 from rich.console import Console
 from rich.progress import (
@@ -18,11 +17,6 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.table import Table
-
-if TYPE_CHECKING:  # Half of the robot's modules.
-    from shapechanger.robot.setup.doctor import Finding
-
-_MARKS: Final = {"good": "good   ", "missing": "MISSING", "unknown": "?      "}
 
 
 def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
@@ -53,20 +47,6 @@ def print_table(table: Table, file_width: int | None = None) -> None:
         file_width: Columns where the output is a file, which has no width; None for 80.
     """
     plain_console(width=None if sys.stdout.isatty() else file_width).print(table)
-
-
-def say_findings(findings: Sequence[Finding]) -> None:
-    """Print the results of checks, and exit with 1 if something has to be mended.
-
-    Args:
-        findings: One result of each check.
-    """
-    for finding in findings:
-        say(f"{_MARKS[finding.level]}  {finding.check}: {finding.sentence}")
-    missing = sum(finding.level == "missing" for finding in findings)
-    if missing:
-        say(f"\n{missing} of {len(findings)} to fix.")
-        sys.exit(1)
 
 
 def counted(number: int, what: str) -> str:

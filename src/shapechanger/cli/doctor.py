@@ -10,12 +10,14 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from shapechanger.cli.console import say_findings
+from shapechanger.cli.console import say
 from shapechanger.errors import MissingExtra
-from shapechanger.robot.setup.doctor import Finding
+from shapechanger.robot.check.check import Check, Finding, Results, run_checks
+from shapechanger.robot.check.report import write_report
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
@@ -41,19 +43,37 @@ print(f"{width} x {height} with {os.environ.get('MUJOCO_GL', 'glfw')}")
 class ExamineMachine:
     """Say what works on this machine, and how to mend what does not.
 
-    `shapechanger robot doctor PROFILE` examines a robot.
+    `shapechanger robot check PROFILE` checks a robot.
     """
 
     def run(self) -> None:
         """Print the findings, and exit with 1 if something that is installed does not work."""
-        say_findings(examine_machine())
+        if not write_report([("machine", examine_machine())], say):
+            sys.exit(1)
+
+
+@dataclass(frozen=True)
+class _Machine:
+    """What is installed on this machine; see `Subject`."""
+
+    requirements: Sequence[str]
+    version_of: Callable[[str], str]
+    dev: Path
+
+    def lacks(self, need: str) -> str | None:
+        """Leave out the check of a package that is not installed; an extra says that it is not."""
+        try:
+            self.version_of(need)
+        except importlib.metadata.PackageNotFoundError:
+            return ""
+        return None
 
 
 def examine_machine(
     requirements: Sequence[str] | None = None,
     version_of: Callable[[str], str] = importlib.metadata.version,
     dev: Path = Path("/dev"),
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """Check what Shapechanger can do on this machine.
 
     Args:
@@ -64,61 +84,62 @@ def examine_machine(
     """
     if requirements is None:
         requirements = importlib.metadata.requires(_PACKAGE) or []
-    return [
-        _machine(),
-        *_extras(requirements, version_of),
-        *_if_installed("mujoco", version_of, _drawing),
-        *_if_installed("imageio-ffmpeg", version_of, _films),
-        *_if_installed("torch", version_of, _torch),
-        *_if_installed("warp-lang", version_of, _warp),
-        *_if_installed("ray", version_of, _ray),
-        _gpio(dev),
-    ]
-
-
-def _machine() -> Finding:
-    """Return the versions and the size of the machine."""
-    free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
-    return Finding(
-        "machine",
-        "good",
-        f"shapechanger {importlib.metadata.version(_PACKAGE)}, Python {platform.python_version()}, "
-        f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, {free_gb:.0f} GB free.",
-    )
-
-
-def _extras(requirements: Sequence[str], version_of: Callable[[str], str]) -> Iterator[Finding]:
-    """Yield whether the core and each extra are installed, in the versions that they need."""
     try:
         from packaging.requirements import Requirement
     except ImportError:
         raise MissingExtra("packaging", "cli") from None
     parsed = [Requirement(text) for text in requirements]
     extras = sorted({extra for one in parsed for extra in _extras_of(one)} - {*_NOT_LISTED})
-    for extra in ("", *extras):
-        absent: list[str] = []
-        wrong: list[str] = []
-        for one in parsed:
-            if one.name == _PACKAGE or (one.marker and not one.marker.evaluate({"extra": extra})):
-                continue
-            if bool(extra) != ("extra" in str(one.marker)):
-                continue
-            try:
-                version = version_of(one.name)
-            except importlib.metadata.PackageNotFoundError:
-                absent.append(one.name)
-                continue
-            if not one.specifier.contains(version, prereleases=True):
-                wrong.append(f"{one.name} is {version} and not {one.specifier}")
-        name = f"extra {extra}" if extra else "core"
-        wanted = f"'{_PACKAGE}[{extra}]'" if extra else _PACKAGE
-        remedy = f"run `pip install --upgrade {wanted}`"
-        if wrong:
-            yield Finding(name, "missing", f"{'; '.join(wrong)}: {remedy}.")
-        elif absent:
-            yield Finding(name, "unknown", f"Without {', '.join(absent)}; {remedy} to use it.")
-        else:
-            yield Finding(name, "good", "Installed.")
+    checks = [
+        Check("machine", _machine),
+        *(
+            Check(f"extra {extra}" if extra else "core", partial(_extra, parsed, extra))
+            for extra in ("", *extras)
+        ),
+        Check("pictures", _drawing, ("mujoco",)),
+        Check("films", _films, ("imageio-ffmpeg",)),
+        Check("torch", _torch, ("torch",)),
+        Check("warp", _warp, ("warp-lang",)),
+        Check("ray", _ray, ("ray",)),
+        Check("pins", _gpio),
+    ]
+    return run_checks(checks, _Machine(requirements, version_of, dev))
+
+
+def _machine(_: _Machine) -> Results:
+    """Yield the versions and the size of the machine."""
+    free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
+    yield (
+        "good",
+        f"shapechanger {importlib.metadata.version(_PACKAGE)}, Python {platform.python_version()}, "
+        f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, {free_gb:.0f} GB free.",
+    )
+
+
+def _extra(parsed: Sequence[Requirement], extra: str, machine: _Machine) -> Results:
+    """Yield whether the core or an extra is installed, in the versions that it needs."""
+    absent: list[str] = []
+    wrong: list[str] = []
+    for one in parsed:
+        if one.name == _PACKAGE or (one.marker and not one.marker.evaluate({"extra": extra})):
+            continue
+        if bool(extra) != ("extra" in str(one.marker)):
+            continue
+        try:
+            version = machine.version_of(one.name)
+        except importlib.metadata.PackageNotFoundError:
+            absent.append(one.name)
+            continue
+        if not one.specifier.contains(version, prereleases=True):
+            wrong.append(f"{one.name} is {version} and not {one.specifier}")
+    wanted = f"'{_PACKAGE}[{extra}]'" if extra else _PACKAGE
+    remedy = f"run `pip install --upgrade {wanted}`"
+    if wrong:
+        yield "bad", f"{'; '.join(wrong)}: {remedy}."
+    elif absent:
+        yield "unknown", f"Without {', '.join(absent)}; {remedy} to use it."
+    else:
+        yield "good", "Installed."
 
 
 def _extras_of(requirement: Requirement) -> list[str]:
@@ -127,19 +148,8 @@ def _extras_of(requirement: Requirement) -> list[str]:
     return [part.partition('"')[0] for part in quoted[1:]]
 
 
-def _if_installed(
-    package: str, version_of: Callable[[str], str], check: Callable[[], Finding]
-) -> Iterator[Finding]:
-    """Yield the result of a check of a package that is installed; an extra says that it is not."""
-    try:
-        version_of(package)
-    except importlib.metadata.PackageNotFoundError:
-        return
-    yield check()
-
-
-def _drawing() -> Finding:
-    """Return whether MuJoCo draws a picture, and with which library."""
+def _drawing(_: _Machine) -> Results:
+    """Yield whether MuJoCo draws a picture, and with which library."""
     done = subprocess.run(
         [sys.executable, "-c", _DRAW],
         capture_output=True,
@@ -148,59 +158,57 @@ def _drawing() -> Finding:
         timeout=_PATIENCE_S,
     )
     if done.returncode == 0:
-        return Finding("pictures", "good", f"Drew {done.stdout.strip().splitlines()[-1]}.")
+        yield "good", f"Drew {done.stdout.strip().splitlines()[-1]}."
+        return
     last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-    return Finding("pictures", "missing", last.partition("RenderError: ")[2] or last)
+    yield "bad", last.partition("RenderError: ")[2] or last
 
 
-def _films() -> Finding:
-    """Return whether films can be encoded."""
+def _films(_: _Machine) -> Results:
+    """Yield whether films can be encoded."""
     ffmpeg: Any = importlib.import_module("imageio_ffmpeg")
     try:
-        return Finding("films", "good", f"Encoded by {ffmpeg.get_ffmpeg_exe()}.")
+        yield "good", f"Encoded by {ffmpeg.get_ffmpeg_exe()}."
     except RuntimeError:
-        return Finding(
-            "films", "missing", "No ffmpeg: run `pip install --force-reinstall imageio-ffmpeg`."
-        )
+        yield "bad", "No ffmpeg: run `pip install --force-reinstall imageio-ffmpeg`."
 
 
-def _torch() -> Finding:
-    """Return on what PyTorch computes."""
+def _torch(_: _Machine) -> Results:
+    """Yield on what PyTorch computes."""
     import torch
 
     where = f"{torch.get_num_threads()} threads of the CPU"
     if torch.cuda.is_available():
         where = f"{torch.cuda.get_device_name()} and {where}"
-    return Finding("torch", "good", f"{torch.__version__} on {where}.")
+    yield "good", f"{torch.__version__} on {where}."
 
 
-def _warp() -> Finding:
-    """Return on what `make_vec(..., backend="warp")` steps."""
+def _warp(_: _Machine) -> Results:
+    """Yield on what `make_vec(..., backend="warp")` steps."""
     warp: Any = importlib.import_module("shapechanger.envs.warp.devices").wp
-    devices = [device.name for device in warp.get_cuda_devices()]
-    if devices:
-        return Finding("warp", "good", f"Steps on {', '.join(devices)}.")
-    return Finding("warp", "unknown", "Steps on the CPU, slowly: CUDA finds no GPU here.")
+    if devices := [device.name for device in warp.get_cuda_devices()]:
+        yield "good", f"Steps on {', '.join(devices)}."
+    else:
+        yield "unknown", "Steps on the CPU, slowly: CUDA finds no GPU here."
 
 
-def _ray() -> Finding:
-    """Return whether Ray can be imported."""
+def _ray(_: _Machine) -> Results:
+    """Yield whether Ray can be imported."""
     try:
         ray: Any = importlib.import_module("ray")
     except ImportError as error:
-        return Finding("ray", "missing", f"It cannot be imported ({error}): install it again.")
-    return Finding("ray", "good", f"{ray.__version__}; `--executor ray` runs studies on it.")
+        yield "bad", f"It cannot be imported ({error}): install it again."
+    else:
+        yield "good", f"{ray.__version__}; `--executor ray` runs studies on it."
 
 
-def _gpio(dev: Path) -> Finding:
-    """Return whether this machine has pins that a robot could use."""
-    chips = sorted(dev.glob("gpiochip*"))
+def _gpio(machine: _Machine) -> Results:
+    """Yield whether this machine has pins that a robot could use."""
+    chips = sorted(machine.dev.glob("gpiochip*"))
     if not chips:
-        return Finding("pins", "unknown", "None here: robots run as twins, on simulated pins.")
-    if not any(os.access(chip, os.R_OK | os.W_OK) for chip in chips):
-        return Finding(
-            "pins",
-            "missing",
-            f"{chips[0]} may not be opened: run `sudo usermod -aG gpio $USER` and log in again.",
-        )
-    return Finding("pins", "good", "`shapechanger robot doctor PROFILE` examines a robot's.")
+        yield "unknown", "None here: robots run as twins, on simulated pins."
+    elif any(os.access(chip, os.R_OK | os.W_OK) for chip in chips):
+        yield "good", "`shapechanger robot check PROFILE` checks a robot's."
+    else:
+        remedy = "run `sudo usermod -aG gpio $USER` and log in again"
+        yield "bad", f"{chips[0]} may not be opened: {remedy}."

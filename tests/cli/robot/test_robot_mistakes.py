@@ -82,7 +82,7 @@ def write_ready_profile(home: Path, text: str = CAR) -> str:
     [
         "init",
         "install",
-        "doctor",
+        "check",
         "calibrate",
         "serve",
         "key",
@@ -92,7 +92,6 @@ def write_ready_profile(home: Path, text: str = CAR) -> str:
         "drive",
         "stop",
         "safe-pins",
-        "selftest",
     ],
 )
 def test_help(run: Run, command: str) -> None:
@@ -119,25 +118,28 @@ def test_help(run: Run, command: str) -> None:
         ("serve test-car.toml --twin --wired-as nowhere.toml", "There is no file nowhere.toml"),
         ("serve test-car.toml --twin --twin-folder nowhere", "There is no folder"),
         ("serve test-car.toml --twin --twin-folder stale", "A twin has left"),
-        ("doctor nocar", "No profile matches 'nocar'"),
         ("safe-pins nocar", "No profile matches 'nocar'"),
-        ("selftest nocar", "No profile matches 'nocar'"),
-        ("selftest test-car.toml", "lift its wheels"),
-        ("selftest test-car.toml --cap 0", "The cap is above 0"),
-        ("selftest test-car.toml --twin --trials 0", "At least one trial"),
-        ("selftest test-car.toml --yes", "--yes needs --leds"),
-        ("selftest test-car.toml --twin --leds --probe 20", "A twin needs no --probe"),
-        ("selftest test-car.toml --leds --probe 22", "Pin 22 is used by drive forward"),
-        ("selftest finger --twin --leds", "an LED cannot stand for it"),
-        ("selftest test-car.toml --leds --probe 40", "GPIO0 to GPIO27, got 40"),
-        ("selftest test-car.toml --leds --twin --cap 7", "The cap is above 0"),
-        ("selftest test-car.toml --leds --twin --trials 3", "--trials needs --twin, without"),
-        ("selftest test-car.toml --no-one-shot", "--no-one-shot needs --twin"),
-        ("selftest test-car.toml --twin --jumper 20 21", "--jumper goes with neither"),
-        ("selftest test-car.toml --leds --wheels-up", "--wheels-up goes with neither"),
-        ("selftest test-car.toml --wheels-up --jumper 20 28", "GPIO0 to GPIO27, got 28"),
-        ("selftest test-car.toml --wheels-up --jumper 20 20", "A jumper joins two pins"),
-        ("doctor test-car.toml --port 99999", "A port is 0"),
+        ("check nocar", "No profile matches 'nocar'"),
+        ("check test-car.toml", "lift its wheels"),
+        ("check test-car.toml --cap 0", "The cap is above 0"),
+        ("check test-car.toml --leds --twin --cap 7", "The cap is above 0"),
+        ("check test-car.toml --wiring --cap 0.5", "--cap needs a check that drives"),
+        ("check test-car.toml --faults --trials 0", "At least one trial"),
+        ("check test-car.toml --faults --leds", "Choose one of --leds and --faults"),
+        ("check test-car.toml --yes", "--yes needs --leds"),
+        ("check test-car.toml --twin --leds --probe 20", "A twin needs no --probe"),
+        ("check test-car.toml --leds --probe 22", "Pin 22 is used by drive forward"),
+        ("check test-car.toml --leds --probe 40", "GPIO0 to GPIO27, got 40"),
+        ("check finger --twin --leds", "an LED cannot stand for it"),
+        ("check finger --faults", "there is nothing to stop"),
+        ("check test-car.toml --leds --twin --trials 3", "--trials needs --faults"),
+        ("check test-car.toml --no-one-shot", "--no-one-shot needs --faults"),
+        ("check test-car.toml --twin --jumper 20 21", "--jumper goes with none of --twin"),
+        ("check test-car.toml --leds --wheels-up", "--wheels-up goes with none of --twin"),
+        ("check test-car.toml --twin --motors-off", "--motors-off goes with none of --twin"),
+        ("check test-car.toml --wheels-up --jumper 20 28", "GPIO0 to GPIO27, got 28"),
+        ("check test-car.toml --wheels-up --jumper 20 20", "A jumper joins two pins"),
+        ("check test-car.toml --wiring --port 99999", "A port is 0"),
         ("serve test-car.toml --twin --policy nowhere", "There is no policy file or folder"),
         ("init", "Name the kind of the new robot"),
         ("init car --camera usb --name ../up", "name"),
@@ -285,10 +287,10 @@ def test_the_key_can_be_shown_again(run: Run, home: Path) -> None:
 def test_a_profile_in_this_folder_is_found_by_its_name(run: Run, home: Path) -> None:
     """A shipped profile of that name takes precedence."""
     write_ready_profile(home)
-    _, output, _ = run("doctor", "test-car", "--port", "0")
-    assert "good     profile: test-car.toml is valid" in output
+    _, output, _ = run("check", "test-car", "--wiring", "--port", "0")
+    assert "good  profile: test-car.toml is valid" in output
     (home / "work" / "car.toml").write_text("broken")
-    _, output, _ = run("doctor", "car", "--port", "0")
+    _, output, _ = run("check", "car", "--wiring", "--port", "0")
     assert "shipped" in output
 
 
@@ -303,15 +305,15 @@ def test_stopping_a_robot_that_is_off(run: Run, monkeypatch: pytest.MonkeyPatch)
     assert "The stop was not confirmed" in wrong
 
 
-def test_doctor(run: Run, home: Path) -> None:
-    """The doctor reports what is good on a machine other than a Raspberry Pi."""
-    code, output, _ = run("doctor", write_ready_profile(home), "--port", "0")
+def test_wiring(run: Run, home: Path) -> None:
+    """The check reports what is good on a machine other than a Raspberry Pi."""
+    code, output, _ = run("check", write_ready_profile(home), "--wiring", "--port", "0")
     assert code == 1
-    assert "good     profile" in output
-    assert "good     credentials" in output
+    assert "good  profile" in output
+    assert "good  credentials" in output
     shutil.rmtree(home / "config" / "shapechanger")
-    _, output, _ = run("doctor", "test-car.toml")
-    assert "MISSING  credentials" in output
+    _, output, _ = run("check", "test-car.toml", "--wiring")
+    assert "BAD   credentials" in output
 
 
 def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -325,10 +327,11 @@ def test_remember_and_forget(run: Run, home: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.skipif(any(Path("/dev").glob("gpiochip*")), reason="This machine has pins.")
-@pytest.mark.parametrize("command", ["serve", "safe-pins"])
+@pytest.mark.parametrize("command", ["serve", "safe-pins", "check --leds"])
 def test_a_machine_without_pins(run: Run, home: Path, command: str) -> None:
     """The error names the twin, and nothing starts that would fail repeatedly."""
-    code, _, output = run(command, write_ready_profile(home))
+    name, *options = command.split()
+    code, _, output = run(name, write_ready_profile(home), *options)
     assert code == 2
     assert "serve --twin" in output
     assert output.count("\n") == 1

@@ -325,16 +325,16 @@ def test_an_action_that_is_capped(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_selftest_on_a_twin(tmp_path: Path) -> None:
+def test_faults_on_a_twin(tmp_path: Path) -> None:
     """Each fault is tried once, and a missed promise sets the exit code."""
     text = changed('[camera]\ndriver = "picamera2"\nsize = [160, 120]\nfps = 20\n\n', "", CAR)
     profile = write_profile(tmp_path, changed("camera_stale_ms = 500\n", "", text))
-    with Person(("robot", "selftest", str(profile.path), "--twin"), tmp_path, {}) as person:
+    with Person(("robot", "check", str(profile.path), "--faults"), tmp_path, {}) as person:
         code = person.end(200.0)
         output = person.text
-    assert "this robot has no camera" in output
-    assert "NEVER" not in output
-    assert "it never drove" not in output
+    assert "This robot has no camera" in output
+    assert "At rest never" not in output
+    assert "It did not drive" not in output
     assert code == (1 if "BAD" in output else 0)
 
 

@@ -11,7 +11,7 @@ import msgspec
 from playwright.sync_api import Browser, Page, TimeoutError
 
 from shapechanger.robot.profile.load import load_profile
-from shapechanger.twin.oracle import propelled
+from shapechanger.twin.judge import propelled
 from shapechanger.twin.robot import RunningRobot
 from shapechanger.twin.signals import Transition
 from shapechanger.twin.wiring import TwinWiring

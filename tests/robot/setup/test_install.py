@@ -11,9 +11,10 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.check.computer import examine
+from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.setup.doctor import examine_robot
 from shapechanger.robot.setup.install import (
     RootCommand,
     changes_to_install,
@@ -69,17 +70,17 @@ def test_a_car_is_put_in_place_once(pi: FakePi) -> None:
     assert pi.ran == ran
 
 
-def test_the_doctor_is_content_afterwards(pi: FakePi) -> None:
-    """What the doctor finds missing in the computer's settings is what `install` puts in place."""
+def test_the_checks_are_content_afterwards(pi: FakePi) -> None:
+    """What the checks find bad in the computer's settings is what `install` puts in place."""
     plan = _plan("car")
     profile = pi.root / "home" / "car.toml"
 
     def levels() -> dict[str, str]:
-        found = examine_robot(plan, None, 0, pi.root, profile=profile)
+        found = examine(StandingRobot(plan, None, 0, pi.root, unit_of=profile))
         return {one.check: one.level for one in found}
 
     before = levels()
-    assert (before["strict_gpiod"], before["systemd"]) == ("missing", "missing")
+    assert (before["strict_gpiod"], before["systemd"]) == ("bad", "bad")
     _install(pi, plan)
     after = levels()
     assert (after["strict_gpiod"], after["systemd"]) == ("good", "good")

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.check.computer import examine
+from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.setup.doctor import examine_robot
 from shapechanger.robot.setup.zeros import find_joint_zeros
 from shapechanger.twin.chips import Magnet
 from shapechanger.twin.in_process import LocalBoard
@@ -63,7 +64,7 @@ def test_a_missing_magnet_is_an_error() -> None:
 
 def _found(root: Path, plan: GuardPlan, board: LocalBoard, port: int = 0) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
-    for one in examine_robot(plan, None, port, root, hardware=lambda: board.hardware):
+    for one in examine(StandingRobot(plan, None, port, root, hardware=lambda: board.hardware)):
         found.setdefault(one.check, []).append(f"{one.level}: {one.sentence}")
     return found
 
@@ -82,12 +83,12 @@ def root(tmp_path: Path) -> Path:
     ("how", "expected"),
     [
         ("", "good: The encoder of PIP_flexion detects its magnet."),
-        ("gone", "missing: The encoder of PIP_flexion detects no magnet: fit one above the chip."),
-        ("weak", "missing: The magnet of PIP_flexion is too far from its encoder."),
-        ("strong", "missing: The magnet of PIP_flexion is too near to its encoder."),
+        ("gone", "bad: The encoder of PIP_flexion detects no magnet: fit one above the chip."),
+        ("weak", "bad: The magnet of PIP_flexion is too far from its encoder."),
+        ("strong", "bad: The magnet of PIP_flexion is too near to its encoder."),
     ],
 )
-def test_the_doctor_checks_each_magnet(root: Path, how: Magnet, expected: str) -> None:
+def test_each_magnet_is_checked(root: Path, how: Magnet, expected: str) -> None:
     """A missing, weak or strong magnet is reported for its joint only."""
     board = _board()
     board.pins.encoder("PIP_flexion").set_magnet(how)
@@ -96,7 +97,7 @@ def test_the_doctor_checks_each_magnet(root: Path, how: Magnet, expected: str) -
     assert [one.partition(":")[0] for one in found[:2]] == ["good"] * 2
 
 
-def test_the_doctor_names_a_chip_that_does_not_answer(root: Path) -> None:
+def test_the_check_names_a_chip_that_does_not_answer(root: Path) -> None:
     """A dead multiplexer is reported for each joint behind it."""
     board = _board()
     board.pins.dead_chips.add((1, 0x70))
@@ -105,7 +106,7 @@ def test_the_doctor_names_a_chip_that_does_not_answer(root: Path) -> None:
     assert all("The multiplexer of sensor 'joints' at 0x70" in one for one in found)
 
 
-def test_the_doctor_leaves_the_encoders_of_a_served_robot_alone(root: Path) -> None:
+def test_checks_leave_the_encoders_of_a_served_robot_alone(root: Path) -> None:
     """Selecting a channel would disturb the readings of a running guard."""
     with socket.socket() as taken:
         taken.bind(("", 0))
@@ -121,12 +122,12 @@ def test_the_doctor_leaves_the_encoders_of_a_served_robot_alone(root: Path) -> N
     ("config", "expected"),
     [
         ("dtparam=i2c_arm_baudrate=1000000", "good"),
-        ("dtparam=i2c_arm=on", "missing"),
-        ("#dtparam=i2c_arm_baudrate=400000", "missing"),
-        ("dtparam=i2c_arm_baudrate=100000", "missing"),
+        ("dtparam=i2c_arm=on", "bad"),
+        ("#dtparam=i2c_arm_baudrate=400000", "bad"),
+        ("dtparam=i2c_arm_baudrate=100000", "bad"),
     ],
 )
-def test_the_doctor_checks_the_bus_speed(root: Path, config: str, expected: str) -> None:
+def test_the_bus_speed_is_checked(root: Path, config: str, expected: str) -> None:
     """The check applies only to robots with encoders."""
     (root / "boot/config.txt").write_text(config)
     assert _found(root, _PLAN, _board())["I2C speed"][0].startswith(expected)

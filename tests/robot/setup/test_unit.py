@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
-from shapechanger.robot.setup.doctor import Finding, examine_robot
+from shapechanger.robot.check.check import Finding
+from shapechanger.robot.check.computer import examine
+from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.setup.systemd import unit_text, unit_word, write_unit
-from tests.robot.setup.test_doctor import CAR
+from tests.robot.check.test_computer import CAR
 
 
 def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
@@ -16,14 +18,14 @@ def test_the_unit_names_profile_program_and_user(tmp_path: Path) -> None:
     assert "@" not in text
 
 
-def test_the_doctor_accepts_the_unit_of_init(tmp_path: Path) -> None:
-    """The written unit passes the doctor's check, unless it is for another profile."""
+def test_the_check_accepts_the_unit_of_init(tmp_path: Path) -> None:
+    """The written unit passes its check, unless it is for another profile."""
     folder = tmp_path / "etc/systemd/system"
     folder.mkdir(parents=True)
     path, is_new = write_unit("car", folder / "car.toml")
 
     def finding(profile: Path) -> Finding:
-        findings = examine_robot(CAR, None, 0, tmp_path, profile=profile)
+        findings = examine(StandingRobot(CAR, None, 0, tmp_path, unit_of=profile))
         return next(finding for finding in findings if finding.check == "systemd")
 
     assert is_new
@@ -31,7 +33,7 @@ def test_the_doctor_accepts_the_unit_of_init(tmp_path: Path) -> None:
     assert path.name == "shapechanger-car.service"
     assert finding(folder / "car.toml").level == "good"
     other = finding(folder / "other.toml")
-    assert other.level == "missing"
+    assert other.level == "bad"
     assert "is for another profile" in other.sentence
 
 
@@ -54,12 +56,12 @@ def test_words_of_a_unit_are_quoted() -> None:
     assert "Description=Shapechanger robot my-car\n" in text
 
 
-def test_the_doctor_reads_quoted_paths(tmp_path: Path) -> None:
+def test_the_check_reads_quoted_paths(tmp_path: Path) -> None:
     """A profile in a folder with a blank is found in its unit."""
     folder = tmp_path / "etc/systemd/system"
     folder.mkdir(parents=True)
     profile = tmp_path / "my robots/car.toml"
     path, _ = write_unit("car", profile)
     (folder / path.name).write_bytes(path.read_bytes())
-    findings = examine_robot(CAR, None, 0, tmp_path, profile=profile)
+    findings = examine(StandingRobot(CAR, None, 0, tmp_path, unit_of=profile))
     assert next(one for one in findings if one.check == "systemd").level == "good"

@@ -9,13 +9,13 @@ import tyro
 
 from shapechanger.cli.robot.calibrate import Calibrate
 from shapechanger.cli.robot.camera import CameraView
+from shapechanger.cli.robot.check import CheckRobot
 from shapechanger.cli.robot.drive import Drive
 from shapechanger.cli.robot.fetch import FetchEpisodes
 from shapechanger.cli.robot.key import Key
 from shapechanger.cli.robot.remote import Find, Forget, Remember, Stop
-from shapechanger.cli.robot.selftest import Selftest
 from shapechanger.cli.robot.serve import Serve
-from shapechanger.cli.robot.setup import Doctor, Home, Init, Install, SafePins
+from shapechanger.cli.robot.setup import Home, Init, Install, SafePins
 
 __all__ = ["Robot"]
 
@@ -27,7 +27,7 @@ class Robot:
     command: (
         Annotated[Init, tyro.conf.subcommand("init")]
         | Annotated[Install, tyro.conf.subcommand("install")]
-        | Annotated[Doctor, tyro.conf.subcommand("doctor")]
+        | Annotated[CheckRobot, tyro.conf.subcommand("check")]
         | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
         | Annotated[CameraView, tyro.conf.subcommand("camera")]
         | Annotated[Home, tyro.conf.subcommand("home")]
@@ -40,5 +40,4 @@ class Robot:
         | Annotated[FetchEpisodes, tyro.conf.subcommand("fetch")]
         | Annotated[Stop, tyro.conf.subcommand("stop")]
         | Annotated[SafePins, tyro.conf.subcommand("safe-pins")]
-        | Annotated[Selftest, tyro.conf.subcommand("selftest")]
     )

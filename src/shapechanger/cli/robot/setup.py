@@ -1,4 +1,4 @@
-"""`shapechanger robot init | install | doctor | home | safe-pins`: set up a robot."""
+"""`shapechanger robot init | install | home | safe-pins`: set up a robot."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 import tyro
 
-from shapechanger.cli.console import say, say_findings
+from shapechanger.cli.console import say
 from shapechanger.cli.robot.key import how_to_remember, robot_at, shown_credentials
 from shapechanger.errors import RobotError, ShapechangerError, UnknownName
 from shapechanger.remote.known_robots import check_name, remember
@@ -34,7 +34,7 @@ from shapechanger.robot.profile.load import (
     write_text,
 )
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.setup.doctor import Finding, examine_robot, needs_pins
+from shapechanger.robot.setup.computer import needs_pins
 from shapechanger.robot.setup.install import (
     Machine,
     Outcome,
@@ -154,7 +154,7 @@ class Init:
             say(
                 f"Next: shapechanger robot install {profile}   "
                 "(on the Pi: service, groups, buses)\n"
-                f"      shapechanger robot doctor {profile}\n"
+                f"      shapechanger robot check {profile} --wiring\n"
                 f"      shapechanger robot serve {profile}   (with --twin: without any hardware)"
             )
         say(how_to_remember(name, credentials))
@@ -351,7 +351,7 @@ class Install:
         if not (self.remove or self.dry_run):
             unit = unit_name(profile.name).removesuffix(".service")
             say(
-                f"\nNext: shapechanger robot doctor {profile.path}\n"
+                f"\nNext: shapechanger robot check {profile.path} --wiring\n"
                 f"      sudo systemctl start {unit}   (restart, if it runs already)"
             )
 
@@ -372,43 +372,6 @@ class Install:
                 "again."
             )
         return unit
-
-
-@dataclass(frozen=True)
-class Doctor:
-    """Check a robot's computer, wiring and settings, without moving it."""
-
-    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
-    """The robot's profile."""
-    port: int = 5000
-    """Port that it will be served at."""
-    motors_off: bool = False
-    """The motors' supply is off, so test the resistors that keep their drivers off, too."""
-    credentials: Path | None = None
-    """Folder of its key and certificate, if not the one that `init` made."""
-
-    def run(self) -> None:
-        """Print the findings and exit with 1 if something is missing."""
-        require_port(self.port)
-        profile = load_profile(find_profile(self.profile))
-        findings = [Finding("profile", "good", f"{profile.path} is valid.")]
-        try:
-            folder = self.credentials or credentials_folder(profile.name)
-            folder = load_credentials(folder).key_file.parent
-            findings.append(Finding("credentials", "good", f"Key and certificate: {folder}."))
-        except ShapechangerError as error:
-            findings.append(Finding("credentials", "missing", str(error)))
-        if profile.calibrated is None:
-            sentence = f"Never calibrated: shapechanger robot calibrate {profile.path}"
-            findings.append(Finding("calibration", "unknown", sentence))
-        findings += examine_robot(
-            profile.guard_plan(),
-            profile.camera,
-            self.port,
-            profile=profile.path.absolute(),
-            motors_off=self.motors_off,
-        )
-        say_findings(findings)
 
 
 _LAST_PORT: Final = 65535

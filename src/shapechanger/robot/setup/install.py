@@ -18,7 +18,7 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.servos.settings import DRIVER
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.robot.setup.doctor import (
+from shapechanger.robot.setup.computer import (
     FAST_HZ,
     boot_config,
     boot_lines,

@@ -7,7 +7,7 @@ robot's own programs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from shapechanger.twin.signals import Levels, Transition
@@ -86,7 +86,7 @@ def unauthorised(
         deadline_ms: Longest effect of a command, ms.
         slack_ms: How much later than that an output may come to rest, ms.
     """
-    allowed = _union(
+    allowed = sorted(
         (arrival_ns, arrival_ns + (min(ttl_ms, deadline_ms) + slack_ms) * 1e6)
         for arrival_ns, ttl_ms in commands
     )
@@ -135,14 +135,3 @@ def _moments(
     ends_ns = wiring.power_ends_ns(levels)
     if ends_ns is not None:
         yield ends_ns, wiring.read(levels, ends_ns)
-
-
-def _union(intervals: Iterable[tuple[float, float]]) -> Sequence[tuple[float, float]]:
-    """Return the union of intervals, in order and without overlap."""
-    united: list[tuple[float, float]] = []
-    for start, end in sorted(intervals):
-        if united and start <= united[-1][1]:
-            united[-1] = (united[-1][0], max(end, united[-1][1]))
-        else:
-            united.append((start, end))
-    return united

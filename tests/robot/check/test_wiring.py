@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from gpiozero.pins.mock import MockFactory, MockPin
 
+from shapechanger.robot.check.computer import examine
+from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.setup.doctor import examine_robot
-from shapechanger.robot.setup.wiring import examine_wiring, pull_resistors
 from shapechanger.twin.in_process import LocalBoard
 from shapechanger.twin.wiring import TwinWiring
 from shapechanger.twin.world.vehicle import DrivingWorld
@@ -40,7 +40,10 @@ def _found(
     plan: GuardPlan, board: _Board, *, motors_off: bool = True
 ) -> dict[str, list[tuple[str, str]]]:
     found: dict[str, list[tuple[str, str]]] = {}
-    for check, level, sentence in examine_wiring(plan, board.hardware, motors_off=motors_off):
+    robot = StandingRobot(
+        plan, hardware=lambda: board.hardware, motors_off=motors_off, on_twin=True
+    )
+    for check, level, sentence in examine(robot):
         found.setdefault(check, []).append((level, sentence))
     return found
 
@@ -82,13 +85,13 @@ def test_pressed_switches(car: GuardPlan) -> None:
     board.advance(board.now_ns() + 100_000_000)
     found = _found(car, board)
     level, sentence = found["emergency button"][0]
-    assert (level, "it is pressed" in sentence) == ("missing", True)
-    assert ("missing", "bumper is pressed, or a wire of it is wrong.") in found["sensor"]
+    assert (level, "it is pressed" in sentence) == ("bad", True)
+    assert ("bad", "bumper is pressed, or a wire of it is wrong.") in found["sensor"]
 
 
 @pytest.mark.parametrize(
     ("limit_v", "level", "words"),
-    [(6.6, "good", "V."), (50.0, "missing", "below low_battery_v, 50 V: charge")],
+    [(6.6, "good", "V."), (50.0, "bad", "below low_battery_v, 50 V: charge")],
 )
 def test_the_battery_is_measured(car: GuardPlan, limit_v: float, level: str, words: str) -> None:
     """Its voltage is compared with the limit at which the robot stops."""
@@ -111,7 +114,7 @@ def test_a_battery_that_is_not_connected(car: GuardPlan) -> None:
 
     hardware.i2c = i2c
     found = next(one for one in _found(car, board)["sensor"] if "pack" in one[1])
-    assert found == ("missing", "pack measures 0.00 V: connect its V- to the load.")
+    assert found == ("bad", "pack measures 0.00 V: connect its V- to the load.")
 
 
 def test_dead_sensors_do_not_hide_others(car: GuardPlan) -> None:
@@ -120,7 +123,7 @@ def test_dead_sensors_do_not_hide_others(car: GuardPlan) -> None:
     board.pins.dead_chips.add((1, 0x40))
     board.pins.sensors.override_distance(None, dead=True)
     found = _found(car, board)["sensor"]
-    assert [level for level, _ in found] == ["unknown", "good", "missing", "missing"]
+    assert [level for level, _ in found] == ["unknown", "good", "bad", "bad"]
     assert "receives no echo" in found[2][1]
     assert "0x40" in found[3][1]
 
@@ -134,7 +137,7 @@ def test_servo_boards(dead: bool) -> None:
         board.pins.dead_chips.add((1, 0x40))
     found = _found(plan, board)
     ((level, sentence),) = found["servo board"]
-    assert (level, "i2cdetect -y 1" in sentence) == (("missing", True) if dead else ("good", False))
+    assert (level, "i2cdetect -y 1" in sentence) == (("bad", True) if dead else ("good", False))
     assert found["resistors"] == [("good", "GPIO25, OE of the servo board, is pulled up.")]
 
 
@@ -147,7 +150,7 @@ def test_the_servos_of_a_rig_answer() -> None:
     assert (level, sentence) == ("good", f"All {len(servos)} servos answer.")
     board.pins.require_rig().break_servo(servos[0].name, "mute")
     ((level, sentence),) = _found(plan, board)["servo bus"]
-    assert (level, servos[0].name in sentence) == ("missing", True)
+    assert (level, servos[0].name in sentence) == ("bad", True)
 
 
 class _Held(MockPin):
@@ -176,15 +179,20 @@ class _Pins(RealHardware):
         return self.factory
 
 
+def _resistors(plan: GuardPlan, held: dict[int, type[_Held]]) -> list[tuple[str, str]]:
+    robot = StandingRobot(plan, hardware=lambda: _Pins(held), motors_off=True, on_twin=True)
+    return [(one.level, one.sentence) for one in examine(robot) if one.check == "resistors"]
+
+
 def test_missing_and_wrong_resistors() -> None:
     """A pin that follows the Pi's own resistor has none; one that is held high is dangerous."""
     car = load_profile(find_profile("car")).guard_plan()
-    found = list(pull_resistors(car, _Pins({22: _Held, 27: _HeldHigh})))
+    found = _resistors(car, {22: _Held, 27: _HeldHigh})
     assert ("good", "GPIO22, drive forward, is pulled down.") in found
     words = {sentence.split(",")[0]: (level, sentence) for level, sentence in found}
-    assert words["GPIO27"][0] == "missing"
+    assert words["GPIO27"][0] == "bad"
     assert "holds it high" in words["GPIO27"][1]
-    assert words["GPIO4"][0] == "missing"
+    assert words["GPIO4"][0] == "bad"
     assert "no pull-down: fit 10 kOhm to ground" in words["GPIO4"][1]
 
 
@@ -192,12 +200,12 @@ def test_missing_and_wrong_resistors() -> None:
 def test_oe_needs_a_pull_up(held: dict[int, type[_Held]], words: str) -> None:
     """Without one a servo board sends pulses while no program holds it."""
     cat = load_profile(find_profile("cat")).guard_plan()
-    ((level, sentence),) = pull_resistors(cat, _Pins(held))
-    assert level == "missing"
+    ((level, sentence),) = _resistors(cat, held)
+    assert level == "bad"
     assert f"GPIO25, OE of the servo board, {words}: fit 10 kOhm to 3.3 V" in sentence
 
 
-def test_the_doctor_examines_the_wiring(tmp_path: Path, car: GuardPlan) -> None:
+def test_the_wiring_is_examined_on_a_computer(tmp_path: Path, car: GuardPlan) -> None:
     """It does so where there are pins and buses, and the robot is not served."""
     for name in ("gpiochip0", "i2c-1"):
         (tmp_path / "dev").mkdir(exist_ok=True)
@@ -205,8 +213,8 @@ def test_the_doctor_examines_the_wiring(tmp_path: Path, car: GuardPlan) -> None:
 
     def checks(port: int, root: Path = tmp_path) -> dict[str, str]:
         board = _board(car)
-        found = examine_robot(
-            car, None, port, root, hardware=lambda: board.hardware, motors_off=True
+        found = examine(
+            StandingRobot(car, None, port, root, hardware=lambda: board.hardware, motors_off=True)
         )
         return {one.check: one.sentence for one in found}
 

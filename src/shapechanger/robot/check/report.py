@@ -1,4 +1,4 @@
-"""Report of a bench with LEDs, without names of the computer or its user."""
+"""The report of checks: a line for each finding, told at once, and a file to send."""
 
 from __future__ import annotations
 
@@ -8,22 +8,21 @@ import getpass
 import platform
 import re
 import socket
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
-from shapechanger.cli.console import say
-from shapechanger.cli.robot.leds import Bench, lamps_of
 from shapechanger.errors import OutputError
+from shapechanger.robot.check.check import MARKS, Finding
 from shapechanger.robot.new_file import write_new
 from shapechanger.robot.profile.profile import Profile
 
-_MARKS: Final = {"good": "good", "bad": "BAD", "unknown": "?"}
+_PACKAGES: Final = ("shapechanger", "gpiozero", "lgpio", "smbus2", "picamera2")
 
 
 def facts(profile: Profile, *, twin: bool, root: Path = Path("/")) -> list[str]:
-    """Return what the report tells about the machine and the robot.
+    """Return what a report tells about the machine and the robot.
 
     Args:
         profile: The robot.
@@ -45,13 +44,10 @@ def facts(profile: Profile, *, twin: bool, root: Path = Path("/")) -> list[str]:
         f"{platform.machine()}",
         f"python       {platform.python_version()}",
     ]
-    for package in ("shapechanger", "gpiozero", "lgpio", "smbus2", "picamera2"):
+    for package in _PACKAGES:
         with contextlib.suppress(PackageNotFoundError):
             lines.append(f"{package:12} {version(package)}")
-    lines.append(f"body         {profile.body}, {profile.control_hz:g} Hz")
-    for lamp in lamps_of(profile.guard_plan()):
-        lines.append(f"LED          {lamp.place}: {lamp.name}")
-    return lines
+    return [*lines, f"body         {profile.body}, {profile.control_hz:g} Hz"]
 
 
 def anonymous(text: str) -> str:
@@ -64,7 +60,7 @@ def anonymous(text: str) -> str:
     return text
 
 
-def free_name(path: Path) -> Path:
+def _free_name(path: Path) -> Path:
     """Return a path, or the next one with a number that does not exist yet."""
     number = 2
     free = path
@@ -74,55 +70,60 @@ def free_name(path: Path) -> Path:
     return free
 
 
-def run_leds(bench: Bench, profile: Profile, report: Path, *, twin: bool) -> bool:
-    """Run the bench test, print it, and write its report line by line.
+def write_report(
+    parts: Iterable[tuple[str, Iterator[Finding]]],
+    say: Callable[[str], object],
+    path: Path | None = None,
+    head: Iterable[str] = (),
+) -> bool:
+    """Run the parts of a check, and report each finding as it comes.
 
     Args:
-        bench: The bench.
-        profile: The robot.
-        report: File of the report; an existing one stays, and a number is added.
-        twin: Whether on its twin.
+        parts: Name and findings of each part.
+        say: Tells a person a line.
+        path: File that has the lines, too, without names of the computer and its user; an existing
+            one stays, and a number is added. None for no file.
+        head: First lines of the file.
 
     Returns:
-        Whether nothing of it was bad, apart from the settings of the computer.
+        Whether nothing was bad.
 
     Raises:
-        OutputError: If the report cannot be written.
+        OutputError: If the file cannot be written.
     """
-    path = free_name(report)
-    counts = dict.fromkeys(("good", "bad", "unknown"), 0)
-    good = True
-    head = ["Shapechanger: one board with LEDs in place of motors", ""]
-    with _written(path):
-        write_new(path, "\n".join([*head, *facts(profile, twin=twin), ""]).encode())
-        file = path.open("a", encoding="utf-8", buffering=1)
-    with contextlib.closing(file):
+    counts = dict.fromkeys(MARKS, 0)
+    with contextlib.ExitStack() as opened:
+        file = None
+        if path is not None:
+            path = _free_name(path)
+            with _written(path):
+                write_new(path, "\n".join(["Check of a robot", "", *head, ""]).encode())
+                file = opened.enter_context(path.open("a", encoding="utf-8", buffering=1))
 
         def tell(line: str) -> None:
-            """Write a line to the report, and print it."""
-            with _written(path):
-                file.write(f"{anonymous(line)}\n")
-            say(anonymous(line))
+            if file is not None and path is not None:
+                with _written(path):
+                    file.write(f"{anonymous(line)}\n")
+            say(line)
 
         try:
-            for part, result in bench.results():
-                if result is None:
-                    tell(f"\n{part}")
-                    continue
-                tell(f"{_MARKS[result.level]:4}  {result.name}: {result.sentence}")
-                counts[result.level] += 1
-                good = good and (result.level != "bad" or part == "wiring")
+            for part, findings in parts:
+                tell(f"\n{part}")
+                for one in findings:
+                    tell(f"{MARKS[one.level]:4}  {one.check}: {one.sentence}")
+                    counts[one.level] += 1
         except BaseException as error:
             # Also after Ctrl-C, a report is worth sending.
             why = "it was interrupted." if isinstance(error, KeyboardInterrupt) else str(error)
-            with contextlib.suppress(OSError):
-                file.write(anonymous(f"\nIt ended early: {why or type(error).__name__}\n"))
-            say(f"\n{path} has what was tested so far.")
+            if file is not None:
+                with contextlib.suppress(OSError):
+                    file.write(anonymous(f"\nIt ended early: {why or type(error).__name__}\n"))
+                say(f"\n{path} has what was checked so far.")
             raise
-        known, bad, unknown = counts.values()
-        tell(f"\n{known} good, {bad} bad, {unknown} not measured.")
-    say(f"wrote {path}: it holds no key, no network and no name of this computer")
-    return good
+        tell(f"\n{counts['good']} good, {counts['bad']} bad, {counts['unknown']} not measured.")
+    if path is not None:
+        say(f"wrote {path}: it holds no key, no network and no name of this computer")
+    return not counts["bad"]
 
 
 @contextlib.contextmanager

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.twin.oracle import ExpectedCommand, propelled, time_to_rest, unauthorised
+from shapechanger.twin.judge import ExpectedCommand, propelled, time_to_rest, unauthorised
 from shapechanger.twin.signals import Transition
 from shapechanger.twin.wiring import TwinWiring
 from tests.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc

@@ -9,9 +9,9 @@ import socket
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final, Literal
 
-from shapechanger.cli.robot.trial_driver import FAILURES, Driver
 from shapechanger.errors import LinkError, RobotError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.link.authentication import new_key
@@ -19,6 +19,7 @@ from shapechanger.link.messages import Role
 from shapechanger.remote.client import RobotClient
 from shapechanger.robot.guard.plan import LimitPlan
 from shapechanger.twin.camera import CameraFault
+from shapechanger.twin.check.driver import FAILURES, Driver
 from shapechanger.twin.network import BadNetwork
 from shapechanger.twin.robot import Operator, RunningRobot
 
@@ -35,15 +36,25 @@ class Scene:
         robot: The robot.
         driver: The driving process.
         network: The network between them.
-        operator: The operator beside the twin.
+        operator: The operator beside the twin; None on pins.
         strangers: Open connections without authentication.
     """
 
     robot: RunningRobot
     driver: Driver
     network: BadNetwork
-    operator: Operator
+    operator: Operator | None
     strangers: list[socket.socket] = field(default_factory=list[socket.socket])
+
+    def on_board(self) -> Operator:
+        """Return the operator.
+
+        Raises:
+            RobotError: If the robot is not on a twin.
+        """
+        if self.operator is None:
+            raise RobotError("Only the board of a twin has this fault.")
+        return self.operator
 
 
 # Performs an action and returns its time: monotonic, ns.
@@ -67,6 +78,7 @@ class Fault:
         silences: Whether later commands of the driver do not count.
         guards_late: Whether the guard itself fails, which adds its own promised time.
         by_policy: Whether a policy drives, as on board, and a person armed the robot for it.
+        on_pins: Whether it is also tried on the pins of a bench with LEDs.
     """
 
     name: str
@@ -80,6 +92,7 @@ class Fault:
     silences: bool = False
     guards_late: bool = False
     by_policy: bool = False
+    on_pins: bool = False
 
     def limit_ms(self, limits: LimitPlan) -> float:
         """Return the promised time to rest for these limits, ms."""
@@ -182,11 +195,11 @@ def _by_another(role: Role, act: Callable[[RobotClient], object]) -> Make:
 
 
 def _break_camera(how: CameraFault) -> Make:
-    return _now(lambda scene: scene.operator.break_camera(how))
+    return _now(lambda scene: scene.on_board().break_camera(how))
 
 
 def _mend_camera(scene: Scene) -> None:
-    scene.operator.break_camera("")
+    scene.on_board().break_camera("")
 
 
 def _list_faults() -> list[Fault]:
@@ -197,67 +210,56 @@ def _list_faults() -> list[Fault]:
         "short": "camera sends half pictures",
         "off": "camera off",
     }
+    by_deadline = partial(Fault, within_ms=20.0, after="deadline")
+    harmless = partial(by_deadline, harms=False)
+    at_once = partial(Fault, within_ms=20.0)
+    restarts = partial(Fault, then="starts afresh", on_pins=True)
     return [
-        Fault("driver killed", _to_driver(signal.SIGKILL), 20.0, "deadline"),
-        Fault("driver stopped", _to_driver(signal.SIGSTOP), 20.0, "deadline"),
+        by_deadline("driver killed", _to_driver(signal.SIGKILL), on_pins=True),
+        by_deadline("driver stopped", _to_driver(signal.SIGSTOP), on_pins=True),
         *(
-            Fault(f"policy {how}", _to_driver(number), 20.0, "deadline", by_policy=True)
+            by_deadline(f"policy {how}", _to_driver(number), by_policy=True)
             for how, number in {"is killed": signal.SIGKILL, **FAILURES}.items()
         ),
-        Fault(
+        by_deadline(
             "network silent",
             _at_once(lambda s: setattr(s.network, "silent", True)),
-            20.0,
-            "deadline",
             undo=_restore_network,
         ),
-        Fault("network reset", _at_once(lambda s: s.network.reset()), 20.0, "deadline"),
-        Fault("network half closed", _at_once(lambda s: s.network.half_close()), 20.0, "deadline"),
+        by_deadline("network reset", _at_once(lambda s: s.network.reset())),
+        by_deadline("network half closed", _at_once(lambda s: s.network.half_close())),
         # What answers an observation of a second ago is refused, so the last command that acts is
         # one that had arrived already.
-        Fault(
+        by_deadline(
             "network late by 1 s",
             _at_once(lambda s: setattr(s.network, "latency_s", _LATE_S)),
-            20.0,
-            "deadline",
             undo=_restore_network,
         ),
-        Fault(
+        at_once(
             "emergency stop by another",
             _by_another("program", lambda c: c.emergency_stop("A trial.")),
-            20.0,
             silences=True,
+            on_pins=True,
         ),
-        Fault(
-            "a person takes over", _by_another("person", lambda c: c.take()), 20.0, silences=True
+        at_once("a person takes over", _by_another("person", lambda c: c.take()), silences=True),
+        at_once(
+            "a person disarms",
+            _by_another("person", lambda c: c.disarm()),
+            silences=True,
+            on_pins=True,
         ),
-        Fault("a person disarms", _by_another("person", lambda c: c.disarm()), 20.0, silences=True),
-        Fault(
+        harmless(
             "network in slices of 1 byte",
             _at_once(lambda s: setattr(s.network, "slice_bytes", 1)),
-            20.0,
-            "deadline",
             undo=lambda s: setattr(s.network, "slice_bytes", 0),
-            harms=False,
         ),
-        *(
-            Fault(name, make, 20.0, "deadline", harms=False)
-            for name, make in (
-                ("a stranger with a wrong key", _now(_knock_with_a_wrong_key)),
-                ("a message of 1 MB", _now(_say_too_much)),
-                (
-                    "a second program commands",
-                    _by_another("program", _command_without_the_lease),
-                ),
-            )
-        ),
-        Fault(
+        harmless("a stranger with a wrong key", _now(_knock_with_a_wrong_key)),
+        harmless("a message of 1 MB", _now(_say_too_much)),
+        harmless("a second program commands", _by_another("program", _command_without_the_lease)),
+        harmless(
             "strangers who say nothing",
             _now(_connect_silently),
-            20.0,
-            "deadline",
             undo=lambda s: [stranger.close() for stranger in s.strangers],
-            harms=False,
         ),
         *(
             Fault(name, _break_camera(how), 70.0, "camera", _mend_camera, needs="camera")
@@ -265,47 +267,31 @@ def _list_faults() -> list[Fault]:
         ),
         Fault(
             "bumper pressed",
-            _now(lambda s: s.operator.press_bumper()),
+            _now(lambda s: s.on_board().press_bumper()),
             40.0,
-            undo=lambda s: s.operator.press_bumper(down=False),
+            undo=lambda s: s.on_board().press_bumper(down=False),
             needs="bumper",
         ),
         Fault(
             "emergency button",
-            _now(lambda s: s.operator.press_stop()),
+            _now(lambda s: s.on_board().press_stop()),
             40.0,
-            undo=lambda s: s.operator.press_stop(down=False),
+            undo=lambda s: s.on_board().press_stop(down=False),
             needs="button",
             silences=True,
         ),
-        Fault("daemon killed", _signal("daemon", signal.SIGKILL), 20.0, then="starts afresh"),
-        Fault(
-            "daemon stopped",
-            _signal("daemon", signal.SIGSTOP),
-            20.0,
-            "deadline",
-            then="starts afresh",
-        ),
-        Fault(
-            "guard killed",
-            _signal("guard", signal.SIGKILL),
-            100.0,
-            then="starts afresh",
-            guards_late=True,
-        ),
-        Fault(
-            "guard stopped",
-            _signal("guard", signal.SIGSTOP),
-            100.0,
-            "deadline",
-            then="starts afresh",
-            guards_late=True,
+        restarts("daemon killed", _signal("daemon", signal.SIGKILL), 20.0),
+        restarts("daemon stopped", _signal("daemon", signal.SIGSTOP), 20.0, "deadline"),
+        restarts("guard killed", _signal("guard", signal.SIGKILL), 100.0, guards_late=True),
+        restarts(
+            "guard stopped", _signal("guard", signal.SIGSTOP), 100.0, "deadline", guards_late=True
         ),
         Fault(
             "supervisor killed",
             _at_once(lambda s: s.robot.supervisor.kill()),
             100.0,
             then="is gone",
+            on_pins=True,
         ),
         # Only hardware remains: the one-shot of the enable line, 100 ms, and its tolerance.
         Fault(
@@ -315,6 +301,7 @@ def _list_faults() -> list[Fault]:
             then="is gone",
             needs="one-shot",
             guards_late=True,
+            on_pins=True,
         ),
     ]
 

@@ -12,10 +12,12 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
+from shapechanger.robot.check.check import Finding
+from shapechanger.robot.check.computer import examine
+from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.robot.hardware import RealClock
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.setup.doctor import Finding, examine_robot
 from shapechanger.robot.setup.systemd import unit_name
 from tests.robot.profile.texts import finger_text, read
 from tests.robots import write_profile
@@ -56,7 +58,7 @@ def _found(
     camera: CameraPlan | None = None,
     gives: Frame | RobotError | None = None,
 ) -> dict[str, Finding]:
-    findings = examine_robot(guard, camera, 0, root, lambda _: _Camera(gives))
+    findings = examine(StandingRobot(guard, camera, 0, root, lambda _: _Camera(gives)))
     return {finding.check: finding for finding in findings}
 
 
@@ -71,9 +73,9 @@ def _write(root: Path, name: str, text: str) -> None:
     [
         ("dtparam=strict_gpiod", "good"),
         ("dtparam=i2c_arm=on,strict_gpiod=on  # Pins of the dead go low.", "good"),
-        ("#dtparam=strict_gpiod", "missing"),
-        ("dtparam=strict_gpiod=off", "missing"),
-        ("dtparam=i2c_arm=on", "missing"),
+        ("#dtparam=strict_gpiod", "bad"),
+        ("dtparam=strict_gpiod=off", "bad"),
+        ("dtparam=i2c_arm=on", "bad"),
     ],
 )
 def test_strict_gpiod_is_read_from_the_boot_configuration(
@@ -97,10 +99,10 @@ def test_on_a_workstation_the_computer_is_unknown(tmp_path: Path) -> None:
         ("Restart=always\nExecStopPost=/x/shapechanger robot safe-pins car.toml\n", "good", ""),
         (
             "Restart=on-failure\nExecStopPost=shapechanger robot safe-pins car.toml\n",
-            "missing",
+            "bad",
             "R",
         ),
-        ("Restart=always\n", "missing", "ExecStopPost"),
+        ("Restart=always\n", "bad", "ExecStopPost"),
     ],
 )
 def test_the_systemd_unit_must_restart_and_make_safe(
@@ -116,7 +118,7 @@ def test_the_systemd_unit_must_restart_and_make_safe(
 def test_missing_safety_hardware_is_reported(tmp_path: Path) -> None:
     """A servo board without OE and motors without a one-shot are reported."""
     found = _found(tmp_path, replace(CAR, outputs=(_SERVO,)))
-    assert {found["enable line"].level, found["output enable"].level} == {"missing"}
+    assert {found["enable line"].level, found["output enable"].level} == {"bad"}
     assert _found(tmp_path, replace(CAR, enable_pin=18))["enable line"].level == "good"
 
 
@@ -125,9 +127,11 @@ def test_only_the_devices_of_the_outputs_are_checked(tmp_path: Path) -> None:
     guard = replace(CAR, outputs=(_MOTOR, _SERVO))
     _write(tmp_path, "dev/gpiochip0", "")
     sentences = {
-        f.sentence: f.level for f in examine_robot(guard, None, 0, tmp_path) if f.check == "devices"
+        f.sentence: f.level
+        for f in examine(StandingRobot(guard, None, 0, tmp_path))
+        if f.check == "devices"
     }
-    assert sorted(sentences.values()) == ["good", "missing"]
+    assert sorted(sentences.values()) == ["bad", "good"]
     assert any("raspi-config" in sentence and "i2c-1" in sentence for sentence in sentences)
     # No setting of a computer adds pins to it.
     elsewhere = _found(tmp_path / "workstation")["devices"].sentence
@@ -140,14 +144,14 @@ def test_the_camera_is_opened(tmp_path: Path) -> None:
     frame = Frame(b"\xff\xd8", 0)
     assert _found(tmp_path, camera=_CAMERA, gives=frame)["camera"].level == "good"
     broken = _found(tmp_path, camera=_CAMERA, gives=RobotError("It burns."))["camera"]
-    assert (broken.level, broken.sentence) == ("missing", "pattern: It burns.")
+    assert (broken.level, broken.sentence) == ("bad", "pattern: It burns.")
 
 
-def test_a_camera_that_hangs_does_not_hang_the_doctor(
+def test_a_camera_that_hangs_does_not_hang_the_checks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Waiting for a frame times out (see picamera2#1004)."""
-    monkeypatch.setattr("shapechanger.robot.setup.doctor._CAMERA_S", 0.01)
+    monkeypatch.setattr("shapechanger.robot.check.computer._CAMERA_S", 0.01)
     assert "no frame" in _found(tmp_path, camera=_CAMERA)["camera"].sentence
 
 
@@ -157,8 +161,8 @@ def test_a_port_in_use_is_reported(tmp_path: Path) -> None:
         taken.bind(("", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        ports = [f for f in examine_robot(CAR, None, port, tmp_path) if f.check == "port"]
-    assert [f.level for f in ports] == ["missing"]
+        ports = [f for f in examine(StandingRobot(CAR, None, port, tmp_path)) if f.check == "port"]
+    assert [f.level for f in ports] == ["bad"]
 
 
 def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
@@ -169,7 +173,7 @@ def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
     assert "plug in the adapter" in _found(tmp_path, rig)["devices"].sentence
     _write(tmp_path, "dev/ttyUSB0", "")
     _write(tmp_path, timer, "16\n")
-    assert _found(tmp_path, rig)["latency timer"].level == "missing"
+    assert _found(tmp_path, rig)["latency timer"].level == "bad"
     assert _found(tmp_path, rig)["devices"].level == "good"
     _write(tmp_path, timer, "1\n")
     assert _found(tmp_path, rig)["latency timer"].level == "good"
@@ -177,17 +181,21 @@ def test_a_slow_adapter_is_reported(tmp_path: Path) -> None:
 
 
 def test_servos_without_a_watchdog_need_a_power_switch(tmp_path: Path) -> None:
-    """The doctor requires the one-shot, and the pins that feed it."""
+    """They require the one-shot, and the pins that feed it."""
     rig = read(finger_text("Feetech")).guard_plan()
     _write(tmp_path, "dev/ttyUSB0", "")
     found = _found(tmp_path, rig)
     assert found["enable line"].level == "good"
     assert "as servos without a watchdog must" in found["enable line"].sentence
-    pins = [f.sentence for f in examine_robot(rig, None, 0, tmp_path) if "gpiochip0" in f.sentence]
+    pins = [
+        f.sentence
+        for f in examine(StandingRobot(rig, None, 0, tmp_path))
+        if "gpiochip0" in f.sentence
+    ]
     assert len(pins) == 1
     assert "does not exist" in pins[0]
     bare = _found(tmp_path, replace(rig, enable_pin=None))["enable line"]
-    assert bare.level == "missing"
+    assert bare.level == "bad"
     assert "Fit the one-shot" in bare.sentence
 
 
@@ -260,7 +268,7 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
 ) -> None:
     """Each check has a deadline, its failure is a finding, and all others are made."""
     limit_s = 0.05 if error is None else 5.0
-    monkeypatch.setattr("shapechanger.robot.setup.doctor._CAMERA_S", limit_s)
+    monkeypatch.setattr("shapechanger.robot.check.computer._CAMERA_S", limit_s)
     for name in ("dev/gpiochip0", "dev/i2c-1"):
         _write(tmp_path, name, "")
     robot = load_profile(write_profile(tmp_path).path).guard_plan()
@@ -268,21 +276,23 @@ def test_a_driver_that_hangs_or_fails_leaves_the_other_checks(
 
     def findings(stuck: _Stuck) -> list[Finding]:
         return list(
-            examine_robot(
-                guard,
-                _CAMERA,
-                0,
-                tmp_path,
-                stuck.open,
-                hardware=lambda: cast("Any", stuck),
-                motors_off=True,
-                limit_s=limit_s,
+            examine(
+                StandingRobot(
+                    guard,
+                    _CAMERA,
+                    0,
+                    tmp_path,
+                    stuck.open,
+                    hardware=lambda: cast("Any", stuck),
+                    motors_off=True,
+                    limit_s=limit_s,
+                )
             )
         )
 
     found = findings(_Stuck(where, error, freed))
     words = "No answer within|no frame within" if error is None else "Input/output|Odd"
-    assert any(re.search(words, one.sentence) for one in found if one.level == "missing")
+    assert any(re.search(words, one.sentence) for one in found if one.level == "bad")
     sound = findings(_Stuck("", None, freed))
     assert {one.check for one in found} >= {one.check for one in sound}
     assert found[-1].check == "port"

@@ -1,4 +1,4 @@
-"""Checks of the self-test, run on a twin."""
+"""Checks that drive a robot, on a twin."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.checks import SelftestResult, check_robot
+from shapechanger.robot.check.check import Finding
+from shapechanger.twin.check.driving import check_driving
 from shapechanger.twin.robot import run_robot
 from tests.robots import BLIND_CAR, CAR, IN_A_ROOM, changed, write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 
 
-def _checked(folder: Path, text: str, wired: str = "") -> dict[str, SelftestResult]:
+def _checked(folder: Path, text: str, wired: str = "") -> dict[str, Finding]:
     profile = write_profile(folder, text)
     files = folder / "robot"
     files.mkdir()
@@ -23,7 +24,7 @@ def _checked(folder: Path, text: str, wired: str = "") -> dict[str, SelftestResu
         true.mkdir()
         arguments = ("--wired-as", str(write_profile(true, wired).path), *IN_A_ROOM)
     with run_robot(profile, folder=files, arguments=arguments) as robot:
-        return {check.name: check for check in check_robot(robot, profile, 0.5)}
+        return {check.check: check for check in check_driving(robot, profile, 0.5)}
 
 
 def test_a_good_robot_passes_every_check(tmp_path: Path) -> None:

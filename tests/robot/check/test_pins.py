@@ -1,4 +1,4 @@
-"""The self-test of two pins joined by a wire."""
+"""Pins of a robot, and the test of two that are joined by a wire."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 from gpiozero.pins.mock import MockConnectedPin, MockFactory
 
-from shapechanger.cli.robot.checks import check_jumper
 from shapechanger.errors import RobotError
+from shapechanger.robot.check.pins import check_jumper, plan_of_pins, probed_pin
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.robot.hardware import RealHardware
+from shapechanger.robot.profile.load import find_profile, load_profile
 
 _PLAN = GuardPlan(
     "car",
@@ -63,3 +64,26 @@ def test_pins_of_the_robot_are_never_toggled(pair: tuple[int, int], user: str) -
     """Pins in use are refused, so that the test cannot start a motor."""
     with pytest.raises(RobotError, match=user):
         check_jumper(*pair, _PLAN)
+
+
+def test_the_plan_has_each_pin_with_its_position() -> None:
+    """A person compares it with the wires."""
+    assert plan_of_pins(_PLAN) == [
+        "pin          GPIO6 (31): bumper",
+        "pin          GPIO13 (33): bumper",
+        "pin          GPIO19 (35): enable line",
+        "pin          GPIO22 (15): drive forward",
+        "pin          GPIO26 (37): the emergency button",
+        "pin          GPIO27 (13): drive backward",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "probe", "words"),
+    [("car", 27, "used by drive backward"), ("boat", 20, "needs a motor on an H-bridge")],
+)
+def test_probes_that_cannot_measure(kind: str, probe: int, words: str) -> None:
+    """A pin of the robot, and a servo's pulses, which go on at rest."""
+    with pytest.raises(RobotError, match=words):
+        probed_pin(load_profile(find_profile(kind)).guard_plan(), probe)
+    assert probed_pin(load_profile(find_profile("tank")).guard_plan(), 20) == 17

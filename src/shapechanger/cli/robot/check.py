@@ -1,0 +1,195 @@
+"""`shapechanger robot check`: check a robot's wires, and prove that it stops."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import tyro
+
+from shapechanger.cli.console import say
+from shapechanger.cli.robot.calibrate import ask_for_wheels_up
+from shapechanger.cli.robot.setup import require_pins, require_port
+from shapechanger.errors import RobotError
+from shapechanger.robot.check.check import MARKS
+from shapechanger.robot.check.lamps import lamps_of
+from shapechanger.robot.check.pins import check_jumper, plan_of_pins
+from shapechanger.robot.check.report import facts, write_report
+from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.profile.load import find_profile, load_profile
+
+if TYPE_CHECKING:  # Starts a tenth of a second sooner.
+    from shapechanger.twin.check.levels import CheckLevel
+
+_PILOT: Final = "shapechanger.vehicles.remote.full_throttle"
+_CAP: Final = 0.2
+_PORT: Final = 5000
+
+
+@dataclass(frozen=True)
+class CheckRobot:
+    """Check a robot's computer and wires, and then, with its wheels off the ground, that it stops.
+
+    It exits with 1 if anything is bad.
+    """
+
+    profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
+    """The robot's profile."""
+    wiring: bool = False
+    """Move nothing: check the computer, the settings and the wires, and list the pins, with
+    their positions on the header."""
+    leds: bool = False
+    """Check a bench of one Pi with LEDs in place of motors, light each of them, let faults happen,
+    and write a report to send."""
+    faults: bool = False
+    """Inject every fault into the robot's twin, and judge by the ledger of its pins."""
+    twin: bool = False
+    """Check the robot's twin, without any hardware; --faults does always."""
+    port: int = _PORT
+    """Port that it will be served at."""
+    credentials: Path | None = None
+    """Folder of its key and certificate, if not the one that `init` made."""
+    motors_off: bool = False
+    """The motors' supply is off, so test the resistors that keep their drivers off, too."""
+    wheels_up: bool = False
+    """The wheels are off the ground, so do not ask."""
+    jumper: tuple[int, int] | None = None
+    """Two free BCM pins joined by a wire, an output and an input, to try first."""
+    cap: float = _CAP
+    """Largest throttle of the checks that drive, 0 to 1; faults are tried at full throttle."""
+    yes: bool = False
+    """With --leds: no motor is connected, and nobody is there to answer, so ask nothing."""
+    probe: int | None = None
+    """With --leds: a free BCM pin, joined by a wire to the pin of the motor that drives forward,
+    which measures when it stops."""
+    trials: int = 1
+    """With --faults: trials of each fault."""
+    one_shot: bool = True
+    """With --faults: whether the one-shot of the enable line is fitted, where the profile has
+    one."""
+    report: Path | None = None
+    """File of the report; leds-report.txt with --leds, and none otherwise."""
+
+    def run(self) -> None:
+        """Run the checks, report them, and exit with 1 if one is bad."""
+        profile = load_profile(find_profile(self.profile))
+        level = self._level()
+        on_twin = self.twin or self.faults
+        # Makes the output self-contained.
+        say(
+            f"shapechanger {version('shapechanger')}, {profile.name} ({profile.body}), "
+            f"{'twin' if on_twin else 'hardware'}, Python {platform.python_version()}, "
+            f"{platform.platform()}"
+        )
+        from shapechanger.twin.check.bench import Bench
+        from shapechanger.twin.check.levels import check_robot, require_level
+        from shapechanger.twin.check.trial import Trial
+
+        bench = Bench(
+            profile,
+            twin=on_twin,
+            one_shot=self.one_shot,
+            probe=self.probe,
+            # The driver that faults befall is a program.
+            arguments=("--arm-by-program",) if self.leds and not on_twin else (),
+        )
+        asks = sys.stdin.isatty() and not (self.yes or on_twin)
+        ask = ask_person if asks else ask_nobody
+        trial = Trial(bench, pilot=_PILOT, trials=self.trials, ask=ask)
+        require_level(level, trial)
+        if not on_twin:
+            self._require_consent(bench.plan, asks=asks)
+        standing = StandingRobot(
+            bench.plan,
+            profile.camera,
+            port=0 if self.leds or on_twin else self.port,
+            unit_of=profile.path.absolute(),
+            motors_off=self.motors_off or self.leds or on_twin,
+            installed=not self.leds,
+            profile=None if self.leds else profile,
+            credentials=self.credentials,
+        )
+        pins = plan_of_pins(bench.plan)
+        if self.wiring:
+            say("\n".join(["", *pins]))
+        head = [*facts(profile, twin=on_twin), *pins]
+        report = self.report
+        if self.leds:
+            lamps = lamps_of(bench.plan)
+            head += [f"LED          {lamp.place}: {lamp.name}" for lamp in lamps]
+            report = report or Path("leds-report.txt")
+        if not write_report(check_robot(level, trial, standing, self.cap), say, report, head):
+            sys.exit(1)
+
+    def _level(self) -> CheckLevel:
+        """Return the level; refuse options without an effect, and numbers that mean nothing."""
+        options: dict[CheckLevel, bool] = {
+            "wiring": self.wiring,
+            "leds": self.leds,
+            "faults": self.faults,
+        }
+        asked: list[CheckLevel] = [level for level, chosen in options.items() if chosen]
+        if len(asked) > 1:
+            raise RobotError(f"Choose one of {' and '.join(f'--{level}' for level in asked)}.")
+        level: CheckLevel = asked[0] if asked else "plain"
+        pins = "goes with none of --twin, --wiring, --leds and --faults"
+        drives_pins = level == "plain" and not self.twin
+        has_supply = level in {"plain", "wiring"} and not self.twin
+        for option, given, has, needs in (
+            ("--yes", self.yes, self.leds, "needs --leds"),
+            ("--probe", self.probe is not None, self.leds, "needs --leds"),
+            ("--trials", self.trials != 1, self.faults, "needs --faults"),
+            ("--no-one-shot", not self.one_shot, self.faults, "needs --faults"),
+            ("--cap", self.cap != _CAP, level in {"plain", "leds"}, "needs a check that drives"),
+            ("--wheels-up", self.wheels_up, drives_pins, pins),
+            ("--jumper", self.jumper is not None, drives_pins, pins),
+            ("--motors-off", self.motors_off, has_supply, pins.replace(" --wiring,", "")),
+        ):
+            if given and not has:
+                raise RobotError(f"{option} {needs}.")
+        require_port(self.port)
+        if not 0.0 < self.cap <= 1.0:
+            raise RobotError(f"The cap is above 0 and at most 1, got {self.cap}.")
+        if self.trials < 1:
+            raise RobotError(f"At least one trial is needed, got {self.trials}.")
+        return level
+
+    def _require_consent(self, plan: GuardPlan, *, asks: bool) -> None:
+        """Refuse to drive pins before a person has said that nothing can run away."""
+        if self.wiring:
+            return
+        if not self.leds:
+            if not self.wheels_up:
+                ask_for_wheels_up()
+            if self.jumper is not None:
+                say(f"{MARKS['good']}  jumper: {check_jumper(*self.jumper, plan)}")
+            return
+        require_pins(plan)
+        if not (asks or self.yes):
+            raise RobotError(
+                "All outputs will be driven: put LEDs in place of the motors, and say so with "
+                "--yes."
+            )
+        if asks and not ask_person("All outputs will be driven. Is every motor taken off?"):
+            raise RobotError("Nothing was lit.")
+
+
+def ask_nobody(_: str) -> None:
+    """Ask nothing; see `Ask`."""
+
+
+def ask_person(question: str) -> bool | None:
+    """Ask until the answer is yes or no; see `Ask`."""
+    while True:
+        try:
+            answer = input(f"{question} [y/n] ").strip().lower()
+        except EOFError:
+            return None
+        if answer in {"y", "yes", "n", "no"}:
+            return answer.startswith("y")
+        say("Answer y or n.")

@@ -1,0 +1,81 @@
+"""A policy that drives at full throttle, as the process on board does, and fails at a signal.
+
+It is a program for the trials of a robot: see `shapechanger.twin.check.driver`.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+import time
+from typing import Any, Final
+
+import numpy as np
+
+from shapechanger.demos.cloning.card import CloneCard
+from shapechanger.demos.cloning.pictures import Framing
+from shapechanger.vehicles.remote.pilot import PolicyDriver
+from shapechanger.errors import LinkError
+from shapechanger.layout import Layout
+from shapechanger.remote.client import RobotClient
+from shapechanger.twin.check.driver import FAILURES, asked_robot, print_time
+
+# Longer than the age at which a robot refuses answers to an observation.
+_LATE_S: Final = 0.5
+
+
+class FullThrottle:
+    """A policy that sees nothing and knows one command.
+
+    Args:
+        actions: Layout of the robot's actions.
+        state: Layout of its state.
+    """
+
+    def __init__(self, actions: Layout, state: Layout) -> None:
+        self.card = CloneCard(
+            framing=Framing(),
+            channels=(1,),
+            features=1,
+            eyes="none",
+            nerves=(1,),
+            action_layout=actions,
+            state_layout=state,
+        )
+        self._throttle = np.array([float(name == "throttle") for name in actions.names], np.float32)
+        self._failing = ""
+        for number in FAILURES.values():
+            signal.signal(number, self._fail)
+
+    def predict(self, picture: object, state: object = None) -> object:
+        """Return full throttle, or fail."""
+        del picture, state
+        while self._failing == "hangs":
+            time.sleep(_LATE_S)
+        if self._failing == "is late":
+            time.sleep(_LATE_S)
+        if self._failing == "gives NaN":
+            return math.nan * self._throttle
+        print_time()
+        return self._throttle
+
+    def _fail(self, number: int, _: object) -> None:
+        self._failing = next(how for how, one in FAILURES.items() if one == number)
+
+
+def main() -> None:
+    """Drive until the link or this process ends."""
+    robot = asked_robot()
+    with RobotClient.connect(robot, frames=False) as client:
+        actions = Layout.from_json(client.welcome.action_layout)
+        state = Layout.from_json(client.welcome.state_layout)
+    policy: Any = FullThrottle(actions, state)
+    PolicyDriver(policy, "policy", robot).run()
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except LinkError as error:
+        sys.exit(str(error))

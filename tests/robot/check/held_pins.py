@@ -1,0 +1,31 @@
+"""Pins that stay as they are, and robots that have them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gpiozero.pins.mock import MockFactory, MockPWMPin
+
+from shapechanger.robot.hardware import RealHardware
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.profile.profile import Profile
+
+
+def shipped(kind: str) -> Profile:
+    """Load a profile that comes with Shapechanger."""
+    return load_profile(find_profile(kind))
+
+
+class HeldPins(RealHardware):
+    """gpiozero's mock pins, which stay as they are when they are closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.factory: Any = MockFactory(pin_class=MockPWMPin)
+
+    def pin_factory(self) -> Any:
+        """Return the factory of the pins."""
+        return self.factory
+
+    def close(self) -> None:
+        """Leave the pins open."""
