@@ -15,11 +15,11 @@ import numpy as np
 
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import Framing
-from shapechanger.vehicles.remote.pilot import PolicyDriver
 from shapechanger.errors import LinkError
 from shapechanger.layout import Layout
 from shapechanger.remote.client import RobotClient
 from shapechanger.twin.check.driver import FAILURES, asked_robot, print_time
+from shapechanger.vehicles.remote.pilot import PolicyDriver
 
 # Longer than the age at which a robot refuses answers to an observation.
 _LATE_S: Final = 0.5
