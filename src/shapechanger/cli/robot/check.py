@@ -41,8 +41,8 @@ class CheckRobot:
     profile: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PROFILE")]
     """The robot's profile."""
     wiring: bool = False
-    """Move nothing: check the computer, the settings and the wires, and list the pins, with
-    their positions on the header."""
+    """Move nothing: check the computer, the settings and the wires, and list the pins with their
+    positions on the header."""
     leds: bool = False
     """Check a bench of one Pi with LEDs in place of motors, light each of them, let faults happen,
     and write a report to send."""
@@ -168,6 +168,7 @@ class CheckRobot:
                 ask_for_wheels_up()
             if self.jumper is not None:
                 say(f"{MARKS['good']}  jumper: {check_jumper(*self.jumper, plan)}")
+            require_pins(plan)
             return
         require_pins(plan)
         if not (asks or self.yes):

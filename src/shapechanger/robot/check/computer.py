@@ -20,7 +20,7 @@ from shapechanger.robot.check.check import (
     run_checks,
 )
 from shapechanger.robot.check.standing import StandingRobot
-from shapechanger.robot.check.wiring import check_encoders, wiring_checks
+from shapechanger.robot.check.wiring import wiring_checks
 from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.setup.computer import (
@@ -278,7 +278,6 @@ _COMPUTER: Final = (
     Check("camera", _camera, ("camera",)),
     Check("camera's geometry", _geometry, ("camera",)),
     Check("I2C speed", _bus_speed, ("encoders",)),
-    Check("encoders", check_encoders, ("encoders", "hardware")),
 )
 _LAST: Final = (
     Check("wiring", _served),

@@ -169,7 +169,7 @@ def _servo_bus(robot: StandingRobot) -> Results:
     yield "good", f"All {len(servos)} servos answer."
 
 
-def check_encoders(robot: StandingRobot) -> Results:
+def _encoders(robot: StandingRobot) -> Results:
     """Check the magnets of the encoders at the joints, where their bus can be opened."""
     from shapechanger.robot.drivers.as5600 import connect_encoders
 
@@ -219,4 +219,5 @@ def wiring_checks(robot: StandingRobot) -> list[Check[StandingRobot]]:
             if plan.driver not in {"as5600", DRIVER} and robot.can_read(plan)
         ),
         Check("servo bus", _servo_bus, ("hardware",)),
+        Check("encoders", _encoders, ("encoders", "hardware")),
     ]
