@@ -106,8 +106,7 @@ def start_alike(worlds: WarpVectorEnv, alone: list[Any], seed: int) -> list[Any]
         env.reset(seed=seed, options=options)
         env._t = batch.kind.task._times[i]
         env._look()
-        distance = float(np.linalg.norm(env.plant.fingertip - env._points[0]))
-        begun.append((env._observation(env._senses), env._info(distance)))
+        begun.append((env._observation(env._senses), env._info()))
     return begun
 
 
@@ -174,7 +173,7 @@ def test_a_step_from_the_same_state_has_the_same_results(
             for env, action in zip(alone, rng.uniform(-1.2, 1.2, shape), strict=True):
                 env.step(action.astype(np.float32))
         if isinstance(alone[0], FingerTrackEnv):
-            alone[0]._steps, alone[0]._counted, alone[0]._squares = 40, 15, 15 * 0.002**2
+            alone[0]._steps, alone[0]._squares = 40, 15 * 0.002**2
         else:  # Where it has to be, for the tenth time if it stays.
             alone[0]._target, alone[0]._steps_near = alone[0].plant.fingertip, 9
         copy_states(worlds, alone)
