@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 import simplejpeg
 
-from shapechanger.demos.dataset import decode_picture
 from shapechanger.demos.episodes import DRIVERS, Driver, Episode, Step
+from shapechanger.demos.jpeg import decode_picture
 from shapechanger.demos.overlay import COLOURS
 from shapechanger.demos.statistics import Distribution, EpisodeStatistics, gaps_s, spread, summary
 from shapechanger.errors import DemosError

@@ -13,7 +13,7 @@ from PIL import Image
 
 from shapechanger.demos.episodes import Step
 from shapechanger.demos.exchange import ImportContext, export_recording, import_recording
-from shapechanger.demos.exchange.lerobot import FORMAT
+from shapechanger.demos.exchange.lerobot import read_lerobot
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Layout
 from tests.demos.exchange.lerobot_set import CAMERA, SIZE, VIDEO, pairs_of, write_set, write_video
@@ -101,7 +101,7 @@ def test_a_picture_that_steps_share_is_stored_once(tmp_path: Path) -> None:
 
     folder = write_set(tmp_path / "set", rows=spoil, **stored(images))
     context = ImportContext()
-    rows = [list(episode.rows) for episode in FORMAT.read(folder, context)]
+    rows = [list(episode.rows) for episode in read_lerobot(folder, context)]
     assert [[row.jpeg is not None for row in episode] for episode in rows] == [
         [True, False, False, False, True, False, False],
         [True, False, False, False] * 2,

@@ -14,7 +14,7 @@ import pytest
 from minari.serialization import serialize_space
 
 from shapechanger.demos.exchange import ImportContext, export_recording, import_recording
-from shapechanger.demos.exchange.minari import FORMAT
+from shapechanger.demos.exchange.minari import read_minari
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 from tests.demos.exchange.small import all_of, drive
@@ -71,7 +71,7 @@ def _observe(group: h5py.Group, name: str, space: gym.Space[Any]) -> None:
 def actions_of(folder: Path) -> tuple[list[list[int]], ImportContext]:
     """Return the actions of each episode, and the findings."""
     context = ImportContext()
-    episodes = [list(episode.rows) for episode in FORMAT.read(folder, context)]
+    episodes = [list(episode.rows) for episode in read_minari(folder, context)]
     return [[int(row.step.action[0]) for row in rows] for rows in episodes], context
 
 

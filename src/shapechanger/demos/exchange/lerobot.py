@@ -221,7 +221,7 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
     return Layout(tuple(found)).to_json() if found else ""
 
 
-def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+def read_lerobot(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a dataset."""
     path = folder / INFO
     info = parse_json_object(read_text(path), str(path))
@@ -453,7 +453,7 @@ FORMAT: Final = Format(
     title="LeRobot",
     sign=INFO,
     detect=lambda folder: (folder / INFO).is_file(),
-    read=_read,
+    read=read_lerobot,
     write=write,
     options=frozenset({"camera", "task", "images"}),
     consecutive=True,

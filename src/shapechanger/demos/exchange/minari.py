@@ -92,7 +92,7 @@ def _data_folder(folder: Path) -> Path | None:
     return next((p for p in (folder / DATA, folder) if (p / METADATA).is_file()), None)
 
 
-def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+def read_minari(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a dataset."""
     place = _data_folder(folder) or folder
     path = place / METADATA
@@ -402,7 +402,7 @@ FORMAT: Final = Format(
     title="Minari",
     sign=f"{DATA}/{METADATA}",
     detect=lambda folder: _data_folder(folder) is not None,
-    read=_read,
+    read=read_minari,
     write=write_minari,
     options=frozenset({"hz", "dropped"}),
     consecutive=True,
