@@ -111,18 +111,10 @@ def test_a_finger_loads_few_modules() -> None:
 
 def test_missing_mujoco_names_the_extra() -> None:
     """Without MuJoCo, making an env raises an error with the command that installs it."""
-    plain = (*_IDS, *_FINGERS)
-    lines = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=plain)).splitlines()
+    every = (*_IDS, *_FINGERS, *_VEHICLES)
+    lines = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=every)).splitlines()
     sentence = "This needs mujoco, which is not installed: run `pip install 'shapechanger[sim]'`."
-    assert lines == [sentence] * len(plain)
-
-
-def test_missing_mujoco_names_both_extras_for_vehicles() -> None:
-    """Vehicles need the extras `sim` and `robot`."""
-    lines = _run(_BLOCK.format(blocked="mujoco") + _MAKE.format(ids=_VEHICLES)).splitlines()
-    sentence = "This needs mujoco, which is not installed: "
-    sentence += "run `pip install 'shapechanger[sim,robot]'`."
-    assert lines == [sentence] * len(_VEHICLES)
+    assert lines == [sentence] * len(every)
 
 
 @pytest.mark.parametrize("blocked", ["glfw", "imageio"])

@@ -9,8 +9,11 @@ from typing import Final
 import shapechanger
 
 PACKAGE: Final = Path(shapechanger.__file__).parent
-# The validity of a certificate is a calendar date.
-MAY: Final = {PACKAGE / "robot" / "daemon" / part for part in ("credentials.py", "recorder.py")}
+# The validity of a certificate and the day of a recording or a report are calendar dates.
+MAY: Final = {
+    PACKAGE / "robot" / part
+    for part in ("check/report.py", "daemon/credentials.py", "daemon/recorder.py")
+}
 WALL: Final = {
     "time.time",
     "time.time_ns",
@@ -52,7 +55,7 @@ def test_the_search_finds_each_spelling() -> None:
 
 
 def test_no_wall_clock() -> None:
-    """Only certificates and the dates of recordings read the calendar."""
+    """Only certificates and the dates of recordings and reports read the calendar."""
     reads = {
         str(path.relative_to(PACKAGE)): found
         for path in FILES
