@@ -126,7 +126,7 @@ ROBOTS: Final = (
         _INERTIA,
     ),
     _Robot(f"{_URDF}/panda_description/urdf/panda.urdf", _MOTORS, _INERTIA),
-    # Its file allows 10 N·m, at which it diverges; its servos have 3 N·m.
+    # Its file allows 10 N·m, at which it diverges. A Feetech STS3215 stalls at 30 kg·cm (12 V).
     _Robot(f"{_URDF}/so_arm_description/urdf/so101.urdf", (AddMotor("*", 3.0),), _INERTIA),
     # 12 joints of its hands follow others.
     _Robot(f"{_URDF}/talos_data/robots/talos_full_v2.urdf", _MOTORS, _INERTIA),

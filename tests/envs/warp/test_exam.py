@@ -20,6 +20,7 @@ from tests.envs.warp.side_by_side import (
     many,
     names_of,
     set_all,
+    tolerance,
     visited,
 )
 
@@ -54,7 +55,7 @@ def test_a_step_from_the_same_state_has_the_same_results(
         for i, env in enumerate(alone):
             observation, reward, ended, _, info = env.step(actions[i])
             # A world that has ended is observed at its next start.
-            assert apart(infos["final_obs"][i], observation) < OBSERVATION_TOLERANCE
+            assert apart(infos["final_obs"][i], observation) < tolerance(worlds)
             assert apart(rewards[i], reward) < REWARD_TOLERANCE
             assert bool(terminated[i]) == ended
             assert names_of(infos) == set(info)

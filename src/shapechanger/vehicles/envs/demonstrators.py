@@ -164,11 +164,11 @@ def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
 
 
 def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
-    """Return an action that moves a vehicle which stands, unless its throttle is exactly 0.
+    """Return an action that moves a standing vehicle, unless its throttle is exactly 0.
 
     A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest.
-    The vehicle then sees the same for ever, and stands for good. The exploration of the training
-    moved it, so that the training hardly saw this.
+    The vehicle then observes the same numbers indefinitely and stands for good. In training,
+    exploration moved it, so training hardly saw this.
 
     Args:
         action: Steering and throttle, shape (2,).
