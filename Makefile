@@ -32,7 +32,7 @@ SITE := NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
 # slows the others down by a third, and they add nothing to it.
 COVERING := test_architecture.py contract/test_drive.py test_errors.py test_layout.py envs/stepping envs/vector \
 	finger/identify finger/paths finger/task \
-	laws link morphology robot/guard robot/profile tasks transfer/body_map transfer/metrics
+	laws morphology robot/guard robot/link robot/profile tasks transfer/body_map transfer/metrics
 COVERING := $(addprefix tests/,$(COVERING))
 
 VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \

@@ -21,7 +21,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from benchmarks.row import Row
 from shapechanger.robot.profile.load import load_profile
-from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from tests.robots import CAR, IN_A_ROOM
 
 SECONDS: Final = 35.0

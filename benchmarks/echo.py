@@ -22,15 +22,15 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from shapechanger.layout import Feature, Layout
-from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known_robots import KnownRobot
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard import messages as wire
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
-from shapechanger.twin.camera import with_capture_time
+from shapechanger.robot.twin.camera import with_capture_time
 
 _HZ = 100.0
 # A robot accepts 500 messages per second and closes the connection of a client that sends more.

@@ -18,7 +18,11 @@ from pathlib import Path
 
 from shapechanger.errors import LinkError
 from shapechanger.layout import Feature, Layout
-from shapechanger.link.messages import (
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.daemon.session import Authenticator, MessageRate, Session
+from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.link.messages import (
     VERSION,
     Acknowledge,
     Arm,
@@ -38,10 +42,6 @@ from shapechanger.link.messages import (
     Undo,
     encode,
 )
-from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.session import Authenticator, MessageRate, Session
-from shapechanger.robot.guard.messages import Order
 
 ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
 PLAN = DaemonPlan(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from shapechanger.remote.env import RemoteVehicleEnv
-from shapechanger.twin.robot import Operator
+from shapechanger.robot.client.env import RemoteVehicleEnv
+from shapechanger.robot.twin.robot import Operator
 from shapechanger.vehicles.envs.evaluation import LIMIT_S, METRES, Act, DriveResult
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 

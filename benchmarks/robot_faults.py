@@ -22,9 +22,9 @@ import shapechanger
 from benchmarks.row import Row, asked
 from shapechanger.errors import RobotError
 from shapechanger.robot.profile.load import load_profile
-from shapechanger.twin.check.bench import Bench
-from shapechanger.twin.check.faults import FAULTS, Fault
-from shapechanger.twin.check.trial import Trial
+from shapechanger.robot.twin.check.bench import Bench
+from shapechanger.robot.twin.check.faults import FAULTS, Fault
+from shapechanger.robot.twin.check.trial import Trial
 from tests.robots import CAR
 
 TRIALS: Final = 100

@@ -24,7 +24,7 @@ from benchmarks.echo import EchoRobot
 from benchmarks.row import Row
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from tests.robots import CAR
 
 ROUND_TRIPS: Final = 3_000

@@ -22,9 +22,9 @@ from benchmarks.waypoints import taught_source
 from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.layout import Layout
-from shapechanger.remote.env import RemoteVehicleEnv
+from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.twin.robot import run_robot
+from shapechanger.robot.twin.robot import run_robot
 from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
 from shapechanger.vehicles.envs.evaluation import METRES, Act, DriveResult, DriveScore, drive
 

@@ -16,7 +16,7 @@ import tyro
 import shapechanger  # noqa: F401  # Registers the ids.
 from shapechanger.robot.guard.plan import output_values
 from shapechanger.robot.profile import load_profile
-from shapechanger.twin.robot import run_robot
+from shapechanger.robot.twin.robot import run_robot
 
 PROFILE = """
 [robot]

@@ -401,14 +401,14 @@ MODULES: Final = (
     "shapechanger.finger.reach",
     "shapechanger.finger.remote",
     "shapechanger.finger.track",
-    "shapechanger.remote.env",
+    "shapechanger.robot.client.env",
     "shapechanger.vehicles.remote.waypoints",
-    "shapechanger.remote.client",
-    "shapechanger.remote.known_robots",
-    "shapechanger.link.messages",
+    "shapechanger.robot.client.client",
+    "shapechanger.robot.client.known_robots",
+    "shapechanger.robot.link.messages",
     "shapechanger.transfer.study",
     "shapechanger.transfer.learners.policy_file",
-    "shapechanger.twin.robot",
+    "shapechanger.robot.twin.robot",
 )
 """Modules of the reference besides the packages: they hold public names that no package exports."""
 

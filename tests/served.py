@@ -7,13 +7,13 @@ from contextlib import contextmanager
 from typing import Any, Literal
 
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Observation
-from shapechanger.remote.client import RobotClient
-from shapechanger.twin.judge import propelled
-from shapechanger.twin.robot import Operator, RunningRobot
-from shapechanger.twin.signals import read_ledger
-from shapechanger.twin.wiring import TwinWiring
-from tests.twin.robots import until
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.link.messages import Observation
+from shapechanger.robot.twin.judge import propelled
+from shapechanger.robot.twin.robot import Operator, RunningRobot
+from shapechanger.robot.twin.signals import read_ledger
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.robots import until
 
 Clock = Literal["twin", "real"]
 

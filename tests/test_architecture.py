@@ -49,7 +49,7 @@ def test_no_file_is_longer_than_600_lines() -> None:
     [
         ("shapechanger", _HEAVY | _SIMULATORS | {"tyro", "rich", "scipy", "tensorboard"}),
         ("shapechanger.transfer", _SIMULATORS | {"matplotlib"}),
-        ("shapechanger.link", _HEAVY | _SIMULATORS),
+        ("shapechanger.robot.link", _HEAVY | _SIMULATORS),
         ("shapechanger.robot", _HEAVY | _SIMULATORS),
     ],
 )

@@ -70,7 +70,7 @@ if TYPE_CHECKING:
         reshape,
     )
     from shapechanger.morphology.certificate import Certificate, certify
-    from shapechanger.remote.client import RobotClient
+    from shapechanger.robot.client.client import RobotClient
     from shapechanger.transfer import BodyMap, TransferTask
     from shapechanger.transfer.learners.policy_file import save_policy
     from shapechanger.transfer.policies import load_policy
@@ -144,7 +144,7 @@ _MODULES: Final = {
         "register_edit",
     ),
     "morphology.certificate": ("Certificate", "certify"),
-    "remote.client": ("RobotClient",),
+    "robot.client.client": ("RobotClient",),
     "transfer": ("BodyMap", "TransferTask"),
     "transfer.learners.policy_file": ("save_policy",),
     "transfer.policies": ("load_policy",),

@@ -14,7 +14,7 @@ import pytest
 from shapechanger.errors import RobotRefused
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.vehicles.envs import WaypointEnv
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 

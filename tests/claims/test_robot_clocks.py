@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.link.messages import Observation
+from shapechanger.robot.link.messages import Observation
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.robot import RunningRobot, run_robot
-from shapechanger.twin.signals import read_ledger
-from shapechanger.twin.wiring import TwinWiring
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.twin.signals import read_ledger
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.robots import until
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import Clock, Served, driving
-from tests.twin.robots import until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 

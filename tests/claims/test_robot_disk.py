@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.twin.robot import run_robot
-from shapechanger.twin.wiring import TwinWiring
+from shapechanger.robot.twin.robot import run_robot
+from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robots import IN_A_ROOM, write_profile
 from tests.served import driving
 

@@ -14,12 +14,12 @@ import pytest
 from shapechanger.errors import LinkError
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.robot import RunningRobot, run_robot
-from shapechanger.twin.wiring import TwinWiring, WiredOutput
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.twin.wiring import TwinWiring, WiredOutput
 from shapechanger.vehicles.remote.discrete_driving import FOUR_WAYS, DiscreteDriving
 from tests.robot.profile.texts import HOVERCRAFT
+from tests.robot.twin.robots import until
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
-from tests.twin.robots import until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 

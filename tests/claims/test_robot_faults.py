@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.twin.check.bench import Bench
-from shapechanger.twin.check.faults import FAULTS
-from shapechanger.twin.check.trial import Trial
-from shapechanger.twin.signals import Transition, read_ledger
+from shapechanger.robot.twin.check.bench import Bench
+from shapechanger.robot.twin.check.faults import FAULTS
+from shapechanger.robot.twin.check.trial import Trial
+from shapechanger.robot.twin.signals import Transition, read_ledger
 from tests.robots import write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]

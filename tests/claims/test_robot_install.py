@@ -13,7 +13,7 @@ from typing import Final
 import pytest
 
 from tests.drawing import missing
-from tests.twin.robots import until
+from tests.robot.twin.robots import until
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 SPARED: Final = ("torch", "cv2", "mujoco", "matplotlib", "stable_baselines3", "ray", "pandas")

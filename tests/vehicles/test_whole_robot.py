@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.layout import Layout
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.twin.in_process import InProcessRobot
+from shapechanger.robot.twin.in_process import InProcessRobot
 from shapechanger.vehicles.courses.course import HOME
 from shapechanger.vehicles.envs import VehicleEnv
 from shapechanger.vehicles.world import MujocoWorld

@@ -7,8 +7,8 @@ from typing import Any
 from lerobot.teleoperators import Teleoperator
 
 from lerobot_robot_shapechanger.config import ShapechangerConsoleConfig
-from lerobot_robot_shapechanger.link import Link, named
-from shapechanger.remote.operator import Takeover
+from lerobot_robot_shapechanger.robot.link import Link, named
+from shapechanger.robot.client.operator import Takeover
 
 
 class ShapechangerConsole(Teleoperator):

@@ -9,11 +9,11 @@ from typing import Final
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
 
 from shapechanger.errors import LinkError, RobotRefused
-from shapechanger.link.messages import Welcome
-from shapechanger.remote.client import RobotClient
-from shapechanger.remote.inbox import Received
-from shapechanger.remote.known_robots import known_names, recall
-from shapechanger.remote.observations import RobotSpaces
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.known_robots import known_names, recall
+from shapechanger.robot.client.observations import RobotSpaces
+from shapechanger.robot.link.messages import Welcome
 
 _NO_CAMERA: Final = (160, 120)  # Size of the pictures that a robot without a camera never sends.
 

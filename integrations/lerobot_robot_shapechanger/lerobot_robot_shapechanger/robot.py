@@ -10,13 +10,13 @@ from typing import Any, Final
 from lerobot.robots import Robot
 
 from lerobot_robot_shapechanger.config import ShapechangerConfig
-from lerobot_robot_shapechanger.link import Link, named
+from lerobot_robot_shapechanger.robot.link import Link, named
 from shapechanger.errors import RobotRefused, SpaceMismatch, UnknownName
-from shapechanger.link.messages import Observation
-from shapechanger.remote.client import RobotClient
-from shapechanger.remote.inbox import Received
-from shapechanger.remote.observations import IMAGE, RobotSpaces
-from shapechanger.remote.operator import Takeover, interruption
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.observations import IMAGE, RobotSpaces
+from shapechanger.robot.client.operator import Takeover, interruption
+from shapechanger.robot.link.messages import Observation
 
 CAMERA: Final = "camera"
 """Name of the picture in an observation."""

@@ -18,10 +18,10 @@ os.environ["HF_LEROBOT_HOME"] = str(Path(_HOME.name) / "lerobot")
 os.environ["HF_HUB_OFFLINE"] = "1"
 os.environ["XDG_CONFIG_HOME"] = str(Path(_HOME.name) / "config")
 
-from shapechanger.link.messages import Observation  # noqa: E402
-from shapechanger.remote.known_robots import remember  # noqa: E402
+from shapechanger.robot.client.known_robots import remember  # noqa: E402
+from shapechanger.robot.link.messages import Observation  # noqa: E402
 from shapechanger.robot.profile.load import find_profile  # noqa: E402
-from shapechanger.twin.robot import RunningRobot, run_robot  # noqa: E402
+from shapechanger.robot.twin.robot import RunningRobot, run_robot  # noqa: E402
 
 LAB_CAR = "lab-car"
 

@@ -23,9 +23,9 @@ from lerobot_robot_shapechanger import (
     ShapechangerConsoleConfig,
 )
 from shapechanger.errors import LinkError, RobotRefused, SpaceMismatch, UnknownName
-from shapechanger.link import messages as m
-from shapechanger.remote.known_robots import forget, remember
-from shapechanger.twin.robot import RunningRobot
+from shapechanger.robot.client.known_robots import forget, remember
+from shapechanger.robot.link import messages as m
+from shapechanger.robot.twin.robot import RunningRobot
 
 AHEAD = {"steering": 0.25, "throttle": 0.5}
 BACK = (-0.5, -0.4)

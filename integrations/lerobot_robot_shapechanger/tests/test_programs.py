@@ -18,7 +18,7 @@ from lerobot.scripts.lerobot_teleoperate import TeleoperateConfig, teleoperate
 
 from lerobot_robot_shapechanger import ShapechangerConfig, ShapechangerConsoleConfig
 from shapechanger.errors import LinkError
-from shapechanger.twin.robot import RunningRobot
+from shapechanger.robot.twin.robot import RunningRobot
 
 from .conftest import served
 from .stick import Stick, StickConfig

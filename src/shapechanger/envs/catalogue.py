@@ -250,7 +250,7 @@ def register_all() -> None:
             "shapechanger.finger.remote:RemoteFingerTrackEnv",
             track.episode_steps,
         ),
-        (REMOTE_VEHICLE, "shapechanger.remote.env:RemoteVehicleEnv", None),
+        (REMOTE_VEHICLE, "shapechanger.robot.client.env:RemoteVehicleEnv", None),
         (REMOTE_WAYPOINT, "shapechanger.vehicles.remote.waypoints:RemoteWaypointEnv", None),
     ):
         _register(env_id, entry_point, limit, nondeterministic=True)  # A robot.

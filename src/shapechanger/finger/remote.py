@@ -25,10 +25,10 @@ from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.finger.rig import LengthApproach, RigSenses, StartApproach
 from shapechanger.finger.task import FingerSenses
 from shapechanger.finger.track import FingerTrackEnv
-from shapechanger.link.messages import Pace
-from shapechanger.remote.env import KNOWN_ROBOT, RemoteVehicleEnv
+from shapechanger.robot.client.env import KNOWN_ROBOT, RemoteVehicleEnv
+from shapechanger.robot.link.messages import Pace
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.twin.robot import Operator, RunningRobot, run_robot
+from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
 
 NOMINAL_TWIN: Final = "nominal"
 """Name of the twin with the parameters of the nominal finger."""

@@ -17,7 +17,7 @@ from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.tensions import drive_of
 
 if TYPE_CHECKING:
-    from shapechanger.twin.servos.rig import Rig
+    from shapechanger.robot.twin.servos.rig import Rig
 
 # N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
 _CABLE_STIFFNESS: Final = 20e3

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from shapechanger.contract.world import World
 from shapechanger.errors import MissingExtra
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.twin.world.place import Place
+from shapechanger.robot.twin.world.place import Place
 
 
 def course_place(world: str, vehicle: str, lenses: Sequence[str] = ()) -> Place:

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
-from shapechanger.remote.known_robots import KnownRobot, remember
-from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.client.known_robots import KnownRobot, remember
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from tests.cli.robot.typing import Person
-from tests.remote.robot import eventually
+from tests.robot.client.robot import eventually
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]

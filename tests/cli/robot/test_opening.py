@@ -12,9 +12,9 @@ from shapechanger.cli import main
 from shapechanger.cli.robot import key as opening
 from shapechanger.cli.robot.key import can_open, open_console
 from shapechanger.errors import LinkError
-from shapechanger.link.authentication import new_key
-from shapechanger.remote.known_robots import KnownRobot, remember
-from shapechanger.twin.robot import run_robot
+from shapechanger.robot.client.known_robots import KnownRobot, remember
+from shapechanger.robot.link.authentication import new_key
+from shapechanger.robot.twin.robot import run_robot
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
 
 pytestmark = pytest.mark.realtime

@@ -14,9 +14,9 @@ from shapechanger.finger.gap import GAPS
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.robot import Operator
-from shapechanger.twin.start import start_board
-from shapechanger.twin.world.place import Place
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.start import start_board
+from shapechanger.robot.twin.world.place import Place
 from shapechanger.vehicles.twin import course_place
 from tests.robots import CAR, changed, write_profile
 

@@ -23,9 +23,9 @@ from shapechanger.demos.episodes import (
     repair,
 )
 from shapechanger.errors import DemosError
-from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known_robots import KnownRobot, remember
-from tests.remote.test_real_daemon import Served
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.known_robots import KnownRobot, remember
+from tests.robot.client.test_real_daemon import Served
 from tests.robot.daemon.plans import ACTIONS, picture
 
 pytestmark = pytest.mark.realtime
@@ -47,7 +47,7 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture
 def robot(there: Path) -> Iterator[RobotClient]:
     """A connection to the robot."""
-    from shapechanger.remote.known_robots import recall
+    from shapechanger.robot.client.known_robots import recall
 
     with RobotClient.connect(recall("car"), frames=False) as client:
         yield client
@@ -241,7 +241,7 @@ def test_a_running_recording_is_skipped(
     there: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A message says so."""
-    from shapechanger.remote.known_robots import recall
+    from shapechanger.robot.client.known_robots import recall
 
     with RobotClient.connect(recall("car"), role="person") as person:
         began = person.record()

@@ -9,9 +9,9 @@ import pytest
 from shapechanger.cli import main
 from shapechanger.cli.robot.fetch import recorded
 from shapechanger.demos.episodes import episodes_of, read_episode
-from shapechanger.link.messages import Observation
-from shapechanger.remote.known_robots import KnownRobot, remember
-from shapechanger.twin.robot import run_robot
+from shapechanger.robot.client.known_robots import KnownRobot, remember
+from shapechanger.robot.link.messages import Observation
+from shapechanger.robot.twin.robot import run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.cli.robot.typing import Person
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile

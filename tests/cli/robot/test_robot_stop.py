@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.remote.client import RobotClient
-from shapechanger.remote.known_robots import KnownRobot, recall, remember
-from shapechanger.twin.robot import run_robot
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.known_robots import KnownRobot, recall, remember
+from shapechanger.robot.twin.robot import run_robot
 from tests.cli.robot.typing import Person
 from tests.robots import BLIND_CAR, IN_A_ROOM, write_profile
 from tests.served import driving

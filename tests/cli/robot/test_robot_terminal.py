@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapechanger.remote.env import RemoteVehicleEnv
-from shapechanger.remote.known_robots import KnownRobot, remember
-from shapechanger.twin.robot import run_robot
+from shapechanger.robot.client.env import RemoteVehicleEnv
+from shapechanger.robot.client.known_robots import KnownRobot, remember
+from shapechanger.robot.twin.robot import run_robot
 from tests.cli.robot.typing import Person
-from tests.remote.robot import eventually
+from tests.robot.client.robot import eventually
+from tests.robot.client.sequences import UNKNOWN
 from tests.robots import CAR, IN_A_ROOM, PATIENT_CAR, changed, write_profile
-from tests.teleop.sequences import UNKNOWN
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 

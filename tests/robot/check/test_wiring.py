@@ -16,9 +16,9 @@ from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.twin.in_process import LocalBoard
-from shapechanger.twin.wiring import TwinWiring
-from shapechanger.twin.world.vehicle import DrivingWorld
+from shapechanger.robot.twin.in_process import LocalBoard
+from shapechanger.robot.twin.wiring import TwinWiring
+from shapechanger.robot.twin.world.vehicle import DrivingWorld
 from tests.robots import write_profile
 
 

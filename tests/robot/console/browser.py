@@ -11,11 +11,11 @@ import msgspec
 from playwright.sync_api import Browser, Page, TimeoutError
 
 from shapechanger.robot.profile.load import load_profile
-from shapechanger.twin.judge import propelled
-from shapechanger.twin.robot import RunningRobot
-from shapechanger.twin.signals import Transition
-from shapechanger.twin.wiring import TwinWiring
-from tests.twin.robots import until
+from shapechanger.robot.twin.judge import propelled
+from shapechanger.robot.twin.robot import RunningRobot
+from shapechanger.robot.twin.signals import Transition
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.robots import until
 
 DESK: Final[dict[str, Any]] = {"viewport": {"width": 1280, "height": 800}}
 PHONE: Final[dict[str, Any]] = {

@@ -10,7 +10,7 @@ from typing import Literal
 import pytest
 from playwright.sync_api import Browser
 
-from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from tests.robot.console.browser import Console
 from tests.robots import CAR, IN_A_ROOM, write_profile
 

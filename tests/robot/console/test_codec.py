@@ -10,9 +10,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from shapechanger.link import messages as m
-from shapechanger.link.authentication import make_proof, new_key, parse_key
-from shapechanger.twin.robot import RunningRobot
+from shapechanger.robot.link import messages as m
+from shapechanger.robot.link.authentication import make_proof, new_key, parse_key
+from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.console.browser import Console
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Error
 
-from shapechanger.twin.robot import RunningRobot
+from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.console.browser import PHONE, Console, Pins
-from tests.twin.robots import until
+from tests.robot.twin.robots import until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 

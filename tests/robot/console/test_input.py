@@ -8,9 +8,9 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import CDPSession
 
-from shapechanger.twin.robot import RunningRobot
+from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.console.browser import Console
-from tests.twin.robots import until
+from tests.robot.twin.robots import until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 

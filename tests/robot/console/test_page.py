@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Route
 
-from shapechanger.link.authentication import new_key
-from shapechanger.twin.robot import RunningRobot
+from shapechanger.robot.link.authentication import new_key
+from shapechanger.robot.twin.robot import RunningRobot
 from tests.robot.console.browser import DESK, PHONE, PHONE_ON_ITS_SIDE, Console
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]

@@ -19,12 +19,12 @@ from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.errors import LinkError, RobotRefused
-from shapechanger.remote.client import RobotClient
+from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.profile import load
-from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from tests.robot.console.browser import Console, Pins
+from tests.robot.twin.robots import until
 from tests.robots import IN_A_ROOM, PATIENT_CAR, write_profile
-from tests.twin.robots import until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.system]
 

@@ -15,8 +15,13 @@ from typing import Any, TypeVar
 import aiohttp
 import pytest
 
-from shapechanger.link.authentication import fingerprint_of, make_proof
-from shapechanger.link.messages import (
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon import process
+from shapechanger.robot.daemon.camera import FrameReader
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.hardware import Clock, RealClock
+from shapechanger.robot.link.authentication import fingerprint_of, make_proof
+from shapechanger.robot.link.messages import (
     VERSION,
     Acknowledge,
     Arm,
@@ -33,11 +38,6 @@ from shapechanger.link.messages import (
     decode_robot_message,
     encode,
 )
-from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon import process
-from shapechanger.robot.daemon.camera import FrameReader
-from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.hardware import Clock, RealClock
 from tests.robot.daemon.fakes import FakeCamera, FakeGuard
 from tests.robot.daemon.plans import picture
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.link.messages import Command
 from shapechanger.robot.daemon.control import ClientIdentity, ControlLease
 from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.link.messages import Command
 from tests.robot.daemon.plans import car_plan, guard_state
 
 ANN = ClientIdentity(1, "Ann", "person")

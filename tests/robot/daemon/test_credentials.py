@@ -13,7 +13,6 @@ import pytest
 from cryptography import x509
 
 from shapechanger.errors import OutputError, RobotError
-from shapechanger.link.authentication import fingerprint_of
 from shapechanger.robot.daemon.credentials import (
     check_exposure,
     credentials_folder,
@@ -22,6 +21,7 @@ from shapechanger.robot.daemon.credentials import (
     read_key,
     server_tls,
 )
+from shapechanger.robot.link.authentication import fingerprint_of
 from tests.robot.daemon.plans import car_plan
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from shapechanger.link.address import SERVICE
 from shapechanger.robot.daemon import discovery
 from shapechanger.robot.daemon.discovery import announce, withdraw
+from shapechanger.robot.link.address import SERVICE
 from tests.robot.daemon.plans import car_plan
 
 

@@ -12,7 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, drop, keep, read_episode
-from shapechanger.link.messages import (
+from shapechanger.robot.daemon.library import (
+    Answer,
+    LineIndex,
+    Question,
+    RecordingFolder,
+    RecordingLibrary,
+)
+from shapechanger.robot.link.messages import (
     MAX_EPISODES,
     MAX_PIECE,
     Browse,
@@ -21,13 +28,6 @@ from shapechanger.link.messages import (
     Piece,
     Recordings,
     Refused,
-)
-from shapechanger.robot.daemon.library import (
-    Answer,
-    LineIndex,
-    Question,
-    RecordingFolder,
-    RecordingLibrary,
 )
 from tests.robot.daemon.plans import ACTIONS, picture
 

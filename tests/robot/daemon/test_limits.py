@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shapechanger.link.messages import Event, Lease, Pong
 from shapechanger.robot.daemon.session import MessageRate, Outbox, SentObservations
+from shapechanger.robot.link.messages import Event, Lease, Pong
 
 MS = 1_000_000
 

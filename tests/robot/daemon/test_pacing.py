@@ -7,8 +7,8 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from shapechanger.link.messages import Acknowledge, Command, Observation
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.link.messages import Acknowledge, Command, Observation
 from tests.robot.daemon.fakes import SteppedClock
 from tests.robot.daemon.plans import car_plan, picture
 from tests.robot.daemon.running import Running, running, until

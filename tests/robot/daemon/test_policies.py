@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.link.messages import PolicyState, Refused, RunPolicy
 from shapechanger.robot.daemon import policies
 from shapechanger.robot.daemon.policies import PolicyRunner
+from shapechanger.robot.link.messages import PolicyState, Refused, RunPolicy
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import running, until
 

@@ -23,7 +23,6 @@ from shapechanger.demos.episodes import (
     repair,
     writer,
 )
-from shapechanger.link.messages import Mark, Observation, Undo
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
@@ -32,6 +31,7 @@ from shapechanger.robot.daemon.recorder import (
     EpisodeThread,
     StepBuilder,
 )
+from shapechanger.robot.link.messages import Mark, Observation, Undo
 from tests.robot.daemon.plans import ACTIONS, picture
 
 pytestmark = pytest.mark.realtime

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step, read_episode
-from shapechanger.link.messages import (
+from shapechanger.robot.daemon.credentials import make_credentials
+from shapechanger.robot.link.messages import (
     MAX_PIECE,
     Acknowledge,
     Browse,
@@ -32,7 +33,6 @@ from shapechanger.link.messages import (
     Undo,
     encode,
 )
-from shapechanger.robot.daemon.credentials import make_credentials
 from tests.robot.daemon.plans import ACTIONS, car_plan, picture
 from tests.robot.daemon.running import Client, Running, running, until
 

@@ -14,8 +14,12 @@ import aiohttp
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.link.authentication import make_proof
-from shapechanger.link.messages import (
+from shapechanger.robot.daemon import connection, server
+from shapechanger.robot.daemon.credentials import make_credentials, read_key
+from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.daemon.pre_auth import PreAuthConnections
+from shapechanger.robot.link.authentication import make_proof
+from shapechanger.robot.link.messages import (
     MAX_CLIENT_MESSAGE,
     VERSION,
     Acknowledge,
@@ -35,10 +39,6 @@ from shapechanger.link.messages import (
     Take,
     encode,
 )
-from shapechanger.robot.daemon import connection, server
-from shapechanger.robot.daemon.credentials import make_credentials, read_key
-from shapechanger.robot.daemon.plan import DaemonPlan
-from shapechanger.robot.daemon.pre_auth import PreAuthConnections
 from tests.robot.daemon.plans import car_plan
 from tests.robot.daemon.running import Client, Running, running, until
 

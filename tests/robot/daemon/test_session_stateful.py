@@ -10,7 +10,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from shapechanger.errors import LinkError
-from shapechanger.link.messages import (
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.session import Authenticator, Session
+from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.link.messages import (
     VERSION,
     Arm,
     Browse,
@@ -28,10 +32,6 @@ from shapechanger.link.messages import (
     Undo,
     encode,
 )
-from shapechanger.robot.cameras.camera import Frame
-from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.session import Authenticator, Session
-from shapechanger.robot.guard.messages import Order
 from tests.robot.daemon.plans import car_plan, guard_state
 
 MAX_AGE_NS = 400 * 1_000_000

@@ -14,10 +14,10 @@ from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.zeros import find_joint_zeros
-from shapechanger.twin.chips import Magnet
-from shapechanger.twin.in_process import LocalBoard
-from shapechanger.twin.wiring import TwinWiring
-from shapechanger.twin.world.vehicle import DrivingWorld
+from shapechanger.robot.twin.chips import Magnet
+from shapechanger.robot.twin.in_process import LocalBoard
+from shapechanger.robot.twin.wiring import TwinWiring
+from shapechanger.robot.twin.world.vehicle import DrivingWorld
 
 _PLAN = load_profile(find_profile("finger")).guard_plan()
 _ZEROS = [1234, 4095, 0, 2]

@@ -10,9 +10,9 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.zeros import find_zeros
-from shapechanger.twin.in_process import LocalBoard
-from shapechanger.twin.wiring import TwinWiring
-from shapechanger.twin.world.vehicle import DrivingWorld
+from shapechanger.robot.twin.in_process import LocalBoard
+from shapechanger.robot.twin.wiring import TwinWiring
+from shapechanger.robot.twin.world.vehicle import DrivingWorld
 
 
 def _board(plan: GuardPlan) -> LocalBoard:

@@ -20,13 +20,13 @@ from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Feature, Layout
-from shapechanger.remote.client import RobotClient
+from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.profile.load import find_profile
-from shapechanger.twin.robot import RunningRobot, run_robot
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from shapechanger.vehicles.remote.pilot import Origin, RobotFacts, require_fit
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
-from tests.twin.robots import until
+from tests.robot.twin.robots import until
 
 _STEERING = Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in ("steering", "throttle")))
 _STATE = Layout((Feature("speed", "m/s"),))

@@ -21,14 +21,14 @@ from shapechanger.demos.overlay import blank, overlay
 from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from shapechanger.errors import DemosError, LinkError, RobotRefused
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Welcome
-from shapechanger.remote.known_robots import recall
-from shapechanger.teleop import Terminal
+from shapechanger.robot.client.known_robots import recall
+from shapechanger.robot.client.teleop import Terminal
+from shapechanger.robot.link.messages import Welcome
 
 if TYPE_CHECKING:
     from shapechanger.demos.episodes import Step
     from shapechanger.demos.recording import EncodedObservation
-    from shapechanger.remote.client import RobotClient
+    from shapechanger.robot.client.client import RobotClient
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def _play_on_robot(episode: Episode, name: str) -> None:
 
     The robot's caps, reflexes and deadline apply as usual. Any key stops it, and so does any error.
     """
-    from shapechanger.remote.client import RobotClient
+    from shapechanger.robot.client.client import RobotClient
 
     known = recall(name)
     with (

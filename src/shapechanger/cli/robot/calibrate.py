@@ -21,6 +21,7 @@ from shapechanger.cli.console import plain_console, say
 from shapechanger.cli.robot.setup import change_profile, own_profile
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
+from shapechanger.robot.client.teleop import STOPS, Terminal
 from shapechanger.robot.drivers.pulse import PULSE_KEYS
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.profile.load import load_profile
@@ -33,10 +34,9 @@ from shapechanger.robot.setup.calibration import (
     wheel_changes,
     with_widest_pulses,
 )
-from shapechanger.teleop import STOPS, Terminal
 
 if TYPE_CHECKING:
-    from shapechanger.remote.client import RobotClient
+    from shapechanger.robot.client.client import RobotClient
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ class Calibration:
     def _served(self, settings: dict[str, Any]) -> Generator[RobotClient]:
         """Serve the robot with other settings, armed for a person."""
         from shapechanger.robot.profile.edit import rewrite
-        from shapechanger.twin.robot import run_robot
+        from shapechanger.robot.twin.robot import run_robot
 
         with tempfile.TemporaryDirectory(prefix="shapechanger-calibrate-") as folder:
             path = Path(folder) / "profile.toml"

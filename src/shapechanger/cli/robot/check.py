@@ -24,7 +24,7 @@ from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 
 if TYPE_CHECKING:  # Starts a tenth of a second sooner.
-    from shapechanger.twin.check.levels import CheckLevel
+    from shapechanger.robot.twin.check.levels import CheckLevel
 
 _PILOT: Final = "shapechanger.vehicles.remote.full_throttle"
 _CAP: Final = 0.2
@@ -86,9 +86,9 @@ class CheckRobot:
             f"{'twin' if on_twin else 'hardware'}, Python {platform.python_version()}, "
             f"{platform.platform()}"
         )
-        from shapechanger.twin.check.bench import Bench
-        from shapechanger.twin.check.levels import check_robot, require_level
-        from shapechanger.twin.check.trial import Trial
+        from shapechanger.robot.twin.check.bench import Bench
+        from shapechanger.robot.twin.check.levels import check_robot, require_level
+        from shapechanger.robot.twin.check.trial import Trial
 
         bench = Bench(
             profile,

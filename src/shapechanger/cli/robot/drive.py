@@ -18,12 +18,12 @@ from shapechanger.cli.robot.fetch import recorded
 from shapechanger.cli.robot.key import can_open, open_console
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Observation
-from shapechanger.remote.known_robots import KnownRobot, recall
-from shapechanger.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
+from shapechanger.robot.client.known_robots import KnownRobot, recall
+from shapechanger.robot.client.teleop import DIRECTIONS, FIRST_HOLD_S, STOPS, HeldKeys, Terminal
+from shapechanger.robot.link.messages import Observation
 
 if TYPE_CHECKING:
-    from shapechanger.remote.client import RobotClient
+    from shapechanger.robot.client.client import RobotClient
     from shapechanger.vehicles.remote.pilot import DrivingPolicy, PolicyDriver
 
 _LOOK_EVERY_S: Final = 0.2
@@ -50,7 +50,7 @@ class Drive:
 
     def run(self) -> None:
         """Drive until Q, or until Ctrl-C if the console is used."""
-        from shapechanger.remote.client import RobotClient
+        from shapechanger.robot.client.client import RobotClient
 
         if not 0.0 < self.cap <= 1.0:
             raise LinkError(f"The cap is above 0 and at most 1, got {self.cap}.")
@@ -301,7 +301,7 @@ class Driving:
 
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
-    from shapechanger.remote.client import RobotClient
+    from shapechanger.robot.client.client import RobotClient
     from shapechanger.vehicles.remote.pilot import Origin, PolicyDriver, RobotFacts, require_fit
 
     policy: DrivingPolicy

@@ -28,11 +28,11 @@ from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import Step, decode_line, split_lines
 from shapechanger.errors import DemosError, OutputError, RobotRefused, UnknownName
 from shapechanger.files import cannot_write, write_atomic
-from shapechanger.link.messages import EpisodeSummary, Piece
-from shapechanger.remote.known_robots import recall
+from shapechanger.robot.client.known_robots import recall
+from shapechanger.robot.link.messages import EpisodeSummary, Piece
 
 if TYPE_CHECKING:
-    from shapechanger.remote.client import RobotClient
+    from shapechanger.robot.client.client import RobotClient
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class FetchEpisodes:
 
     def run(self) -> None:
         """Download; exit with 1 if an episode failed."""
-        from shapechanger.remote.client import RobotClient
+        from shapechanger.robot.client.client import RobotClient
 
         failed = 0
         with RobotClient.connect(recall(self.robot), frames=False) as robot:

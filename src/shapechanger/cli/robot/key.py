@@ -17,10 +17,10 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.errors import LinkError, MissingExtra, UnknownName
-from shapechanger.link.address import parse_address
-from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
-from shapechanger.remote.known_robots import INSECURE, KnownRobot
+from shapechanger.robot.client.known_robots import INSECURE, KnownRobot
 from shapechanger.robot.daemon.credentials import Credentials, credentials_folder, load_credentials
+from shapechanger.robot.link.address import parse_address
+from shapechanger.robot.link.authentication import fingerprint_hex, fingerprint_short
 
 
 @dataclass(frozen=True)

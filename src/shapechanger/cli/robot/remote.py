@@ -14,8 +14,8 @@ from rich.table import Table
 
 from shapechanger.cli.console import print_table, say
 from shapechanger.errors import LinkError, ShapechangerError
-from shapechanger.link.messages import VERSION
-from shapechanger.remote.known_robots import KnownRobot, forget, known_names, recall, remember
+from shapechanger.robot.client.known_robots import KnownRobot, forget, known_names, recall, remember
+from shapechanger.robot.link.messages import VERSION
 
 _KEY_VARIABLE = "SHAPECHANGER_KEY"
 
@@ -29,7 +29,7 @@ class Find:
 
     def run(self) -> None:
         """Print a table with the robots' local names."""
-        from shapechanger.remote.discovery import find
+        from shapechanger.robot.client.discovery import find
 
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
@@ -118,7 +118,7 @@ class Stop:
 
     def run(self) -> None:
         """Stop the robot; exit with 1 if it does not confirm."""
-        from shapechanger.remote.client import RobotClient
+        from shapechanger.robot.client.client import RobotClient
 
         known = recall(self.robot)
         try:

@@ -34,8 +34,13 @@ from shapechanger.errors import (
     check_seed,
     no_policy_file,
 )
-from shapechanger.link.address import Address, is_loopback, parse_address
-from shapechanger.remote.known_robots import KnownRobot, check_name, known_names, recall, remember
+from shapechanger.robot.client.known_robots import (
+    KnownRobot,
+    check_name,
+    known_names,
+    recall,
+    remember,
+)
 from shapechanger.robot.daemon.credentials import (
     credentials_folder,
     load_credentials,
@@ -44,10 +49,11 @@ from shapechanger.robot.daemon.credentials import (
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.policies import ENDING, policies_in
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd, supervisor_command
+from shapechanger.robot.link.address import Address, is_loopback, parse_address
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.twin.start import BoardAt, find_board, start_board
-from shapechanger.twin.world.place import Place
+from shapechanger.robot.twin.start import BoardAt, find_board, start_board
+from shapechanger.robot.twin.world.place import Place
 from shapechanger.vehicles.courses.course import HOME, require_element
 
 _HERE: Final = "127.0.0.1"

@@ -16,7 +16,7 @@ import tyro
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.key import how_to_remember, robot_at, shown_credentials
 from shapechanger.errors import RobotError, ShapechangerError, UnknownName
-from shapechanger.remote.known_robots import check_name, remember
+from shapechanger.robot.client.known_robots import check_name, remember
 from shapechanger.robot.daemon.credentials import (
     credentials_folder,
     load_credentials,

@@ -12,16 +12,16 @@ import aiohttp
 from aiohttp import WSMsgType, web
 
 from shapechanger.errors import LinkError, ShapechangerError
-from shapechanger.link.messages import (
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.session import NOT_READING, Session
+from shapechanger.robot.hardware import Clock
+from shapechanger.robot.link.messages import (
     MAX_CLIENT_MESSAGE,
     Observation,
     Refused,
     RobotMessage,
     encode,
 )
-from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.session import NOT_READING, Session
-from shapechanger.robot.hardware import Clock
 
 HELLO_TIMEOUT_S: Final = 3.0
 """Time that a client has for its hello, s."""

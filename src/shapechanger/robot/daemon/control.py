@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shapechanger.link.messages import Role
+from shapechanger.robot.link.messages import Role
 
 
 @dataclass(frozen=True, slots=True)

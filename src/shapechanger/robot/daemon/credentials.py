@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import LinkError, OutputError, RobotError
-from shapechanger.link.address import is_loopback
-from shapechanger.link.authentication import fingerprint_of, new_key, parse_key
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.link.address import is_loopback
+from shapechanger.robot.link.authentication import fingerprint_of, new_key, parse_key
 from shapechanger.robot.new_file import write_new
 
 _KEY: Final = "key"

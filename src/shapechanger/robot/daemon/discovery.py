@@ -13,10 +13,10 @@ from zeroconf import (
 )
 from zeroconf.asyncio import AsyncZeroconf
 
-from shapechanger.link.address import SERVICE
-from shapechanger.link.authentication import fingerprint_hex
-from shapechanger.link.messages import VERSION
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.link.address import SERVICE
+from shapechanger.robot.link.authentication import fingerprint_hex
+from shapechanger.robot.link.messages import VERSION
 
 _log = logging.getLogger(__name__)
 

@@ -11,7 +11,6 @@ from typing import Final, Protocol
 
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Command, Event, Lease, Refused, RobotMessage
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity, ControlLease, PendingCommand
 from shapechanger.robot.daemon.library import RecordingLibrary
@@ -20,6 +19,7 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.policies import PolicyRunner
 from shapechanger.robot.daemon.recorder import Recorder
 from shapechanger.robot.guard.messages import GuardState, Order
+from shapechanger.robot.link.messages import Command, Event, Lease, Refused, RobotMessage
 
 _MAX_CLIENTS: Final = 8
 """Most clients connected at the same time."""

@@ -20,7 +20,7 @@ from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode
 from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import durations_s
 from shapechanger.errors import DemosError, ShapechangerError
-from shapechanger.link.messages import (
+from shapechanger.robot.link.messages import (
     MAX_EPISODES,
     MAX_PIECE,
     MAX_ROBOT_MESSAGE,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Observation
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.control import ClientIdentity, PendingCommand
 from shapechanger.robot.guard.messages import GuardState
+from shapechanger.robot.link.messages import Observation
 
 _ABSENT: Final = "absent"
 """Source of a quantity that no sensor measures; its value is NaN, never an invented 0."""

@@ -8,8 +8,8 @@ import msgspec
 from msgspec import Meta
 
 from shapechanger.errors import ProfileError
-from shapechanger.link.address import DEFAULT_PORT
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.link.address import DEFAULT_PORT
 
 
 class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

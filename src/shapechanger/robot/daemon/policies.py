@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.errors import UnknownName
-from shapechanger.link.address import Address
-from shapechanger.link.authentication import fingerprint_hex
-from shapechanger.link.messages import PolicyState
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard.priority import run_normally
+from shapechanger.robot.link.address import Address
+from shapechanger.robot.link.authentication import fingerprint_hex
+from shapechanger.robot.link.messages import PolicyState
 
 _log = logging.getLogger(__name__)
 

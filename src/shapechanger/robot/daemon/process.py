@@ -17,8 +17,6 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import ShapechangerError
-from shapechanger.link.address import Address, is_loopback
-from shapechanger.link.authentication import fingerprint_hex, fingerprint_short
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.daemon.camera import FrameChecks, FrameReader
 from shapechanger.robot.daemon.connection import Timekeeper
@@ -33,6 +31,8 @@ from shapechanger.robot.guard.messages import GuardState
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.guard.serve_plan import read_plan_fd
 from shapechanger.robot.hardware import Clock, connect
+from shapechanger.robot.link.address import Address, is_loopback
+from shapechanger.robot.link.authentication import fingerprint_hex, fingerprint_short
 
 _log = logging.getLogger(__name__)
 

@@ -17,10 +17,17 @@ import msgspec
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Mark, Observation, RecorderState, Refused, RobotMessage, Undo
 from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.link.messages import (
+    Mark,
+    Observation,
+    RecorderState,
+    Refused,
+    RobotMessage,
+    Undo,
+)
 
 _log = logging.getLogger(__name__)
 

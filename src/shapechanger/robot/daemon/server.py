@@ -14,9 +14,6 @@ from urllib.parse import urlsplit
 from aiohttp import web
 
 from shapechanger.errors import LinkError, RobotError, ShapechangerError
-from shapechanger.link.address import is_loopback, parse_address
-from shapechanger.link.authentication import fingerprint_hex
-from shapechanger.link.messages import VERSION
 from shapechanger.robot.console import ENTRY, console_files
 from shapechanger.robot.daemon.connection import (
     ClientConnection,
@@ -27,6 +24,9 @@ from shapechanger.robot.daemon.connection import (
 from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.pre_auth import Listener, PreAuthConnections
 from shapechanger.robot.daemon.session import Authenticator, Session, WrongKey
+from shapechanger.robot.link.address import is_loopback, parse_address
+from shapechanger.robot.link.authentication import fingerprint_hex
+from shapechanger.robot.link.messages import VERSION
 
 _log = logging.getLogger(__name__)
 

@@ -11,8 +11,13 @@ from time import monotonic
 from typing import Final
 
 from shapechanger.errors import LinkError, RobotRefused
-from shapechanger.link.authentication import is_proof, new_nonce
-from shapechanger.link.messages import (
+from shapechanger.robot.daemon.control import ClientIdentity
+from shapechanger.robot.daemon.hub import SessionHub
+from shapechanger.robot.daemon.library import Answer
+from shapechanger.robot.daemon.observation import build_observation
+from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.link.authentication import is_proof, new_nonce
+from shapechanger.robot.link.messages import (
     VERSION,
     Acknowledge,
     Arm,
@@ -45,11 +50,6 @@ from shapechanger.link.messages import (
     Welcome,
     decode_client_message,
 )
-from shapechanger.robot.daemon.control import ClientIdentity
-from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.library import Answer
-from shapechanger.robot.daemon.observation import build_observation
-from shapechanger.robot.guard.messages import Order
 
 MESSAGES_PER_S: Final = 500.0
 """Messages per second that a connection may send; a driver sends 50."""

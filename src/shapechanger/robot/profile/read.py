@@ -26,7 +26,7 @@ from shapechanger.robot.profile.profile import Profile, ResetStep
 from shapechanger.robot.profile.schema import ProfileKey, Section
 from shapechanger.robot.profile.wiring import PinAllocation, with_servo_bus
 
-_MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.link.messages`.
+_MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.robot.link.messages`.
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
 _DIGITS: Final = re.compile(r"[0-9_]{600}")
 

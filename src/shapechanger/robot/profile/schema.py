@@ -67,7 +67,7 @@ REQUIRED: Final = object()
 NO_PIN: Final = -1
 """Value of an unconnected pin."""
 
-_LONGEST_TEXT: Final = 64  # As in the messages, see `shapechanger.link.messages`.
+_LONGEST_TEXT: Final = 64  # As in the messages, see `shapechanger.robot.link.messages`.
 _NOT_PRINTABLE: Final = re.compile(r"[^\x20-\x7e\xa0-\U0010ffff]")
 _A_PIN: Final = f'a BCM pin from 0 to {HIGHEST_BCM}, such as 22, "GPIO22" or "BOARD15"'
 

@@ -267,7 +267,7 @@ class SensedVehicle:
     """A vehicle that moves within a robot's limits and senses what the robot would.
 
     It is the robot without pins, chips, link and emergency stops: `InProcessRobot` of
-    `shapechanger.twin.in_process` emulates those, and drives to the same place.
+    `shapechanger.robot.twin.in_process` emulates those, and drives to the same place.
 
     Args:
         plan: Plan of the guard.

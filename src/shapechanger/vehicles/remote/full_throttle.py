@@ -1,6 +1,6 @@
 """A policy that drives at full throttle, as the process on board does, and fails at a signal.
 
-It is a program for the trials of a robot: see `shapechanger.twin.check.driver`.
+It is a program for the trials of a robot: see `shapechanger.robot.twin.check.driver`.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.errors import LinkError
 from shapechanger.layout import Layout
-from shapechanger.remote.client import RobotClient
-from shapechanger.twin.check.driver import FAILURES, asked_robot, print_time
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.twin.check.driver import FAILURES, asked_robot, print_time
 from shapechanger.vehicles.remote.pilot import PolicyDriver
 
 # Longer than the age at which a robot refuses answers to an observation.

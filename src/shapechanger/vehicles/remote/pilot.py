@@ -22,10 +22,10 @@ from shapechanger.demos.cloning.pictures import PolicyError
 from shapechanger.demos.statistics import is_same_rate
 from shapechanger.errors import RobotRefused, ShapechangerError
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Welcome
-from shapechanger.remote.client import RobotClient
-from shapechanger.remote.env import RemoteVehicleEnv
-from shapechanger.remote.known_robots import KnownRobot
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.env import RemoteVehicleEnv
+from shapechanger.robot.client.known_robots import KnownRobot
+from shapechanger.robot.link.messages import Welcome
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import RobotRefused, WorldError
 from shapechanger.layout import Layout
-from shapechanger.link.messages import Welcome
-from shapechanger.remote.env import RemoteVehicleEnv
+from shapechanger.robot.client.env import RemoteVehicleEnv
+from shapechanger.robot.link.messages import Welcome
 from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
 from shapechanger.vehicles.waypoints import (
     ACTION_LAYOUT,

@@ -1,0 +1,517 @@
+"""Synchronous client of a robot: command, observe, stop.
+
+>>> with RobotClient.connect(recall("new-bright")) as robot:
+...     robot.take()
+...     robot.arm()
+...     seen = robot.observation()
+...     robot.command((0.0, 0.3), answers=seen.message.seq)
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import getpass
+import itertools
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Final, Self, TypeVar
+
+from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.robot.client.connection import Access, RobotConnection, open_connection
+from shapechanger.robot.client.inbox import Inbox, Received, Request
+from shapechanger.robot.client.known_robots import KnownRobot, parse_trust, untrusted
+from shapechanger.robot.link import messages
+from shapechanger.robot.link.address import parse_address
+from shapechanger.robot.link.authentication import parse_key
+from shapechanger.robot.link.messages import ClientMessage, Event, RobotMessage, Welcome
+
+_Answer = TypeVar("_Answer", bound=RobotMessage)
+
+_MARGIN_S: Final = 2.0  # Of a call beyond the link's own time limit, s.
+_DISK_S: Final = 30.0  # Time that a robot may take to read its disk, s.
+
+
+def _own_name() -> str:
+    """Return the default name of a client: user and host."""
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):  # A container may have no user name.
+        user = "unknown"
+    return f"{user}@{socket.gethostname()}"[:64]
+
+
+class RobotClient:
+    """Connection to a robot, made by `connect` and kept by a thread of its own.
+
+    All methods may be called from any thread. Failures are `LinkError`, or `RobotRefused` where
+    the robot refuses.
+
+    Args:
+        access: Settings of the connection.
+
+    Attributes:
+        welcome: Description of the robot.
+        pace: Whether the clocks or the client set the pace.
+    """
+
+    def __init__(self, access: Access) -> None:
+        self.pace = access.pace
+        self._access = access
+        self._process = os.getpid()
+        self._inbox = Inbox(time.monotonic)
+        self._asking = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._stop = asyncio.Event()
+        self._connection: RobotConnection | None = None
+        self._thread = threading.Thread(
+            target=self._run, name=f"robot {access.address}", daemon=True
+        )
+        welcome = Request(Welcome)
+        with self._inbox.expecting(welcome):
+            self._thread.start()
+            try:
+                self.welcome = self._inbox.answer(welcome)
+            except BaseException:  # Ctrl-C too: leave no thread behind.
+                self.close()
+                raise
+
+    @classmethod
+    def connect(
+        cls,
+        robot: KnownRobot | str,
+        *,
+        key: str = "",
+        fingerprint: str = "",
+        role: messages.Role = "program",
+        name: str = "",
+        pace: messages.Pace = "realtime",
+        frames: bool = True,
+        timeout_s: float = 2.0,
+    ) -> Self:
+        """Connect to a robot.
+
+        Args:
+            robot: A known robot, from `shapechanger.robot.client.known_robots.recall`; or an
+                address, HOST or HOST:PORT.
+            key: The robot's key, for an address.
+            fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
+            role: Whether a person or a program drives.
+            name: Display name of the client; user and host by default.
+            pace: Whether the clocks or the client set the pace.
+            frames: Whether observations carry frames.
+            timeout_s: Time limit of the handshake, and of silence before the link is lost, s.
+
+        Raises:
+            RobotRefused: If the robot's certificate differs, or it refuses the client.
+            LinkError: If no robot answers, or one with another version of the link. Without a
+                fingerprint the message shows the robot's.
+        """
+        if not timeout_s > 0.0:
+            raise LinkError(f"timeout_s must be above 0, got {timeout_s:g}.")
+        if not isinstance(robot, KnownRobot):
+            if not fingerprint:
+                raise untrusted(parse_address(robot), timeout_s)
+            robot = KnownRobot("robot", robot, key, fingerprint)
+        access = Access(
+            parse_address(robot.address),
+            parse_key(robot.key) if robot.key else b"",
+            parse_trust(robot.fingerprint),
+            name or _own_name(),
+            role,
+            pace,
+            frames,
+            timeout_s,
+        )
+        return cls(access)
+
+    @property
+    def alive(self) -> bool:
+        """True while the link is up, in the process that made it."""
+        return self._inbox.failure is None and self._process == os.getpid()
+
+    @property
+    def newest(self) -> Received | None:
+        """The newest observation of any age; None before the first."""
+        return self._inbox.newest
+
+    @property
+    def recorder(self) -> messages.RecorderState | None:
+        """Last reported state of the robot's recorder, or None."""
+        return self._inbox.recorder
+
+    @property
+    def policies(self) -> messages.PolicyState | None:
+        """Last report of the policies on board, or None."""
+        return self._inbox.policies
+
+    def take(self) -> None:
+        """Take control.
+
+        Raises:
+            RobotRefused: If another client keeps control.
+        """
+        lease = self._ask(messages.Take(), messages.Lease)
+        if not lease.mine:
+            raise RobotRefused(lease.reason or f"{lease.holder or 'Another client'} has control.")
+
+    def arm(self) -> None:
+        """Let the outputs move; from a person this also ends an emergency stop seen before.
+
+        Raises:
+            RobotRefused: If the robot refuses, or is not armed in time.
+        """
+        seen = self.newest or self.ask()
+        # Answer a new observation, but end only an emergency stop that was seen before the call.
+        newest = self.ask()
+        request = Request(messages.Refused)
+        with self._inbox.expecting(request):
+            self._post(messages.Arm(answers=newest.message.seq, emergency=seen.message.emergencies))
+            until = time.monotonic() + self._access.timeout_s
+            while time.monotonic() < until:
+                newest = self.ask()
+                if request.refusal is not None:
+                    raise RobotRefused(request.refusal)
+                if newest.message.armed:
+                    return
+        reason = newest.message.stop_reason
+        raise RobotRefused(f"The robot did not arm{f': {reason}' if reason else ''}.")
+
+    def command(
+        self,
+        values: Sequence[float],
+        *,
+        answers: int,
+        ttl_ms: int | None = None,
+        scale: float = 1.0,
+    ) -> int:
+        """Send a command, in force until the next one or until it expires.
+
+        Args:
+            values: One number for each action of the robot, in the order of its action layout.
+            answers: `seq` of the observation that the command answers.
+            ttl_ms: Lifetime, ms; None for the robot's deadline.
+            scale: Cap, 0 to 1, by which the values are multiplied.
+
+        Returns:
+            The number of the command.
+        """
+        seq = next(self._numbers)
+        ttl_ms = self.welcome.deadline_ms if ttl_ms is None else ttl_ms
+        floats = tuple(float(value) for value in values)
+        self._post(
+            messages.Command(seq=seq, answers=answers, values=floats, ttl_ms=ttl_ms, scale=scale)
+        )
+        return seq
+
+    def suggest(self, values: Sequence[float], *, answers: int) -> int:
+        """Send a suggestion while another client has control; the robot only shows it.
+
+        A suggestion lives as long as a command, and asks for the next observation as one does.
+
+        Args:
+            values: One number for each action of the robot, in the order of its action layout.
+            answers: `seq` of the observation that the suggestion answers.
+
+        Returns:
+            The number of the suggestion, for `refusal`.
+        """
+        seq = next(self._numbers)
+        floats = tuple(float(value) for value in values)
+        self._post(messages.Suggest(seq=seq, answers=answers, values=floats))
+        return seq
+
+    def acknowledge(self) -> None:
+        """Ask for the next observation without a command."""
+        newest = self.newest
+        self._post(messages.Acknowledge(seq=newest.message.seq if newest else 0))
+
+    def observation(self, newer_than: int = 0, timeout_s: float | None = None) -> Received:
+        """Wait for an observation, and return the newest one.
+
+        Args:
+            newer_than: Its `seq` is larger than this.
+            timeout_s: Time limit, s; None for that of the link.
+
+        Raises:
+            StaleObservation: If none arrives in time.
+            LinkError: If the link is lost.
+        """
+        self._require_own()
+        return self._inbox.take(newer_than, self._limit(timeout_s))
+
+    def newer(self, newer_than: int, timeout_s: float) -> Received | None:
+        """Wait for an observation as `observation` does, but return None after the time limit.
+
+        Args:
+            newer_than: Its `seq` is larger than this.
+            timeout_s: Time limit, s.
+
+        Raises:
+            LinkError: If the link is lost.
+        """
+        self._require_own()
+        return self._inbox.wait(newer_than, timeout_s)
+
+    def ask(self) -> Received:
+        """Ask for a new observation, and wait for it.
+
+        Raises:
+            LinkError: If none arrives in time, or the link is lost.
+        """
+        newest = self.newest
+        self.acknowledge()
+        return self.observation(newest.message.seq if newest else 0)
+
+    def exchange(self, values: Sequence[float], seen: Received) -> Received:
+        """Send a command, and wait for the next observation.
+
+        Args:
+            values: One number for each action of the robot, in the order of its action layout.
+            seen: The observation that the command answers.
+
+        Raises:
+            LinkError: If none arrives in time, or the link is lost.
+        """
+        self.command(values, answers=seen.message.seq)
+        return self.observation(seen.message.seq)
+
+    def emergency_stop(self, reason: str = "") -> None:
+        """Stop all outputs, without control too, until a person arms the robot again."""
+        self._post(messages.EmergencyStop(reason=reason))
+
+    def disarm(self) -> None:
+        """Keep the outputs at rest."""
+        self._post(messages.Disarm())
+
+    def release(self) -> None:
+        """Give control back; the robot stops and disarms."""
+        self._post(messages.Release())
+
+    def record(self, on: bool = True, name: str = "") -> messages.RecorderState:
+        """Begin or end an episode on the robot's disk; only as a person.
+
+        Args:
+            on: Whether to record.
+            name: Title of the episode.
+
+        Raises:
+            RobotRefused: If the robot cannot record, as on a full disk, or records already.
+            LinkError: If it does not answer in time.
+        """
+        return self._ask_disk(
+            messages.Record(on=on, name=name),
+            messages.RecorderState,
+            accepts=lambda state: state.recording == on and bool(state.episode),
+        )
+
+    def mark(self, text: str = "") -> messages.RecorderState:
+        """Mark the newest step of the episode being recorded; raises as `record` does."""
+        before = 0 if self._inbox.recorder is None else self._inbox.recorder.marks
+        return self._ask_disk(
+            messages.Mark(text=text),
+            messages.RecorderState,
+            accepts=lambda state: state.marks > before,
+        )
+
+    def undo(self, seconds: float = 5.0) -> messages.RecorderState:
+        """Drop the newest steps of the episode being recorded; raises as `record` does.
+
+        Args:
+            seconds: How far back, s, above 0.
+        """
+        before = 0 if self._inbox.recorder is None else self._inbox.recorder.dropped
+        return self._ask_disk(
+            messages.Undo(seconds=seconds),
+            messages.RecorderState,
+            accepts=lambda state: state.dropped > before,
+        )
+
+    def run_policy(self, name: str) -> messages.PolicyState:
+        """Start a policy on board in place of the one that runs; only as a person.
+
+        Args:
+            name: Name of the policy; "" to end the one that runs.
+
+        Raises:
+            RobotRefused: If there is no such policy on board, or it runs already.
+            LinkError: If the robot does not answer in time.
+        """
+        return self._ask_disk(
+            messages.RunPolicy(policy=name),
+            messages.PolicyState,
+            accepts=lambda state: state.running == name,
+        )
+
+    def browse(self, before: str = "", timeout_s: float = _DISK_S) -> messages.Recordings:
+        """List the episodes on the robot, newest first.
+
+        Args:
+            before: Only episodes whose id sorts before this one; "" for the newest.
+            timeout_s: Time limit, s.
+
+        Raises:
+            RobotRefused: If the robot has no folder for recordings.
+            LinkError: If it does not answer in time.
+        """
+        return self._ask_disk(messages.Browse(before=before), messages.Recordings, timeout_s)
+
+    def fetch(
+        self, episode: str, first: int = 0, count: int = 1_000, timeout_s: float = _DISK_S
+    ) -> messages.Piece:
+        """Read a part of an episode on the robot's disk; raises as `browse` does.
+
+        Args:
+            episode: Id of the episode.
+            first: Number of the first line, from 0.
+            count: Most lines to read; fewer are sent where the message would be too large.
+            timeout_s: Time limit, s.
+        """
+        request = messages.Fetch(episode=episode, first=first, count=count)
+        return self._ask_disk(request, messages.Piece, timeout_s)
+
+    def judge(
+        self, episode: str, first: int, last: int, *, keep: bool, timeout_s: float = _DISK_S
+    ) -> messages.EpisodeSummary:
+        """Keep or drop steps of an episode; only as a person.
+
+        Args:
+            episode: Id of the episode.
+            first: Number of the first step.
+            last: Number of the last step, inclusive.
+            keep: Whether to use the steps for training.
+            timeout_s: Time limit, s.
+
+        Returns:
+            The episode after the change.
+
+        Raises:
+            RobotRefused: If there are no such steps, or the episode is being recorded.
+            LinkError: If the robot does not answer in time.
+        """
+        request = messages.Judge(episode=episode, first=first, last=last, keep=keep)
+        return self._ask_disk(request, messages.Recordings, timeout_s).episodes[0]
+
+    def ping(self, timeout_s: float | None = None) -> tuple[float, int]:
+        """Measure the round trip.
+
+        Returns:
+            The round trip, s, and the robot's time at its answer, ns.
+        """
+        start = time.monotonic()
+        pong = self._ask(messages.Ping(), messages.Pong, timeout_s)
+        return time.monotonic() - start, pong.now_ns
+
+    def events(self) -> list[Event]:
+        """Return the events since the last call, oldest first, at most 256."""
+        return self._inbox.events()
+
+    def refusal(self, seq: int) -> str:
+        """Return the reason why the robot refused a command, or "" if it has not."""
+        return self._inbox.refusal(seq)
+
+    def close(self) -> None:
+        """End the connection after pending messages are sent; may be called again."""
+        if self._process != os.getpid():
+            return  # A copy made by fork: the connection belongs to the other process.
+        self._inbox.fail(LinkError("The connection was closed: make a new one."))
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            with contextlib.suppress(RuntimeError):  # It may close in between.
+                loop.call_soon_threadsafe(self._stop.set)
+        self._thread.join()
+
+    def abandon(self) -> None:
+        """Release and close without waiting or taking a lock.
+
+        For clients that are dropped without `close`: the garbage collector may call this in any
+        thread, including that of the connection.
+        """
+        loop, connection = self._loop, self._connection
+        if self._process != os.getpid() or loop is None or connection is None:
+            return
+        with contextlib.suppress(RuntimeError):  # It has ended already.
+            loop.call_soon_threadsafe(connection.post, messages.Release())
+            loop.call_soon_threadsafe(self._stop.set)
+
+    def __enter__(self) -> Self:
+        """The client itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the connection."""
+        self.close()
+
+    # In the callers' threads.
+
+    def _limit(self, timeout_s: float | None) -> float:
+        return self._access.timeout_s + _MARGIN_S if timeout_s is None else timeout_s
+
+    def _require_own(self) -> None:
+        if self._process != os.getpid():
+            raise LinkError("This connection belongs to another process: make one in this one.")
+
+    def _post(self, message: ClientMessage) -> None:
+        self._require_own()
+        self._inbox.check()
+        if self._loop is None or self._connection is None:
+            raise LinkError("The connection is not open yet.")
+        try:
+            self._loop.call_soon_threadsafe(self._connection.post, message)
+        except RuntimeError:  # The loop has ended meanwhile.
+            self._inbox.check()
+            raise LinkError("The link to the robot is lost.") from None
+
+    def _ask_disk(
+        self,
+        message: ClientMessage,
+        kind: type[_Answer],
+        timeout_s: float = _DISK_S,
+        accepts: Callable[[_Answer], bool] = lambda _: True,
+    ) -> _Answer:
+        """Ask a question about recordings, of which a robot answers one at a time."""
+        # A field out of range is an error before anything is sent.
+        messages.decode_client_message(messages.encode(message))
+        with self._asking:
+            return self._ask(message, kind, timeout_s, accepts)
+
+    def _ask(
+        self,
+        message: ClientMessage,
+        kind: type[_Answer],
+        timeout_s: float | None = None,
+        accepts: Callable[[_Answer], bool] = lambda _: True,
+    ) -> _Answer:
+        request = Request(kind, accepts)
+        with self._inbox.expecting(request):
+            self._post(message)
+            try:
+                return self._inbox.answer(request, self._limit(timeout_s))
+            except TimeoutError:
+                asked = type(message).__name__
+                raise LinkError(f"The robot did not answer {asked!r} in time.") from None
+
+    # In the connection's thread.
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._exchange())
+        except LinkError as error:
+            self._inbox.fail(error)
+        except BaseException as error:
+            # Waiting callers must not wait for ever.
+            self._inbox.fail(LinkError(f"The link to the robot failed: {error!r}."))
+            raise
+        else:
+            self._inbox.fail(LinkError("The connection was closed: make a new one."))
+
+    async def _exchange(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        async with open_connection(self._access) as connection:
+            self._connection = connection
+            self._inbox.put(connection.welcome)
+            await connection.run(self._inbox.put, self._stop)

@@ -1,0 +1,291 @@
+"""WebSocket connection to a robot: handshake, sending, receiving and the silence timeout."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncGenerator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Any, Final, TypeVar
+
+from shapechanger.errors import LinkError, MissingExtra, RobotRefused
+from shapechanger.robot.link import messages
+from shapechanger.robot.link.address import Address
+from shapechanger.robot.link.authentication import fingerprint_hex, make_proof
+from shapechanger.robot.link.messages import (
+    Challenge,
+    ClientMessage,
+    Hello,
+    Ping,
+    RobotMessage,
+    Welcome,
+)
+
+try:
+    import aiohttp
+except ImportError as error:
+    raise MissingExtra("aiohttp", "remote") from error
+
+PATH: Final = "/link"
+"""Path of the WebSocket on the robot's server."""
+
+_CLOSE_S: Final = 0.5  # Time limit of the closing handshake.
+# Shares of the silence timeout: when to send a ping, and how often to check.
+_PING_AFTER: Final = 0.4
+_CHECK_EVERY: Final = 0.1
+
+# attrs makes aiohttp's class in a way that pyright does not understand.
+_CLOSING: Final = aiohttp.ClientWSTimeout(ws_close=_CLOSE_S)  # pyright: ignore[reportCallIssue]
+
+_Handler = Callable[[RobotMessage], None]
+_M = TypeVar("_M", Challenge, Welcome)
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """Settings of a connection.
+
+    Attributes:
+        address: Address of the robot.
+        key: The robot's key.
+        fingerprint: SHA-256 of its certificate; None for no encryption.
+        name: Display name of the client.
+        role: Whether a person or a program drives.
+        pace: Whether the clocks or the client set the pace.
+        frames: Whether observations carry frames.
+        timeout_s: Time limit of the handshake, and of silence, s.
+    """
+
+    address: Address
+    key: bytes
+    fingerprint: bytes | None
+    name: str
+    role: messages.Role
+    pace: messages.Pace
+    frames: bool
+    timeout_s: float
+
+
+class RobotConnection:
+    """Open connection to a robot, made by `open_connection`.
+
+    Args:
+        websocket: The WebSocket.
+        welcome: Description of the robot.
+        access: Settings of the connection.
+
+    Attributes:
+        welcome: Description of the robot.
+    """
+
+    def __init__(
+        self, websocket: aiohttp.ClientWebSocketResponse, welcome: Welcome, access: Access
+    ) -> None:
+        self.welcome = welcome
+        self._websocket = websocket
+        self._access = access
+        self._received_at = asyncio.get_running_loop().time()
+        self._pending: list[ClientMessage] = []
+        self._posted = asyncio.Event()
+
+    def post(self, message: ClientMessage) -> None:
+        """Queue a message, in place of one of the same type that still waits.
+
+        After a blocked connection the robot so gets the newest command, and no older ones.
+        """
+        self._pending = [m for m in self._pending if type(m) is not type(message)]
+        self._pending.append(message)
+        self._posted.set()
+
+    async def run(self, handle: _Handler, stop: asyncio.Event) -> None:
+        """Receive and send until `stop` is set.
+
+        Args:
+            handle: Called with each message; it may raise `LinkError` to end the connection.
+            stop: When set, pending messages are sent, and the connection is closed.
+
+        Raises:
+            LinkError: If the connection is lost, or the robot sends an invalid message.
+        """
+        work = (self._receive(handle), self._send(), self._watch(), stop.wait())
+        tasks = [asyncio.ensure_future(each) for each in work]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+        for task in done:
+            task.result()
+        await self._close()
+
+    async def _receive(self, handle: _Handler) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            message = await _receive(self._websocket)
+            self._received_at = loop.time()
+            handle(message)
+
+    async def _send(self) -> None:
+        while True:
+            await self._posted.wait()
+            self._posted.clear()
+            await self._send_pending()
+
+    async def _send_pending(self) -> None:
+        while self._pending:
+            message = self._pending.pop(0)
+            try:
+                await self._websocket.send_bytes(messages.encode(message))
+            except (ConnectionError, aiohttp.ClientError) as error:
+                raise _lost(str(error) or "the connection broke") from None
+
+    async def _watch(self) -> None:
+        """End a silent connection: a radio that dies closes nothing."""
+        loop, limit_s = asyncio.get_running_loop(), self._access.timeout_s
+        while True:
+            await asyncio.sleep(_CHECK_EVERY * limit_s)
+            silent_s = loop.time() - self._received_at
+            if silent_s > limit_s:
+                raise _lost(f"no message for {silent_s:.1f} s")
+            if silent_s > _PING_AFTER * limit_s:
+                self.post(Ping())
+
+    async def _close(self) -> None:
+        try:
+            async with asyncio.timeout(_CLOSE_S):
+                await self._send_pending()
+                await self._websocket.close()
+        except (LinkError, TimeoutError):
+            return  # The robot notices the end of the connection anyway.
+
+
+@asynccontextmanager
+async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
+    """Connect and authenticate.
+
+    Raises:
+        RobotRefused: If the robot's certificate differs, or it refuses the client.
+        LinkError: If no robot answers, or one with another version of the link.
+    """
+    expected = access.fingerprint
+    websocket: aiohttp.ClientWebSocketResponse | None = None
+    sockets: list[socket.socket] = []
+
+    def made(address: tuple[Any, ...]) -> socket.socket:
+        sockets.append(socket.socket(*address[:3]))
+        return sockets[-1]
+
+    connector = aiohttp.TCPConnector(
+        ssl=aiohttp.Fingerprint(expected) if expected else True, socket_factory=made
+    )
+    session = aiohttp.ClientSession(connector=connector, connector_owner=False)
+    try:
+        async with asyncio.timeout(access.timeout_s) as limit:
+            websocket = await session.ws_connect(
+                f"{'wss' if expected else 'ws'}://{access.address}{PATH}",
+                max_msg_size=messages.MAX_ROBOT_MESSAGE,
+                timeout=_CLOSING,
+            )
+            welcome = await _welcomed(websocket, access)
+            limit.reschedule(None)
+            yield RobotConnection(websocket, welcome, access)
+    # Callers see one error of ours, without a chain of library errors.
+    except TimeoutError:
+        raise LinkError(
+            f"The robot at {access.address} did not answer within {access.timeout_s:.1f} s. Is it "
+            "on, and in this network?"
+        ) from None
+    except aiohttp.ServerFingerprintMismatch as error:
+        raise RobotRefused(
+            f"{access.address} shows the fingerprint\n  {fingerprint_hex(error.got)}\nand not\n"
+            f"  {fingerprint_hex(error.expected)}\nEither the robot was set up again, or the "
+            "connection is intercepted. Compare it with the one that `shapechanger robot key NAME` "
+            "shows on the robot before you trust it."
+        ) from None
+    except aiohttp.WSServerHandshakeError as error:
+        raise LinkError(
+            f"The server at {access.address} is not a robot of this kind: {error.message}."
+        ) from None
+    except (aiohttp.ClientError, OSError) as error:
+        if isinstance(error, LinkError):
+            raise
+        raise LinkError(
+            f"No robot answers at {access.address} ({error}). Is it on, and does "
+            "`shapechanger robot serve` run on it?"
+        ) from None
+    finally:
+        # Skip the closing handshake of TLS, which a dead connection never answers.
+        for each in sockets:
+            with contextlib.suppress(OSError):  # It was never connected, or has ended already.
+                each.shutdown(socket.SHUT_RDWR)
+        if websocket is not None:
+            await websocket.close()
+        await session.close()
+        await connector.close(abort_ssl=True)
+        await _wait_until_closed(sockets)
+
+
+async def _wait_until_closed(sockets: list[socket.socket]) -> None:
+    """Wait until the loop has noticed the end of the sockets, which would stay open otherwise."""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(_CLOSE_S):
+            while any(each.fileno() != -1 for each in sockets):
+                await asyncio.sleep(0)
+
+
+async def _welcomed(websocket: aiohttp.ClientWebSocketResponse, access: Access) -> Welcome:
+    challenge = await _expect(websocket, Challenge)
+    if challenge.version != messages.VERSION:
+        older = "robot" if challenge.version < messages.VERSION else "workstation"
+        raise LinkError(
+            f"The robot uses version {challenge.version} of the link, this workstation "
+            f"{messages.VERSION}: update Shapechanger on the {older}."
+        )
+    hello = Hello(
+        version=messages.VERSION,
+        proof=make_proof(access.key, challenge.nonce, access.fingerprint or b"", access.role),
+        name=access.name,
+        role=access.role,
+        pace=access.pace,
+        frames=access.frames,
+    )
+    await websocket.send_bytes(messages.encode(hello))
+    return await _expect(websocket, Welcome)
+
+
+async def _expect(websocket: aiohttp.ClientWebSocketResponse, kind: type[_M]) -> _M:
+    """Receive a message of one type.
+
+    Raises:
+        RobotRefused: If the robot refuses.
+        LinkError: If the connection ended, or another message arrives.
+    """
+    message = await _receive(websocket)
+    if isinstance(message, messages.Refused):
+        raise RobotRefused(message.reason)
+    if not isinstance(message, kind):
+        raise LinkError(f"Expected a {kind.__name__} from the robot, got {type(message).__name__}.")
+    return message
+
+
+async def _receive(websocket: aiohttp.ClientWebSocketResponse) -> RobotMessage:
+    """Receive the next message.
+
+    Raises:
+        LinkError: If the connection ended, or the message is invalid.
+    """
+    received = await websocket.receive()
+    if received.type is aiohttp.WSMsgType.BINARY:
+        return messages.decode_robot_message(received.data)
+    if received.type is aiohttp.WSMsgType.TEXT:
+        raise LinkError("Expected a binary message from the robot, got text.")
+    if received.type is aiohttp.WSMsgType.ERROR:
+        raise _lost(str(received.data) or "the connection broke")
+    raise _lost(str(received.extra or "") or "the robot closed it")
+
+
+def _lost(why: str) -> LinkError:
+    return LinkError(f"The link to the robot is lost: {why}.")

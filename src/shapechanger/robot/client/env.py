@@ -1,0 +1,492 @@
+"""Gymnasium env of a vehicle or another robot on the network."""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.contract.drive import DriveReward
+from shapechanger.errors import LinkError, RenderError, RobotRefused, UnknownName
+from shapechanger.layout import Layout
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.known_robots import KnownRobot, known_names, recall
+from shapechanger.robot.client.observations import BUMP, RobotSpaces, StepMeter, View
+from shapechanger.robot.client.operator import Preparation, Takeover, interruption
+from shapechanger.robot.link.messages import Observation, Pace, Role, Welcome
+
+OnReset = Literal["operator", "person", "routine"] | Callable[[int | None], object]
+"""Kind of reset."""
+
+LATE: Final = 0.5
+"""Delay of a step up to which its deadline is met, as a share of the control period."""
+
+KNOWN_ROBOT: Final = "known robot"
+"""Kind of the name of a robot, in errors."""
+
+_SERVE_A_TWIN: Final = "`shapechanger robot serve PROFILE --twin` serves a twin and makes it known."
+_WAYS_TO_RESET: Final = ("operator", "person", "routine")
+_LOCKSTEP_S: Final = 10.0  # Time limit of a step in lockstep, where a robot waits for the env.
+_NS_PER_S: Final = 1e9
+
+
+class RemoteVehicleEnv(gym.Env[Any, NDArray[np.float32]]):
+    """Env of a robot on the network: a car, boat, tank, cat or finger.
+
+    ## Action space
+    One number for each action of the robot, in the order of `action_layout`: for vehicles
+    `[steering, throttle]` in [-1, 1], where -1 steers left and +1 drives forward. (In ROS positive
+    is left.) One-sided actions, such as tendons, are in [0, 1].
+
+    ## Observation space
+    The camera's picture, RGB, `uint8`, shape (height, width, 3), (120, 160, 3) by default; with
+    `state=True` a Dict of `image` and `state`; the state alone for a robot without a camera.
+    `observation_layout` describes the numbers of the state.
+
+    ## Reward
+    The sum of `info["reward_terms"]`, each of which is in `info` too, see `DriveReward`: metres
+    forward, collisions, seconds stuck. `info["reward_sources"]` names the source of `speed`,
+    `collision` and `stall`: a sensor, "estimated" or "absent". Terms of absent quantities are left
+    out.
+
+    ## Start
+    `reset` waits until the operator has armed the robot, or runs the reset routine of its profile.
+    The first observation was made after that.
+
+    ## End
+    Terminated by a collision, unless the reward is set otherwise. Truncated when the link is lost,
+    at an emergency stop, when the robot is disarmed and when another client takes control;
+    `info["truncated_because"]` is the reason. After a lost link the observation is the last one,
+    and the next `reset` connects again. With `interventions=True` a person may take control within
+    an episode. The program's actions are then only suggestions, until the person gives control
+    back and arms the robot.
+
+    ## Info
+    `action_applied`: applied outputs; `stop_reason`: why they differ from the action; `refused`:
+    why the robot refused the command of this step; `events`: sentences; `latency`: see `latencies`,
+    s; `frame_age`, s, and `frame_repeated`; `deadline_missed`: number of steps in this episode that
+    ended half a period late or more; `armed`, `emergency`; `absent`: features of the state without
+    a measurement, which have the middle of their range; `captured_ns` and `decided_ns`: capture
+    time of the frame, and arrival time of the applied command, ns of the robot's clock;
+    `intervene_action`: command of a person who has control in place of the program.
+
+    Args:
+        robot: Name of a known robot, or its address, HOST or HOST:PORT.
+        key: The robot's key, for an address.
+        fingerprint: SHA-256 of its certificate, for an address; "insecure" for no encryption.
+        size: Width and height of the pictures, pixels, such as (128, 128) in 2017; see
+            `resize_picture`. None for those of the camera.
+        state: Whether observations have the state besides the picture.
+        image: Whether observations have a picture; None if the robot has a camera.
+        pace: "realtime": a step lasts one control period of the robot; "lockstep": the robot waits
+            for each command and answers one period later.
+        reward: Weights that replace those of the robot's profile, by name.
+        on_reset: "operator": a person puts the robot back and arms it; where anyone may arm it, the
+            env does so at once. "person": always a person. "routine": the reset routine of the
+            profile. Or a function that is called with the seed.
+        on_waiting: Called with a sentence that describes what a reset waits for; None for a warning
+            in the log of `shapechanger.robot.client.operator` after 2 s.
+        reset_timeout_s: Time limit of a reset, s.
+        max_observation_age_s: Time limit of a step for an observation, s; None for the age at which
+            the robot refuses answers to it.
+        timeout_s: Silence of the robot after which the link is lost, s.
+        interventions: Whether a person may take control and give it back within an episode.
+        role: Whether a person or a program drives.
+        name: Display name of the client.
+        render_mode: "rgb_array" makes `render` return the newest frame at the camera's size.
+
+    Raises:
+        UnknownName: If a robot, a weight or a way to reset is unknown.
+        LinkError: If the robot cannot be reached, or is not trusted.
+        RobotRefused: If the robot refuses the client, or its time moves in steps and the pace is
+            "realtime".
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  # Gymnasium's.
+
+    def __init__(
+        self,
+        robot: str,
+        *,
+        key: str = "",
+        fingerprint: str = "",
+        size: Sequence[int] | None = (160, 120),
+        state: bool = False,
+        image: bool | None = None,
+        pace: Pace = "realtime",
+        reward: Mapping[str, float] | None = None,
+        on_reset: OnReset = "operator",
+        on_waiting: Callable[[str], object] | None = None,
+        reset_timeout_s: float = 60.0,
+        max_observation_age_s: float | None = None,
+        timeout_s: float = 2.0,
+        interventions: bool = False,
+        role: Role = "program",
+        name: str = "",
+        render_mode: str | None = None,
+    ) -> None:
+        self._arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__")}
+        if not callable(on_reset) and on_reset not in _WAYS_TO_RESET:
+            raise UnknownName("way to reset", on_reset, _WAYS_TO_RESET)
+        self._robot = _resolve(robot)
+        self._key, self._fingerprint = key, fingerprint
+        self._pace: Pace = pace
+        self._role: Role = role
+        self._name = name
+        self._takeover = Takeover(allowed=interventions)
+        self._on_reset = on_reset
+        self._on_waiting = on_waiting
+        self._reset_timeout_s = reset_timeout_s
+        self._timeout_s = timeout_s
+        self.render_mode = render_mode
+        self._clock = time.monotonic
+        self._frames = image is not False or render_mode == "rgb_array"
+        self._client = self._connect()
+        try:
+            welcome = self._client.welcome
+            wide, high = size or welcome.image_size or (160, 120)
+            self._spaces = RobotSpaces(welcome, (int(wide), int(high)), image, state)
+            self._reward = DriveReward.from_weights({**welcome.reward, **(reward or {})})
+            self._meter = StepMeter(self._spaces)
+            if pace == "realtime" and welcome.clock == "twin":
+                raise RobotRefused(
+                    f"The time of {welcome.robot} moves only in steps (`serve --clock twin`), so "
+                    "commands would expire before they act: pass pace='lockstep'."
+                )
+        except BaseException:
+            self._client.close()
+            raise
+        self.observation_space = self._spaces.observation_space
+        self.action_space = self._spaces.action_space
+        self.metadata = {**self.metadata, "render_fps": welcome.control_hz}
+        longest_s = welcome.max_observation_age_ms / 1e3
+        self._patience_s = max_observation_age_s or longest_s
+        if pace == "lockstep":
+            self._patience_s = _LOCKSTEP_S
+        self._schedule = Schedule(1.0 / welcome.control_hz, self._clock)
+        self._last: Received | None = None
+        self._last_view: View | None = None
+        self._missed = 0
+        self._has_stepped = False
+
+    @property
+    def welcome(self) -> Welcome:
+        """Description of the robot."""
+        return self._client.welcome
+
+    @property
+    def newest_jpeg(self) -> bytes | None:
+        """JPEG of the newest observation's frame, as the robot sent it; None without one."""
+        return None if self._last is None or not self._spaces.has_image else self._last.jpeg
+
+    @property
+    def record_clock(self) -> Literal["real", "twin"]:
+        """Source of the times in `info`."""
+        return self.welcome.clock
+
+    @property
+    def action_layout(self) -> Layout:
+        """Layout of an action."""
+        return self._spaces.action_layout
+
+    @property
+    def observation_layout(self) -> Layout:
+        """Layout of an observation; a picture is the one block `camera/image`."""
+        return self._spaces.observation_layout
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Bring the robot to the start, and return the first observation.
+
+        Args:
+            seed: Passed to `on_reset` if that is a function; a robot has no seed.
+            options: Unused.
+
+        Raises:
+            RobotRefused: If the robot was not armed in time, or refuses the client.
+            LinkError: If the robot cannot be reached in time.
+        """
+        super().reset(seed=seed)
+        known_as = self._robot.name if isinstance(self._robot, KnownRobot) else ""
+        ready = Preparation(self._reset_timeout_s, self._on_waiting, self._clock, known_as)
+        if not self._client.alive:
+            self._client = ready.connect(self._connect)
+            self._spaces.reconnect()
+        robot = self._client
+        if self._on_reset == "routine":
+            ready.require_routine(robot)
+        ready.take(robot)
+        # Nobody must carry an armed robot, nor may the last command stay in force. Arming it then
+        # confirms that it is at the start.
+        if self._on_reset != "routine" and self._has_stepped:
+            ready.disarm(robot)
+        if callable(self._on_reset):
+            self._on_reset(seed)
+        ready.arm(robot, self._role, by_person=self._on_reset == "person")
+        if self._on_reset == "routine":
+            ready.play(robot)
+        received = ready.first(robot, self._spaces.rest, self._is_after)
+        view = self._spaces.view(received)
+        self._last, self._last_view = received, view
+        self._meter.start(received.message)
+        self._takeover.start()
+        self._missed, self._has_stepped = 0, False
+        robot.events()  # Drop events from before the episode.
+        return view.observation, self._info(received, view)
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Send a command in answer to the newest observation, and wait for the next one.
+
+        Raises:
+            SpaceMismatch: If the action does not fit the robot.
+            ResetNeeded: If the link was lost, or `reset` was never called.
+        """
+        last, robot = self._last, self._client
+        if last is None:
+            raise gym.error.ResetNeeded(
+                "Call reset() before the first step, and after a lost link."
+            )
+        values = self._spaces.values(action)
+        if not self._has_stepped:
+            self._schedule.start()
+            self._has_stepped = True
+        sent_at = self._clock()
+        try:
+            seq = self._takeover.act(robot, values, last.message)
+            received = self._next(robot, last, sent_at)
+            view = self._spaces.view(received)
+        except LinkError as failure:
+            return self._cut(last, str(failure))
+        late = self._schedule.advance(received.received_at)
+        self._missed += late and self._pace == "realtime"
+        events = robot.events()
+        bumped = any(event.name == BUMP for event in events)
+        measured = self._meter.measure(last.message, received.message, bumped)
+        terms = self._reward.terms(*measured)
+        info = self._info(received, view)
+        info |= terms
+        info["reward_terms"] = terms
+        info["events"] = tuple(event.text for event in events)
+        info["refused"] = robot.refusal(seq)
+        clock = robot.welcome.clock
+        info["latency"] = latencies(last.message, seq, sent_at, received, clock)
+        is_lent = self._takeover.goes_on(received.message)
+        info["truncated_because"] = "" if is_lent else interruption(received.message)
+        self._last, self._last_view = received, view
+        terminated = self._reward.ends(measured.collided)
+        truncated = not terminated and bool(info["truncated_because"])
+        return view.observation, sum(terms.values()), terminated, truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the newest frame, shape (height, width, 3); None without a render mode.
+
+        Raises:
+            RenderError: If the robot has sent no frame.
+        """
+        if self.render_mode is None:
+            return None
+        newest = self._client.newest
+        if newest is not None:
+            self._spaces.shows(newest)
+        if self._spaces.picture is None:
+            raise RenderError(f"{self.welcome.robot} has sent no picture. Does it have a camera?")
+        return self._spaces.picture.copy()
+
+    def close(self) -> None:
+        """Stop the robot, and give control back."""
+        if self._client.alive:
+            self._client.release()
+        self._client.close()
+        self._last = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the arguments, because a connection cannot be copied."""
+        return {"arguments": self._arguments, "spec": self.spec}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Open a new connection."""
+        type(self).__init__(self, **state["arguments"])
+        self.spec = state["spec"]
+
+    def _connect(self) -> RobotClient:
+        client = RobotClient.connect(
+            self._robot,
+            key=self._key,
+            fingerprint=self._fingerprint,
+            role=self._role,
+            name=self._name,
+            pace=self._pace,
+            frames=self._frames,
+            timeout_s=self._timeout_s,
+        )
+        # An env that is dropped without `close` must not keep control.
+        weakref.finalize(self, client.abandon)
+        return client
+
+    def _is_after(self, received: Received, now_ns: int) -> bool:
+        """Return True if an observation and its frame were made after a time of the robot, ns."""
+        message = received.message
+        if message.state_ns <= now_ns:
+            return False
+        if not self._spaces.has_image:
+            return True
+        return message.captured_ns > now_ns and self._spaces.shows(received)
+
+    def _next(self, robot: RobotClient, last: Received, sent_at: float) -> Received:
+        """Return the newest observation at the end of the control period, and always a new one."""
+        if self._pace == "lockstep":
+            return robot.observation(last.message.seq, self._patience_s)
+        left_s = max(0.0, self._schedule.left_s)
+        found = robot.observation(last.message.seq, left_s + self._patience_s)
+        while found.received_at <= sent_at:  # It was sent before the command.
+            found = robot.observation(found.message.seq, left_s + self._patience_s)
+        while (left_s := self._schedule.left_s) > 0.0:
+            robot.acknowledge()
+            newer = robot.newer(found.message.seq, left_s)
+            found = newer or found
+        return found
+
+    def _cut(self, last: Received, because: str) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Return the end of an episode after a lost link."""
+        view = self._spaces.view(last)
+        info = self._info(last, view)
+        measured = self._meter.measure(last.message, last.message, False)
+        terms = dict.fromkeys(self._reward.terms(*measured), 0.0)
+        info |= terms
+        info |= {
+            "reward_terms": terms,
+            "events": (),
+            "refused": "",
+            "latency": {},
+            "truncated_because": because,
+            "frame_repeated": True,
+        }
+        self._last = None
+        return view.observation, 0.0, False, True, info
+
+    def _info(self, received: Received, view: View) -> dict[str, Any]:
+        message = received.message
+        info: dict[str, Any] = {
+            "action_applied": np.array(message.action_applied, np.float32),
+            "stop_reason": message.stop_reason,
+            "armed": message.armed,
+            "emergency": message.emergency,
+            "absent": view.absent,
+            "reward_sources": self._meter.sources(message),
+            "deadline_missed": self._missed,
+            "captured_ns": message.captured_ns,
+            "decided_ns": message.command_ns,
+        }
+        by_person = self._takeover.action(message) if self._role == "program" else None
+        if by_person is not None:
+            info["intervene_action"] = np.array(by_person, np.float32)
+        if self._spaces.has_image:
+            info["frame_age"] = frame_age_s(received, self._clock())
+            info["frame_repeated"] = not view.fresh
+        return info
+
+
+class Schedule:
+    """Control period of the env, synchronised with the robot.
+
+    If this machine delays a step a little, the next one is shorter, so that the mean rate holds.
+    If the robot's observation came after the end of the period, the next period starts at its
+    arrival, because no two clocks are equally fast. A missed deadline also starts a new period,
+    because two commands in quick succession are worse than a late one.
+
+    Args:
+        period_s: Control period, s.
+        clock: Monotonic clock, s.
+    """
+
+    def __init__(self, period_s: float, clock: Callable[[], float]) -> None:
+        self._period_s = period_s
+        self._clock = clock
+        self._tick = clock()
+
+    def start(self) -> None:
+        """Begin the first step now."""
+        self._tick = self._clock()
+
+    @property
+    def left_s(self) -> float:
+        """Time until the end of the step, s; negative when it is late."""
+        return self._tick + self._period_s - self._clock()
+
+    def advance(self, arrived_at: float) -> bool:
+        """End a step and begin the next.
+
+        Args:
+            arrived_at: Arrival time of the observation that ends the step, s.
+
+        Returns:
+            True if the step missed its deadline.
+        """
+        end = self._tick + self._period_s
+        now = self._clock()
+        missed = now - end > LATE * self._period_s
+        self._tick = now if missed else max(end, arrived_at)
+        return missed
+
+
+def latencies(
+    answered: Observation,
+    seq: int,
+    sent_at: float,
+    received: Received,
+    clock: Literal["real", "twin"] = "real",
+) -> dict[str, float]:
+    """Return the measurable delays of a step, s.
+
+    Args:
+        answered: The observation that the command answers.
+        seq: Number of the command.
+        sent_at: Time at which it was sent on this machine's clock, s.
+        received: The observation after it.
+        clock: Source of the robot's time; a twin's seconds have another length than ours.
+
+    Returns:
+        `capture_to_send`: from the capture of the frame to its sending, by the robot's clock. If
+        the robot acted on this command, also `round_trip`: there and back, without the time on the
+        robot, on real clocks only; `observation_age_at_action`: from the capture of the answered
+        frame to the command's arrival; `command_to_pin`: from its arrival to the outputs.
+    """
+    seen = received.message
+    known = {"capture_to_send": (seen.sent_ns - seen.captured_ns) / _NS_PER_S}
+    if seen.applied_seq != seq or not seen.mine:
+        return known
+    if seen.command_ns is not None:
+        on_robot = (seen.sent_ns - seen.command_ns) / _NS_PER_S
+        if clock == "real":
+            known["round_trip"] = received.received_at - sent_at - on_robot
+        known["observation_age_at_action"] = (seen.command_ns - answered.captured_ns) / _NS_PER_S
+    if seen.command_ns is not None and seen.applied_ns is not None:
+        known["command_to_pin"] = (seen.applied_ns - seen.command_ns) / _NS_PER_S
+    return known
+
+
+def frame_age_s(received: Received, now: float) -> float:
+    """Return the age of an observation's frame, s, without its time on the network.
+
+    Args:
+        received: The observation.
+        now: Time on this machine's clock, s.
+    """
+    seen = received.message
+    return (seen.sent_ns - seen.captured_ns) / _NS_PER_S + now - received.received_at
+
+
+def _resolve(robot: str) -> KnownRobot | str:
+    """Return the known robot of this name, or the address."""
+    if robot in known_names():
+        return recall(robot)
+    if "." in robot or ":" in robot or robot == "localhost":
+        return robot
+    raise UnknownName(KNOWN_ROBOT, robot, known_names(), _SERVE_A_TWIN)

@@ -1,0 +1,233 @@
+"""Messages of a robot on their way from the connection's thread to the calling threads."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final, Generic, TypeVar
+
+from shapechanger.errors import LinkError, RobotRefused, StaleObservation
+from shapechanger.robot.link.messages import (
+    Event,
+    Observation,
+    PolicyState,
+    RecorderState,
+    Refused,
+    RobotMessage,
+)
+
+_Answer = TypeVar("_Answer", bound=RobotMessage)
+
+_MAX_EVENTS: Final = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """An observation and its time of arrival.
+
+    Attributes:
+        message: The observation.
+        received_at: Time of arrival on this machine's monotonic clock, s.
+        jpeg: Frame number `message.frame_seq`, whichever message brought it; None without one.
+    """
+
+    message: Observation
+    received_at: float
+    jpeg: bytes | None
+
+
+@dataclass(eq=False)
+class Request(Generic[_Answer]):
+    """A call that waits for an answer.
+
+    Attributes:
+        kind: Type of the answer.
+        accepts: Returns True if a message of that type is the answer.
+        answer: The answer; None until it arrives.
+        refusal: Reason of a refusal in place of the answer; None without one.
+    """
+
+    kind: type[_Answer]
+    accepts: Callable[[_Answer], bool] = lambda _: True
+    answer: _Answer | None = None
+    refusal: str | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """True until the robot has answered or refused."""
+        return self.answer is None and self.refusal is None
+
+    def offer(self, message: RobotMessage) -> bool:
+        """Take a message if it is the answer; a refusal answers any open request."""
+        if not self.is_open:
+            return False
+        if isinstance(message, Refused):
+            self.refusal = message.reason
+        elif isinstance(message, self.kind) and self.accepts(message):
+            self.answer = message
+        return not self.is_open
+
+
+class Inbox:
+    """Messages of a robot, for any number of calling threads.
+
+    The newest observation is in one slot, so that a slow reader never gets an old one. A robot
+    sends each frame once, so an observation that replaces an unread one takes over its frame.
+
+    Args:
+        clock: Monotonic clock, s.
+
+    Attributes:
+        newest: The newest observation of any age; None before the first.
+        recorder: Last reported state of the robot's recorder, or None.
+        policies: Last report of the policies on board, or None.
+        failure: Why the link is lost; None while it is up.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self.newest: Received | None = None
+        self.recorder: RecorderState | None = None
+        self.policies: PolicyState | None = None
+        self.failure: LinkError | None = None
+        self._clock = clock
+        self._changed = threading.Condition()
+        self._events: deque[Event] = deque(maxlen=_MAX_EVENTS)
+        self._refusals: dict[int, str] = {}
+        self._requests: list[Request[Any]] = []
+
+    def put(self, message: RobotMessage) -> None:
+        """Store a message that has just arrived.
+
+        Raises:
+            RobotRefused: If the robot ends the connection.
+            LinkError: If an observation is not newer than the one before, as in a replay.
+        """
+        with self._changed:
+            match message:
+                case Observation():
+                    self._observe(message)
+                case Event():
+                    self._events.append(message)
+                case Refused(fatal=True):
+                    raise RobotRefused(message.reason)
+                case Refused(seq=int(seq)):
+                    self._refusals = {seq: message.reason}
+                case _:
+                    if isinstance(message, RecorderState):
+                        self.recorder = message
+                    elif isinstance(message, PolicyState):
+                        self.policies = message
+                    any(request.offer(message) for request in self._requests)  # The oldest one.
+            self._changed.notify_all()
+
+    def fail(self, failure: LinkError) -> None:
+        """End all waits with an error; the first one counts."""
+        with self._changed:
+            self.failure = self.failure or failure
+            self._changed.notify_all()
+
+    def check(self) -> None:
+        """Do nothing while the link is up.
+
+        Raises:
+            LinkError: If it is lost, without the traceback of the connection's thread.
+        """
+        if self.failure is not None:
+            raise type(self.failure)(*self.failure.args)
+
+    def wait(self, newer_than: int, timeout_s: float) -> Received | None:
+        """Wait for an observation. Return None after the time limit.
+
+        Args:
+            newer_than: Its `seq` is larger than this.
+            timeout_s: Time limit, s.
+
+        Raises:
+            LinkError: If the link is lost.
+        """
+
+        def found() -> Received | None:
+            newest = self.newest
+            return newest if newest is not None and newest.message.seq > newer_than else None
+
+        with self._changed:
+            self._changed.wait_for(lambda: self.failure or found(), timeout_s)
+            self.check()
+            return found()
+
+    def take(self, newer_than: int, timeout_s: float) -> Received:
+        """Wait for an observation as `wait` does, and raise an error after the time limit.
+
+        Args:
+            newer_than: Its `seq` is larger than this.
+            timeout_s: Time limit, s.
+
+        Raises:
+            StaleObservation: If none arrives in time.
+            LinkError: If the link is lost.
+        """
+        found = self.wait(newer_than, timeout_s)
+        if found is not None:
+            return found
+        last = self.newest
+        age = f"the last is {self._clock() - last.received_at:.2f} s old" if last else "none ever"
+        raise StaleObservation(
+            f"The robot sent no new observation within {timeout_s:.2f} s ({age})."
+        )
+
+    @contextmanager
+    def expecting(self, request: Request[_Answer]) -> Generator[None]:
+        """Offer the messages that arrive within the block to a request, after older requests."""
+        with self._changed:
+            self._requests.append(request)
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._requests.remove(request)
+
+    def answer(self, request: Request[_Answer], timeout_s: float | None = None) -> _Answer:
+        """Wait for the answer to a request.
+
+        Args:
+            request: The request, which must be expected.
+            timeout_s: Time limit, s; None for that of the link.
+
+        Raises:
+            RobotRefused: If the robot refuses.
+            TimeoutError: If there is no answer in time.
+            LinkError: If the link is lost.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self.failure or not request.is_open, timeout_s)
+        if request.refusal is not None:
+            raise RobotRefused(request.refusal)
+        if request.answer is None:
+            self.check()
+            raise TimeoutError
+        return request.answer
+
+    def events(self) -> list[Event]:
+        """Return the events since the last call, oldest first, at most 256."""
+        with self._changed:
+            events = list(self._events)
+            self._events.clear()
+        return events
+
+    def refusal(self, seq: int) -> str:
+        """Return the reason why the robot refused a command, or "" if it has not."""
+        return self._refusals.get(seq, "")
+
+    def _observe(self, message: Observation) -> None:
+        last = self.newest
+        if last is not None and message.seq <= last.message.seq:
+            raise LinkError(
+                f"Observation {message.seq} arrived after {last.message.seq}, as in a replay."
+            )
+        jpeg = message.frame
+        if jpeg is None and last is not None and message.frame_seq == last.message.frame_seq:
+            jpeg = last.jpeg
+        self.newest = Received(message, self._clock(), jpeg)

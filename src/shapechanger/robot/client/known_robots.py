@@ -1,0 +1,189 @@
+"""Known robots: address, key and fingerprint of each, in a file that only the user can read.
+
+The files are `~/.config/shapechanger/known/NAME.toml`, or below `$XDG_CONFIG_HOME` if that is set.
+
+No robot is trusted on first use. A program cannot tell the robot from a man in the middle; a
+person who compares the fingerprints can.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import ssl
+import tempfile
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from shapechanger.errors import LinkError, OutputError, UnknownName
+from shapechanger.robot.link.address import Address, parse_address
+from shapechanger.robot.link.authentication import (
+    fingerprint_hex,
+    fingerprint_of,
+    fingerprint_short,
+    parse_fingerprint,
+    parse_key,
+)
+
+INSECURE: Final = "insecure"
+"""In place of a fingerprint: no encryption, and no proof of the robot's identity."""
+
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_FIELDS: Final = ("address", "key", "fingerprint")
+_OTHERS: Final = 0o077
+
+
+@dataclass(frozen=True, slots=True)
+class KnownRobot:
+    """A robot that the user trusts.
+
+    Attributes:
+        name: Name of the robot.
+        address: HOST, or HOST:PORT.
+        key: The robot's key, from `shapechanger robot init`.
+        fingerprint: SHA-256 of its certificate in hexadecimal; or "insecure", and then the key may
+            be empty.
+
+    Raises:
+        LinkError: If an attribute is invalid.
+    """
+
+    name: str
+    address: str
+    key: str
+    fingerprint: str
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        parse_address(self.address)
+        parse_trust(self.fingerprint)
+        if self.key or self.fingerprint != INSECURE:
+            parse_key(self.key)
+
+    def __repr__(self) -> str:
+        """Leave out the key, which does not belong in a log."""
+        return f"KnownRobot({self.name!r}, {self.address!r}, fingerprint={self.fingerprint!r})"
+
+
+def check_name(name: str) -> None:
+    """Check the name of a robot.
+
+    Raises:
+        LinkError: If it is not a valid name.
+    """
+    if not _NAME.fullmatch(name):
+        raise LinkError(
+            f"A robot's name has up to 64 letters, digits, '-', '_' and '.', got {name!r}."
+        )
+
+
+def known_folder() -> Path:
+    """Return the folder of the files."""
+    config = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return Path(config) / "shapechanger" / "known"
+
+
+def known_names() -> tuple[str, ...]:
+    """Return the names of all known robots, sorted."""
+    return tuple(sorted(path.stem for path in known_folder().glob("*.toml")))
+
+
+def remember(robot: KnownRobot) -> Path:
+    """Save a robot; one of the same name is replaced.
+
+    Returns:
+        The file.
+
+    Raises:
+        OutputError: If it cannot be written; an existing file is unchanged.
+    """
+    folder = known_folder()
+    # JSON strings are TOML strings, but for one character, which no field contains.
+    lines = [
+        f"{field} = {json.dumps(getattr(robot, field), ensure_ascii=False)}\n" for field in _FIELDS
+    ]
+    path = folder / f"{robot.name}.toml"
+    written: Path | None = None
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        # Only the user can read a temporary file.
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=folder, delete=False) as file:
+            written = Path(file.name)
+            file.writelines(lines)
+        written.replace(path)
+    except OSError as error:
+        if written is not None:
+            written.unlink(missing_ok=True)
+        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from None
+    return path
+
+
+def recall(name: str) -> KnownRobot:
+    """Load a known robot.
+
+    Raises:
+        UnknownName: If there is no robot of this name.
+        LinkError: If its file is invalid, or other users can read it.
+    """
+    path = _file(name)
+    if os.name == "posix" and path.stat().st_mode & _OTHERS:
+        raise LinkError(f"Other users can read the key in {path}: run `chmod 600 {path}`.")
+    try:
+        fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise LinkError(f"Cannot read {path}: {error}.") from None
+    if set(fields) != set(_FIELDS) or not all(isinstance(v, str) for v in fields.values()):
+        raise LinkError(f"{path} must have the strings {', '.join(_FIELDS)}.")
+    return KnownRobot(name, **fields)
+
+
+def forget(name: str) -> None:
+    """Delete a known robot.
+
+    Raises:
+        UnknownName: If there is no robot of this name.
+    """
+    _file(name).unlink()
+
+
+def parse_trust(fingerprint: str) -> bytes | None:
+    """Return the SHA-256 of the expected certificate; None for "insecure".
+
+    Raises:
+        LinkError: If the text is neither a fingerprint nor "insecure".
+    """
+    return None if fingerprint == INSECURE else parse_fingerprint(fingerprint)
+
+
+def untrusted(address: Address, timeout_s: float) -> LinkError:
+    """Return the error for a connection without a fingerprint, which shows the one to compare.
+
+    Args:
+        address: Address of the robot.
+        timeout_s: Time limit, s.
+
+    Raises:
+        LinkError: If no server shows a certificate.
+    """
+    try:
+        shown = ssl.get_server_certificate((address.host, address.port), timeout=timeout_s)
+    except OSError as error:
+        raise LinkError(f"No server shows a certificate at {address}: {error}.") from None
+    fingerprint = fingerprint_of(ssl.PEM_cert_to_DER_cert(shown))
+    digits = fingerprint_hex(fingerprint)
+    return LinkError(
+        f"The robot at {address} is not trusted yet. Its fingerprint is\n"
+        f"  {digits}  (in short {fingerprint_short(fingerprint)})\n"
+        "Compare it with the one that `shapechanger robot key NAME` shows on the robot. If they "
+        f"are the same, run\n  shapechanger robot remember NAME {address} --fingerprint {digits}"
+    )
+
+
+def _file(name: str) -> Path:
+    names = known_names()
+    if name not in names:
+        raise UnknownName("known robot", name, names)
+    return known_folder() / f"{name}.toml"

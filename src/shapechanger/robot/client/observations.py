@@ -1,0 +1,330 @@
+"""Gymnasium spaces, observations and measured steps from the messages of a robot."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.errors import LinkError, MissingExtra, RobotRefused, SpaceMismatch
+from shapechanger.layout import Element, Feature, Layout
+from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.link.messages import Observation, Welcome
+
+try:
+    import simplejpeg  # pyright: ignore[reportMissingTypeStubs]  # Typed, but for its arrays.
+except ImportError as error:
+    raise MissingExtra("simplejpeg", "remote") from error
+
+IMAGE: Final = "camera/image"
+"""Name of the picture in an observation layout."""
+
+BUMP: Final = "bump"
+"""Name of the bump event, and of the quantity."""
+
+# A few bytes of JPEG can claim 65,535 x 65,535 pixels, which is 12 GB.
+_MAX_PIXELS: Final = 4096 * 4096
+_ABSENT: Final = "absent"
+_BRIGHTEST: Final = 255
+_NS_PER_S: Final = 1e9
+_QUANTITIES: Final = ("speed", "collision", "stall")
+
+
+def decode_picture(jpeg: bytes) -> NDArray[np.uint8]:
+    """Decode a JPEG to RGB, shape (height, width, 3).
+
+    Raises:
+        LinkError: If the bytes are not a JPEG, or the picture is too large.
+    """
+    try:
+        height, width = (int(n) for n in simplejpeg.decode_jpeg_header(jpeg)[:2])
+        if height * width > _MAX_PIXELS:
+            raise LinkError(f"A picture of {width} x {height} pixels is too large.")
+        return simplejpeg.decode_jpeg(jpeg, colorspace="RGB")
+    except ValueError as error:
+        raise LinkError(f"The robot sent an invalid JPEG: {error}.") from None
+
+
+def resize_picture(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Resize a picture.
+
+    If width and height shrink by whole numbers, each pixel is the rounded mean of its box.
+    Otherwise it is the pixel nearest to its middle. Nothing is cropped, so a change of proportions
+    stretches the picture.
+
+    Args:
+        picture: Shape (height, width, 3).
+        size: Width and height, pixels, each at least 1.
+
+    Returns:
+        Shape (size[1], size[0], 3); the picture itself if it has this size.
+    """
+    height, width = picture.shape[:2]
+    wide, high = size
+    if (width, height) == (wide, high):
+        return picture
+    if width % wide == 0 and height % high == 0:
+        boxes = picture.reshape(high, height // high, wide, width // wide, 3)
+        return np.rint(boxes.mean(axis=(1, 3))).astype(np.uint8)
+    rows = (2 * np.arange(high) + 1) * height // (2 * high)
+    columns = (2 * np.arange(wide) + 1) * width // (2 * wide)
+    return picture[rows[:, None], columns[None, :]]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Observation of an env, and facts for its `info`.
+
+    Attributes:
+        observation: The observation, which shares no memory.
+        fresh: Whether its picture differs from the previous one; True without pictures.
+        absent: Names of the state's features that no sensor measures now.
+    """
+
+    observation: Any
+    fresh: bool
+    absent: tuple[str, ...]
+
+
+class RobotSpaces:
+    """Spaces and layouts of one robot, and observations from its messages.
+
+    Args:
+        welcome: Description of the robot.
+        size: Width and height of the pictures, pixels.
+        image: Whether observations have a picture; None if the robot has a camera.
+        state: Whether observations have the state besides the picture.
+
+    Attributes:
+        action_layout: Layout of an action.
+        action_space: One number for each action of the robot.
+        observation_layout: Layout of an observation; a picture is one block.
+        observation_space: Space of the picture, the state, or both.
+        has_image: Whether observations have a picture.
+        picture: The newest picture at the camera's size; None before the first.
+
+    Raises:
+        RobotRefused: If a picture is required and the robot has no camera.
+        SpaceMismatch: If the size is below 1 pixel.
+    """
+
+    def __init__(
+        self, welcome: Welcome, size: tuple[int, int], image: bool | None, state: bool
+    ) -> None:
+        has_camera = welcome.image_size is not None
+        if image and not has_camera:
+            raise RobotRefused(
+                f"{welcome.robot} has no camera: leave out `image` to get its state."
+            )
+        if min(size) < 1:
+            raise SpaceMismatch(
+                f"A picture must have at least 1 x 1 pixels, got {size[0]} x {size[1]}."
+            )
+        self._size = size
+        self.has_image = has_camera if image is None else image
+        self._has_state = state or not self.has_image
+        self._state_layout = Layout.from_json(welcome.state_layout)
+        self._state_size = self._state_layout.size
+        self._places: dict[str, int] = {
+            name: place.start for name, place in self._state_layout.slices.items()
+        }
+        self.action_layout = Layout.from_json(welcome.action_layout)
+        self._low, self._high = self.action_layout.low, self.action_layout.high
+        self.action_space = gym.spaces.Box(
+            self._low.astype(np.float32), self._high.astype(np.float32)
+        )
+        self.observation_layout = self._layout()
+        self.observation_space = self._space()
+        self.picture: NDArray[np.uint8] | None = None
+        self._tried_seq = 0
+        self._picture_seq = 0
+        self._viewed_seq = 0
+
+    def values(self, action: Any) -> tuple[float, ...]:
+        """Return the values of a command, clipped to the range of the action.
+
+        Raises:
+            SpaceMismatch: If the shape is wrong, or a number is not finite.
+        """
+        array = np.asarray(action, dtype=np.float64)
+        if array.shape != self.action_space.shape or not np.isfinite(array).all():
+            raise SpaceMismatch(
+                f"An action of this robot is {len(self.action_layout)} finite numbers "
+                f"({', '.join(self.action_layout.names)}), got {array.tolist()}."
+            )
+        return tuple(np.clip(array, self._low, self._high).tolist())
+
+    @property
+    def rest(self) -> tuple[float, ...]:
+        """The action at rest: 0, or the bound nearest to it."""
+        return tuple(min(max(0.0, f.low), f.high) for f in self.action_layout)
+
+    def quantity(self, message: Observation, name: str) -> float | None:
+        """Return a quantity of the state by name, or None if no sensor measures it.
+
+        Args:
+            message: An observation.
+            name: Name of the quantity, such as "speed".
+        """
+        place = self._places.get(name)
+        if place is None or message.sources.get(name, _ABSENT) == _ABSENT:
+            return None
+        value = message.state[place]
+        return None if math.isnan(value) else value
+
+    def source(self, message: Observation, name: str) -> str:
+        """Return the source of a quantity: name of the sensor, "estimated" or "absent".
+
+        Args:
+            message: An observation.
+            name: Name of the quantity, such as "speed".
+        """
+        is_measured = self.quantity(message, name) is not None
+        return message.sources[name] if is_measured else _ABSENT
+
+    def shows(self, received: Received) -> bool:
+        """Decode the frame of an observation. Return False if there is none, or it is invalid.
+
+        After an invalid frame `picture` is still the previous one, and `View.fresh` is False.
+        """
+        seq = received.message.frame_seq
+        if received.jpeg is None:
+            return False
+        if seq != self._tried_seq:  # An invalid frame is tried once, too.
+            self._tried_seq = seq
+            try:
+                self.picture = decode_picture(received.jpeg)
+            except LinkError:
+                return False
+            self._picture_seq = seq
+        return seq == self._picture_seq
+
+    def reconnect(self) -> None:
+        """Forget the numbers of frames: after a restart, the robot counts from 1 again."""
+        self._tried_seq = self._picture_seq = self._viewed_seq = 0
+
+    def view(self, received: Received) -> View:
+        """Return the env's observation for an observation of the robot.
+
+        Raises:
+            LinkError: If the state does not fit the layout, or there is no picture yet.
+        """
+        message = received.message
+        if len(message.state) != self._state_size:
+            raise LinkError(
+                f"The state layout has {self._state_size} numbers, and the robot sent "
+                f"{len(message.state)}."
+            )
+        state, absent = self._state(message)
+        if not self.has_image:
+            return View(state, True, absent)
+        self.shows(received)
+        if self.picture is None:
+            raise LinkError("The robot has sent no picture yet.")
+        fresh, self._viewed_seq = self._picture_seq != self._viewed_seq, self._picture_seq
+        image = resize_picture(self.picture, self._size)
+        image = image.copy() if image is self.picture else image
+        seen = {"image": image, "state": state} if self._has_state else image
+        return View(seen, fresh, absent)
+
+    def _state(self, message: Observation) -> tuple[NDArray[np.float32], tuple[str, ...]]:
+        """Return the state with absent values at the middle of their range, and their names."""
+        state = np.array(message.state, dtype=np.float32)
+        missing = np.isnan(state)
+        if not missing.any():
+            return state, ()
+        features, places = self._state_layout.features, self._state_layout.slices
+        absent = [f for f in features if missing[places[f.name]].any()]
+        for feature in absent:
+            block = state[places[feature.name]]
+            block[np.isnan(block)] = feature.middle
+        return state, tuple(feature.name for feature in absent)
+
+    def _layout(self) -> Layout:
+        features: list[Feature] = []
+        if self.has_image:
+            shape = (self._size[1], self._size[0], 3)
+            camera = Element("camera", "camera")
+            features.append(Feature(IMAGE, "1", 0.0, _BRIGHTEST, camera, shape))
+        if self._has_state:
+            features += self._state_layout.features
+        return Layout(tuple(features))
+
+    def _space(self) -> gym.Space[Any]:
+        low, high = (
+            bound.astype(np.float32) for bound in (self._state_layout.low, self._state_layout.high)
+        )
+        state = gym.spaces.Box(low, high)
+        if not self.has_image:
+            return state
+        image = gym.spaces.Box(0, _BRIGHTEST, (self._size[1], self._size[0], 3), np.uint8)
+        return gym.spaces.Dict({"image": image, "state": state}) if self._has_state else image
+
+
+class StepMeasures(NamedTuple):
+    """Measured quantities of one step, from which a task computes its reward.
+
+    Attributes:
+        speed_mps: Forward speed, m/s, negative backwards; None if it is not measured.
+        collided: Whether the robot touches something that it did not touch before; None if unknown.
+        stalled: Whether it pushes without moving; None if unknown.
+        dt_s: Duration of the step, s, at least 0.
+    """
+
+    speed_mps: float | None
+    collided: bool | None
+    stalled: bool | None
+    dt_s: float
+
+
+class StepMeter:
+    """Measures one robot's steps, one after another.
+
+    Args:
+        spaces: Reads the robot's messages.
+    """
+
+    def __init__(self, spaces: RobotSpaces) -> None:
+        self._spaces = spaces
+        self._touched = False
+
+    def start(self, seen: Observation) -> None:
+        """Begin an episode; an obstacle that is touched already does not count as a collision."""
+        self._touched = bool(self._touches(seen)[0])
+
+    def measure(self, before: Observation, seen: Observation, bumped: bool) -> StepMeasures:
+        """Return the measured quantities of a step.
+
+        Args:
+            before: The observation before the step.
+            seen: The observation after the step.
+            bumped: Whether there was a bump, which may be over by now.
+        """
+        touches = self._touches(seen)[0]
+        stall = self._spaces.quantity(seen, "stall")
+        hits = bool(touches) or bumped
+        collided = None if touches is None else hits and not self._touched
+        self._touched = hits
+        return StepMeasures(
+            self._spaces.quantity(seen, "speed"),
+            collided,
+            None if stall is None else bool(stall),
+            max(0, seen.state_ns - before.state_ns) / _NS_PER_S,
+        )
+
+    def sources(self, seen: Observation) -> dict[str, str]:
+        """Return the source of each quantity of the reward."""
+        sources = {name: self._spaces.source(seen, name) for name in _QUANTITIES}
+        return sources | {"collision": self._touches(seen)[1]}
+
+    def _touches(self, seen: Observation) -> tuple[float | None, str]:
+        """Return whether the robot touches something, 0 or 1, and the source."""
+        for quantity in ("collision", BUMP):
+            value = self._spaces.quantity(seen, quantity)
+            if value is not None:
+                return value, self._spaces.source(seen, quantity)
+        return None, _ABSENT

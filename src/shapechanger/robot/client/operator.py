@@ -1,0 +1,283 @@
+"""Reset and takeover: how a remote env waits for the operator of its robot."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import time
+from collections.abc import Callable
+from typing import Final
+
+from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.link.messages import Observation
+
+_POLL_S: Final = 0.05  # Period of checks for what a person does.
+_LOG_AFTER_S: Final = 2.0  # Shorter waits are not logged.
+_NS_PER_S: Final = 1e9
+
+_HAND_OVER: Final = "P in `shapechanger robot drive` lets a waiting program drive."
+
+_log = logging.getLogger(__name__)
+
+
+class Preparation:
+    """Steps of one reset, with one time limit for all of them.
+
+    Args:
+        timeout_s: Time limit, s.
+        on_waiting: Called once with a sentence for each thing that is waited for; None for a
+            warning in the log after 2 s.
+        clock: Monotonic clock, s.
+        known_as: Name under which the robot is known on this machine; "" for none.
+    """
+
+    def __init__(
+        self,
+        timeout_s: float,
+        on_waiting: Callable[[str], object] | None,
+        clock: Callable[[], float],
+        known_as: str = "",
+    ) -> None:
+        self._timeout_s = timeout_s
+        self._on_waiting = on_waiting
+        self._clock = clock
+        self._known_as = known_as
+        self._since = clock()
+        self._until = self._since + timeout_s
+        self._reported: set[str] = set()
+
+    def connect(self, make: Callable[[], RobotClient]) -> RobotClient:
+        """Connect, with retries.
+
+        Raises:
+            RobotRefused: If the robot refuses the client.
+            LinkError: If it does not answer in time.
+        """
+        while True:
+            try:
+                return make()
+            except RobotRefused:
+                raise
+            except LinkError as error:
+                if not self._wait("The robot does not answer."):
+                    raise LinkError(f"{error} Gave up after {self._timeout_s:.0f} s.") from None
+
+    def take(self, robot: RobotClient) -> None:
+        """Take control, once no other client has it.
+
+        Raises:
+            RobotRefused: If another client keeps control for too long.
+        """
+        while True:
+            try:
+                robot.take()
+            except RobotRefused as refusal:
+                if not self._wait(str(refusal), _HAND_OVER):
+                    raise
+            else:
+                return
+
+    def disarm(self, robot: RobotClient) -> None:
+        """Disarm the robot, so that a person can put it back.
+
+        Raises:
+            RobotRefused: If it stays armed.
+        """
+        robot.disarm()
+        while robot.ask().message.armed:
+            if not self._wait(f"{robot.welcome.robot} is still armed."):
+                raise RobotRefused(f"{robot.welcome.robot} does not disarm.")
+
+    def arm(self, robot: RobotClient, role: str, *, by_person: bool = False) -> None:
+        """Arm the robot where that is allowed, or wait for a person; we then have control.
+
+        Args:
+            robot: The robot.
+            role: Our role.
+            by_person: Whether to wait for a person in any case.
+
+        Raises:
+            RobotRefused: If it is not armed in time.
+        """
+        name = robot.welcome.robot
+        because = "It waits for a person"
+        how = self._how_to_arm(name)
+        waits_for = f"{name} waits for its operator: put it at the start and arm it: {how}."
+        while True:
+            seen = robot.ask().message
+            if not seen.mine and self._clock() <= self._until:
+                # A person has control, and gives it back to arm the robot for us.
+                self.take(robot)
+                continue
+            if seen.mine and seen.armed and not seen.emergency:
+                return
+            may = robot.welcome.arming == "anyone" and not seen.emergency and not by_person
+            if role == "person" or may:
+                try:
+                    robot.arm()
+                except RobotRefused as refusal:
+                    because = str(refusal).rstrip(".")
+                else:
+                    continue
+            if not self._wait(waits_for):
+                stopped = f" ({seen.stop_reason.rstrip('.')})" if seen.stop_reason else ""
+                raise RobotRefused(
+                    f"{name} was not armed within {self._timeout_s:.0f} s. {because}{stopped}. "
+                    f"To arm it, {how}; `reset_timeout_s` says how long to wait for that."
+                )
+
+    def _how_to_arm(self, name: str) -> str:
+        """Return instructions to arm the robot for a program."""
+        first = "" if self._known_as else f"`shapechanger robot remember {name} …` once, then "
+        return (
+            f"{first}`shapechanger robot drive {self._known_as or name}` in another terminal, and "
+            "there P, which arms it for the program"
+        )
+
+    def require_routine(self, robot: RobotClient) -> None:
+        """Check that the robot has a reset routine, before it moves.
+
+        Raises:
+            RobotRefused: If its profile has none.
+        """
+        if not robot.welcome.reset:
+            raise RobotRefused(
+                f"The profile of {robot.welcome.robot} has no reset routine: add [[reset]] tables "
+                "to it, or let its operator put it back with on_reset='operator'."
+            )
+
+    def play(self, robot: RobotClient) -> None:
+        """Run the reset routine of the robot's profile.
+
+        Raises:
+            RobotRefused: If the robot is disarmed meanwhile.
+        """
+        for values, seconds in robot.welcome.reset:
+            seen = robot.ask()
+            end_ns = seen.message.state_ns + seconds * _NS_PER_S
+            while seen.message.state_ns < end_ns:
+                if not seen.message.armed:
+                    raise RobotRefused(
+                        f"The reset routine was stopped: {seen.message.stop_reason or 'disarmed'}"
+                    )
+                seen = robot.exchange(values, seen)
+
+    def first(
+        self, robot: RobotClient, rest: tuple[float, ...], is_new: Callable[[Received, int], bool]
+    ) -> Received:
+        """Wait for the first observation after the reset.
+
+        In lockstep, commands at rest advance the robot's time.
+
+        Args:
+            robot: The robot.
+            rest: Command at rest.
+            is_new: Returns True if an observation was made after a time of the robot, ns.
+
+        Raises:
+            LinkError: If none arrives in time.
+        """
+        _, now_ns = robot.ping()
+        seen = robot.ask()
+        while not is_new(seen, now_ns):
+            if self._clock() > self._until:
+                raise LinkError(
+                    f"{robot.welcome.robot} sends no new observation. Does its camera still work?"
+                )
+            seen = robot.exchange(rest, seen) if robot.pace == "lockstep" else robot.ask()
+        return seen
+
+    def _wait(self, sentence: str, hint: str = "") -> bool:
+        """Wait a moment. Return False after the time limit.
+
+        Args:
+            sentence: What is waited for, a sentence.
+            hint: What a person can do, for the log.
+        """
+        now = self._clock()
+        is_due = self._on_waiting is not None or now - self._since > _LOG_AFTER_S
+        if is_due and sentence not in self._reported:
+            self._reported.add(sentence)
+            if self._on_waiting is not None:
+                self._on_waiting(sentence)
+            else:
+                words = f"{sentence} {hint}".rstrip()
+                left_s = max(0.0, self._until - now)
+                _log.warning("%s (Waiting for up to %.0f s more.)", words, left_s)
+        if self._clock() > self._until:
+            return False
+        time.sleep(_POLL_S)
+        return True
+
+
+class Takeover:
+    """Continues an episode while a person has control.
+
+    Afterwards the person gives control back and arms the robot for the program. Until both have
+    happened, the program only sends suggestions.
+
+    Args:
+        allowed: Whether an episode goes on when a person takes control.
+    """
+
+    def __init__(self, *, allowed: bool) -> None:
+        self._allowed = allowed
+        self._waits = False
+
+    def start(self) -> None:
+        """Begin an episode with control of an armed robot."""
+        self._waits = False
+
+    def act(self, robot: RobotClient, values: tuple[float, ...], last: Observation) -> int:
+        """Send a command, or a suggestion while another client has control.
+
+        Args:
+            robot: The robot.
+            values: Values of the command.
+            last: The observation that it answers.
+
+        Returns:
+            Number of the command or suggestion.
+
+        Raises:
+            LinkError: If the link is lost.
+        """
+        if not self._allowed or last.mine:
+            return robot.command(values, answers=last.seq)
+        if not last.holder:
+            # A person who takes control again meanwhile keeps it.
+            with contextlib.suppress(RobotRefused):
+                robot.take()
+        return robot.suggest(values, answers=last.seq)
+
+    def goes_on(self, seen: Observation) -> bool:
+        """Return True if the episode goes on without control of an armed robot.
+
+        It does while a person drives, or is about to give control back.
+        """
+        if not self._allowed or seen.emergency:
+            return False
+        if seen.mine and seen.armed:
+            self._waits = False
+        elif seen.holder_role == "person" or not seen.holder:
+            self._waits = True
+        return self._waits and (seen.mine or seen.holder_role == "person" or not seen.holder)
+
+    @staticmethod
+    def action(seen: Observation) -> tuple[float, ...] | None:
+        """Return the command of a person, or None if no person has control."""
+        return seen.commanded if seen.commanded and seen.holder_role == "person" else None
+
+
+def interruption(message: Observation) -> str:
+    """Return the reason why a program does not drive, or ""."""
+    why = f": {message.stop_reason}" if message.stop_reason else "."
+    if not message.mine:
+        return f"{message.holder or 'No client'} has control of the robot now{why}"
+    if message.emergency:
+        return f"Emergency stop{why}"
+    if not message.armed:
+        return f"The robot was disarmed{why}"
+    return ""

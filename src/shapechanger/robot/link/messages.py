@@ -1,0 +1,600 @@
+"""Messages between a client and a robot, each one binary WebSocket message.
+
+A message is a msgpack map with its type under `kind`; JPEG bytes are sent as they are. Unknown
+keys are ignored, so that newer minor versions stay readable; unknown types are refused.
+
+The course of a connection:
+
+```
+robot   Challenge          name of the robot, version, nonce
+client  Hello              version, name and role of the client, proof that it holds the key
+robot   Welcome | Refused  description of the robot; or the reason why the connection ends
+client  Take               asks for control; answered by Lease
+client  Arm                (a person, by default) lets the outputs move
+robot   Observation        the newest one, whenever the client has credit
+client  Command            values for the outputs, and the observation it answers; gives credit
+client  Suggest            the same from a client without control, to show; gives credit
+client  Record Mark Undo   (a person) records an episode on the robot's disk
+robot   RecorderState      state of the recorder, to all clients
+client  Browse Fetch Judge asks for the list of episodes, or a piece of one; marks steps as bad
+robot   Recordings Piece   the answers
+```
+
+Times are nanoseconds of the robot's monotonic clock. Clocks of two machines are never subtracted:
+the age of a command is the time since the robot sent the observation that it answers.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta
+
+from shapechanger.errors import LinkError
+
+VERSION: Final = 1
+"""Version of the messages, which must be the same on both sides."""
+
+MAX_CLIENT_MESSAGE: Final = 64 * 1024
+"""Largest message that a robot reads, bytes; a larger one is an attack or a bug."""
+
+MAX_ROBOT_MESSAGE: Final = 4 * 1024 * 1024
+"""Largest message that a client reads, bytes."""
+
+MAX_PIECE: Final = 256 * 1024
+"""Approximate size of a `Piece`, bytes, to keep observations from waiting on a slow radio."""
+
+MAX_EPISODES: Final = 200
+"""Most episodes in one `Recordings`; `Browse.before` asks for older ones."""
+
+Role = Literal["person", "program"]
+"""Kind of client. A person takes control from a program at once, never the other way round."""
+
+Pace = Literal["realtime", "lockstep"]
+"""Pace: both sides follow their clocks, or the robot waits for a command and answers with the
+observation one control period later."""
+
+_M = TypeVar("_M")
+
+# Names are written by people, and end up in logs and on screens.
+_Name = Annotated[str, Meta(max_length=64)]
+_Words = Annotated[str, Meta(max_length=1024)]
+_Sequence = Annotated[int, Meta(ge=0, le=2**53)]
+_Values = Annotated[tuple[float, ...], Meta(max_length=64)]
+# A folder directly in that of the recordings: no separator, and no leading dot.
+_Episode = Annotated[str, Meta(max_length=128, pattern=r"^[0-9A-Za-z][0-9A-Za-z._-]*\Z")]
+_Before = Annotated[str, Meta(max_length=128, pattern=r"^([0-9A-Za-z][0-9A-Za-z._-]*)?\Z")]
+
+
+class _Message(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower, kw_only=True):
+    """A message of either side."""
+
+    def __repr__(self) -> str:
+        """Show bytes by their number only: frames and proofs do not belong in a log."""
+        fields = (
+            f"{name}=<{len(value)} bytes>" if isinstance(value, bytes) else f"{name}={value!r}"
+            for name, value in msgspec.structs.asdict(self).items()
+        )
+        return f"{type(self).__name__}({', '.join(fields)})"
+
+
+# Messages of a client.
+
+
+class Hello(_Message, frozen=True):
+    """First message of a client.
+
+    Attributes:
+        version: Version of the messages that the client uses.
+        proof: Answer to the challenge, see `shapechanger.robot.link.authentication`.
+        name: Display name.
+        role: Kind of client.
+        pace: Whether the clocks or the client set the pace.
+        frames: Whether observations carry frames.
+    """
+
+    version: int
+    proof: Annotated[bytes, Meta(max_length=64)]
+    name: _Name = ""
+    role: Role = "program"
+    pace: Pace = "realtime"
+    frames: bool = True
+
+
+class Command(_Message, frozen=True):
+    """Values for the outputs, in force until the next command or until they expire.
+
+    Attributes:
+        seq: Number of the command, larger than the one before.
+        answers: `seq` of the observation that the command answers.
+        values: One number for each action of the robot, in the order of its action layout.
+        ttl_ms: Lifetime from the arrival, ms; the robot's deadline holds where it is shorter.
+        scale: Cap of the client, 0 to 1, by which the values are multiplied.
+    """
+
+    seq: _Sequence
+    answers: _Sequence
+    values: _Values
+    ttl_ms: Annotated[int, Meta(ge=1, le=60_000)] = 1_000
+    scale: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
+
+
+class Acknowledge(_Message, frozen=True):
+    """Request for the observation after number `seq`, without a command; 0 for the first."""
+
+    seq: _Sequence = 0
+
+
+class Take(_Message, frozen=True):
+    """Request for control."""
+
+
+class Release(_Message, frozen=True):
+    """Return of control; the robot stops and disarms."""
+
+
+class Arm(_Message, frozen=True):
+    """Request to let the outputs move; from a person it also ends an emergency stop.
+
+    Attributes:
+        answers: `seq` of a recent observation, as in a command: a delayed request must not arm a
+            robot that its operator no longer watches.
+        emergency: Number of emergency stops that the sender has seen
+            (`Observation.emergencies`). A later one stays in force.
+    """
+
+    answers: _Sequence
+    emergency: _Sequence = 0
+
+
+class Disarm(_Message, frozen=True):
+    """Request to keep the outputs at rest."""
+
+
+class EmergencyStop(_Message, frozen=True):
+    """Stop of all outputs, from any client, until a person arms the robot again."""
+
+    reason: _Words = ""
+
+
+class Ping(_Message, frozen=True):
+    """Request for a `Pong` with the same token."""
+
+    token: _Sequence = 0
+
+
+class Suggest(_Message, frozen=True):
+    """Values that a client without control would command; the robot does not apply them.
+
+    A suggestion is shown to all clients (`Observation.suggested`) and recorded, and gives credit
+    for the next observation, as a command does. It expires after `Welcome.deadline_ms`, and when
+    its sender leaves or takes control.
+
+    Attributes:
+        seq: Number of the suggestion, larger than the one before. A refusal names it.
+        answers: `seq` of the observation that the suggestion answers.
+        values: One number for each action of the robot, in the order of its action layout.
+    """
+
+    seq: _Sequence
+    answers: _Sequence
+    values: _Values
+
+
+class Record(_Message, frozen=True):
+    """Begin or end of an episode on the robot's disk; only from a person.
+
+    Answered by `RecorderState` to all clients, or by `Refused`. Commands of any client are
+    recorded while the robot is armed. The episode ends when the last person disconnects.
+
+    Attributes:
+        on: Whether to record.
+        name: Title of the episode.
+    """
+
+    on: bool
+    name: _Name = ""
+
+
+class Mark(_Message, frozen=True):
+    """Mark with a text for the newest step of the episode being recorded; only from a person."""
+
+    text: _Words = ""
+
+
+class Undo(_Message, frozen=True):
+    """Request to drop the last `seconds` of the episode being recorded; only from a person.
+
+    The steps stay on the disk, and are not used for training.
+    """
+
+    seconds: Annotated[float, Meta(gt=0.0, le=3_600.0)] = 5.0
+
+
+class Browse(_Message, frozen=True):
+    """Request for `Recordings` with ids before `before`, or the newest ones for ""."""
+
+    before: _Before = ""
+
+
+class Fetch(_Message, frozen=True):
+    """Request for a part of an episode; answered by `Piece`.
+
+    A further question about recordings is refused until the answer has been sent.
+
+    Attributes:
+        episode: Id of the episode.
+        first: Number of the first line of `steps.jsonl`, from 0.
+        count: Most lines to send.
+    """
+
+    episode: _Episode
+    first: _Sequence = 0
+    count: Annotated[int, Meta(ge=1, le=100_000)] = 1_000
+
+
+class Judge(_Message, frozen=True):
+    """Judgement that steps of an episode are bad, or good after all; only from a person.
+
+    Answered by `Recordings` with that episode alone.
+
+    Attributes:
+        episode: Id of the episode, which must not be the one being recorded.
+        first: Number of the first step.
+        last: Number of the last step, inclusive.
+        keep: Whether to use the steps for training.
+    """
+
+    episode: _Episode
+    first: _Sequence
+    last: _Sequence
+    keep: bool = False
+
+
+class RunPolicy(_Message, frozen=True):
+    """Start of a policy on board, in place of the one that runs; only from a person.
+
+    Answered by `PolicyState` to all clients, or by `Refused`. The policy is a client of its own, a
+    program: it waits until nobody has control, takes it, and drives once a person arms the robot.
+
+    Attributes:
+        policy: Name of the policy, one of `PolicyState.names`; "" to end the one that runs.
+    """
+
+    policy: _Name = ""
+
+
+ClientMessage = (
+    Hello
+    | Command
+    | Acknowledge
+    | Take
+    | Release
+    | Arm
+    | Disarm
+    | EmergencyStop
+    | Ping
+    | Suggest
+    | Record
+    | Mark
+    | Undo
+    | Browse
+    | Fetch
+    | Judge
+    | RunPolicy
+)
+
+
+# Messages of a robot.
+
+
+class Challenge(_Message, frozen=True):
+    """First message of a robot.
+
+    Attributes:
+        version: Version of the messages that the robot uses.
+        nonce: Random bytes for the proof, new for each connection.
+        robot: Name of the robot.
+    """
+
+    version: int
+    nonce: bytes
+    robot: str
+
+
+class Welcome(_Message, frozen=True):
+    """Description of the robot for an authenticated client.
+
+    Attributes:
+        robot: Name of the robot.
+        body: Kind of robot, such as "car".
+        action_layout: JSON of the `Layout` of `Command.values`.
+        state_layout: JSON of the `Layout` of `Observation.state`.
+        image_size: Width and height of the frames, pixels; None without a camera.
+        camera_pitch_deg: Angle of the camera's optical axis below the horizon, degrees; None if the
+            profile does not state it.
+        camera_fovy_deg: Vertical field of view of the camera, degrees; None likewise.
+        control_hz: Commands per second that the robot expects.
+        tick_hz: Rate of the guard, Hz.
+        slew_per_s: Fastest change of each action away from rest, 1/s; 0 for no limit.
+        slew_down_per_s: Fastest change of each action towards rest, 1/s; 0 for no limit.
+        deadline_ms: Longest time that a command acts, ms.
+        max_observation_age_ms: Oldest observation that a command may answer, ms.
+        reward: Weights of the task, from the robot's profile, by name.
+        reset: Commands that return the robot to the start, from its profile: values and duration,
+            s, of each; empty for none.
+        arming: Who may arm the robot.
+        clock: Source of the robot's time.
+        session: Number of this connection.
+        can_record: Whether the robot has a folder for recordings.
+        turning: Turn at full steering, rad for each metre and for each second; None if the profile
+            does not state it.
+    """
+
+    robot: str
+    body: str
+    action_layout: str
+    state_layout: str
+    image_size: tuple[int, int] | None
+    control_hz: float
+    deadline_ms: int
+    max_observation_age_ms: int
+    reward: dict[str, float]
+    reset: tuple[tuple[tuple[float, ...], float], ...]
+    arming: Literal["person", "anyone"]
+    clock: Literal["real", "twin"]
+    session: int
+    can_record: bool = False
+    tick_hz: float = 100.0
+    slew_per_s: tuple[float, ...] = ()
+    slew_down_per_s: tuple[float, ...] = ()
+    camera_pitch_deg: float | None = None
+    camera_fovy_deg: float | None = None
+    turning: tuple[float, float] | None = None
+
+
+class Refused(_Message, frozen=True):
+    """Refusal of a message.
+
+    Attributes:
+        reason: Reason, a sentence.
+        seq: `seq` of the refused command or suggestion; None for any other message.
+        fatal: Whether the connection ends.
+    """
+
+    reason: str
+    seq: int | None = None
+    fatal: bool = False
+
+
+class Observation(_Message, frozen=True):
+    """Sensor values, and the state of the outputs.
+
+    Attributes:
+        seq: Number of the observation, larger than the one before.
+        captured_ns: Capture time of the frame; without a camera, `state_ns`.
+        state_ns: Time at which the state was read.
+        sent_ns: Time at which the observation was sent.
+        frame: The frame as JPEG; None if the newest one was sent already.
+        frame_seq: Number of the frame; equal numbers mean the same frame. 0 for none yet.
+        state: Numbers of the state layout.
+        sources: Source of each quantity: name of the sensor, "estimated" or "absent".
+        action_applied: Applied outputs, in the order and units of the command, after caps, slew
+            and reflexes.
+        applied_seq: `seq` of the command behind them; None while the robot rests by itself.
+        applied_ns: Time at which that command reached the outputs.
+        command_ns: Time at which that command arrived.
+        stop_reason: Reason why the robot does not follow the command, a sentence; "" if it does.
+        armed: Whether the outputs may move.
+        emergency: Whether an emergency stop is in force.
+        emergencies: Number of emergency stops since the robot's start.
+        holder: Name of the client in control; "" for none.
+        mine: Whether this client has control.
+        holder_role: Role of the client in control; "" for none.
+        commanded: Values of the command in force, times its scale; empty for none.
+        suggested: Values of the newest suggestion; empty for none.
+        suggested_by: Name of the client that sent it; "" for none.
+    """
+
+    seq: int
+    captured_ns: int
+    state_ns: int
+    sent_ns: int
+    frame: bytes | None
+    frame_seq: int
+    state: tuple[float, ...]
+    sources: dict[str, str]
+    action_applied: tuple[float, ...]
+    applied_seq: int | None
+    applied_ns: int | None
+    command_ns: int | None
+    stop_reason: str
+    armed: bool
+    emergency: bool
+    emergencies: int
+    holder: str
+    mine: bool
+    holder_role: Literal["", "person", "program"] = ""
+    commanded: tuple[float, ...] = ()
+    suggested: tuple[float, ...] = ()
+    suggested_by: str = ""
+
+
+class Lease(_Message, frozen=True):
+    """The client in control, after a change or a refused request.
+
+    Attributes:
+        mine: Whether this client has control.
+        holder: Name of the client in control; "" for none.
+        reason: Reason for the change or the refusal, a sentence.
+    """
+
+    mine: bool
+    holder: str
+    reason: str = ""
+
+
+class Event(_Message, frozen=True):
+    """Event on the robot, for people to read.
+
+    Attributes:
+        name: Kind of event, such as "emergency", "armed", "disarmed" or "bump".
+        text: A sentence.
+        at_ns: Time of the event.
+    """
+
+    name: str
+    text: str
+    at_ns: int
+
+
+class Pong(_Message, frozen=True):
+    """Answer to a `Ping`, with its token and the robot's time."""
+
+    token: int
+    now_ns: int
+
+
+class RecorderState(_Message, frozen=True):
+    """State of the recorder, sent at each change and once a second while recording.
+
+    Attributes:
+        episode: Id of the current or last episode; "" for none yet, and while a new one is made.
+        recording: Whether steps are recorded.
+        steps: Number of steps.
+        dropped: Number of steps that were dropped.
+        seconds: Time from the first step to the newest kept one, s.
+        marks: Number of marks.
+        text: Reason why the episode ended by itself, such as a full disk; "" otherwise.
+    """
+
+    episode: _Before = ""
+    recording: bool = False
+    steps: int = 0
+    dropped: int = 0
+    seconds: float = 0.0
+    marks: int = 0
+    text: str = ""
+
+
+class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """One episode in a list.
+
+    Attributes:
+        id: Name of its folder.
+        steps: Number of steps.
+        kept: Number of steps that are not dropped.
+        seconds: Duration of the kept steps, s.
+        closed: Whether it was closed; False for the episode being recorded.
+        created: Start, ISO 8601 in UTC.
+        driver: Name of the driver.
+        outcome: How it ended, such as "collision", or ""; the error if it cannot be read.
+    """
+
+    id: _Episode
+    steps: int = 0
+    kept: int = 0
+    seconds: float = 0.0
+    closed: bool = False
+    created: str = ""
+    driver: str = ""
+    outcome: str = ""
+
+
+class Recordings(_Message, frozen=True):
+    """List of episodes, newest first.
+
+    Attributes:
+        episodes: At most `MAX_EPISODES` episodes.
+        more: Whether there are older ones, see `Browse.before`.
+    """
+
+    episodes: tuple[EpisodeSummary, ...]
+    more: bool = False
+
+
+class Piece(_Message, frozen=True):
+    """Part of an episode, as it is on the robot's disk.
+
+    Attributes:
+        episode: Id of the episode.
+        first: Number of the first line, as in the request.
+        total: Number of complete lines in `steps.jsonl` now.
+        lines: Lines from `first` on, without line ends; fewer than requested at the end of the
+            file, and where they would make the message too large.
+        frames: JPEG that the `frame` of each line names; None for none, or that of the line before.
+        header: Text of `episode.json` now.
+    """
+
+    episode: _Episode
+    first: int
+    total: int
+    lines: tuple[str, ...]
+    frames: tuple[bytes | None, ...]
+    header: str = ""
+
+
+class PolicyState(_Message, frozen=True):
+    """The policies on board, sent to a new client and at each change.
+
+    Attributes:
+        names: Names of those that can be started.
+        running: Name of the one that runs; "" for none.
+        text: What it does, or why the last one ended, a sentence; "" for nothing to say.
+    """
+
+    names: tuple[str, ...]
+    running: str = ""
+    text: str = ""
+
+
+RobotMessage = (
+    Challenge
+    | Welcome
+    | Refused
+    | Observation
+    | Lease
+    | Event
+    | Pong
+    | RecorderState
+    | Recordings
+    | Piece
+    | PolicyState
+)
+
+_ENCODER: Final = msgspec.msgpack.Encoder()
+_CLIENT_DECODER: Final = msgspec.msgpack.Decoder(ClientMessage)
+_ROBOT_DECODER: Final = msgspec.msgpack.Decoder(RobotMessage)
+
+
+def encode(message: ClientMessage | RobotMessage) -> bytes:
+    """Encode a message."""
+    return _ENCODER.encode(message)
+
+
+def decode_client_message(data: bytes) -> ClientMessage:
+    """Decode a message of a client.
+
+    Raises:
+        LinkError: If the bytes are too many, or not a message of a client.
+    """
+    return _decoded(_CLIENT_DECODER, data, MAX_CLIENT_MESSAGE)
+
+
+def decode_robot_message(data: bytes) -> RobotMessage:
+    """Decode a message of a robot.
+
+    Raises:
+        LinkError: If the bytes are too many, or not a message of a robot.
+    """
+    return _decoded(_ROBOT_DECODER, data, MAX_ROBOT_MESSAGE)
+
+
+def _decoded(decoder: msgspec.msgpack.Decoder[_M], data: bytes, limit: int) -> _M:
+    if len(data) > limit:
+        raise LinkError(f"A message of {len(data)} bytes is larger than the {limit} allowed.")
+    try:
+        return decoder.decode(data)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise LinkError(f"Not a valid message: {error}.") from error

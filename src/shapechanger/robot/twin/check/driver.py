@@ -1,0 +1,122 @@
+"""Program that drives at full throttle in a separate process.
+
+It is started by path, reads the robot's address from standard input, and prints the time of each
+sent command on a line: monotonic, ns. A pilot in its place, which drives as a policy on board does,
+fails at a signal, as `FAILURES` has it.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final, Self
+
+import msgspec
+
+from shapechanger.errors import LinkError, RobotError
+from shapechanger.layout import Layout
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.known_robots import KnownRobot
+
+_STARTED_S: Final = 30.0
+
+FAILURES: Final = {
+    "hangs": signal.SIGUSR1,
+    "is late": signal.SIGUSR2,
+    "gives NaN": signal.SIGALRM,
+}
+"""Signal at which a policy fails, by how it fails."""
+
+
+class Driver:
+    """The driving process.
+
+    Args:
+        robot: The robot.
+        within: Command prefix, such as one that enters a network namespace.
+        pilot: Module of a program that drives as a policy on board, which a person has to arm the
+            robot for; "" for this program.
+    """
+
+    def __init__(self, robot: KnownRobot, within: Sequence[str] = (), *, pilot: str = "") -> None:
+        self._folder = TemporaryDirectory(prefix="shapechanger-driver-")
+        # Files and not pipes, which a driver that is never read would fill.
+        self._sent, self._words = (Path(self._folder.name, name) for name in ("sent", "words"))
+        with self._sent.open("wb") as sent, self._words.open("wb") as words:
+            self.process = subprocess.Popen(
+                # By path, so that little is imported.
+                [*within, sys.executable, "-P", *(["-m", pilot] if pilot else [__file__])],
+                stdin=subprocess.PIPE,
+                stdout=sent,
+                stderr=words,
+            )
+        if self.process.stdin is not None:
+            self.process.stdin.write(msgspec.json.encode(asdict(robot)))
+            self.process.stdin.close()
+
+    def __enter__(self) -> Self:
+        """Return the driver."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Kill it."""
+        self.process.kill()
+        self.process.wait()
+        self._folder.cleanup()
+
+    @property
+    def sent(self) -> list[int]:
+        """Return the time of each sent command, ns."""
+        return [int(line) for line in self._sent.read_bytes().split(b"\n")[:-1]]
+
+    def await_commands(self, count: int) -> None:
+        """Wait until it has sent `count` commands.
+
+        Raises:
+            RobotError: If it ends before, or takes too long.
+        """
+        until_s = time.monotonic() + _STARTED_S
+        while len(self.sent) < count:
+            if self.process.poll() is not None or time.monotonic() > until_s:
+                words = self._words.read_text(errors="replace").strip()
+                raise RobotError(f"The driver did not drive: {words}")
+            time.sleep(0.002)
+
+
+def asked_robot() -> KnownRobot:
+    """Read the robot to drive from standard input."""
+    return KnownRobot(**msgspec.json.decode(sys.stdin.buffer.read()))
+
+
+def print_time() -> None:
+    """Print that a command is about to be sent, so that a kill in between cannot hide it."""
+    sys.stdout.write(f"{time.monotonic_ns()}\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    """Drive until the link or this process ends."""
+    with RobotClient.connect(asked_robot()) as client:
+        actions = Layout.from_json(client.welcome.action_layout)
+        values = [float(name == "throttle") for name in actions.names]
+        client.take()
+        client.arm()
+        client.acknowledge()
+        seq = 0
+        while True:
+            seq = client.observation(seq).message.seq
+            print_time()
+            client.command(values, answers=seq)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except LinkError as error:
+        sys.exit(str(error))

@@ -1,0 +1,182 @@
+"""gpiozero's pins on a board."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from gpiozero import PinInvalidState, PinSetInput
+from gpiozero.pins.pi import PiFactory, PiPin
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.hardware import Clock
+from shapechanger.robot.twin.messages import BoardPins, ClaimPin, DrivePin
+
+_REVISION: Final = 0xC03115
+"""A Raspberry Pi 4B with 4 GB; its header has the pins of all newer ones."""
+
+
+class TwinPin(PiPin):
+    """One pin of the board.
+
+    Args:
+        factory: Factory of the pin.
+        info: gpiozero's description of the pin.
+    """
+
+    bounce: float | None = None
+    edges = "both"
+
+    def __init__(self, factory: TwinPinFactory, info: Any) -> None:
+        super().__init__(factory, info)
+        self._board = factory.board
+        self._function = "input"
+        self._pull = "floating"
+        self._watched = False
+        self._pwm_hz = 0
+        self._duty = 0.0
+        self._claim()
+
+    @property
+    def number(self) -> int:
+        """BCM number."""
+        return self._number
+
+    def close(self) -> None:
+        """Leave an output at its level, or low if it had PWM; remove the pull of an input."""
+        if self._board.closed:
+            return
+        if self._function == "output":
+            self.frequency = None
+        else:
+            self._pull = "floating"
+            self._watched = False
+            self._claim()
+
+    def output_with_state(self, state: bool) -> None:
+        """Become an output at this level; an output changes to it."""
+        if self._function != "output":
+            self._function, self._pull, self._watched = "output", "floating", False
+            self._claim(int(state))
+        self.state = state
+
+    def report_edge(self, level: int, at_ns: int) -> None:
+        """Call the callback of the pin, if it watches edges in this direction.
+
+        Args:
+            level: Level after the edge.
+            at_ns: Time, ns.
+        """
+        if self._watched and self.edges in ("both", "rising" if level else "falling"):
+            self._call_when_changed(at_ns / 1e9, level)
+
+    def _claim(self, level: int = 0) -> None:
+        now_ns = self.factory.clock.now_ns()
+        mode = "output" if self._function == "output" else "input"
+        request = ClaimPin(pin=self._number, mode=mode, pull=self._pull, level=level, t=now_ns)
+        found = self._board.levels[self._number] = self._board.ask(request, int)
+        self._pwm_hz, self._duty = 0, float(found)
+
+    def _drive(self, duty: float, hz: int) -> None:
+        if (duty, hz) != (self._duty, self._pwm_hz):
+            now_ns = self.factory.clock.now_ns()
+            self._board.post(DrivePin(pin=self._number, duty=duty, hz=hz, t=now_ns))
+            self._duty, self._pwm_hz = duty, hz
+
+    def _get_function(self) -> str:
+        return self._function
+
+    def _set_function(self, value: str) -> None:
+        if value not in ("input", "output"):
+            raise ValueError(f"A pin is an input or an output, not {value!r}.")
+        self._function = value
+        self._pull = "floating"
+        self._watched = False
+        self._claim()
+
+    def _get_state(self) -> float:
+        if self._pwm_hz or self._function == "output":
+            return self._duty
+        self._board.drain()
+        return self._board.levels[self._number]
+
+    def _set_state(self, value: float) -> None:
+        if self._function == "input":
+            raise PinSetInput(f"cannot set state of pin {self!r}")
+        if not 0 <= value <= 1:
+            raise PinInvalidState(f"invalid state {value!r} for pin {self!r}")
+        if self._pwm_hz:
+            self._drive(int(value * 100) / 100, self._pwm_hz)
+        else:
+            self._drive(float(bool(value)), 0)
+
+    def _get_frequency(self) -> float | None:
+        return self._pwm_hz or None
+
+    def _set_frequency(self, value: float | None) -> None:
+        if not value:
+            if self._pwm_hz and not self._board.closed:
+                self._drive(0.0, 0)
+        elif self._function != "output":
+            raise RobotError(f"{self!r} is an input and cannot send PWM.")
+        else:
+            self._drive(self._duty if self._pwm_hz else 0.0, int(value))
+
+    def _get_pull(self) -> str:
+        return self._pull
+
+    def _set_pull(self, value: str) -> None:
+        if self._function != "input" or value not in ("up", "down", "floating"):
+            raise RobotError(f"{self!r} is an {self._function} and takes no pull {value!r}.")
+        self._pull = value
+        self._claim()
+
+    def _enable_event_detect(self) -> None:
+        self._watched = True
+
+    def _disable_event_detect(self) -> None:
+        self._watched = False
+
+
+class TwinPinFactory(PiFactory):
+    """Factory of the pins of a board.
+
+    It has no thread: edges of inputs are dispatched while the process waits on the clock.
+
+    Args:
+        board: The pins.
+        clock: Source of the time of each change.
+    """
+
+    def __init__(self, board: BoardPins, clock: Clock) -> None:
+        super().__init__()
+        self.board = board
+        self.clock = clock
+        self.pin_class = TwinPin
+        self._by_number: dict[int, TwinPin] = {}
+        board.on_edge = self._report_edge
+
+    def pin(self, name: int | str) -> TwinPin:
+        """Return a pin by its name, such as 22, "GPIO22" or "BOARD15"."""
+        pin: TwinPin = super().pin(name)
+        self._by_number[pin.number] = pin
+        return pin
+
+    def close(self) -> None:
+        """Close all pins."""
+        super().close()
+        self._by_number.clear()
+
+    def ticks(self) -> float:
+        """Return the clock's time in seconds."""
+        return self.clock.now_ns() / 1e9
+
+    def ticks_diff(self, later: float, earlier: float) -> float:
+        """Return the seconds between two values of `ticks`."""
+        return later - earlier
+
+    def _get_revision(self) -> int:
+        return _REVISION
+
+    def _report_edge(self, pin: int, level: int, at_ns: int) -> None:
+        if (watching := self._by_number.get(pin)) is not None:
+            watching.report_edge(level, at_ns)

@@ -1,0 +1,336 @@
+"""A whole robot in this process: guard, drivers, pins and world.
+
+The guard and the drivers are those of a served robot. `step` gives the guard one command and
+advances one control period. There is no link, no control lease and no deadline to miss; time
+advances only in steps, as with `--clock twin`.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+import numpy as np
+import simplejpeg
+
+from shapechanger.contract.world import World
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import Frame
+from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
+from shapechanger.robot.guard.messages import GuardState, Order
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.guard.process import Guard
+from shapechanger.robot.link.messages import Observation, Welcome
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.twin.hardware import TwinHardware
+from shapechanger.robot.twin.messages import HardwareRequest
+from shapechanger.robot.twin.pin_board import PinBoard
+from shapechanger.robot.twin.server import START_NS
+from shapechanger.robot.twin.wiring import TwinWiring
+
+_log = logging.getLogger(__name__)
+
+_SESSION: Final = 1
+# Ticks in which the guard must arm, once all speed controllers listen.
+_MAX_ARM_TICKS: Final = 10
+
+
+class LocalBoard:
+    """A board with its world in this process, whose time only `advance` moves.
+
+    It is the board of the only process that uses it, and that process's clock; see `BoardPins` and
+    `Clock`.
+
+    Args:
+        wiring: What is attached to the pins.
+        world: World of the robot.
+        seed: Seed of the phase of software PWM.
+
+    Attributes:
+        pid: This process, which owns the pins.
+        pins: Pins, chips and servos.
+        hardware: Hardware for a guard in this process.
+        levels: Level of each pin that is claimed as an input.
+        on_edge: Called with pin, level and time of each edge.
+        closed: Whether `close` was called.
+    """
+
+    def __init__(self, wiring: TwinWiring, world: World, seed: int = 0) -> None:
+        self._now_ns = START_NS
+        self.pid = os.getpid()
+        self.pins = PinBoard(wiring, world, None, seed, START_NS)
+        self.levels: dict[int, int] = {}
+        self.on_edge: Callable[[int, int, int], None] | None = None
+        self.closed = False
+        self.hardware = TwinHardware(self, self)
+
+    def now_ns(self) -> int:
+        """Return the time in nanoseconds."""
+        return self._now_ns
+
+    def advance(self, now_ns: int) -> None:
+        """Advance time, the world and the sensors."""
+        self._now_ns = now_ns
+        for t, pin, level in self.pins.advance(now_ns):
+            if pin in self.levels:
+                self.levels[pin] = level
+                if self.on_edge is not None:
+                    self.on_edge(pin, level, t)
+
+    def post(self, request: HardwareRequest) -> None:
+        """Execute a request."""
+        self.pins.execute(self, request)
+
+    def ask(self, request: HardwareRequest, kind: Any = None) -> Any:
+        """Execute a request and return its result; see `BoardPins.ask`."""
+        return self.pins.execute(self, request)
+
+    def drain(self) -> None:
+        """Do nothing: edges arrive with `advance`."""
+
+    def close(self) -> None:
+        """Use the pins no more."""
+        self.closed = True
+
+    def wait(self, readable: Sequence[int], until_ns: int, at_most_s: float) -> bool:
+        """Refuse: the caller is the one who would have to advance the board."""
+        raise RobotError("The time of a board in this process advances only by `advance`.")
+
+    def keep_alive(self, beat: Callable[[], object]) -> None:
+        """Do nothing: a guard in this process has no supervisor."""
+
+    async def sleep(self, seconds: float) -> int | None:
+        """Refuse; see `wait`."""
+        raise RobotError("The time of a board in this process advances only by `advance`.")
+
+
+class _Orders:
+    """Orders of this process and the newest state of the guard; see `Channel`."""
+
+    def __init__(self) -> None:
+        self.lost = False
+        self.waiting: list[Order] = []
+        self.state: GuardState | None = None
+        self.refused = ""
+
+    def filenos(self) -> list[int]:
+        """Return no descriptors: there is nothing to wait for."""
+        return []
+
+    def orders(self) -> tuple[list[Order], list[str]]:
+        """Return the orders given since the last call."""
+        orders, self.waiting = self.waiting, []
+        return orders, []
+
+    def send(self, state: GuardState) -> bool:
+        """Keep the newest state."""
+        self.state = state
+        self.refused = state.refused or self.refused
+        return True
+
+
+class InProcessRobot:
+    """A robot in a world, advanced step by step.
+
+    Args:
+        profile: The robot. Pictures come from the world, not from its camera's driver.
+        world: World of the robot.
+        pictures: Whether observations have pictures.
+        seed: Seed of the phase of software PWM.
+        wired_as: The robot as it is really wired; None for the plan of the profile.
+
+    Attributes:
+        welcome: Description of the robot, as a daemon sends it to a client.
+
+    Raises:
+        RobotError: If the world does not fit the profile.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        world: World,
+        *,
+        pictures: bool = True,
+        seed: int = 0,
+        wired_as: GuardPlan | None = None,
+    ) -> None:
+        self._profile = profile
+        self._plan = profile.guard_plan()
+        self._wiring = TwinWiring(self._plan if wired_as is None else wired_as)
+        self._world = world
+        self._seed = seed
+        camera = profile.camera if pictures else None
+        self._camera = camera
+        state_layout, action_layout = profile.state_layout(), profile.action_layout()
+        self._reader = StateReader(state_layout, action_layout)
+        self._tick_ns = round(1e9 / self._plan.tick_hz)
+        self._period_ns = round(1e9 / profile.control_hz)
+        self.welcome = Welcome(
+            robot=profile.name,
+            body=profile.body,
+            action_layout=action_layout.to_json(),
+            state_layout=state_layout.to_json(),
+            image_size=None if camera is None else camera.size,
+            camera_pitch_deg=None if camera is None else camera.pitch_deg,
+            camera_fovy_deg=None if camera is None else camera.fovy_deg,
+            control_hz=profile.control_hz,
+            deadline_ms=profile.limits.deadline_ms,
+            max_observation_age_ms=profile.max_observation_age_ms,
+            reward=profile.reward,
+            reset=profile.reset,
+            arming="anyone",
+            clock="twin",
+            session=_SESSION,
+        )
+        self._guard: Guard | None = None
+        self._pictured = 0  # Counts through all starts, so that each picture has its own number.
+        self._start()
+
+    @property
+    def now_ns(self) -> int:
+        """Time of the robot in nanoseconds."""
+        return self._board.now_ns()
+
+    def start(self, place: Callable[[], object] | None = None) -> Observation:
+        """Restart the robot, arm it, and place it at a start.
+
+        Args:
+            place: Places the vehicle, before and after it is armed; None to leave it.
+
+        Returns:
+            First observation there.
+
+        Raises:
+            RobotError: If the robot does not arm.
+        """
+        if place is not None:
+            place()  # So that a moving vehicle does not roll on while the robot starts.
+        self._start()
+        self._arm()
+        if place is not None:
+            place()
+            # A served robot sends its first observation after one period, too.
+            self._advance(self._period_ns)
+        return self._observe()
+
+    def step(self, values: Sequence[float]) -> tuple[Observation, bool]:
+        """Act for one control period.
+
+        Args:
+            values: One value for each action.
+
+        Returns:
+            The observation at the end of the period, and whether the robot bumped into something.
+        """
+        bumps = self._state.bumps
+        self._command_ns = self._board.now_ns()
+        self._seq += 1
+        self._orders.waiting.append(
+            Order(
+                kind="command",
+                session=_SESSION,
+                seq=self._seq,
+                issued_ns=self._command_ns,
+                ttl_ms=self._profile.limits.deadline_ms,
+                frame_ns=self._board.now_ns(),
+                values=tuple(values),
+            )
+        )
+        self._advance(self._period_ns)
+        return self._observe(), self._state.bumps > bumps
+
+    def arm(self) -> None:
+        """Arm the robot, as a person does after a stop.
+
+        Raises:
+            RobotError: If the robot does not arm.
+        """
+        self._orders.refused = refused = ""  # An earlier refusal is about something else.
+        seen = self._state.emergencies
+        for _ in range(_MAX_ARM_TICKS):
+            now_ns = self._board.now_ns()
+            self._orders.waiting.append(Order("arm", issued_ns=now_ns, emergency=seen, person=True))
+            self._advance(self._tick_ns)
+            refused = self.refused
+            if self._state.armed and not refused:
+                return
+        raise RobotError(f"The robot does not arm: {refused or self._state.stop_reason}")
+
+    @property
+    def pins(self) -> PinBoard:
+        """Pins, chips and servos, since the last start."""
+        return self._board.pins
+
+    @property
+    def refused(self) -> str:
+        """Reason for which the guard refused the newest command; empty if it did not."""
+        refused, self._orders.refused = self._orders.refused, ""
+        return refused
+
+    def close(self) -> None:
+        """Bring the outputs to rest and let go of the pins."""
+        if self._guard is not None:
+            self._guard.close()
+            self._board.hardware.close()
+            self._guard = None
+
+    @property
+    def _state(self) -> GuardState:
+        if self._orders.state is None:
+            raise RobotError("The guard has sent no state yet.")
+        return self._orders.state
+
+    def _start(self) -> None:
+        self.close()
+        self._board = LocalBoard(self._wiring, self._world, self._seed)
+        self._orders = _Orders()
+        self._guard = Guard(self._plan, self._board.hardware, self._orders, _log)
+        self._seq = 0
+        self._observed = 0
+        self._command_ns: int | None = None
+        self._advance(self._period_ns)
+
+    def _advance(self, ns: int) -> None:
+        """Advance time, with a round of the guard at each of its ticks."""
+        guard, board = self._guard, self._board
+        if guard is None:
+            raise RobotError("This robot is closed.")
+        now_ns = board.now_ns()
+        end_ns = now_ns + ns
+        while now_ns < end_ns:
+            now_ns = min(now_ns + self._tick_ns, end_ns)
+            board.advance(now_ns)
+            guard.round(now_ns)
+
+    def _arm(self) -> None:
+        """Arm the robot, once its speed controllers have seen neutral for long enough."""
+        settings = (output.settings for output in self._plan.outputs)
+        patience_s = max((one["arm_s"] for one in settings if "arm_s" in one), default=0.0)
+        self._advance(round(patience_s * 1e9))
+        self.arm()
+
+    def _observe(self) -> Observation:
+        self._observed += 1
+        newest = None
+        if self._camera is not None:
+            self._pictured += 1
+            quality = self._camera.jpeg_quality
+            jpeg = simplejpeg.encode_jpeg(
+                np.ascontiguousarray(self._world.picture()), quality, "RGB", "444"
+            )
+            newest = NumberedFrame(self._pictured, Frame(jpeg, self._board.now_ns()))
+        return build_observation(
+            seq=self._observed,
+            now_ns=self._board.now_ns(),
+            reader=self._reader,
+            state=self._state,
+            newest=newest,
+            frame_sent=self._pictured - 1,
+            lease=_SESSION,
+            command_ns=self._command_ns,
+            holder=None,
+            mine=True,
+        )

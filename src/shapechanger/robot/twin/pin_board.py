@@ -1,0 +1,253 @@
+"""Pins, chips and servos of the board: their owners, and the levels that outlive a process."""
+
+from __future__ import annotations
+
+import errno
+import random
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from shapechanger.contract.world import World
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.twin.chips import (
+    Chip,
+    SimulatedAs5600,
+    SimulatedPca9685,
+    Tca9548a,
+    chips_of,
+)
+from shapechanger.robot.twin.messages import (
+    ClaimPin,
+    DrivePin,
+    Edge,
+    HardwareRequest,
+    InstructServos,
+    PulsePin,
+    ReadChip,
+    WriteChip,
+)
+from shapechanger.robot.twin.sensors import Surroundings
+from shapechanger.robot.twin.servos.rig import Rig
+from shapechanger.robot.twin.signals import LedgerWriter, Levels, Pulse, PwmChannel
+from shapechanger.robot.twin.wiring import TwinWiring
+
+
+class Owner(Protocol):
+    """Connection of a process that holds pins; two connections of one process are two owners.
+
+    Attributes:
+        pid: Process id.
+    """
+
+    pid: int
+
+
+@dataclass(slots=True)
+class _Claim:
+    """A pin that a process holds, or held until it ended."""
+
+    owner: Owner | None = None
+    mode: Literal["input", "output"] = "input"
+    hz: float = 0
+    phase_ns: int = 0  # Start of a period of its PWM or pulses.
+
+
+class PinBoard:
+    """Pins, pulses, chips and servos, with the world that moves their sensors.
+
+    Args:
+        wiring: What is attached; it gives undriven pins their level.
+        world: World of the robot.
+        ledger: Record of the changes of outputs; None to keep none.
+        seed: Seed of the phase of software PWM.
+        now_ns: Time, ns.
+
+    Attributes:
+        levels: State of all outputs.
+        sensors: Sensors on input pins.
+        rig: Servos on a bus; None without any.
+        dead_chips: Bus and address of the chips that do not answer.
+
+    Raises:
+        RobotError: If the world does not fit the robot.
+    """
+
+    def __init__(
+        self, wiring: TwinWiring, world: World, ledger: LedgerWriter | None, seed: int, now_ns: int
+    ) -> None:
+        self._wiring = wiring
+        self._chips = chips_of(wiring.plan, world)
+        self._ledger = ledger
+        self._random = random.Random(f"phase {seed}")
+        self._claims: dict[int, _Claim] = {}
+        self.levels = Levels()
+        self._surroundings = Surroundings(wiring, world, now_ns)
+        self.sensors = self._surroundings.sensors
+        self.rig = self._surroundings.rig
+        self.dead_chips: set[tuple[int, int]] = set()
+        for address, chip in self._chips.items():
+            if isinstance(chip, SimulatedPca9685):
+                self._update_channels(address, chip)
+
+    def advance(self, now_ns: int) -> list[Edge]:
+        """Advance the world to a time and return the edges of inputs on the way."""
+        return self._surroundings.advance(now_ns, self.levels)
+
+    def require_rig(self) -> Rig:
+        """Return the servos; raise RobotError if there are none."""
+        if self.rig is None:
+            raise RobotError("This twin has no servo bus.")
+        return self.rig
+
+    def owner(self, pin: int) -> Owner | None:
+        """Return the owner of a pin; None for a free one."""
+        claim = self._claims.get(pin)
+        return None if claim is None else claim.owner
+
+    def execute(self, owner: Owner, request: HardwareRequest) -> object:
+        """Execute a request and return its result.
+
+        Args:
+            owner: The process that sends it.
+            request: The request.
+
+        Raises:
+            RobotError: If another process holds the pin, or this one has not claimed it.
+            OSError: If no chip answers, with the `errno` of the kernel's driver.
+        """
+        match request:
+            case DrivePin():
+                self._start_pulses(self._output(owner, request.pin), request.hz, request.t)
+                self._drive(owner.pid, request.pin, request.duty, request.hz, request.t)
+            case PulsePin():
+                self._pulse(owner, request)
+            case ReadChip():
+                return self._chip(request.bus, request.address).read(
+                    request.register, request.length
+                )
+            case WriteChip():
+                self._write_chip(owner.pid, request)
+            case InstructServos():
+                rig = self.require_rig()
+                rig.require(request.device)
+                if request.size:
+                    return rig.bus.read(request.ids, request.at, request.size)
+                return rig.bus.write(dict(zip(request.ids, request.data, strict=True)), request.at)
+            case ClaimPin():
+                return self._claim(owner, request)
+        return None
+
+    def leave(self, owner: Owner, t: int, *, died: bool) -> None:
+        """Free the pins of a process that has ended; outputs keep their level of that moment.
+
+        Args:
+            owner: The process.
+            t: Time, ns.
+            died: Whether it ended without closing its pins.
+        """
+        if died:
+            self._record(t, "gone", pid=owner.pid)
+        for pin, claim in sorted(self._claims.items()):
+            if claim.owner is not owner:
+                continue
+            claim.owner = None
+            if claim.mode != "output" or not (died or claim.hz):
+                continue
+            duty = self.levels.duties.get(pin, 0.0)
+            if claim.hz and 0.0 < duty < 1.0:
+                period_ns = 1e9 / claim.hz
+                duty = float((t - claim.phase_ns) % period_ns < duty * period_ns)
+            claim.hz = 0
+            self._drive(owner.pid, pin, duty, 0, t)
+
+    def encoder(self, joint: str) -> SimulatedAs5600:
+        """Return the encoder of a joint.
+
+        Raises:
+            UnknownName: If no such joint has an encoder.
+        """
+        muxes = [chip for chip in self._chips.values() if isinstance(chip, Tca9548a)]
+        behind = [chip for mux in muxes for chip in mux.channels.values()]
+        encoders = {chip.joint: chip for chip in behind if isinstance(chip, SimulatedAs5600)}
+        if joint not in encoders:
+            raise UnknownName("joint with an encoder", joint, encoders)
+        return encoders[joint]
+
+    def _record(self, t: int, kind: str, **fields: Any) -> None:
+        if self._ledger is not None:
+            self._ledger.write(t, kind, **fields)
+
+    def _claim(self, owner: Owner, request: ClaimPin) -> int:
+        """Return the level of the pin; for an input that of its sensor, pull or resistors."""
+        pin, t = request.pin, request.t
+        claim = self._claims.setdefault(pin, _Claim())
+        if claim.owner is not None and claim.owner is not owner:
+            raise RobotError(f"GPIO{pin} is busy: process {claim.owner.pid} holds it.")
+        claim.owner, claim.mode, claim.hz = owner, request.mode, 0
+        if request.mode == "output":
+            self._drive(owner.pid, pin, float(request.level), 0, t)
+            return request.level
+        idle = self._wiring.idle_level(pin)
+        if pin in self.levels.duties:
+            self.levels.release(pin)
+            self._record(t, "pin", pin=pin, duty=float(idle), hz=0, pid=owner.pid, released=True)
+            self.sensors.output_changed(t, pin, float(idle))
+        if request.pull != "floating" and not self._wiring.has_resistor(pin):
+            idle = int(request.pull == "up")
+        return self.sensors.levels.get(pin, idle)
+
+    def _pulse(self, owner: Owner, request: PulsePin) -> None:
+        pin, us, hz = request.pin, request.us, request.hz
+        self._start_pulses(self._output(owner, pin), hz if us else 0, request.t)
+        pulse = Pulse(us, hz)
+        if self.levels.pulses.get(pin) != pulse:
+            self.levels.pulse(pin, pulse)
+            self._record(request.t, "pulse", pin=pin, us=us, hz=hz, pid=owner.pid)
+
+    def _write_chip(self, pid: int, request: WriteChip) -> None:
+        t, bus, address = request.t, request.bus, request.address
+        chip = self._chip(bus, address)
+        chip.write(request.register, request.data)
+        if isinstance(chip, Tca9548a):
+            return  # It moves nothing, and hundreds of writes a second would fill the ledger.
+        at = {"bus": bus, "address": address}
+        self._record(t, "i2c", **at, register=request.register, data=request.data, pid=pid)
+        if isinstance(chip, SimulatedPca9685):
+            for channel, pulse in self._update_channels((bus, address), chip):
+                us, hz = round(pulse.us, 3), round(pulse.hz, 3)
+                self._record(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
+
+    def _update_channels(
+        self, at: tuple[int, int], chip: SimulatedPca9685
+    ) -> list[tuple[int, Pulse]]:
+        """Update the levels of a chip's channels and return those that changed."""
+        changed: list[tuple[int, Pulse]] = []
+        for number, pulse in enumerate(chip.channels):
+            channel = PwmChannel(*at, number)
+            before = self.levels.channels.get(channel, Pulse(0.0, 0.0))
+            if pulse.us != before.us or (pulse.us and pulse.hz != before.hz):
+                changed.append((number, pulse))
+                self.levels.channels[channel] = pulse
+        return changed
+
+    def _output(self, owner: Owner, pin: int) -> _Claim:
+        claim = self._claims.get(pin)
+        if claim is None or claim.owner is not owner or claim.mode != "output":
+            raise RobotError(f"Process {owner.pid} does not hold GPIO{pin} as an output.")
+        return claim
+
+    def _start_pulses(self, claim: _Claim, hz: float, t: int) -> None:
+        if hz and hz != claim.hz:
+            claim.phase_ns = t - int(self._random.random() * 1e9 / hz)
+        claim.hz = hz
+
+    def _drive(self, pid: int, pin: int, duty: float, hz: float, t: int) -> None:
+        self.levels.drive(pin, duty, t)
+        self._record(t, "pin", pin=pin, duty=duty, hz=hz, pid=pid)
+        self.sensors.output_changed(t, pin, duty)
+
+    def _chip(self, bus: int, address: int) -> Chip:
+        chip = self._chips.get((bus, address))
+        if chip is None or (bus, address) in self.dead_chips:
+            raise OSError(errno.EREMOTEIO, "no chip answers")
+        return chip

@@ -1,0 +1,351 @@
+"""A robot that is served on its twin, and the operator beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Final, Literal, Self
+
+from shapechanger.errors import LinkError, RobotError
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.known_robots import KnownRobot
+from shapechanger.robot.daemon.credentials import make_credentials
+from shapechanger.robot.profile.load import load_profile
+from shapechanger.robot.profile.profile import Profile
+from shapechanger.robot.twin.board_client import BoardClient
+from shapechanger.robot.twin.camera import CameraFault
+from shapechanger.robot.twin.chips import Magnet
+from shapechanger.robot.twin.messages import OperatorRequest, SleepOnBoard, SleepResult, Whereabouts
+from shapechanger.robot.twin.servos.rig import ServoFault
+from shapechanger.robot.twin.signals import Levels
+from shapechanger.robot.twin.start import BoardAt
+
+
+class Operator:
+    """A person beside the robot, who moves the vehicle and breaks and presses things.
+
+    Each request takes effect after everything that the robot's processes sent before it.
+
+    Args:
+        path: Socket on which the board listens.
+
+    Raises:
+        RobotError: If no board listens there.
+    """
+
+    def __init__(self, path: str) -> None:
+        self._client = BoardClient(path, "operator")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def place(self, seed: int) -> None:
+        """Place the vehicle at the start that follows from a seed."""
+        self._act("place", seed)
+
+    def put_back(self) -> None:
+        """Put a vehicle that has collided back on its lane, at rest, to continue from there.
+
+        In the plain room, which has no lane, it returns to its start. Its truth counts on.
+        """
+        self._act("put_back")
+
+    def lay_out(self, seed: int) -> None:
+        """Replace the surroundings, and place the vehicle at a start in them.
+
+        On a course in MuJoCo the board stands still for some tenths of a second meanwhile, and also
+        for the first `put_back` on it. A twin that is started with another seed has no such wait.
+        """
+        self._act("lay_out", seed)
+
+    def advance(self, seconds: float) -> int:
+        """Advance the twin's clock and return its time in nanoseconds.
+
+        Raises:
+            RobotError: If the board runs in real time.
+        """
+        return self._client.ask(SleepOnBoard(ns=round(seconds * 1e9)), SleepResult).t
+
+    def break_camera(self, fault: CameraFault) -> None:
+        """Make the camera fail; "" repairs it."""
+        self._act("camera", fault)
+
+    def press_bumper(self, down: bool = True) -> None:
+        """Press or release all bumpers."""
+        self._act("bumper", down)
+
+    def press_stop(self, down: bool = True) -> None:
+        """Press or release the emergency stop button."""
+        self._act("stop", down)
+
+    def set_battery(self, volts: float | None) -> None:
+        """Set the battery's voltage without load, V; None for a full one."""
+        self._act("battery", None if volts is None else float(volts))
+
+    def set_distance(self, metres: float | None, *, dead: bool = False) -> None:
+        """Override what distance sensors measure.
+
+        Args:
+            metres: Distance, m; None for the truth.
+            dead: Whether they do not answer at all.
+        """
+        self._act("distance", None if metres is None else float(metres), dead)
+
+    def break_chip(self, bus: int, address: int, *, dead: bool = True) -> None:
+        """Make an I2C chip stop answering, or answer again.
+
+        Args:
+            bus: Number of the bus.
+            address: Address on the bus.
+            dead: Whether it stops answering.
+        """
+        self._act("chip", bus, address, dead)
+
+    def break_servo(self, tendon: str, fault: ServoFault) -> None:
+        """Make the servo of a tendon fail.
+
+        Args:
+            tendon: Name of the tendon.
+            fault: The fault; "" repairs what can be repaired.
+        """
+        self._act("servo", tendon, fault)
+
+    def break_magnet(self, joint: str, state: Magnet = "gone") -> None:
+        """Change the magnet of a joint's encoder.
+
+        Args:
+            joint: Name of the joint.
+            state: State of the magnet; "" repairs it.
+        """
+        self._act("magnet", joint, state)
+
+    def tensions(self) -> dict[str, float]:
+        """Return the tension of each tendon on the servo bus, N, by name."""
+        return self._act("tensions", kind=dict[str, float])
+
+    def levels(self) -> Levels:
+        """Return the state of all outputs."""
+        return self._act("levels", kind=Levels)
+
+    def where(self) -> Whereabouts:
+        """Return the true state of the vehicle."""
+        return self._act("whereabouts", kind=Whereabouts)
+
+    def close(self) -> None:
+        """Leave the board."""
+        self._client.close()
+
+    def _act(self, action: str, *values: bool | int | float | str | None, kind: Any = None) -> Any:
+        return self._client.ask(OperatorRequest(action=action, values=values), kind)
+
+
+_READY: Final = "ready.json"
+_PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
+_READY_S: Final = 60.0
+_END_S: Final = 10.0
+_POLL_S: Final = 0.02
+_LOG: Final = 2000  # Of the end of a log, characters.
+
+
+@dataclass(frozen=True, slots=True)
+class _Ready:
+    """Content of the file that the daemon writes when it can be reached."""
+
+    port: int
+    fingerprint: str
+
+
+class RunningRobot:
+    """A robot that is served by processes on this machine, until `close`.
+
+    Args:
+        folder: Folder of its files: the twin's ledger and socket, the key and the log.
+        supervisor: Process of its supervisor.
+        temporary: Whether `close` removes the folder.
+
+    Attributes:
+        folder: Folder of its files.
+        supervisor: Process of its supervisor.
+
+    Raises:
+        RobotError: If it does not start.
+    """
+
+    def __init__(
+        self, folder: Path, supervisor: subprocess.Popen[bytes], *, temporary: bool = False
+    ) -> None:
+        self.folder = folder
+        self.supervisor = supervisor
+        self._temporary = temporary
+        self._ready = self._await_ready()
+
+    def __enter__(self) -> Self:
+        """Return the robot."""
+        return self
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        """Close the robot, and add the end of its log to a `LinkError`, as a note."""
+        if isinstance(error, LinkError):
+            error.add_note(f"The log of the robot ends:\n{self.log_text()[-_LOG:]}")
+        self.close()
+
+    @property
+    def port(self) -> int:
+        """Port on 127.0.0.1; while the daemon restarts, wait for its new one."""
+        if self.supervisor.poll() is None:
+            self._ready = self._await_ready()
+        return self._ready.port
+
+    @property
+    def ledger_path(self) -> Path:
+        """Ledger of the twin."""
+        return BoardAt(self.folder).ledger_path
+
+    @property
+    def known(self) -> KnownRobot:
+        """Address and credentials."""
+        return self.known_at(f"127.0.0.1:{self.port}")
+
+    def known_at(self, address: str) -> KnownRobot:
+        """Return the credentials with another address, such as that of a proxy."""
+        key = (self.folder / "credentials" / "key").read_text().strip()
+        return KnownRobot("robot", address, key, self._ready.fingerprint or "insecure")
+
+    def client(self, **options: Any) -> RobotClient:
+        """Connect to it; the options are those of `RobotClient.connect`."""
+        return RobotClient.connect(self.known, **options)
+
+    def operator(self) -> Operator:
+        """Connect an operator to its twin."""
+        return Operator(BoardAt(self.folder).socket_path)
+
+    def pid_of(self, program: Literal["guard", "daemon"]) -> int:
+        """Return the process id of a program of the robot.
+
+        Raises:
+            RobotError: If it does not run at the moment.
+        """
+        parent = self.supervisor.pid
+        children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+        for pid in children:
+            arguments = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+            if any(a.decode().endswith((program, f"robot.{program}")) for a in arguments):
+                return int(pid)
+        raise RobotError(f"The robot's {program} does not run at the moment.")
+
+    def log_text(self) -> str:
+        """Return the log of its processes so far."""
+        path = self.folder / "log.txt"
+        return path.read_text(errors="replace") if path.exists() else ""
+
+    def await_restart(self, timeout_s: float = _READY_S) -> None:
+        """Wait until the daemon can be reached again after a restart.
+
+        Raises:
+            RobotError: If it does not restart in time.
+        """
+        self._ready = self._await_ready(timeout_s)
+
+    def forget_ready(self) -> None:
+        """Remove the daemon's ready file, before something that restarts the daemon."""
+        (self.folder / _READY).unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """End its processes, with its outputs at rest."""
+        self._end()
+        if self._temporary:
+            # The board may still write the last lines of its ledger.
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _end(self) -> None:
+        if self.supervisor.poll() is None:
+            self.supervisor.send_signal(signal.SIGCONT)
+            self.supervisor.terminate()
+        try:
+            self.supervisor.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self.supervisor.kill()
+            self.supervisor.wait()
+
+    def _await_ready(self, timeout_s: float = _READY_S) -> _Ready:
+        path = self.folder / _READY
+        until_s = time.monotonic() + timeout_s
+        while not path.exists():
+            if self.supervisor.poll() is not None or time.monotonic() > until_s:
+                self._end()
+                text = self.log_text().strip()
+                self.close()
+                raise RobotError(f"The robot did not start: {text}")
+            time.sleep(_POLL_S)
+        return _Ready(**json.loads(path.read_text()))
+
+
+def run_robot(
+    profile: Profile | Path,
+    *,
+    twin: bool = True,
+    clock: Literal["real", "twin"] = "real",
+    seed: int = 0,
+    folder: Path | None = None,
+    log: IO[bytes] | None = None,
+    arguments: tuple[str, ...] = (),
+) -> RunningRobot:
+    """Serve a robot on a free port of 127.0.0.1, as `shapechanger robot serve` does.
+
+    Args:
+        profile: Profile of the robot, or its file.
+        twin: Whether to serve it on its twin.
+        clock: Clock of a twin: the machine's, or one that only clients advance.
+        seed: Seed of a twin's world.
+        folder: Folder for its files; None for a temporary one. A twin that runs there is used.
+        log: Log of its processes; None for a file in the folder.
+        arguments: Further arguments of `serve`.
+
+    Raises:
+        RobotError: If it does not start.
+    """
+    if not isinstance(profile, Profile):
+        profile = load_profile(profile)
+    temporary = folder is None
+    folder = folder or Path(tempfile.mkdtemp(prefix="shapechanger-robot-"))
+    make_credentials(folder / "credentials", profile.name)
+    command = [sys.executable, "-m", "shapechanger", "robot", "serve", str(profile.path)]
+    command += ["--port", "0", "--no-announce"]
+    command += ["--credentials", str(folder / "credentials")]
+    command += ["--host", "127.0.0.1", "--ready-file", str(folder / "ready.json")]
+    command += ["--recordings", str(folder / "recordings"), *arguments]
+    if twin:
+        command += ["--twin", "--clock", clock, "--seed", str(seed)]
+        command += ["--twin-folder", str(folder)]
+    with contextlib.ExitStack() as stack:
+        output = log or stack.enter_context((folder / "log.txt").open("wb"))
+        supervisor = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            # So that Ctrl-C first reaches the driving program, which then ends the robot.
+            process_group=0,
+            preexec_fn=_end_with_parent if sys.platform == "linux" else None,
+        )
+    return RunningRobot(folder, supervisor, temporary=temporary)
+
+
+def _end_with_parent() -> None:
+    """Let the kernel end this process when its parent ends, for whatever reason.
+
+    A robot must not run on because a terminal was closed. The setting survives `exec`.
+    """
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -1,0 +1,46 @@
+"""A car without sensors, which all attacks share.
+
+It is a twin in real time, with its real supervisor, guard and daemon. A person holds control of it,
+armed and at rest, while each attack runs, so that any command that came through would move a pin.
+After the attack the twin's ledger must show no movement, and the robot must serve an honest client.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from shapechanger.robot.twin.robot import RunningRobot, run_robot
+from tests.robot.client.attacks.scene import CAP, Scene, key_of, movements, settle
+from tests.robot.client.attacks.stranger import Stranger
+from tests.robots import BLIND_CAR, IN_A_ROOM, changed, write_profile
+
+
+@pytest.fixture(scope="package")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningRobot]:
+    """A car without sensors, for all attacks."""
+    folder = tmp_path_factory.mktemp("attacked")
+    profile = write_profile(
+        folder, changed("mix = { throttle = 1.0 }", f"mix = {{ throttle = {CAP} }}", BLIND_CAR)
+    )
+    with run_robot(profile, folder=folder, arguments=IN_A_ROOM) as served:
+        yield served
+
+
+@pytest.fixture
+def scene(robot: RunningRobot) -> Iterator[Scene]:
+    """The robot, armed by a person who does not command. Nothing may move until the test ends."""
+    key = key_of(robot)
+    before, pids = movements(robot), [robot.pid_of("guard"), robot.pid_of("daemon")]
+    with Stranger(robot.port) as operator:
+        operator.enter(key, "person", name="Grace")
+        while not operator.take()["mine"]:
+            pass  # The client of the test before may still be leaving.
+        operator.arm()
+        made = Scene(robot, robot.port, key, operator)
+        with made.stack:
+            yield made
+            settle(robot, key)
+            assert movements(robot) == before
+    assert [robot.pid_of("guard"), robot.pid_of("daemon")] == pids

@@ -1,0 +1,80 @@
+"""The scene of an attack: a served twin, armed and at rest, and what judges a movement."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass, field
+
+from shapechanger.robot.twin.robot import RunningRobot
+from shapechanger.robot.twin.signals import read_ledger
+from tests.robot.client.attacks.stranger import Stranger, key_bytes
+
+FULL = (1.0, 1.0)
+"""What every attacker wants the outputs to do."""
+
+CAP = 0.6
+"""Largest duty of the motor that the profile allows."""
+
+WRONG = b"\x5a" * 16
+"""A key that the robot does not have."""
+
+
+@dataclass
+class Scene:
+    """A robot under attack.
+
+    Attributes:
+        robot: Its processes.
+        port: Its port.
+        key: Its key.
+        operator: The person in control, whose robot is armed and at rest.
+        stack: Closes the connections.
+    """
+
+    robot: RunningRobot
+    port: int
+    key: bytes
+    operator: Stranger
+    stack: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
+
+    def stranger(self, **how: object) -> Stranger:
+        """Connect, without any request."""
+        return self.stack.enter_context(Stranger(self.port, **how))
+
+    def knock(self, key: bytes = WRONG, role: str = "program", **fields: object) -> str:
+        """Say hello, and return why the robot refuses."""
+        stranger = self.stranger()
+        stranger.hello(key, role, **fields)
+        return stranger.refusal()
+
+    def inside(self, role: str = "program", name: str = "thief") -> Stranger:
+        """Connect with the robot's key."""
+        stranger = self.stranger()
+        stranger.enter(self.key, role, name=name)
+        return stranger
+
+
+def movements(robot: RunningRobot) -> int:
+    """Return how often a pin of the motors has left rest."""
+    ledger = read_ledger(robot.ledger_path)
+    return sum(line.kind == "pin" and bool(line.duty) for line in ledger)
+
+
+def settle(robot: RunningRobot, key: bytes, wait_ns: int = 50_000_000) -> None:
+    """Let an honest client see a state of the guard that is later than all that was sent.
+
+    Args:
+        robot: The robot.
+        key: Its key.
+        wait_ns: Time by which the state is later, ns.
+    """
+    with Stranger(robot.port) as honest:
+        honest.enter(key, "person", name="honest")
+        now_ns = honest.now_ns()
+        while honest.observe()["state_ns"] < now_ns + wait_ns:
+            pass
+
+
+def key_of(robot: RunningRobot) -> bytes:
+    """Return the key of a robot."""
+    return key_bytes((robot.folder / "credentials" / "key").read_text())

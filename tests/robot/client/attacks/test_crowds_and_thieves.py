@@ -1,0 +1,225 @@
+"""Attackers that hold all connections, and thieves of the key: what they can do and cannot."""
+
+from __future__ import annotations
+
+import base64
+import itertools
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from shapechanger.robot.twin.robot import RunningRobot
+from shapechanger.robot.twin.signals import read_ledger
+from tests.robot.client.attacks.scene import CAP, FULL, WRONG, Scene, key_of, movements, settle
+from tests.robot.client.attacks.stranger import Stranger, header, proof
+
+pytestmark = [pytest.mark.system, pytest.mark.realtime]
+
+DRIVE_PINS = (22, 27)
+ELSEWHERE = [f"127.0.0.{number}" for number in range(2, 8)]  # Addresses of attackers.
+
+
+# Many at once. The limits before a hello are 16 connections per address and 48 in all.
+
+
+def knocks(scene: Scene, source: str) -> Stranger:
+    """Guess a key, and do not wait for the answer."""
+    stranger = scene.stranger(source=source)
+    stranger.hello(os.urandom(16), "person")
+    return stranger
+
+
+def says_nothing(scene: Scene, source: str) -> Stranger:
+    """Connect alone, without a handshake."""
+    return scene.stranger(source=source, version=None)
+
+
+def half_a_handshake(scene: Scene, source: str) -> Stranger:
+    """Send the beginning of a TLS handshake."""
+    stranger = scene.stranger(source=source, version=None)
+    stranger.write(b"\x16\x03\x01\x02\x00\x01")
+    return stranger
+
+
+def half_a_request(scene: Scene, source: str) -> Stranger:
+    """Send a request without its end."""
+    stranger = scene.stranger(source=source)
+    stranger.write(b"GET /link HTTP/1.1\r\nHost: x\r\n")
+    return stranger
+
+
+def half_a_hello(scene: Scene, source: str) -> Stranger:
+    """Open the link, and send the beginning of a hello."""
+    stranger = scene.stranger(source=source)
+    stranger.challenge()
+    stranger.write(header(100) + b"\x81\xa4kind")
+    return stranger
+
+
+def thief_without_a_word(scene: Scene, source: str) -> Stranger:
+    """Connect as a person with the key, and read nothing from then on."""
+    stranger = scene.stranger(source=source)
+    stranger.hello(scene.key, "person", name="thief")
+    return stranger
+
+
+def thief_in_half_a_message(scene: Scene, source: str) -> Stranger:
+    """Connect as a person with the key, and never finish a message."""
+    stranger = thief_without_a_word(scene, source)
+    stranger.write(header(1000))
+    return stranger
+
+
+HOLDS = (
+    knocks,
+    says_nothing,
+    half_a_handshake,
+    half_a_request,
+    half_a_hello,
+    thief_without_a_word,
+    thief_in_half_a_message,
+)
+
+
+@pytest.mark.parametrize("hold", HOLDS, ids=lambda hold: hold.__name__)
+def test_a_person_stops_the_robot_whoever_holds_its_connections(
+    scene: Scene, hold: Callable[[Scene, str], Stranger]
+) -> None:
+    """With 48 connections of six addresses held, or eight of clients with the key."""
+    count = 9 if "thief" in hold.__name__ else 54
+    held = [hold(scene, source) for _ in range(count // 6 + 1) for source in ELSEWHERE]
+    person = scene.stranger()
+    person.enter(scene.key, "person", name="Ada")
+    person.send("emergencystop", reason="a child")
+    while not scene.operator.observe()["emergency"]:
+        pass
+    assert len(held) >= count
+    assert not any(b"welcome" in stranger.unread for stranger in held if hold is knocks)
+
+
+@pytest.mark.parametrize("hold", [half_a_request, half_a_hello])
+def test_a_slow_connection_ends_however_many_bytes_it_sends(
+    scene: Scene, hold: Callable[[Scene, str], Stranger]
+) -> None:
+    """The time for a request and for a hello counts from its beginning."""
+    slow = [hold(scene, source) for source in ELSEWHERE]
+    while slow:
+        for stranger in slow:
+            stranger.write(b"x")
+        scene.operator.observe()
+        slow = [stranger for stranger in slow if stranger.is_open()]
+
+
+# What a thief of the key can do, and cannot.
+
+
+def test_a_thief_of_the_key_stays_within_the_limits_of_the_guard(robot: RunningRobot) -> None:
+    """Full speed for a minute is the profile's speed until the deadline; then the robot rests."""
+    key = key_of(robot)
+    before = len(read_ledger(robot.ledger_path))
+    with Stranger(robot.port) as thief:
+        thief.enter(key, "person", name="thief")
+        while not thief.take()["mine"]:
+            pass
+        thief.arm()
+        for seq in itertools.count(1):
+            thief.drive(seq, 1e6, 1e6, ttl_ms=60_000)
+            if thief.expect("observation")["applied_seq"]:
+                break
+        settle(robot, key, 1_100_000_000)  # The deadline is 1 s.
+        assert thief.observe()["armed"]
+    ledger = read_ledger(robot.ledger_path)[before:]
+    drive = [line.duty for line in ledger if line.kind == "pin" and line.pin in DRIVE_PINS]
+    assert max(duty or 0.0 for duty in drive) == pytest.approx(CAP)
+    assert drive[-1] == 0.0
+
+
+def test_any_client_with_the_key_stops_a_thief(robot: RunningRobot) -> None:
+    """A program stops a person; only a client that claims to be a person goes on."""
+    key = key_of(robot)
+    with Stranger(robot.port) as thief, Stranger(robot.port) as program:
+        thief.enter(key, "person", name="thief")
+        while not thief.take()["mine"]:
+            pass
+        thief.arm()
+        program.enter(key, name="watchdog")
+        program.send("emergencystop", reason="nobody should drive")
+        while not (seen := thief.observe())["emergency"]:
+            pass
+        before = movements(robot)
+        thief.drive(1, *FULL)
+        assert "Emergency stop" in thief.refusal()
+        program.send("arm", answers=program.observe()["seq"], emergency=seen["emergencies"])
+        assert "Only a person" in program.refusal()
+        thief.send("arm", answers=thief.observe()["seq"], emergency=seen["emergencies"] - 1)
+        assert "emergency stops" in thief.refusal()
+        assert movements(robot) == before
+
+
+def test_a_proof_can_be_passed_on_by_who_has_the_certificate(robot: RunningRobot) -> None:
+    """As SECURITY.md says: the proof of an honest client fits another connection to its robot.
+
+    It fits no other certificate (`man_in_the_middle`), and not twice (`replayed_hello`).
+    """
+    key = key_of(robot)
+    with Stranger(robot.port) as between:
+        passed_on = proof(key, between.challenge(), between.certificate, "person")
+        between.send("hello", version=1, proof=passed_on, role="person")
+        between.expect("welcome")
+
+
+def test_no_log_contains_a_key_or_a_proof(robot: RunningRobot) -> None:
+    """Nor do command lines, environments, pages and files outside of the credentials' folder."""
+    text = (robot.folder / "credentials" / "key").read_text().strip()
+    private = (robot.folder / "credentials" / "certificate.key").read_text().splitlines()[1:-1]
+    key = key_of(robot)
+    secrets = [key]
+    for held, role in ((key, "person"), (key, "program"), (WRONG, "person")):
+        with Stranger(robot.port) as client:
+            client.hello(held, role, name="Lin\nguard: Armed.\x1b[2J")
+            client.receive()
+            secrets.append(client.proof)
+    with Stranger(robot.port) as client:
+        page = client.request("GET / HTTP/1.1", Connection="close") + client.rest()
+    with Stranger(robot.port) as client:
+        page += (
+            client.request("GET /console/robot.json HTTP/1.1", Connection="close") + client.rest()
+        )
+    log = robot.log_text()
+    processes = [robot.supervisor.pid, robot.pid_of("guard"), robot.pid_of("daemon")]
+    places = {f"/proc/{pid}/{name}" for pid in processes for name in ("cmdline", "environ")}
+    places |= {
+        str(p) for p in robot.folder.rglob("*") if p.is_file() and p.parent.name != "credentials"
+    }
+    written = b"".join(Path(place).read_bytes() for place in sorted(places)) + page.encode()
+    forms = [*private, text, text.replace("-", ""), text.lower()]
+    forms += [form(secret) for secret in secrets for form in (bytes.hex, repr, base64_of)]
+    assert "Lin guard: Armed. [2J, a person, connected" in log
+    assert "Wrong key" in log
+    assert b"shapechanger" in written
+    found = [form for form in forms if form.encode() in written]
+    assert found == []
+    assert not any(secret in written for secret in secrets)
+
+
+def base64_of(secret: bytes) -> str:
+    """Return bytes in base 64 without padding."""
+    return base64.b64encode(secret).decode().rstrip("=")
+
+
+def test_an_honest_client_moves_the_robot(robot: RunningRobot) -> None:
+    """The same client, by the rules: the ledger shows what the attacks did not achieve."""
+    key = key_of(robot)
+    before = movements(robot)
+    with Stranger(robot.port) as operator:
+        operator.enter(key, "person", name="Grace")
+        while not operator.take()["mine"]:
+            pass
+        operator.arm()
+        for seq in itertools.count(1):
+            operator.drive(seq, 0.0, 0.5)
+            if operator.expect("observation")["applied_seq"]:
+                break
+    assert movements(robot) > before

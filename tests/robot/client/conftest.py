@@ -1,0 +1,50 @@
+"""Fixtures that start robots and clients, and check that no thread remains."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shapechanger.robot.client.client import RobotClient
+from tests.robot.client.robot import Robot, eventually
+
+
+@pytest.fixture(scope="session")
+def credentials(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for the robot's key and certificate."""
+    return tmp_path_factory.mktemp("credentials")
+
+
+@pytest.fixture(autouse=True)
+def _no_thread_remains() -> Iterator[None]:
+    before = set(threading.enumerate())
+    yield
+    eventually(lambda: set(threading.enumerate()) <= before)
+
+
+@pytest.fixture(autouse=True)
+def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+
+
+@pytest.fixture
+def run(credentials: Path) -> Iterator[Callable[..., Robot]]:
+    """Start a robot that is stopped after the test."""
+    with contextlib.ExitStack() as stack:
+        yield lambda **what: stack.enter_context(Robot(**what).running(credentials))
+
+
+@pytest.fixture
+def connect() -> Iterator[Callable[..., RobotClient]]:
+    """Connect to a robot; the connection is closed after the test."""
+    with contextlib.ExitStack() as stack:
+
+        def made(robot: Robot, **how: Any) -> RobotClient:
+            return stack.enter_context(RobotClient.connect(robot.known, **how))
+
+        yield made

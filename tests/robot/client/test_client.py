@@ -1,0 +1,255 @@
+"""The client against a fake robot on a real socket."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import traceback
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from shapechanger.errors import LinkError, RobotRefused
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.link import messages as m
+from shapechanger.robot.link.authentication import new_key
+from tests.robot.client.robot import Robot, eventually
+
+pytestmark = pytest.mark.realtime
+
+Run = Callable[..., Robot]
+Connect = Callable[..., RobotClient]
+
+
+def test_a_program_takes_control_arms_and_commands(run: Run, connect: Connect) -> None:
+    """Take, arm and command, with the observation that each command answers."""
+    robot = run()
+    client = connect(robot, pace="lockstep", name="ada")
+    client.take()
+    client.arm()
+    before = client.ask()
+    after = client.exchange((0.0, 0.5), before)
+    assert client.welcome.robot == "tin"
+    assert after.message.action_applied == (0.0, 0.5)
+    assert after.message.seq > before.message.seq
+    assert after.jpeg != before.jpeg
+    client.close()
+    client.close()
+    (command,) = robot.received(m.Command)
+    assert (command.answers, command.ttl_ms, command.scale) == (before.message.seq, 250, 1.0)
+
+
+def test_arming_ends_only_an_emergency_stop_that_was_seen(run: Run, connect: Connect) -> None:
+    """Arming acknowledges only stops in the last observation."""
+    robot = run()
+    client = connect(robot, role="person")
+    client.take()
+    seen = client.ask().message
+    robot.emergency = True
+    client.arm()
+    (arm,) = robot.received(m.Arm)
+    assert arm.answers == seen.seq + 1
+    assert arm.emergency == seen.emergencies == 0
+
+
+def test_commands_of_two_threads_have_different_numbers(run: Run, connect: Connect) -> None:
+    """Sequence numbers are unique across threads."""
+    client = connect(run(), pace="lockstep")
+    numbers: list[int] = []
+    threads = [
+        threading.Thread(
+            target=lambda: numbers.extend(client.command((0.0, 0.0), answers=0) for _ in range(50))
+        )
+        for _ in range(2)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(numbers) == list(range(1, 101))
+
+
+def test_a_ping_measures_the_round_trip(run: Run, connect: Connect) -> None:
+    """A ping returns the round-trip time and the robot's time."""
+    took_s, now_ns = connect(run()).ping()
+    assert took_s > 0.0
+    assert now_ns > 0
+
+
+def test_without_a_fingerprint_the_error_shows_one(run: Run) -> None:
+    """The error gives the command that stores the fingerprint."""
+    robot = run()
+    with pytest.raises(LinkError) as refused:
+        RobotClient.connect(robot.address, key=robot.key)
+    assert robot.fingerprint in str(refused.value)
+    assert f"robot remember NAME {robot.address} --fingerprint {robot.fingerprint}" in str(
+        refused.value
+    )
+    assert robot.connections == 0
+
+
+def test_another_certificate_is_refused_and_both_are_shown(run: Run) -> None:
+    """The connection is refused before the key is used."""
+    robot = run()
+    expected = "ab" * 32
+    with pytest.raises(RobotRefused) as refused:
+        RobotClient.connect(replace(robot.known, fingerprint=expected))
+    assert robot.fingerprint in str(refused.value)
+    assert expected in str(refused.value)
+    assert robot.messages == []
+
+
+def test_a_wrong_key_is_refused(run: Run) -> None:
+    """The error is the robot's message."""
+    with pytest.raises(RobotRefused, match="Wrong key"):
+        RobotClient.connect(replace(run().known, key=new_key()))
+
+
+@pytest.mark.parametrize(("version", "older"), [(0, "robot"), (2, "workstation")])
+def test_another_version_is_refused(run: Run, version: int, older: str) -> None:
+    """The error names the side to update."""
+    with pytest.raises(LinkError, match=f"on the {older}"):
+        RobotClient.connect(run(version=version).known)
+
+
+def test_a_missing_robot_is_an_error_at_once(run: Run, credentials: object) -> None:
+    """The error says what to check."""
+    robot = Robot()
+    with robot.running(credentials):  # type: ignore[arg-type]
+        known = robot.known
+    with pytest.raises(LinkError, match="shapechanger robot serve"):
+        RobotClient.connect(known)
+
+
+def test_a_failed_connection_is_one_error(run: Run, credentials: object) -> None:
+    """The traceback has no chained socket errors and no frames of another thread."""
+    robot = Robot()
+    with robot.running(credentials):  # type: ignore[arg-type]
+        known = robot.known
+    with pytest.raises(LinkError, match="Connect call failed") as refused:
+        RobotClient.connect(known)
+    shown = "".join(traceback.format_exception(refused.value))
+    assert shown.count("Traceback") == 1
+    assert "aiohttp" not in shown
+    assert "asyncio" not in shown
+
+
+def test_a_failed_request_is_one_error(run: Run, connect: Connect) -> None:
+    """A call that waits for an answer raises one error when the connection is cut."""
+    robot = run(delay_s=60.0)
+    client = connect(robot, timeout_s=30.0)
+    threading.Thread(
+        target=lambda: (eventually(lambda: bool(robot.received(m.Take))), robot.cut())
+    ).start()
+    with pytest.raises(LinkError, match="lost") as refused:
+        client.take()
+    assert "".join(traceback.format_exception(refused.value)).count("Traceback") == 1
+
+
+def test_an_abandoned_client_gives_control_back(run: Run, connect: Connect) -> None:
+    """`abandon` does not wait, and is idempotent."""
+    robot = run()
+    client = connect(robot)
+    client.take()
+    client.abandon()
+    eventually(lambda: bool(robot.received(m.Release)) and not client.alive)
+    client.abandon()
+    assert len(robot.received(m.Release)) == 1
+
+
+def test_plain_connections_must_be_asked_for(run: Run) -> None:
+    """A plain connection to a TLS port raises an error."""
+    with pytest.raises(LinkError):
+        RobotClient.connect(run().address, fingerprint="insecure", timeout_s=1.0)
+
+
+def test_control_of_another_client_is_not_taken(run: Run, connect: Connect) -> None:
+    """The error is the robot's message."""
+    client = connect(run(held_by="Grace"))
+    with pytest.raises(RobotRefused, match="Grace has control"):
+        client.take()
+
+
+def test_a_refusal_to_arm_has_a_reason(run: Run, connect: Connect) -> None:
+    """With arming = "person", a program is refused."""
+    client = connect(run(arming="person"))
+    client.take()
+    with pytest.raises(RobotRefused, match="Only a person"):
+        client.arm()
+    person = connect(run(arming="person"), role="person")
+    person.take()
+    person.arm()
+
+
+def test_a_refused_command_has_a_reason(run: Run, connect: Connect) -> None:
+    """`refusal` returns the reason for the command with that number."""
+    robot = run(refusal="It is too old.")
+    client = connect(robot, pace="lockstep")
+    client.take()
+    before = client.ask()
+    seq = client.command((0.0, 1.0), answers=before.message.seq)
+    client.observation(before.message.seq)
+    assert client.refusal(seq) == "It is too old."
+    assert client.refusal(seq + 1) == ""
+
+
+def test_events_are_returned_once(run: Run, connect: Connect) -> None:
+    """Events are kept until they are read, up to a limit."""
+    robot = run()
+    client = connect(robot)
+    for i in range(300):
+        robot.send(m.Event(name="bump", text=f"Bump {i}.", at_ns=i))
+    client.ping()
+    assert [event.text for event in client.events()] == [f"Bump {i}." for i in range(44, 300)]
+    assert client.events() == []
+
+
+def test_an_emergency_stop_is_sent_before_closing(run: Run, connect: Connect) -> None:
+    """A stop followed by a close stops the robot."""
+    robot = run()
+    client = connect(robot)
+    client.emergency_stop("a dog")
+    client.close()
+    eventually(lambda: robot.received(m.EmergencyStop) == [m.EmergencyStop(reason="a dog")])
+
+
+def test_a_closed_client_raises_an_error(run: Run, connect: Connect) -> None:
+    """Every method raises."""
+    client = connect(run())
+    client.close()
+    assert not client.alive
+    for ask in (client.take, client.ask, client.ping, client.release, client.observation):
+        with pytest.raises(LinkError, match="make a new one"):
+            ask()
+
+
+def _in_child(client: RobotClient, answers: multiprocessing.Queue[str]) -> None:
+    try:
+        client.acknowledge()
+    except LinkError as error:
+        answers.put(str(error))
+    client.close()
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork.*:DeprecationWarning")
+def test_a_forked_client_does_not_touch_the_connection(run: Run, connect: Connect) -> None:
+    """A worker process must open its own connection."""
+    client = connect(run(), pace="lockstep")
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+    child = context.Process(target=_in_child, args=(client, answers))
+    child.start()
+    assert "another process" in answers.get(timeout=20.0)
+    child.join(20.0)
+    answers.close()
+    answers.join_thread()
+    assert child.exitcode == 0
+    assert client.ask().message.seq > 0
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, -1.0, float("nan")])
+def test_an_invalid_timeout_is_an_error(timeout_s: float) -> None:
+    """The error is raised before connecting."""
+    with pytest.raises(LinkError, match="above 0"):
+        RobotClient.connect("192.0.2.1", timeout_s=timeout_s)

@@ -1,0 +1,137 @@
+"""Broken connections are detected in time, reported, and not hidden by stale data."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import LinkError, StaleObservation
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.link import messages as m
+from tests.robot.client.robot import Robot, eventually
+
+pytestmark = pytest.mark.realtime
+
+Run = Callable[..., Robot]
+Connect = Callable[..., RobotClient]
+
+TIMEOUT_S = 0.3
+
+
+def _ready(client: RobotClient) -> None:
+    client.take()
+    client.arm()
+
+
+def test_a_black_hole_is_detected_in_time(run: Run, connect: Connect) -> None:
+    """The connection is lost after the timeout, although the socket stays open."""
+    robot = run()
+    client = connect(robot, pace="lockstep", timeout_s=TIMEOUT_S)
+    _ready(client)
+    seen = client.ask()
+    robot.silent = True
+    client.command((0.0, 1.0), answers=seen.message.seq)
+    with pytest.raises(LinkError, match="no message for"):
+        client.observation(seen.message.seq, timeout_s=60.0)
+    assert not client.alive
+
+
+def test_an_idle_link_stays_up(run: Run, connect: Connect) -> None:
+    """Pings keep an idle connection alive."""
+    robot = run()
+    client = connect(robot, timeout_s=TIMEOUT_S)
+    eventually(lambda: len(robot.received(m.Ping)) > 3)
+    assert client.alive
+
+
+def test_a_closed_connection_is_detected_at_once(credentials: Path) -> None:
+    """A call that waits for an observation ends before its timeout."""
+    robot = Robot()
+    with robot.running(credentials):
+        client = RobotClient.connect(robot.known, timeout_s=30.0)
+        errors: list[LinkError] = []
+
+        def wait() -> None:
+            try:
+                client.observation(timeout_s=60.0)
+            except LinkError as error:
+                errors.append(error)
+
+        waiting = threading.Thread(target=wait)
+        waiting.start()
+    waiting.join(10.0)
+    assert "lost" in str(errors[0])
+    with pytest.raises(LinkError, match="lost"):
+        client.take()
+    client.close()
+
+
+def test_a_slow_robot_is_stale_and_not_lost(run: Run, connect: Connect) -> None:
+    """A late observation raises StaleObservation, and the connection stays up."""
+    client = connect(run(delay_s=0.2))
+    client.acknowledge()
+    with pytest.raises(StaleObservation):
+        client.observation(timeout_s=0.01)
+    assert client.observation(timeout_s=10.0).message.seq == 1
+
+
+@pytest.mark.timeout(30)  # The connection's own is 60 s.
+def test_closing_a_dead_connection_takes_no_time(run: Run, connect: Connect) -> None:
+    """A silent robot does not delay `close`."""
+    robot = run()
+    client = connect(robot, timeout_s=60.0)
+    robot.silent = True
+    client.close()
+
+
+@given(garbage=st.binary(max_size=100))
+def test_an_invalid_message_ends_the_link(credentials: Path, garbage: bytes) -> None:
+    """All waiting calls raise."""
+    robot = Robot(garbage=garbage)
+    with robot.running(credentials), RobotClient.connect(robot.known) as client:
+        with pytest.raises(LinkError, match="Not a valid message"):
+            client.ask()
+        assert not client.alive
+
+
+def test_an_old_observation_ends_the_link(run: Run, connect: Connect) -> None:
+    """A sequence number that decreases may be a replay."""
+    robot = run()
+    client = connect(robot)
+    robot._seq = 10
+    client.ask()
+    robot._seq = 5
+    with pytest.raises(LinkError, match="as in a replay"):
+        client.ask()
+
+
+def test_a_fatal_refusal_ends_the_link_with_its_reason(run: Run, connect: Connect) -> None:
+    """The error is the robot's message, not a broken pipe."""
+    robot = run()
+    client = connect(robot)
+    robot.send(m.Refused(reason="Too many messages.", fatal=True))
+    eventually(lambda: not client.alive)
+    with pytest.raises(LinkError, match="Too many messages"):
+        client.ask()
+
+
+def test_a_blocked_connection_delivers_only_the_newest_command(run: Run, connect: Connect) -> None:
+    """Queued commands are replaced by newer ones."""
+    robot = run()
+    client = connect(robot)
+    client.take()
+    stuck = threading.Event()
+    loop = client._loop
+    assert loop is not None
+    loop.call_soon_threadsafe(lambda: stuck.wait(10.0))
+    for i in range(1, 6):
+        client.command((0.0, i / 10), answers=0)
+    stuck.set()
+    eventually(lambda: bool(robot.received(m.Command)))
+    client.ping()
+    assert [command.values for command in robot.received(m.Command)] == [(0.0, 0.5)]

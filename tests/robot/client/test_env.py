@@ -1,0 +1,592 @@
+"""The remote env against a fake robot on a real socket."""
+
+from __future__ import annotations
+
+import gc
+import itertools
+import logging
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.contract import testing
+from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.contract.testing import MakeEnv
+from shapechanger.errors import LinkError, RenderError, RobotRefused, SpaceMismatch, UnknownName
+from shapechanger.layout import Element, Feature
+from shapechanger.robot.client.env import RemoteVehicleEnv, Schedule
+from shapechanger.robot.client.known_robots import remember
+from shapechanger.robot.link import messages as m
+from shapechanger.vehicles.remote.discrete_driving import FOUR_WAYS, DiscreteDriving
+from tests.robot.client.robot import FULL_SPEED, STATE, THROTTLE, WALL, Robot, eventually
+
+pytestmark = pytest.mark.realtime
+
+Run = Callable[..., Robot]
+
+ID = "shapechanger/RemoteVehicle-v1"
+AHEAD = np.array([0.0, 1.0], np.float32)
+REST = np.zeros(2, np.float32)
+TENDONS = tuple(
+    Feature(name, "1", 0.0, 1.0, Element("tendon", name)) for name in ("FDP", "FDS", "EDC")
+)
+
+
+def made(robot: Robot, **how: Any) -> gym.Env[Any, Any]:
+    """Make the env of a robot, in lockstep."""
+    return gym.make(ID, **{"pace": "lockstep"} | robot.arguments | how)
+
+
+@pytest.mark.parametrize(
+    "promise",
+    [
+        testing.passes_gymnasiums_checker,
+        testing.is_deterministic,
+        testing.shares_no_memory,
+        testing.reward_is_the_sum_of_its_terms,
+        testing.pickles,
+    ],
+    ids=lambda promise: promise.__name__,
+)
+def test_an_env_with_images_passes_the_checks(run: Run, promise: Callable[[MakeEnv], None]) -> None:
+    """All checks apply except those for flat observations."""
+    promise(partial(made, run(home_at_take=True)))
+
+
+@pytest.mark.parametrize(
+    "promise",
+    [
+        testing.passes_gymnasiums_checker,
+        testing.is_deterministic,
+        testing.shares_no_memory,
+        testing.names_every_number,
+        testing.reward_is_the_sum_of_its_terms,
+        testing.pickles,
+    ],
+    ids=lambda promise: promise.__name__,
+)
+@pytest.mark.parametrize("image", [None, False])
+def test_an_env_without_images_passes_the_checks(
+    run: Run, promise: Callable[[MakeEnv], None], image: bool | None
+) -> None:
+    """Without a camera, and with `image=False`."""
+    robot = run(home_at_take=True, image_size=None if image is None else (160, 120))
+    promise(partial(made, robot, image=image))
+
+
+def test_layouts_name_images_and_states(run: Run) -> None:
+    """An image is one block, in Gymnasium's order of a flattened Dict."""
+    env = made(run(), state=True, size=(40, 30))
+    observation, action = layouts_of(env)
+    assert observation.names == ("camera/image", *(f.name for f in STATE))
+    assert observation["camera/image"].shape == (30, 40, 3)
+    assert action.names == ("steering", "throttle")
+    seen, _ = env.reset(seed=0)
+    assert env.observation_space.contains(seen)
+    assert gym.spaces.flatten(env.observation_space, seen).shape == (observation.size,)
+    env.close()
+
+
+@pytest.mark.parametrize("size", [(160, 120), (80, 60), (128, 128)])
+def test_images_have_the_requested_size(run: Run, size: tuple[int, int]) -> None:
+    """The default is 160 x 120; in 2017 it was 128 x 128."""
+    env = made(run(), size=size, render_mode="rgb_array")
+    seen, _ = env.reset(seed=0)
+    assert seen.shape == (size[1], size[0], 3)
+    assert env.render().shape == (120, 160, 3)
+    env.close()
+
+
+def test_the_reward_is_metres_forward(run: Run) -> None:
+    """Reversing is negative, and `info` names the sensors."""
+    robot = run(reward={"velocity": 2.0})
+    env = made(robot, reward={"stall": -5.0})
+    env.reset(seed=0)
+    way = FULL_SPEED / robot.control_hz
+    _, forth, *_, info = env.step(AHEAD)
+    assert forth == info["reward_velocity"] == pytest.approx(2.0 * way)
+    assert env.step(-AHEAD)[1] == pytest.approx(-2.0 * way)
+    assert info["reward_sources"] == {
+        "speed": "encoder",
+        "collision": "bumper",
+        "stall": "encoder",
+    }
+    env.close()
+
+
+def test_a_collision_costs_once_and_ends_the_episode(run: Run) -> None:
+    """The episode is terminated, not truncated."""
+    robot = run()
+    env = made(robot, on_reset=lambda seed: robot.stand_at(0.0))
+    env.reset(seed=0)
+    ends = []
+    for _ in range(int(WALL / FULL_SPEED * robot.control_hz) + 3):
+        _, _, terminated, truncated, info = env.step(AHEAD)
+        ends.append((terminated, truncated, info["reward_collision"]))
+        if terminated:
+            break
+    assert ends[-1] == (True, False, -10.0)
+    assert not any(terminated or truncated for terminated, truncated, _ in ends[:-1])
+    *_, terminated, _, info = env.step(AHEAD)
+    assert (terminated, info["reward_collision"]) == (False, 0.0)
+    env.reset(seed=0)
+    assert env.step(AHEAD)[2] is False
+    env.close()
+
+
+def test_a_bump_between_two_observations_counts_once(run: Run) -> None:
+    """The event counts, and the bumper's later value is not counted again."""
+    robot = run(reward={"collision_ends_episode": 0.0})
+    env = made(robot)
+    env.reset(seed=0)
+    env.step(REST)
+    robot.send(m.Event(name="bump", text="It bumped into something.", at_ns=0))
+    *_, info = env.step(REST)
+    assert info["reward_collision"] == -10.0
+    assert info["events"] == ("It bumped into something.",)
+    robot.stand_at(WALL)
+    assert env.step(REST)[4]["reward_collision"] == 0.0
+    env.close()
+
+
+def test_an_unmeasured_quantity_is_absent(run: Run) -> None:
+    """It has no reward term, and `info` lists it."""
+    robot = run(absent=("speed", "stall"))
+    env = made(robot, state=True)
+    seen, _ = env.reset(seed=0)
+    *_, info = env.step(AHEAD)
+    assert info["reward_sources"] == {"speed": "absent", "collision": "bumper", "stall": "absent"}
+    assert set(info["reward_terms"]) == {"reward_collision"}
+    assert info["absent"] == ("speed", "stall")
+    assert np.isfinite(seen["state"]).all()
+    env.close()
+
+
+def test_latencies_are_measured_where_they_can_be(run: Run) -> None:
+    """A command that was not applied has no latency to the outputs."""
+    robot = run(clock="real")
+    env = made(robot)
+    env.reset(seed=0)
+    *_, info = env.step(AHEAD)
+    assert set(info["latency"]) == {
+        "capture_to_send",
+        "round_trip",
+        "observation_age_at_action",
+        "command_to_pin",
+    }
+    assert 0.0 < info["latency"]["round_trip"] < 5.0
+    robot.refusal = "It is too old."
+    *_, info = env.step(AHEAD)
+    assert set(info["latency"]) == {"capture_to_send"}
+    assert info["refused"] == "It is too old."
+    assert info["action_applied"].tolist() == [0.0, 0.0]
+    env.close()
+
+
+def test_a_command_answers_the_last_observation(run: Run) -> None:
+    """Each command answers the observation of the previous step."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(AHEAD)
+    eventually(lambda: len(robot.received(m.Command)) >= 3)
+    answers = [command.answers for command in robot.received(m.Command)]
+    assert answers == sorted(set(answers))
+    env.close()
+
+
+@pytest.mark.parametrize("how", ["frozen", "broken"])
+def test_a_repeated_image_is_reported(run: Run, how: str) -> None:
+    """With a frozen camera or invalid frames, the image is the last valid one."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    before, *_, info = env.step(AHEAD)
+    assert not info["frame_repeated"]
+    if how == "frozen":
+        robot.frozen = True
+    else:
+        robot.jpeg = b"\xff\xd8 no picture"
+    after, *_, info = env.step(AHEAD)
+    assert info["frame_repeated"]
+    assert np.array_equal(before, after)
+    assert how == "broken" or info["frame_age"] > 1.0
+    env.close()
+
+
+def test_an_episode_needs_a_new_frame(run: Run) -> None:
+    """`reset` raises if no frame arrives after it."""
+    env = made(run(frozen=True), reset_timeout_s=0.2)
+    with pytest.raises(LinkError, match="Does its camera still work"):
+        env.reset(seed=0)
+    env.close()
+
+
+@pytest.mark.parametrize("action", [[0.0], [0.0, np.nan], [0.0, np.inf], [[0.0, 0.0]]])
+def test_an_invalid_action_is_an_error(run: Run, action: Any) -> None:
+    """The error names the expected numbers, and no command is sent."""
+    robot = run()
+    env = RemoteVehicleEnv(pace="lockstep", **robot.arguments)
+    env.reset(seed=0)
+    sent = len(robot.received(m.Command))
+    with pytest.raises(SpaceMismatch, match="2 finite numbers \\(steering, throttle\\)"):
+        env.step(np.array(action))
+    assert len(robot.received(m.Command)) == sent
+    env.close()
+
+
+def test_a_larger_action_is_clipped_to_the_range(run: Run) -> None:
+    """Actions beyond the range are clipped."""
+    env = RemoteVehicleEnv(pace="lockstep", **run().arguments)
+    env.reset(seed=0)
+    *_, info = env.step(np.array([-3.0, 2.0], np.float32))
+    assert info["action_applied"].tolist() == [-1.0, 1.0]
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("change", "because"),
+    [
+        ({"emergency": True, "stop_reason": "The button was pressed."}, "Emergency stop: The butt"),
+        ({"armed": False}, "The robot was disarmed."),
+        ({"held_by": "Grace"}, "Grace has control of the robot now."),
+    ],
+)
+def test_a_person_truncates_the_episode(run: Run, change: dict[str, Any], because: str) -> None:
+    """`info` has the reason, with the person's name."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    for name, value in change.items():
+        setattr(robot, name, value)
+    *_, terminated, truncated, info = env.step(AHEAD)
+    assert (terminated, truncated) == (False, True)
+    assert info["truncated_because"].startswith(because)
+    env.close()
+
+
+def test_a_lost_link_truncates_and_the_next_reset_connects_again(credentials: Path) -> None:
+    """The last observation is returned again, with the reason."""
+    robot = Robot()
+    with robot.running(credentials):
+        env = made(robot, reset_timeout_s=20.0)
+        env.reset(seed=0)
+        last, *_ = env.step(AHEAD)
+        port = robot.port
+    seen, reward, terminated, truncated, info = env.step(AHEAD)
+    assert (reward, terminated, truncated) == (0.0, False, True)
+    assert "lost" in info["truncated_because"]
+    assert np.array_equal(seen, last)
+    assert not np.may_share_memory(seen, last)
+    assert info["frame_repeated"]
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step(AHEAD)
+    with robot.running(credentials, port):
+        env.reset(seed=0)
+        assert env.step(AHEAD)[3] is False
+        env.close()
+
+
+def test_a_silent_link_truncates_in_time(run: Run) -> None:
+    """The timeout applies although the connection is not closed."""
+    robot = run()
+    env = made(robot, timeout_s=0.3)
+    env.reset(seed=0)
+    robot.silent = True
+    *_, truncated, info = env.step(AHEAD)
+    assert truncated
+    assert "no message for" in info["truncated_because"]
+    env.close()
+
+
+def test_reset_waits_for_the_operator(run: Run) -> None:
+    """`on_waiting` is called once per reset, and the robot is then armed."""
+    robot = run(arming="person")
+    sentences: list[str] = []
+
+    def on_waiting(sentence: str) -> None:
+        sentences.append(sentence)
+        robot.armed = True
+
+    env = made(robot, on_waiting=on_waiting, reset_timeout_s=20.0)
+    _, info = env.reset(seed=0)
+    assert info["armed"]
+    assert len(sentences) == 1
+    assert sentences[0].startswith("tin waits for its operator: put it at the start and arm it: ")
+    assert "`shapechanger robot drive tin` in another terminal, and there P" in sentences[0]
+    env.step(AHEAD)
+    env.reset(seed=0)
+    assert robot.received(m.Disarm)  # The operator may pick it up.
+    assert len(sentences) == 2
+    env.close()
+
+
+def test_a_reset_disarms_the_robot_first(run: Run) -> None:
+    """`on_reset` runs while the robot is disarmed."""
+    robot = run()
+    disarmed: list[int] = []
+    env = made(robot, on_reset=lambda _: disarmed.append(len(robot.received(m.Disarm))))
+    env.reset(seed=0)
+    env.step(AHEAD)
+    env.reset(seed=0)
+    assert disarmed == [0, 1]
+    env.close()
+
+
+def test_no_round_trip_is_reported_across_two_clocks(run: Run) -> None:
+    """The clock of a twin runs at another rate."""
+    env = made(run(clock="twin"))
+    env.reset(seed=0)
+    *_, info = env.step(AHEAD)
+    assert "round_trip" not in info["latency"]
+    assert "command_to_pin" in info["latency"]
+    env.close()
+
+
+def test_reset_times_out(run: Run) -> None:
+    """The error says what to do."""
+    env = made(run(arming="person"), reset_timeout_s=0.1)
+    with pytest.raises(RobotRefused, match=r"was not armed within 0 s.*shapechanger robot drive"):
+        env.reset(seed=0)
+    env.close()
+
+
+def test_a_long_reset_logs_what_it_waits_for(
+    run: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Each reason is logged once, with the command that helps."""
+    monkeypatch.setattr("shapechanger.robot.client.operator._LOG_AFTER_S", 0.0)
+    robot = run(arming="person")
+    remember(robot.known)
+    env = gym.make(ID, robot="tin", pace="lockstep", reset_timeout_s=0.3)
+    with (
+        caplog.at_level(logging.WARNING, "shapechanger.robot.client"),
+        pytest.raises(RobotRefused, match="To arm it, `shapechanger robot drive tin`"),
+    ):
+        env.reset(seed=0)
+    (message,) = [record.getMessage() for record in caplog.records]
+    assert "tin waits for its operator" in message
+    assert "Waiting for up to 0 s more" in message
+    env.close()
+
+
+def test_a_short_wait_is_not_logged(run: Run, caplog: pytest.LogCaptureFixture) -> None:
+    """Waits of up to two seconds are not logged."""
+    env = made(run(arming="person"), reset_timeout_s=0.1)
+    with pytest.raises(RobotRefused):
+        env.reset(seed=0)
+    assert not caplog.records
+    env.close()
+
+
+def test_reset_waits_for_control_of_an_armed_robot(run: Run) -> None:
+    """A robot armed for another client is not enough."""
+    robot = run(arming="person")
+    sentences: list[str] = []
+
+    def on_waiting(sentence: str) -> None:
+        sentences.append(sentence)
+        # First a person takes and arms it, then gives control back.
+        robot.held_by = "Grace" if len(sentences) == 1 else ""
+        robot.armed = True
+
+    env = made(robot, on_waiting=on_waiting, reset_timeout_s=20.0)
+    env.reset(seed=0)
+    assert sentences[1:] == ["Grace has control."]
+    assert not env.step(AHEAD)[3]
+    env.close()
+
+
+def test_reset_waits_for_another_driver(run: Run) -> None:
+    """The reason passed on is the robot's message."""
+    robot = run(held_by="Grace")
+    sentences: list[str] = []
+
+    def on_waiting(sentence: str) -> None:
+        sentences.append(sentence)
+        robot.held_by = ""
+
+    env = made(robot, on_waiting=on_waiting, reset_timeout_s=20.0)
+    env.reset(seed=0)
+    assert sentences == ["Grace has control."]
+    robot.held_by = "Grace"
+    impatient = made(robot, reset_timeout_s=0.1)
+    with pytest.raises(RobotRefused, match="Grace has control"):
+        impatient.reset(seed=0)
+    impatient.close()
+    env.close()
+
+
+def test_the_reset_routine_of_the_profile_runs(run: Run) -> None:
+    """Each step lasts its duration on the robot's clock."""
+    robot = run(reset=(((0.0, -0.5), 0.5), ((1.0, 0.0), 0.2)))
+    env = made(robot, on_reset="routine")
+    env.reset(seed=0)
+    values = [command.values for command in robot.received(m.Command)]
+    assert values.count((0.0, -0.5)) == 10
+    assert values.count((1.0, 0.0)) == 4
+    env.close()
+
+
+def test_a_missing_reset_routine_is_an_error(run: Run) -> None:
+    """The error says how to add one, and the robot is not armed."""
+    robot = run()
+    env = made(robot, on_reset="routine")
+    with pytest.raises(RobotRefused, match=r"\[\[reset\]\]"):
+        env.reset(seed=0)
+    assert not robot.received(m.Arm)
+    env.close()
+
+
+def test_on_reset_gets_the_seed(run: Run) -> None:
+    """The callback can choose the start by the seed."""
+    seeds: list[int | None] = []
+    env = made(run(), on_reset=seeds.append)
+    env.reset(seed=3)
+    env.reset()
+    assert seeds == [3, None]
+    env.close()
+
+
+def test_steps_last_a_control_period(run: Run) -> None:
+    """In real time, 20 steps take at least 20 periods, less 10 %."""
+    robot = run(control_hz=50.0, clock="real")
+    env = made(robot, pace="realtime")
+    env.reset(seed=0)
+    began = time.monotonic()
+    for _ in range(20):
+        env.step(REST)
+    took_s = time.monotonic() - began
+    assert took_s > 0.9 * 20 / 50.0
+    env.close()
+
+
+@pytest.mark.parametrize(("pace", "missed"), [("realtime", [1, 1, 2, 2]), ("lockstep", [0] * 4)])
+def test_late_steps_are_counted(
+    run: Run, monkeypatch: pytest.MonkeyPatch, pace: str, missed: list[int]
+) -> None:
+    """In real time each late step counts, from 0 in every episode; in lockstep none is late."""
+    late = itertools.cycle((True, False))
+    monkeypatch.setattr(Schedule, "advance", lambda *_: next(late))
+    env = made(run(control_hz=50.0, clock="real"), pace=pace)
+    for _ in range(2):
+        _, info = env.reset(seed=0)
+        assert info["deadline_missed"] == 0
+        assert [env.step(REST)[-1]["deadline_missed"] for _ in range(4)] == missed
+    env.close()
+
+
+def test_a_twins_clock_is_driven_in_lockstep_only(run: Run) -> None:
+    """Real-time commands would be too old, since a twin's time advances with observations."""
+    with pytest.raises(RobotRefused, match="pass pace='lockstep'"):
+        RemoteVehicleEnv(**run(clock="twin").arguments)
+
+
+def test_a_finger_is_driven_by_the_same_class(run: Run) -> None:
+    """Actions are 0 to 1, and without a camera the observation is the state."""
+    robot = run(
+        actions=TENDONS,
+        state=tuple(Feature(f"{f.name}/applied", "1", 0.0, 1.0, f.element) for f in TENDONS),
+        image_size=None,
+    )
+    env = made(robot)
+    assert env.action_space.low.tolist() == [0.0, 0.0, 0.0]
+    assert env.observation_space.shape == (3,)
+    env.reset(seed=0)
+    _, reward, *_, info = env.step(np.array([0.5, 0.0, 1.0], np.float32))
+    assert info["action_applied"].tolist() == [0.5, 0.0, 1.0]
+    assert (reward, info["reward_terms"]) == (0.0, {})
+    assert set(info["reward_sources"].values()) == {"absent"}
+    env.close()
+    with pytest.raises(RobotRefused, match="has no camera"):
+        made(robot, image=True)
+    blind = RemoteVehicleEnv(render_mode="rgb_array", pace="lockstep", **robot.arguments)
+    with pytest.raises(RenderError, match="Does it have a camera"):
+        blind.render()
+    blind.close()
+
+
+def test_a_known_robot_is_made_by_its_name(run: Run) -> None:
+    """`EnvRef` makes it from its id and arguments, so other processes can too."""
+    remember(run().known)
+    with EnvRef(ID, {"robot": "tin", "pace": "lockstep"}).make() as env:
+        env.reset(seed=0)
+    with pytest.raises(UnknownName, match="Did you mean 'tin'"):
+        gym.make(ID, robot="tim")
+
+
+@pytest.mark.parametrize(
+    ("how", "error"),
+    [
+        ({"on_reset": "opertor"}, UnknownName),
+        ({"reward": {"speed": 1.0}}, UnknownName),
+        ({"size": (0, 10)}, SpaceMismatch),
+    ],
+)
+def test_invalid_arguments_are_errors(
+    run: Run, how: dict[str, Any], error: type[Exception]
+) -> None:
+    """No connection remains open."""
+    with pytest.raises(error):
+        RemoteVehicleEnv(**run().arguments, **how)
+
+
+def test_closing_gives_control_back(run: Run) -> None:
+    """`close` is idempotent."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    env.close()
+    env.close()
+    eventually(lambda: len(robot.received(m.Release)) == 1)
+
+
+def test_a_dropped_env_gives_control_back(run: Run) -> None:
+    """Garbage collection releases control, so that another env can be made."""
+    robot = run()
+    env = made(robot)
+    env.reset(seed=0)
+    del env
+    gc.collect()
+    eventually(lambda: len(robot.received(m.Release)) == 1)
+    made(robot).close()
+
+
+def test_four_keys_drive_as_in_2017(run: Run) -> None:
+    """The order is that of labels.csv, and steering keys do not drive."""
+    env = DiscreteDriving(made(run()), throttle=0.6, steering=0.4)
+    env.reset(seed=0)
+    applied = {
+        way: env.step(np.int64(i))[4]["action_applied"].tolist() for i, way in enumerate(FOUR_WAYS)
+    }
+    assert applied == {
+        "forward": pytest.approx([0.0, 0.6]),
+        "backward": pytest.approx([0.0, -0.6]),
+        "right": pytest.approx([0.4, 0.0]),
+        "left": pytest.approx([-0.4, 0.0]),
+    }
+    env.close()
+
+
+def test_four_keys_need_steering_and_throttle(run: Run) -> None:
+    """Other actions raise SpaceMismatch."""
+    env = made(run(actions=(THROTTLE,)))
+    with pytest.raises(SpaceMismatch, match="steering, throttle"):
+        DiscreteDriving(env)
+    env.close()
+
+
+@pytest.mark.parametrize("key", [4, -1, 1.5, "forward", [0.0, 1.0], None])
+def test_an_invalid_key_of_the_four_is_an_error(run: Run, key: Any) -> None:
+    """The error lists the keys."""
+    env = DiscreteDriving(made(run()))
+    with pytest.raises(SpaceMismatch, match=r"0 \(forward\), 1 \(backward\)"):
+        env.action(key)
+    env.close()

@@ -1,0 +1,97 @@
+"""The inbox between the receiving thread and callers."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from shapechanger.errors import LinkError, RobotRefused, StaleObservation
+from shapechanger.robot.client.inbox import Inbox
+from shapechanger.robot.link.messages import Observation
+
+
+def seen(seq: int, frame_seq: int = 0, frame: bytes | None = None) -> Observation:
+    """Build an observation with a number and a frame."""
+    return Observation(
+        seq=seq,
+        captured_ns=0,
+        state_ns=0,
+        sent_ns=0,
+        frame=frame,
+        frame_seq=frame_seq,
+        state=(),
+        sources={},
+        action_applied=(),
+        applied_seq=None,
+        applied_ns=None,
+        command_ns=None,
+        stop_reason="",
+        armed=False,
+        emergency=False,
+        emergencies=0,
+        holder="",
+        mine=False,
+    )
+
+
+def test_the_inbox_holds_only_the_newest_observation() -> None:
+    """A slow reader skips older ones."""
+    inbox = Inbox(lambda: 5.0)
+    for seq in (1, 2, 3):
+        inbox.put(seen(seq))
+    found = inbox.take(0, 0.0)
+    assert (found.message.seq, found.received_at) == (3, 5.0)
+
+
+def test_an_observation_is_returned_once() -> None:
+    """Waiting for a newer one raises, with the age of the newest."""
+    now = [10.0]
+    inbox = Inbox(lambda: now[0])
+    inbox.put(seen(1))
+    now[0] = 12.5
+    assert inbox.wait(1, 0.0) is None
+    with pytest.raises(StaleObservation, match=r"within 0.00 s \(the last is 2.50 s old\)"):
+        inbox.take(1, 0.0)
+    with pytest.raises(StaleObservation, match="none ever"):
+        Inbox(lambda: 0.0).take(0, 0.0)
+
+
+@pytest.mark.parametrize("seq", [1, 2])
+def test_a_replay_is_an_error(seq: int) -> None:
+    """A sequence number that does not increase raises an error."""
+    inbox = Inbox(lambda: 0.0)
+    inbox.put(seen(2))
+    with pytest.raises(LinkError, match="as in a replay"):
+        inbox.put(seen(seq))
+
+
+def test_a_frame_outlives_its_observation() -> None:
+    """A frame is sent once, and kept for later observations with its number."""
+    inbox = Inbox(lambda: 0.0)
+    inbox.put(seen(1, frame_seq=7, frame=b"seven"))
+    inbox.put(seen(2, frame_seq=7))
+    assert inbox.take(0, 0.0).jpeg == b"seven"
+    inbox.put(seen(3, frame_seq=8))
+    assert inbox.take(2, 0.0).jpeg is None
+
+
+def test_a_lost_link_ends_all_waits_at_once() -> None:
+    """All waits and later calls raise the first error."""
+    inbox = Inbox(lambda: 0.0)
+    errors: list[LinkError] = []
+
+    def wait() -> None:
+        try:
+            inbox.take(0, 60.0)
+        except LinkError as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    inbox.fail(RobotRefused("First."))
+    inbox.fail(LinkError("Second."))
+    thread.join(10.0)
+    with pytest.raises(RobotRefused, match="First"):
+        inbox.take(0, 0.0)
+    assert [str(error) for error in errors] == ["First."]

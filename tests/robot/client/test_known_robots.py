@@ -1,0 +1,95 @@
+"""Files of known robots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import LinkError, UnknownName
+from shapechanger.robot.client.known_robots import KnownRobot, forget, known_names, recall, remember
+from shapechanger.robot.link.authentication import new_key
+
+KEY = "IVPO-EP6N-42IE-SHAG-6YAL-CDJ5-XI"
+"""A fixed key, for stable test ids."""
+
+PRINT = "ab" * 32
+
+
+@pytest.fixture(autouse=True)
+def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+
+
+def test_a_known_robot_round_trips() -> None:
+    """A robot is recalled by its name until it is forgotten."""
+    robot = KnownRobot("new-bright", "car.local:5000", new_key(), PRINT)
+    path = remember(robot)
+    assert recall("new-bright") == robot
+    assert known_names() == ("new-bright",)
+    assert path.stat().st_mode & 0o777 == 0o600
+    forget("new-bright")
+    with pytest.raises(UnknownName):
+        recall("new-bright")
+    with pytest.raises(UnknownName):
+        forget("new-bright")
+
+
+def test_a_new_address_replaces_the_old() -> None:
+    """The same file is updated."""
+    key = new_key()
+    remember(KnownRobot("car", "car.local", key, PRINT))
+    path = remember(KnownRobot("car", "10.0.0.7", key, PRINT))
+    assert recall("car").address == "10.0.0.7"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_misspelt_name_gets_a_suggestion() -> None:
+    """The error suggests the nearest name."""
+    remember(KnownRobot("new-bright", "car.local", new_key(), PRINT))
+    with pytest.raises(UnknownName, match="Did you mean 'new-bright'"):
+        recall("new-brigt")
+
+
+def test_a_key_that_other_users_can_read_is_refused() -> None:
+    """The error gives the chmod command, as ssh does."""
+    path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
+    path.chmod(0o644)
+    with pytest.raises(LinkError, match="chmod 600"):
+        recall("car")
+
+
+@pytest.mark.parametrize("text", ["adress = 1", "not toml", 'address = "a"\nkey = 1\n'])
+def test_a_broken_file_is_named(text: str) -> None:
+    """The error gives the path of the file."""
+    path = remember(KnownRobot("car", "car.local", new_key(), PRINT))
+    path.write_text(text)
+    with pytest.raises(LinkError, match=r"car\.toml"):
+        recall("car")
+
+
+@pytest.mark.parametrize(
+    ("name", "address", "key", "fingerprint"),
+    [
+        ("../car", "car.local", KEY, PRINT),
+        ("car", "http://car", KEY, PRINT),
+        ("car", "car.local", "short", PRINT),
+        ("car", "car.local", "", PRINT),
+        ("car", "car.local", KEY, "trust me"),
+    ],
+)
+def test_invalid_attributes_are_errors(name: str, address: str, key: str, fingerprint: str) -> None:
+    """Invalid names, addresses, keys and fingerprints raise errors."""
+    with pytest.raises(LinkError):
+        KnownRobot(name, address, key, fingerprint)
+
+
+def test_without_encryption_there_may_be_no_key() -> None:
+    """The key may be empty with the fingerprint "insecure"."""
+    assert KnownRobot("car", "car.local", "", "insecure").key == ""
+
+
+def test_a_key_is_not_in_the_repr() -> None:
+    """`repr` omits the key, so that it is not logged."""
+    key = new_key()
+    assert key not in repr(KnownRobot("car", "car.local", key, PRINT))

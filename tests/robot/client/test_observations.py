@@ -1,0 +1,161 @@
+"""Images and observations decoded from messages of a robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import LinkError
+from shapechanger.layout import Layout
+from shapechanger.robot.client import observations
+from shapechanger.robot.client.inbox import Received
+from shapechanger.robot.client.observations import RobotSpaces, decode_picture, resize_picture
+from shapechanger.robot.link.messages import Observation, Welcome
+from tests.robot.client.robot import picture
+
+sides = st.integers(1, 12)
+
+
+def test_a_frame_decodes_as_upright_rgb() -> None:
+    """The shape is (height, width, 3), with red in the first channel."""
+    seen = decode_picture(picture((160, 120), number=10))
+    assert seen.shape == (120, 160, 3)
+    assert seen.dtype == np.uint8
+    assert abs(int(seen[..., 0].mean()) - 80) < 3
+    assert seen[:, 0, 1].mean() < 10
+    assert seen[:, -1, 1].mean() > 245
+
+
+@given(data=st.binary(max_size=200))
+def test_invalid_jpegs_are_errors(data: bytes) -> None:
+    """Any invalid bytes raise LinkError."""
+    with pytest.raises(LinkError, match="invalid JPEG"):
+        decode_picture(data)
+
+
+def test_a_truncated_jpeg_is_an_error() -> None:
+    """Half a JPEG does not decode."""
+    whole = picture((160, 120), 1)
+    with pytest.raises(LinkError, match="invalid JPEG"):
+        decode_picture(whole[: len(whole) // 2])
+
+
+def test_an_oversized_frame_is_refused() -> None:
+    """The size in the header is checked before decoding."""
+    whole = bytearray(picture((16, 16), 1))
+    frame = whole.index(b"\xff\xc0")
+    whole[frame + 5 : frame + 9] = (20_000).to_bytes(2, "big") * 2
+    with pytest.raises(LinkError, match="20000 x 20000 pixels is too large"):
+        decode_picture(bytes(whole))
+
+
+@given(width=sides, height=sides, wide=sides, high=sides, level=st.integers(0, 255))
+def test_resizing_keeps_a_uniform_colour(
+    width: int, height: int, wide: int, high: int, level: int
+) -> None:
+    """Holds for any source and target size."""
+    small = resize_picture(np.full((height, width, 3), level, np.uint8), (wide, high))
+    assert small.shape == (high, wide, 3)
+    assert small.dtype == np.uint8
+    assert (small == level).all()
+
+
+@given(data=st.data(), wide=sides, high=sides, by=st.integers(1, 4))
+def test_shrinking_by_a_whole_number_keeps_the_mean(
+    data: st.DataObject, wide: int, high: int, by: int
+) -> None:
+    """The mean is kept up to rounding."""
+    seed = data.draw(st.integers(0, 2**32 - 1))
+    whole = np.random.default_rng(seed).integers(0, 256, (by * high, by * wide, 3), np.uint8)
+    assert abs(float(resize_picture(whole, (wide, high)).mean()) - float(whole.mean())) <= 0.5
+
+
+def test_other_sizes_take_the_nearest_pixel() -> None:
+    """Resizing neither mirrors nor shifts."""
+    row = np.arange(5, dtype=np.uint8)
+    whole = np.repeat(np.repeat(row[None, :, None], 2, axis=0), 3, axis=2)
+    assert resize_picture(whole, (2, 2))[0, :, 0].tolist() == [1, 3]
+    assert resize_picture(whole, (10, 2))[0, :, 0].tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
+
+
+def test_an_equal_size_returns_the_same_array() -> None:
+    """No copy is made."""
+    whole = np.zeros((2, 3, 3), np.uint8)
+    assert resize_picture(whole, (3, 2)) is whole
+
+
+def spaces() -> RobotSpaces:
+    """Return the spaces of a robot with a camera and no sensors."""
+    layout = Layout(()).to_json()
+    welcome = Welcome(
+        robot="tin",
+        body="car",
+        action_layout=layout,
+        state_layout=layout,
+        image_size=(16, 12),
+        control_hz=20.0,
+        deadline_ms=250,
+        max_observation_age_ms=400,
+        reward={},
+        reset=(),
+        arming="anyone",
+        clock="real",
+        session=1,
+    )
+    return RobotSpaces(welcome, (16, 12), image=True, state=False)
+
+
+def seen(frame_seq: int, jpeg: bytes | None) -> Received:
+    """Return an observation with a frame."""
+    message = Observation(
+        seq=frame_seq,
+        captured_ns=0,
+        state_ns=0,
+        sent_ns=0,
+        frame=jpeg,
+        frame_seq=frame_seq,
+        state=(),
+        sources={},
+        action_applied=(),
+        applied_seq=None,
+        applied_ns=None,
+        command_ns=None,
+        stop_reason="",
+        armed=False,
+        emergency=False,
+        emergencies=0,
+        holder="",
+        mine=False,
+    )
+    return Received(message, 0.0, jpeg)
+
+
+def test_a_restarted_robot_shows_its_new_frame() -> None:
+    """After a reconnect, an equal frame number is a new frame."""
+    robot = spaces()
+    before = robot.view(seen(1, picture((16, 12), 1)))
+    robot.reconnect()
+    after = robot.view(seen(1, picture((16, 12), 20)))
+    assert after.fresh
+    assert (after.observation != before.observation).any()
+
+
+def test_an_invalid_frame_is_decoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The image remains the last valid one."""
+    robot = spaces()
+    good = robot.view(seen(1, picture((16, 12), 1)))
+    tried: list[bytes] = []
+
+    def decode(jpeg: bytes) -> object:
+        tried.append(jpeg)
+        return decode_picture(jpeg)
+
+    monkeypatch.setattr(observations, "decode_picture", decode)
+    for _ in range(3):
+        assert not robot.shows(seen(2, b"no picture"))
+        shown = robot.view(seen(2, b"no picture"))
+        assert not shown.fresh
+        assert (shown.observation == good.observation).all()
+    assert len(tried) == 1

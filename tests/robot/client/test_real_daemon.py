@@ -1,0 +1,198 @@
+"""The remote env against the real daemon, with a fake guard and camera."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shapechanger.errors import RobotRefused
+from shapechanger.layout import Layout
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.client.known_robots import KnownRobot
+from shapechanger.robot.daemon.credentials import load_credentials, make_credentials
+from shapechanger.robot.link.authentication import fingerprint_hex
+from tests.robot.client.robot import STATE, eventually
+from tests.robot.daemon.plans import car_plan
+from tests.robot.daemon.running import Running, running
+
+pytestmark = pytest.mark.realtime
+
+ID = "shapechanger/RemoteVehicle-v1"
+HZ = 20.0
+SENSED = {"speed": 0.5, "collision": 0.0, "stall": 0.0, "battery": 7.4}
+
+
+class Served:
+    """A daemon in its own thread.
+
+    Attributes:
+        running: The daemon, to be used on its own loop only.
+    """
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **plan: Any) -> None:
+        made = make_credentials(folder, "test car")
+        self.known_at = fingerprint_hex(made.fingerprint)
+        self.key = load_credentials(folder).key_file.read_text().strip()
+        self._plan = car_plan(
+            certificate=str(made.certificate),
+            private_key=str(made.private_key),
+            key_file=str(made.key_file),
+            state_layout=Layout(STATE).to_json(),
+            control_hz=HZ,
+            **plan,
+        )
+        self._monkeypatch = monkeypatch
+        self._ready = threading.Event()
+
+    @contextlib.contextmanager
+    def serving(self) -> Iterator[Served]:
+        """Serve until the end of the block."""
+        thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
+        thread.start()
+        assert self._ready.wait(20.0)
+        try:
+            yield self
+        finally:
+            self._loop.call_soon_threadsafe(self._stop.set)
+            thread.join()
+
+    @property
+    def known(self) -> KnownRobot:
+        """The robot as a known robot."""
+        return KnownRobot("test", f"127.0.0.1:{self.running.port}", self.key, self.known_at)
+
+    def sense(self, **quantities: float) -> None:
+        """Make the guard report sensor values."""
+        sensed = SENSED | quantities
+        state = {"quantities": sensed, "sources": dict.fromkeys(sensed, "wheel")}
+        self._loop.call_soon_threadsafe(lambda: self.running.guard.send(**state))
+
+    async def _serve(self) -> None:
+        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+        async with running(self._plan, self._monkeypatch) as robot:
+            self.running: Running = robot
+            self._ready.set()
+            while not self._stop.is_set():
+                robot.show()
+                robot.guard.send()
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(1.0 / HZ):
+                        await self._stop.wait()
+
+
+@pytest.fixture
+def serve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Served]]:
+    """Start a daemon that is stopped after the test."""
+    with contextlib.ExitStack() as stack:
+
+        def made(**plan: Any) -> Served:
+            robot = stack.enter_context(Served(tmp_path, monkeypatch, **plan).serving())
+            robot.sense()
+            return robot
+
+        yield made
+
+
+def made(robot: Served, **how: Any) -> gym.Env[Any, Any]:
+    """The env of a robot."""
+    known = robot.known
+    access = {"robot": known.address, "key": known.key, "fingerprint": known.fingerprint}
+    return gym.make(ID, **access | how)
+
+
+@pytest.mark.parametrize("pace", ["realtime", "lockstep"])
+def test_an_episode_on_the_real_daemon(serve: Callable[..., Served], pace: str) -> None:
+    """The guard applies the actions, and the reward comes from its sensors."""
+    robot = serve(arming="anyone")
+    env = made(robot, pace=pace, state=True)
+    seen, info = env.reset(seed=0)
+    assert env.observation_space.contains(seen)
+    assert info["armed"]
+    ages: list[float] = []
+    for _ in range(5):
+        seen, reward, terminated, truncated, info = env.step(np.array([0.25, 0.5], np.float32))
+        # Missing if the observation was sent before the guard applied the action.
+        ages += filter(None, [info["latency"].get("observation_age_at_action")])
+        assert not terminated
+        assert not truncated, info["truncated_because"]
+        assert info["refused"] == ""
+    assert info["action_applied"].tolist() == [0.25, 0.5]
+    assert 0.0 < reward < 0.5
+    assert ages
+    assert min(ages) > 0.0
+    assert info["reward_sources"]["speed"] == "wheel"
+    robot.sense(collision=1.0)
+    for _ in range(20):
+        *_, terminated, _, info = env.step(np.array([0.0, 0.0], np.float32))
+        if terminated:
+            break
+    assert info["reward_collision"] == -10.0
+    env.close()
+    eventually(lambda: "disarm" in robot.running.guard.kinds())
+
+
+def test_a_person_takes_control_from_a_program(serve: Callable[..., Served]) -> None:
+    """The episode is truncated with the person's name, and the next reset waits."""
+    robot = serve(arming="anyone")
+    env = made(robot, pace="lockstep", reset_timeout_s=0.3)
+    env.reset(seed=0)
+    with RobotClient.connect(robot.known, role="person", name="Grace", frames=False) as person:
+        person.take()
+        *_, truncated, info = env.step(np.zeros(2, np.float32))
+        assert truncated
+        assert info["truncated_because"].startswith("Grace has control of the robot now")
+        with pytest.raises(RobotRefused, match="Grace has control"):
+            env.reset()
+    env.close()
+
+
+def test_a_person_arms_for_a_program(serve: Callable[..., Served]) -> None:
+    """The program waits for the person, then drives; an emergency stop ends the episode."""
+    robot = serve()
+    with RobotClient.connect(robot.known, role="person", name="Grace") as person:
+
+        def click(_: str) -> None:
+            person.ask()
+            threading.Thread(target=person.arm).start()
+
+        env = made(robot, on_waiting=click, reset_timeout_s=20.0)
+        _, info = env.reset(seed=0)
+        assert info["armed"]
+        person.emergency_stop("a dog")
+        for _ in range(20):
+            *_, truncated, info = env.step(np.zeros(2, np.float32))
+            if truncated:
+                break
+        assert info["truncated_because"].startswith("Emergency stop")
+        env.close()
+
+
+def test_a_command_must_answer_an_observation_that_was_sent(serve: Callable[..., Served]) -> None:
+    """The error is the daemon's message."""
+    robot = serve(arming="anyone")
+    with RobotClient.connect(robot.known, pace="lockstep") as client:
+        client.take()
+        client.arm()
+        seen = client.ask()
+        seq = client.command((0.0, 0.5), answers=seen.message.seq + 1000)
+        client.observation(seen.message.seq)
+        assert "was not sent to this client" in client.refusal(seq)
+
+
+def test_arming_works_after_a_long_silence(serve: Callable[..., Served]) -> None:
+    """`arm` first asks for a new observation."""
+    robot = serve(max_observation_age_ms=100)
+    with RobotClient.connect(robot.known, role="person") as person:
+        person.take()
+        seen = person.ask().message
+        eventually(lambda: robot.running.clock.now_ns() - seen.sent_ns > 200_000_000)
+        person.arm()
+        assert robot.running.guard.state.armed

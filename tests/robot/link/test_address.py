@@ -1,0 +1,80 @@
+"""Parsing of addresses."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import LinkError
+from shapechanger.robot.link.address import DEFAULT_PORT, Address, is_loopback, parse_address
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("car.local", Address("car.local", 5000)),
+        (" car.local:8443 ", Address("car.local", 8443)),
+        ("my_car", Address("my_car", 5000)),
+        ("192.168.42.1", Address("192.168.42.1", 5000)),
+        ("192.168.42.1:1", Address("192.168.42.1", 1)),
+        ("::1", Address("::1", 5000)),
+        ("[::1]", Address("::1", 5000)),
+        ("[fe80::1%wlan0]:65535", Address("fe80::1%wlan0", 65535)),
+    ],
+)
+def test_addresses_are_parsed(text: str, address: Address) -> None:
+    """Names, IPv4 and IPv6, with and without a port."""
+    assert parse_address(text) == address
+    assert parse_address(str(address)) == address
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("car local", "not a valid address"),
+        ("https://car.local", "not a valid address"),
+        ("user@car", "not a valid address"),
+        ("-car", "not a valid address"),
+        ("300.1.1.1", "not a valid address"),
+        ("1.2.3", "not a valid address"),
+        ("car:", "must be a port"),
+        ("car:0", "must be a port"),
+        ("car:65536", "must be a port"),
+        ("car:000080", "must be a port"),
+        ("car:٣", "must be a port"),
+        ("car:12:13", "must be a port"),
+        ("[::1", "brackets"),
+        ("[car]:5000", "brackets"),
+        ("[::1]5000", "brackets"),
+        ("[::1]:", "must be a port"),
+        ("x" * 64, "not a valid address"),
+    ],
+)
+def test_an_invalid_address_is_an_error_with_examples(text: str, words: str) -> None:
+    """The error shows valid addresses."""
+    with pytest.raises(LinkError, match=words) as refused:
+        parse_address(text)
+    assert "192.168.42.1:5000" in str(refused.value)
+
+
+@given(text=st.text(max_size=30))
+def test_any_text_is_an_address_or_an_error(text: str) -> None:
+    """An address round-trips; any other text raises LinkError."""
+    try:
+        address = parse_address(text)
+    except LinkError:
+        return
+    assert parse_address(str(address)) == address
+
+
+def test_the_port_of_2017_is_the_default() -> None:
+    """The default port is 5000."""
+    assert DEFAULT_PORT == 5000
+
+
+def test_loopback_addresses() -> None:
+    """Only loopback addresses and localhost count; other names may resolve to anything."""
+    assert all(map(is_loopback, ("127.0.0.1", "127.9.9.9", "::1", "localhost")))
+    assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.42.1", "car.local", "")))

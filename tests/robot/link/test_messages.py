@@ -1,0 +1,172 @@
+"""Messages of the link: round trips, bounds and invalid bytes."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import get_args
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import LinkError
+from shapechanger.robot.link import messages
+from shapechanger.robot.link.messages import (
+    MAX_CLIENT_MESSAGE,
+    ClientMessage,
+    Command,
+    Observation,
+    RobotMessage,
+    decode_client_message,
+    decode_robot_message,
+    encode,
+)
+from tests.robot.link.messages import client_messages, robot_messages
+
+DECODERS = {"client": decode_client_message, "robot": decode_robot_message}
+
+
+@given(message=client_messages)
+def test_client_messages_round_trip(message: ClientMessage) -> None:
+    """Decoding an encoded message returns an equal one."""
+    assert decode_client_message(encode(message)) == message
+
+
+@given(message=robot_messages)
+def test_robot_messages_round_trip(message: RobotMessage) -> None:
+    """Decoding an encoded message returns an equal one."""
+    assert decode_robot_message(encode(message)) == message
+
+
+def test_every_message_has_a_strategy() -> None:
+    """A new type of message must be added to the strategies."""
+    for union, strategy in ((ClientMessage, client_messages), (RobotMessage, robot_messages)):
+        tried = {kind.__name__ for kind in get_args(union)}
+        assert all(f"{name}" in repr(strategy) for name in tried)
+
+
+@pytest.mark.parametrize("side", DECODERS)
+@given(data=st.binary(max_size=300))
+def test_any_bytes_are_a_message_or_refused(side: str, data: bytes) -> None:
+    """A decoder raises only LinkError."""
+    with contextlib.suppress(LinkError):
+        DECODERS[side](data)
+
+
+@given(message=client_messages | robot_messages, data=st.data())
+def test_a_truncated_message_is_refused(
+    message: ClientMessage | RobotMessage, data: st.DataObject
+) -> None:
+    """No message is a prefix of another."""
+    whole = encode(message)
+    cut = whole[: data.draw(st.integers(0, len(whole) - 1))]
+    for decode in DECODERS.values():
+        with pytest.raises(LinkError):
+            decode(cut)
+
+
+@given(message=client_messages, data=st.data())
+def test_a_flipped_bit_gives_a_message_within_its_bounds_or_none(
+    message: ClientMessage, data: st.DataObject
+) -> None:
+    """Damaged bytes that decode give a message that encodes again."""
+    damaged = bytearray(encode(message))
+    bit = data.draw(st.integers(0, 8 * len(damaged) - 1))
+    damaged[bit // 8] ^= 1 << bit % 8
+    try:
+        decoded = decode_client_message(bytes(damaged))
+    except LinkError:
+        return
+    assert encode(decode_client_message(encode(decoded))) == encode(decoded)
+
+
+def test_trailing_bytes_are_refused() -> None:
+    """A WebSocket message holds exactly one message."""
+    with pytest.raises(LinkError):
+        decode_client_message(encode(messages.Take()) + b"\x00")
+
+
+def test_a_large_message_is_refused_before_it_is_read() -> None:
+    """The size is checked before the content."""
+    with pytest.raises(LinkError, match="larger than the 65536 allowed"):
+        decode_client_message(bytes(MAX_CLIENT_MESSAGE + 1))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\x82\xa4kind\xa7command\xa6values\xdd\xff\xff\xff\xff",
+        b"\x82\xa4kind\xa5hello\xa5proof\xc6\xff\xff\xff\xff",
+        b"\x82\xa4kind\xa5hello\xa4name\xdb\xff\xff\xff\xff",
+        b"\xdf\xff\xff\xff\xff\xa4kind\xa4take",
+        b"\x82\xa4kind\xa4take\xa1x" + b"\x91" * 60_000,
+        b"\x82\xa4kind\xa4take\xa1x" + b"\x81\xa1x" * 20_000,
+    ],
+)
+def test_a_false_length_costs_no_memory(data: bytes) -> None:
+    """False lengths and deep nesting raise without allocating memory or exhausting the stack."""
+    with pytest.raises(LinkError):
+        decode_client_message(data)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"kind": "command", "seq": -1, "answers": 0, "values": [0.0]},
+        {"kind": "command", "seq": 2**63, "answers": 0, "values": [0.0]},
+        {"kind": "command", "seq": 1.5, "answers": 0, "values": [0.0]},
+        {"kind": "command", "seq": 1, "answers": 0, "values": ["0"]},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0] * 65},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "ttl_ms": 0},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "ttl_ms": 10**6},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "scale": 1.01},
+        {"kind": "command", "seq": 1, "answers": 0, "values": [0.0], "scale": float("nan")},
+        {"kind": "hello", "version": 1, "proof": b"", "role": "king"},
+        {"kind": "hello", "version": 1, "proof": b"", "name": "x" * 65},
+        {"kind": "observation", "seq": 1},
+        {"kind": "dance"},
+        {"seq": 1},
+        [1, 2],
+        None,
+    ],
+)
+def test_values_out_of_bounds_are_refused(fields: object) -> None:
+    """Types and bounds of each field are checked."""
+    with pytest.raises(LinkError, match="Not a valid message"):
+        decode_client_message(msgspec.msgpack.encode(fields))
+
+
+def test_unknown_keys_are_ignored() -> None:
+    """A newer minor version may add keys."""
+    fields = {"kind": "command", "seq": 1, "answers": 2, "values": [1], "mood": {"is": ["good"]}}
+    decoded = decode_client_message(msgspec.msgpack.encode(fields))
+    assert decoded == Command(seq=1, answers=2, values=(1.0,))
+
+
+def test_a_frame_is_sent_as_bytes() -> None:
+    """A JPEG adds only its own bytes and a few for its length, without base64."""
+    jpeg = bytes(range(256)) * 20
+    fields = {name: 0 for name in Observation.__struct_fields__}
+    empty = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": b""})
+    full = msgspec.msgpack.encode(fields | {"kind": "observation", "frame": jpeg})
+    assert len(full) - len(empty) <= len(jpeg) + 4
+    assert jpeg in full
+
+
+def test_bytes_are_not_in_the_repr() -> None:
+    """`repr` gives the size of bytes, so that logs hold no frames or proofs."""
+    fields = {name: 0 for name in Observation.__struct_fields__}
+    seen = Observation(**(fields | {"frame": bytes(5_000), "holder": "Grace"}))
+    assert "frame=<5000 bytes>" in repr(seen)
+    assert "holder='Grace'" in repr(seen)
+    assert len(repr(seen)) < 400
+    assert "frame=None" in repr(msgspec.structs.replace(seen, frame=None))
+    hello = messages.Hello(version=1, proof=b"secret" * 5)
+    assert repr(hello).startswith("Hello(version=1, proof=<30 bytes>, name='', role='program'")
+
+
+def test_a_request_to_arm_must_answer_an_observation() -> None:
+    """Without `answers` it is not a valid message."""
+    with pytest.raises(LinkError, match="answers"):
+        decode_client_message(msgspec.msgpack.encode({"kind": "arm", "emergency": 0}))

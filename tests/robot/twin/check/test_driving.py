@@ -1,0 +1,49 @@
+"""Checks that drive a robot, on a twin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shapechanger.robot.check.check import Finding
+from shapechanger.robot.twin.check.driving import check_driving
+from shapechanger.robot.twin.robot import run_robot
+from tests.robots import BLIND_CAR, CAR, IN_A_ROOM, changed, write_profile
+
+pytestmark = [pytest.mark.realtime, pytest.mark.system]
+
+
+def _checked(folder: Path, text: str, wired: str = "") -> dict[str, Finding]:
+    profile = write_profile(folder, text)
+    files = folder / "robot"
+    files.mkdir()
+    arguments: tuple[str, ...] = IN_A_ROOM
+    if wired:
+        true = folder / "true"
+        true.mkdir()
+        arguments = ("--wired-as", str(write_profile(true, wired).path), *IN_A_ROOM)
+    with run_robot(profile, folder=files, arguments=arguments) as robot:
+        return {check.check: check for check in check_driving(robot, profile, 0.5)}
+
+
+def test_a_good_robot_passes_every_check(tmp_path: Path) -> None:
+    """The robot boots disarmed, drives forward, and stops by every means."""
+    checks = _checked(tmp_path, CAR)
+    assert [name for name, check in checks.items() if check.level != "good"] == []
+    assert {"boots disarmed", "drives", "stops by silence", "emergency stop"} <= set(checks)
+    assert "disarmed after a crash" in checks
+
+
+def test_an_encoder_that_counts_backward_is_found(tmp_path: Path) -> None:
+    """Swapped encoder pins would reward reversing."""
+    swapped = changed("a = 5\nb = 6\n", "a = 6\nb = 5\n")
+    assert _checked(tmp_path, swapped, wired=CAR)["drives"].level == "bad"
+
+
+def test_without_an_encoder_checks_are_unknown(tmp_path: Path) -> None:
+    """Unmeasured checks are "unknown", while stopping is measured at the outputs."""
+    checks = _checked(tmp_path, BLIND_CAR)
+    assert (checks["drives"].level, checks["wheels stand"].level) == ("unknown", "unknown")
+    # Do not check the time, since the test machine may be busy.
+    assert checks["stops by silence"].level != "unknown"

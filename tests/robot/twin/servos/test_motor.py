@@ -1,0 +1,92 @@
+"""Dynamics of the simulated servo motor."""
+
+import math
+
+import pytest
+
+from shapechanger.robot.drivers.servos.settings import MODELS
+from shapechanger.robot.twin.servos.motor import EndStops, SimulatedMotor, Tendon
+
+
+def _run(
+    motor: SimulatedMotor, goal_a: float, volts: float, seconds: float, load: EndStops | None = None
+) -> None:
+    travel = 0.0
+    for _ in range(round(seconds * 1000)):
+        motor.advance(goal_a, volts, travel, 1e-3)
+        if load is not None:
+            travel = load.pull([motor.tension], 1e-3)[0]
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+def test_the_no_load_speed_matches_the_data_sheet(name: str) -> None:
+    """At the stall current limit and without load, the motor reaches its data-sheet speed."""
+    model = MODELS[name]
+    motor = SimulatedMotor(MODELS[name], Tendon(snapped=True))
+    _run(motor, model.stall_a, model.volts, 3.0)
+    assert motor.speed * 60 / (2 * math.pi) == pytest.approx(model.no_load_rpm, rel=0.02)
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+@pytest.mark.parametrize("direction", [1, -1])
+def test_the_tension_at_a_stop_matches_the_current(name: str, direction: int) -> None:
+    """A blocked tendon has the tension kt i / r, within the friction of the gears.
+
+    The tension can exceed the goal: the spool overshoots, and friction holds it there.
+    """
+    model = MODELS[name]
+    tendon = Tendon(direction=direction)
+    motor = SimulatedMotor(MODELS[name], tendon)
+    amperes = 0.4 * model.stall_a
+    _run(motor, direction * amperes, model.volts, 1.5)
+    pull = model.torque_constant * amperes / tendon.spool_radius_m
+    friction = MODELS[name].gears.friction_nm / tendon.spool_radius_m
+    assert motor.tension == pytest.approx(pull, abs=1.01 * friction)
+    assert motor.speed == 0.0
+
+
+def test_friction_holds_a_torque_below_it() -> None:
+    """A motor torque below the friction of the gears moves nothing."""
+    model = MODELS["XL330-M288"]
+    motor = SimulatedMotor(model, Tendon())
+    _run(motor, 0.9 * model.gears.friction_nm / model.torque_constant, 5.0, 0.5)
+    assert (motor.angle, motor.tension) == (0.0, 0.0)
+
+
+def test_a_tendon_carries_no_compression() -> None:
+    """Unwinding the spool makes the tendon slack."""
+    motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+    _run(motor, -0.3, 5.0, 0.3)
+    assert motor.angle < -1.0
+    assert motor.tension == 0.0
+
+
+def test_a_pull_ends_at_the_stop_of_its_load() -> None:
+    """At the stop of the load, spool and load differ by the stretch of the cable alone."""
+    load = EndStops(1, nearest_m=0.01)
+    motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+    _run(motor, 0.5, 5.0, 2.0, load)
+    assert load.travels[0] == 0.01
+    stretch = motor.tension / Tendon().stiffness
+    assert motor.angle * 0.005 == pytest.approx(0.01 + stretch, abs=1e-6)
+
+
+def test_the_temperature_rises_with_the_square_of_the_current() -> None:
+    """The temperature rise is proportional to i^2 and follows the thermal time constant."""
+    rises: list[float] = []
+    for share in (0.25, 0.5):
+        motor = SimulatedMotor(MODELS["XL330-M077"], Tendon())
+        motor.advance(share * 1.47, 5.0, 0.0, 120.0)
+        rises.append(motor.temperature - 25.0)
+    assert rises[1] == pytest.approx(4 * rises[0], rel=1e-9)
+    assert rises[1] == pytest.approx(30 * 3.401 * 0.735**2 * (1 - math.exp(-1)), rel=1e-3)
+
+
+def test_a_lower_supply_voltage_lowers_the_top_speed() -> None:
+    """A drop of the supply voltage lowers the no-load speed."""
+    speeds: list[float] = []
+    for volts in (5.0, 2.5):
+        motor = SimulatedMotor(MODELS["XL330-M077"], Tendon(snapped=True))
+        _run(motor, 1.47, volts, 2.0)
+        speeds.append(motor.speed)
+    assert 0.3 * speeds[0] < speeds[1] < 0.55 * speeds[0]

@@ -1,0 +1,101 @@
+"""Requests to a board that is held up."""
+
+from __future__ import annotations
+
+import itertools
+import socket
+import threading
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.twin import board_client
+from shapechanger.robot.twin.board_client import BoardClient, GrantedClock, SteadyClock
+from shapechanger.robot.twin.messages import (
+    MAX_MESSAGE,
+    BoardGreeting,
+    BoardReply,
+    OperatorRequest,
+    encode,
+)
+
+_REQUEST = OperatorRequest(action="levels", values=())
+
+
+def _connected(folder: Path) -> tuple[BoardClient, socket.socket]:
+    """Return a client and the board's end of its connection, which nobody reads."""
+    listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    path = str(folder / "board.socket")
+    listening.bind(path)
+    listening.listen()
+    ends: list[socket.socket] = []
+
+    def greet() -> None:
+        end, _ = listening.accept()
+        end.recv(MAX_MESSAGE)
+        greeting = msgspec.Raw(msgspec.msgpack.encode(BoardGreeting(clock="real", t=0)))
+        end.send(encode(BoardReply(id=1, result=greeting)))
+        ends.append(end)
+
+    with listening:
+        board = threading.Thread(target=greet)
+        board.start()
+        client = BoardClient(path, "hardware")
+        board.join()
+    return client, ends[0]
+
+
+@pytest.mark.parametrize("clock", ["steady", "granted"])
+def test_a_late_reply_is_waited_for_with_heartbeats(tmp_path: Path, clock: str) -> None:
+    """The board replies after five beats, which the guard has sent meanwhile."""
+    client, board = _connected(tmp_path)
+    beats = itertools.count(1)
+
+    def beat() -> None:
+        if next(beats) == 5:
+            board.send(encode(BoardReply(id=2, result=msgspec.Raw(msgspec.msgpack.encode(7)))))
+
+    made = SteadyClock(client) if clock == "steady" else GrantedClock(client, "")
+    made.keep_alive(beat)
+    with board:
+        assert client.ask(_REQUEST, int) == 7
+        client.close()
+    assert next(beats) >= 6
+
+
+def test_requests_that_the_board_does_not_take_are_waited_for(tmp_path: Path) -> None:
+    """A full socket holds a request up until the board reads."""
+    client, board = _connected(tmp_path)
+    beats: list[int] = []
+
+    def beat() -> None:
+        beats.append(1)
+        while len(beats) == 3:
+            try:
+                board.recv(MAX_MESSAGE, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                break
+
+    client.while_held_up = beat
+    with board:
+        while not beats:
+            client.post(_REQUEST)
+        client.close()
+    assert len(beats) == 3
+
+
+def test_a_board_that_never_replies_ends_the_heartbeats(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After that the supervisor finds the guard silent."""
+    monkeypatch.setattr(board_client, "_HELD_UP_S", 0.0)
+    client, board = _connected(tmp_path)
+    client.while_held_up = lambda: pytest.fail("a beat for a broken board")
+    ending = threading.Timer(0.05, board.close)
+    ending.start()
+    with pytest.raises(RobotError, match="board is gone"):
+        client.ask(_REQUEST, int)
+    ending.join()
+    client.close()

@@ -1,0 +1,106 @@
+"""Servo instructions sent over a board's socket to servos in another process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.finger.parameters import NOMINAL
+from shapechanger.robot.guard.outputs import OutputBank, make_safe
+from shapechanger.robot.guard.sensors import Sensors
+from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.robot.twin.hardware import TwinHardware, connect
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.start import RunningBoard, start_board
+from shapechanger.robot.twin.world.place import Place
+from tests.robot.twin.robots import CAR
+
+pytestmark = pytest.mark.realtime
+
+_PLAN = load_profile(find_profile("finger")).guard_plan()
+_PULL = (0.5, *(0.0,) * 6)
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningBoard]:
+    """A finger on the twin's clock."""
+    place = Place(finger=NOMINAL.to_json())
+    with start_board(_PLAN, "twin", tmp_path_factory.mktemp("board"), place=place) as started:
+        yield started
+
+
+@pytest.fixture
+def hardware(board: RunningBoard) -> Iterator[TwinHardware]:
+    """Hardware of a guard connected to the board."""
+    made = connect(board.socket_path)
+    yield made
+    made.close()
+
+
+def test_outputs_set_tensions_that_the_sensors_report(
+    board: RunningBoard, hardware: TwinHardware
+) -> None:
+    """Commanded tensions appear in the readings, and servo and magnet faults as failures."""
+    outputs, sensors = OutputBank(_PLAN, hardware), Sensors(_PLAN, hardware)
+    with Operator(board.socket_path) as operator:
+        for _ in range(20):
+            outputs.write(_PULL, hardware.clock.now_ns())
+            now_ns = operator.advance(0.01)
+            reading = sensors.read(now_ns, 0.0)
+        assert reading.failures == {}
+        assert reading.quantities["FDP/tension"] == pytest.approx(8.0, abs=0.1)
+        assert operator.tensions()["FDP"] == pytest.approx(8.0, abs=1.5)  # Gears and speed.
+        outputs.release()
+        operator.advance(0.3)
+        assert operator.tensions()["FDP"] < 1.5
+        operator.break_servo("PI", "deaf")
+        failures = [sensors.read(operator.advance(0.01), 0.0).failures for _ in range(8)][-1]
+        assert "Servo PI (id 7) does not answer" in failures["tendons"]
+        operator.break_servo("PI", "")
+        operator.break_magnet("PIP_flexion")
+        seen = [sensors.read(operator.advance(0.01), 0.0) for _ in range(5)]
+        assert "PIP_flexion/angle" not in seen[0].quantities
+        assert "DIP_flexion/angle" in seen[0].quantities
+        assert "joints" not in seen[3].failures
+        assert "PIP_flexion, on channel 2, detects no magnet" in seen[4].failures["joints"]
+        operator.break_magnet("PIP_flexion", "")
+        assert "joints" not in sensors.read(operator.advance(0.01), 0.0).failures
+    sensors.close()
+    assert outputs.close(0) == []
+
+
+def test_make_safe_sends_nothing_to_servos(board: RunningBoard, hardware: TwinHardware) -> None:
+    """`make_safe` sends no packets to servos, so that their watchdogs can expire."""
+    outputs = OutputBank(_PLAN, hardware)
+    with Operator(board.socket_path) as operator:
+        for _ in range(10):
+            outputs.write(_PULL, hardware.clock.now_ns())
+            operator.advance(0.01)
+        assert make_safe(_PLAN, hardware) == []
+        assert operator.tensions()["FDP"] > 4.0
+        operator.advance(0.5)
+        assert max(operator.tensions().values()) < 1.5
+    outputs.close(0)
+
+
+def test_an_unknown_bus_device_is_refused(hardware: TwinHardware) -> None:
+    """A mistyped device path raises an error, as on a real rig."""
+    outputs = tuple(
+        replace(one, settings={**one.settings, "device": "/dev/ttyUSB7"}) for one in _PLAN.outputs
+    )
+    with pytest.raises(RobotError, match="There is no /dev/ttyUSB7 at this twin"):
+        OutputBank(replace(_PLAN, outputs=outputs), hardware)
+
+
+def test_a_car_has_no_servo_bus(tmp_path: Path) -> None:
+    """An operator cannot read tendon tensions on a robot without a servo bus."""
+    with (
+        start_board(CAR, "twin", tmp_path) as board,
+        Operator(board.socket_path) as operator,
+        pytest.raises(RobotError, match="no servo bus"),
+    ):
+        operator.tensions()

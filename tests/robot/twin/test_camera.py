@@ -1,0 +1,146 @@
+"""The front camera: timestamped JPEG frames written to a pipe."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import time
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import pytest
+import simplejpeg
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.cameras.pattern import read_barcode
+from shapechanger.robot.twin.camera import CameraFault, FrontCameraPipe
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.start import RunningBoard, start_board
+from shapechanger.robot.twin.world.vehicle import DrivingWorld
+from tests.robot.twin.robots import CAR, until
+
+pytestmark = pytest.mark.realtime
+
+_CAMERA = CameraPlan("pipe", fps=20.0)
+
+
+def _open(board: RunningBoard) -> BinaryIO:
+    return os.fdopen(os.open(board.fifo_path, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0)
+
+
+def _pictures(data: bytes) -> list[tuple[int, bytes]]:
+    """Return the capture time and bytes of each frame."""
+    found = re.finditer(
+        rb"\xff\xd8\xff\xfe..captured_ns=(\d+)\xff.*?\xff\xd9(?=\xff\xd8|$)", data, re.S
+    )
+    return [(int(one[1]), one[0]) for one in found]
+
+
+def test_frames_carry_their_capture_time(tmp_path: Path) -> None:
+    """Each frame holds its capture time in a JPEG comment and in its barcode, at 20 fps."""
+    with (
+        start_board(CAR, "twin", tmp_path, _CAMERA) as board,
+        Operator(board.socket_path) as operator,
+        _open(board) as pipe,
+    ):
+        start = operator.advance(0.0)
+        operator.advance(1.0)
+        pictures = _pictures(pipe.read(1 << 20))
+    assert [t for t, _ in pictures] == [start + 50_000_000 * i for i in range(21)]
+    for t, jpeg in pictures:
+        image = simplejpeg.decode_jpeg(jpeg, "RGB")
+        assert image.shape == (120, 160, 3)
+        assert read_barcode(image) == t
+
+
+def test_frames_without_a_reader_are_dropped(tmp_path: Path) -> None:
+    """Without a reader, frames are dropped, and a later reader gets only new ones."""
+    with (
+        start_board(CAR, "twin", tmp_path, _CAMERA) as board,
+        Operator(board.socket_path) as operator,
+    ):
+        operator.advance(5.0)
+        with _open(board) as pipe:
+            now = operator.advance(0.1)
+            assert all(t > now - 110_000_000 for t, _ in _pictures(pipe.read(1 << 20)))
+        operator.advance(1.0)
+        with _open(board):
+            operator.advance(100.0)  # A full pipe does not stop the clock.
+
+
+def test_in_real_time_the_pipe_holds_the_latest_frame_only(tmp_path: Path) -> None:
+    """After a pause, a reader gets one frame, not a queue of old ones."""
+    with (
+        start_board(CAR, "real", tmp_path, CameraPlan("pipe", fps=100.0)) as board,
+        _open(board) as pipe,
+        select_on(pipe) as poll,
+    ):
+        until(lambda: bool(poll.poll(0)))
+        first_ns = time.monotonic_ns()
+        until(lambda: time.monotonic_ns() > first_ns + 100_000_000)
+        assert len(_pictures(pipe.read(1 << 20))) == 1
+
+
+def select_on(pipe: BinaryIO) -> select.epoll:
+    """Return a poll for a pipe to become readable."""
+    poll = select.epoll()
+    poll.register(pipe, select.EPOLLIN)
+    return poll
+
+
+@pytest.mark.parametrize("how", ["off", "freeze", "garbage", "short"])
+def test_a_camera_fault_stops_valid_frames(tmp_path: Path, how: CameraFault) -> None:
+    """During a fault no new valid frame arrives; afterwards frames arrive again."""
+    with (
+        start_board(CAR, "twin", tmp_path, _CAMERA) as board,
+        Operator(board.socket_path) as operator,
+        _open(board) as pipe,
+    ):
+        operator.advance(0.2)
+        newest = _pictures(pipe.read(1 << 20))[-1]
+        operator.break_camera(how)
+        operator.advance(0.3)
+        broken = pipe.read(1 << 20)
+        whole = set(_pictures(broken or b""))
+        assert whole <= ({newest} if how == "freeze" else set())
+        assert bool(broken) == (how != "off")
+        operator.break_camera("")
+        operator.advance(0.2)
+        assert _pictures(pipe.read(1 << 20))[-1][0] > newest[0]
+
+
+def test_without_a_barcode_the_comment_still_has_the_time(tmp_path: Path) -> None:
+    """The barcode is optional, so that policies cannot learn it; the comment keeps the time."""
+    world = DrivingWorld({"wheels"}, (160, 120), seed=1)
+    plain, striped = (
+        FrontCameraPipe(
+            str(tmp_path / "none"), 20.0, 95, latest_only=True, start_ns=0, seed=0, barcode=barcode
+        ).draw(world, 77)
+        for barcode in (False, True)
+    )
+    assert b"captured_ns=77" in plain
+    seen = simplejpeg.decode_jpeg(plain, "RGB")
+    assert read_barcode(seen) is None
+    assert np.abs(seen.astype(float) - world.picture()).mean() < 5.0
+    assert read_barcode(simplejpeg.decode_jpeg(striped, "RGB")) == 77
+
+
+def test_frames_are_small(tmp_path: Path) -> None:
+    """A JPEG of 160 by 120 takes less than 8 kB on average."""
+    world = DrivingWorld({"wheels"}, (160, 120), seed=1)
+    path = str(tmp_path / "none")
+    camera = FrontCameraPipe(path, 20.0, 80, latest_only=True, start_ns=0, seed=0)
+    sizes = [len(camera.draw(world, i)) for i in range(50)]
+    assert np.mean(sizes) < 8000
+
+
+def test_a_twin_without_a_camera_refuses_camera_faults(tmp_path: Path) -> None:
+    """A twin without a camera refuses requests about it."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        with pytest.raises(RobotError, match="no camera"):
+            operator.break_camera("off")
+        with pytest.raises(RobotError, match="without a camera"):
+            board.camera_plan(_CAMERA)

@@ -1,0 +1,164 @@
+"""Twin time advances only on request and waits for all participants."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.twin.hardware import connect
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.server import START_NS
+from shapechanger.robot.twin.start import start_board
+from tests.robot.twin.robots import CAR, granted, process, steady
+
+pytestmark = pytest.mark.realtime
+
+_GUARD = """
+import sys
+from gpiozero import Motor
+from shapechanger.robot.twin.hardware import connect
+hardware = connect(sys.argv[1])
+clock = hardware.clock
+motor = Motor(22, 27, pin_factory=hardware.pin_factory())
+until = int(sys.argv[2]) if len(sys.argv) > 2 else 2**62
+clock.wait([], until, 0.0)  # Join the clock.
+print("waits", flush=True)
+steps = 0
+while True:
+    if clock.wait([], until, 0.2):
+        steps += 1
+        motor.value = (steps * 7 % 19 + 1) / 20
+"""
+
+
+def test_a_participant_is_granted_each_tick(tmp_path: Path) -> None:
+    """A participant is granted 100 ticks a second, each finished before the next."""
+    with (
+        start_board(CAR, "twin", tmp_path) as board,
+        Operator(board.socket_path) as operator,
+        process(_GUARD, board.socket_path),
+    ):
+        assert operator.advance(0.5) >= START_NS + 500_000_000
+        first = operator.advance(0.0)
+        operator.advance(0.5)
+        times = {t for t in _times(board.ledger_path) if t > first}
+        assert times == {first + 10_000_000 * tick for tick in range(1, 51)}
+
+
+def test_a_participant_is_granted_its_exact_deadline(tmp_path: Path) -> None:
+    """A deadline between two ticks is granted to the nanosecond."""
+    deadline = START_NS + 123_456_789
+    with (
+        start_board(CAR, "twin", tmp_path) as board,
+        Operator(board.socket_path) as operator,
+        process(_GUARD, board.socket_path, str(deadline)),
+    ):
+        operator.advance(0.2)
+        assert deadline in _times(board.ledger_path)
+
+
+def test_time_does_not_wait_for_a_dead_participant(tmp_path: Path) -> None:
+    """A participant that dies does not stop time."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_GUARD, board.socket_path):
+            operator.advance(0.1)
+        before = operator.advance(0.0)
+        assert operator.advance(1.0) == before + 1_000_000_000
+
+
+def test_a_wait_without_a_grant_returns(tmp_path: Path) -> None:
+    """`wait` returns without a grant, so that a guard can send heartbeats while time is stopped."""
+    with start_board(CAR, "twin", tmp_path) as board:
+        hardware = connect(board.socket_path)
+        clock = granted(hardware)
+        assert not clock.wait([], 2**62, 0.01)
+        assert not clock.wait([], 2**62, 0.01)
+        assert clock.now_ns() == START_NS
+        hardware.close()
+
+
+def test_sleep_advances_the_clock(tmp_path: Path) -> None:
+    """Sleeps end on time and overlap, and return the capture time of the newest frame."""
+    with start_board(CAR, "twin", tmp_path, CameraPlan("pipe", fps=20.0)) as board:
+        hardware = connect(board.socket_path)
+        clock = granted(hardware)
+
+        async def sleep() -> None:
+            assert await clock.sleep(0.03) is None  # The pipe has no reader.
+            assert clock.now_ns() == START_NS + 30_000_000
+            await asyncio.gather(clock.sleep(0.05), clock.sleep(0.05))
+            assert START_NS + 80_000_000 <= clock.now_ns() <= START_NS + 130_000_000
+            sleeping = asyncio.ensure_future(clock.sleep(0.02))
+            sleeping.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await sleeping
+
+        asyncio.run(sleep())
+        with board.fifo_path.open("rb"):
+            captured_ns = asyncio.run(clock.sleep(0.2))
+        assert captured_ns is not None
+        assert clock.now_ns() - 50_000_000 < captured_ns <= clock.now_ns()
+        hardware.close()
+
+
+def test_the_same_seed_and_commands_give_the_same_ledger(tmp_path: Path) -> None:
+    """Two runs give the same ledger, except for process ids."""
+
+    def run(folder: Path) -> str:
+        folder.mkdir()
+        with start_board(replace(CAR, enable_pin=None), "twin", folder, seed=5) as board:
+            hardware = connect(board.socket_path)
+            with Operator(board.socket_path) as operator, process(_GUARD, board.socket_path):
+                operator.advance(1.0)
+                operator.place(3)
+                operator.press_bumper()
+                operator.advance(1.0)
+            hardware.close()
+        lines = [json.loads(line) for line in board.ledger_path.read_text().splitlines()]
+        for line in lines:
+            line.pop("pid", None)
+        return "\n".join(map(str, lines))
+
+    first, second = run(tmp_path / "1"), run(tmp_path / "2")
+    assert first.count("input") > 10
+    assert first == second
+
+
+def test_in_real_time_the_clock_runs_by_itself(tmp_path: Path) -> None:
+    """In real time `advance` raises an error and waits end at their deadlines."""
+    with start_board(CAR, "real", tmp_path) as board, Operator(board.socket_path) as operator:
+        with pytest.raises(RobotError, match="real time"):
+            operator.advance(1.0)
+        hardware = connect(board.socket_path)
+        clock = steady(hardware)
+        end = clock.now_ns() + 20_000_000
+        assert clock.wait([], end, 1.0)
+        assert clock.now_ns() >= end
+        assert not clock.wait([], end + 10**12, 0.01)
+        assert asyncio.run(clock.sleep(0.001)) is None
+        hardware.close()
+
+
+def test_using_a_closed_board_raises(tmp_path: Path) -> None:
+    """Waiting or sleeping after the board exits raises an error."""
+    board = start_board(CAR, "twin", tmp_path)
+    hardware = connect(board.socket_path)
+    clock = granted(hardware)
+    board.close()
+    assert board.process.returncode == 0
+    with pytest.raises(RobotError, match="board is gone"):
+        clock.wait([], 2**62, 1.0)
+    with pytest.raises(RobotError, match="board is gone"):
+        asyncio.run(clock.sleep(1.0))
+    hardware.close()
+
+
+def _times(ledger: Path) -> set[int]:
+    lines = [json.loads(line) for line in ledger.read_text().splitlines()]
+    return {line["t"] for line in lines if line["kind"] == "pin" and line["duty"]}

@@ -1,0 +1,81 @@
+"""The real guard process on the twin's pins and clock, checked by the oracle."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from shapechanger.robot.guard import start
+from shapechanger.robot.guard.messages import Order, encode
+from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from shapechanger.robot.twin.judge import ExpectedCommand, propelled, time_to_rest, unauthorised
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.signals import read_ledger
+from shapechanger.robot.twin.start import start_board
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.robots import CAR, until
+
+pytestmark = pytest.mark.realtime
+
+_DEADLINE_MS = 250
+
+
+def test_a_guard_drives_and_stops_at_the_deadline(tmp_path: Path) -> None:
+    """Twenty commands drive the car; after the last it stops exactly at the deadline."""
+    daemon, its_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    heartbeat, its_heartbeat = socket.socketpair()
+    with (
+        start_board(CAR, "twin", tmp_path, seed=1) as board,
+        Operator(board.socket_path) as operator,
+        daemon,
+        heartbeat,
+    ):
+        fd = plan_fd(ServePlan(guard=CAR, daemon={}, hardware=board.hardware))
+        command = [sys.executable, "-I", str(start.__file__), "guard", "--plan-fd", str(fd)]
+        command += ["--daemon-fd", str(its_end.fileno())]
+        command += ["--heartbeat-fd", str(its_heartbeat.fileno())]
+        with (
+            its_end,
+            its_heartbeat,
+            subprocess.Popen(
+                command, pass_fds=(fd, its_end.fileno(), its_heartbeat.fileno())
+            ) as guard,
+        ):
+            # The guard's first message shows that it has joined the clock.
+            daemon.setblocking(False)
+            until(lambda: operator.advance(0.01) > 0 and _received(daemon))
+            now_ns = operator.advance(0.02)
+            daemon.send(encode(Order("arm", session=1, issued_ns=now_ns)))
+            now_ns = operator.advance(0.02)
+            commands: list[ExpectedCommand] = []
+            for seq in range(1, 21):
+                values = (-0.5, 0.6)
+                order = Order("command", 1, seq, issued_ns=now_ns, ttl_ms=1000, values=values)
+                daemon.send(encode(order))
+                commands.append(ExpectedCommand(now_ns, 1000))
+                now_ns = operator.advance(0.05)
+                while _received(daemon):
+                    pass
+            driven = operator.where()
+            operator.advance(1.0)
+            ledger = read_ledger(board.ledger_path)
+            guard.kill()
+        wiring = TwinWiring(CAR)
+        assert driven.travelled_m > 0.3
+        assert driven.speed > 0.5
+        assert [interval.value for interval in propelled(ledger, wiring)] == [0.6]
+        assert unauthorised(ledger, wiring, commands, _DEADLINE_MS) == []
+        assert unauthorised(ledger, wiring, commands, _DEADLINE_MS - 1) != []
+        last = commands[-1].arrival_ns
+        assert time_to_rest(ledger, wiring, last) == pytest.approx(0.25, abs=1e-9)
+
+
+def _received(daemon: socket.socket) -> bool:
+    try:
+        return bool(daemon.recv(65536))
+    except BlockingIOError:
+        return False

@@ -1,0 +1,140 @@
+"""The oracle finds violations in handmade ledgers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.robot.twin.judge import ExpectedCommand, propelled, time_to_rest, unauthorised
+from shapechanger.robot.twin.signals import Transition
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc
+
+_MS = 1_000_000
+_NO_ONE_SHOT = TwinWiring(CAR, one_shot_ms=None)
+
+
+def _pin(ms: float, pin: int, duty: float) -> Transition:
+    return Transition(t=int(ms * _MS), kind="pin", pin=pin, duty=duty, hz=50)
+
+
+def test_driving_within_a_deadline_is_allowed() -> None:
+    """Driving within the deadline of a command is not a violation."""
+    ledger = [_pin(10, 22, 0.5), _pin(200, 22, 0.0)]
+    assert unauthorised(ledger, _NO_ONE_SHOT, [ExpectedCommand(9 * _MS, 1000)], 250) == []
+
+
+def test_driving_without_a_command_is_found() -> None:
+    """Motion without a command is a violation, however short, forward or backward."""
+    for pin, sign in ((22, 1), (27, -1)):
+        found = unauthorised([_pin(10, pin, 0.5), _pin(11, pin, 0.0)], _NO_ONE_SHOT, [], 250)
+        assert found == [("drive", 10 * _MS, 11 * _MS, sign * 0.5)]
+
+
+def test_even_one_percent_is_driving() -> None:
+    """Any nonzero duty is a violation, even below the duty at which the motor starts to move."""
+    plan = replace(CAR, outputs=(replace(DRIVE, settings={**DRIVE.settings, "start": 0.3}), STEER))
+    assert unauthorised([_pin(10, 22, 0.01)], TwinWiring(plan, None), [], 250)
+
+
+def test_steering_is_allowed_without_a_command() -> None:
+    """Steering a standing car is not a violation."""
+    assert unauthorised([_pin(10, 17, 1.0)], _NO_ONE_SHOT, [], 250) == []
+
+
+@pytest.mark.parametrize(("deadline_ms", "ttl_ms"), [(250, 1000), (1000, 250)])
+def test_a_command_ends_at_deadline_or_time_to_live(deadline_ms: float, ttl_ms: float) -> None:
+    """A command ends at the earlier of deadline and TTL, to the nanosecond."""
+    ledger = [_pin(10, 22, 0.5), _pin(300, 22, 0.0)]
+    found = unauthorised(ledger, _NO_ONE_SHOT, [(10 * _MS, ttl_ms)], deadline_ms)
+    assert [(one.start_ns, one.end_ns) for one in found] == [(260 * _MS, 300 * _MS)]
+    assert unauthorised(ledger, _NO_ONE_SHOT, [(10 * _MS, ttl_ms)], deadline_ms, 40) == []
+
+
+def test_gaps_between_commands_are_found() -> None:
+    """Late commands leave a gap that is reported although the motor did not change."""
+    ledger = [_pin(0, 22, 0.5), _pin(900, 22, 0.0)]
+    commands = [(0, 1000), (200 * _MS, 1000), (600 * _MS, 1000)]
+    found = unauthorised(ledger, _NO_ONE_SHOT, commands, 250)
+    assert [(one.start_ns / _MS, one.end_ns / _MS) for one in found] == [(450, 600), (850, 900)]
+
+
+def test_a_motor_that_never_stops_is_found() -> None:
+    """A level that never changes lasts to infinity."""
+    ledger = [_pin(10, 22, 0.5)]
+    assert time_to_rest(ledger, _NO_ONE_SHOT, 10 * _MS) == math.inf
+    assert unauthorised(ledger, _NO_ONE_SHOT, [(10 * _MS, 250)], 250)[0].end_ns == math.inf
+
+
+def test_time_to_rest_ends_at_the_last_stop() -> None:
+    """A motor that stops and restarts is not at rest until its last stop."""
+    ledger = [_pin(0, 22, 0.5), _pin(120, 22, 0.0), _pin(150, 22, 0.1), _pin(180, 22, 0.0)]
+    assert time_to_rest(ledger, _NO_ONE_SHOT, 100 * _MS) == pytest.approx(0.08)
+    assert time_to_rest(ledger, _NO_ONE_SHOT, 500 * _MS) == 0.0
+
+
+def test_the_one_shot_stops_a_frozen_pin() -> None:
+    """With the one-shot on the enable line, a frozen pin drives for at most 100 ms."""
+    toggles = [_pin(ms, 25, float(ms // 10 % 2)) for ms in range(10, 210, 10)]
+    gone = [Transition(t=205 * _MS, kind="gone", pid=1), _pin(205, 22, 1.0), _pin(205, 25, 0.0)]
+    ledger = sorted([*toggles, _pin(15, 22, 0.5), *gone], key=lambda line: line.t)
+    assert time_to_rest(ledger, TwinWiring(CAR, 100.0), 205 * _MS) == pytest.approx(0.09, abs=0.006)
+    assert time_to_rest(ledger, _NO_ONE_SHOT, 205 * _MS) == math.inf
+    plain = replace(CAR, enable_pin=None)
+    assert time_to_rest(ledger, TwinWiring(plan=plain), 205 * _MS) == math.inf
+
+
+def test_without_toggling_the_motors_have_no_power() -> None:
+    """A guard that does not toggle the enable line cannot drive."""
+    assert propelled([_pin(10, 22, 0.5)], TwinWiring(CAR, 100.0)) == []
+
+
+def test_braking_and_released_pins_count_as_rest() -> None:
+    """Both bridge inputs high brake; a released pin falls to its pull-down."""
+    ledger = [_pin(10, 22, 1.0), _pin(10, 27, 1.0)]
+    assert propelled(ledger, _NO_ONE_SHOT) == []
+    released = Transition(t=20 * _MS, kind="pin", pin=22, duty=0.0, hz=0, released=True)
+    found = propelled([_pin(10, 22, 1.0), released], _NO_ONE_SHOT)
+    assert [one.end_ns for one in found] == [20 * _MS]
+
+
+def test_a_speed_controller_rests_near_neutral() -> None:
+    """Pulses within one PCA9685 step of neutral, and no pulses, count as rest."""
+    drive = esc("drive", "wheels", {"throttle": 1.0}, over="lgpio", pin=12)
+    wiring = TwinWiring(replace(CAR, outputs=(drive,), enable_pin=None))
+
+    def pulse(ms: int, us: float) -> Transition:
+        return Transition(t=ms * _MS, kind="pulse", pin=12, us=us, hz=50)
+
+    ledger = [pulse(0, 1503), pulse(10, 1600), pulse(20, 1497), pulse(30, 1300), pulse(40, 0)]
+    found = propelled(ledger, wiring)
+    assert [(one.start_ns / _MS, one.end_ns / _MS) for one in found] == [(10, 20), (30, 40)]
+    assert [one.value for one in found] == pytest.approx([0.2, -0.4])
+    frozen = [pulse(0, 1600), _pin(10, 12, 1.0)]
+    assert time_to_rest(frozen, wiring, 0) == pytest.approx(0.01)
+
+
+_TIMES = st.integers(0, 2000)
+
+
+@given(
+    duties=st.lists(st.tuples(_TIMES, st.sampled_from([0.0, 0.3, 1.0])), max_size=20),
+    arrivals=st.lists(_TIMES, max_size=20),
+)
+def test_the_oracle_agrees_with_a_brute_force_check(
+    duties: list[tuple[int, float]], arrivals: list[int]
+) -> None:
+    """At each sampled instant, the oracle reports motion without a command, and nothing else."""
+    ledger = [_pin(ms, 22, duty) for ms, duty in sorted(duties, key=lambda one: one[0])]
+    wiring = TwinWiring(replace(CAR, actions=ACTIONS), None)
+    found = unauthorised(ledger, wiring, [(ms * _MS, 1000) for ms in arrivals], 250)
+    for ms in range(0, 2500, 7):
+        now = ms * _MS + 1
+        duty = ([line.duty for line in ledger if line.t <= now] or [0.0])[-1]
+        allowed = any(arrival * _MS <= now < (arrival + 250) * _MS for arrival in arrivals)
+        reported = any(one.start_ns <= now < one.end_ns for one in found)
+        assert reported == (duty != 0.0 and not allowed)

@@ -1,0 +1,153 @@
+"""Registers of the simulated PCA9685."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+from gpiozero import DigitalOutputDevice
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.output import open_output
+from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.robot.twin.chips import SimulatedPca9685
+from shapechanger.robot.twin.hardware import connect
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.signals import PwmChannel, read_ledger
+from shapechanger.robot.twin.start import start_board
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.robots import ACTIONS, esc, process, servo
+
+pytestmark = pytest.mark.realtime
+
+_ON_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 3, "output_enable": 24}
+_SERVO_CAR = GuardPlan("car", ACTIONS, (servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),))
+
+_AWAKE_50_HZ = """
+import sys
+from shapechanger.robot.twin.hardware import connect
+from gpiozero import DigitalOutputDevice
+hardware = connect(sys.argv[1])
+enable = DigitalOutputDevice(24, initial_value=False, pin_factory=hardware.pin_factory())
+bus = hardware.i2c(1)
+bus.write_byte_data(0x40, 0xFE, 121)
+bus.write_byte_data(0x40, 0x00, 0x21)
+bus.write_i2c_block_data(0x40, 0x06 + 4 * 3, [0, 0, 307 & 0xFF, 307 >> 8])
+print("pulses", flush=True)
+sys.stdin.read()
+"""
+
+
+def _awake(chip: SimulatedPca9685) -> None:
+    chip.write(0xFE, [121])
+    chip.write(0x00, [0x21])
+
+
+def test_pulses_are_decoded_from_the_registers() -> None:
+    """A prescale of 121 gives 50 Hz, and 307 of 4096 counts about 1.5 ms."""
+    chip = SimulatedPca9685()
+    assert all(pulse.us == 0.0 for pulse in chip.channels)
+    _awake(chip)
+    chip.write(0x06, [0, 0, 307 & 0xFF, 307 >> 8])
+    assert chip.channels[0].us == pytest.approx(307 * 122 / 25.0)
+    assert chip.channels[0].hz == pytest.approx(50.03, abs=0.01)
+    assert chip.read(0x06, 4) == [0, 0, 51, 1]
+
+
+def test_the_full_on_and_full_off_bits() -> None:
+    """Full off takes precedence over full on; ALL_LED registers act on each channel."""
+    chip = SimulatedPca9685()
+    _awake(chip)
+    chip.write(0xFA, [0, 0x10, 0, 0])
+    assert all(pulse.us == pytest.approx(1e6 / pulse.hz) for pulse in chip.channels)
+    chip.write(0xFD, [0x10])
+    assert all(pulse.us == 0.0 for pulse in chip.channels)
+
+
+def test_the_prescale_is_read_only_while_awake() -> None:
+    """The chip ignores a new prescale unless it is asleep."""
+    chip = SimulatedPca9685()
+    _awake(chip)
+    chip.write(0xFE, [3])
+    assert chip.read(0xFE, 1) == [121]
+
+
+def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
+    """After a sleep, channels stay off until RESTART is written, as in the data sheet."""
+    chip = SimulatedPca9685()
+    _awake(chip)
+    chip.write(0x06, [0, 0, 51, 1])
+    chip.write(0x00, [0x31])
+    assert chip.channels[0].us == 0.0
+    chip.write(0x00, [0x21])
+    assert chip.channels[0].us == 0.0
+    assert chip.read(0x00, 1) == [0xA1]
+    chip.write(0x00, [0xA1])
+    assert chip.channels[0].us > 0.0
+    assert chip.read(0x00, 1) == [0x21]
+
+
+def test_without_auto_increment_a_block_lands_in_one_register() -> None:
+    """Without auto-increment, a block write goes to a single register and gives no pulses."""
+    chip = SimulatedPca9685()
+    chip.write(0x00, [0x01])
+    chip.write(0x06, [0, 0, 51, 1])
+    assert chip.read(0x06, 4) == [1, 1, 1, 1]
+    assert chip.channels[0].us == 0.0
+
+
+def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written(
+    tmp_path: Path,
+) -> None:
+    """After a failed transfer the chip stays off until each driver has written its channel."""
+    at = _ON_CHIP | {"channel": 0}
+    plan = GuardPlan(
+        "car",
+        ACTIONS,
+        (
+            esc("drive", "wheels", {"throttle": 1.0}, **at),
+            servo("steer", "steering", {"steering": 1.0}, **_ON_CHIP),
+        ),
+    )
+    with start_board(plan, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        drive, steer = (open_output(output, hardware) for output in plan.outputs)
+        wiring = TwinWiring(plan)
+        steer.write(0.2, 0)
+        operator.break_chip(1, 0x40)
+        with pytest.raises(RobotError, match="Remote I/O"):
+            steer.write(0.4, 1)
+        assert wiring.read(operator.levels(), 0)["steer"].value is None
+        operator.break_chip(1, 0x40, dead=False)
+        steer.write(0.2, 2)
+        assert wiring.read(operator.levels(), 0)["steer"].value is None
+        drive.write(0.0, 2)
+        assert wiring.read(operator.levels(), 0)["steer"].value == pytest.approx(0.2, abs=0.01)
+        hardware.close()
+
+
+def test_pulses_continue_after_the_process_dies(tmp_path: Path) -> None:
+    """A PCA9685 pulses without its process; its output-enable pin, pulled up, stops the pulses."""
+    with (
+        start_board(_SERVO_CAR, "twin", tmp_path) as board,
+        Operator(board.socket_path) as operator,
+    ):
+        with process(_AWAKE_50_HZ, board.socket_path) as robot:
+            robot.send_signal(signal.SIGKILL)
+        wiring, levels = TwinWiring(_SERVO_CAR), operator.levels()
+        assert levels.channels[PwmChannel(1, 0x40, 3)].us == pytest.approx(1498.16)
+        assert wiring.read(levels, 0)["steer"].value == pytest.approx(0.0, abs=0.01)
+        lines = [line for line in read_ledger(board.ledger_path) if line.channel == 3]
+        assert [(line.us, line.hz) for line in lines] == [(1498.16, 50.029)]
+
+        hardware = connect(board.socket_path)
+        enable = DigitalOutputDevice(24, pin_factory=hardware.pin_factory())
+        enable.on()
+        assert wiring.read(operator.levels(), 0)["steer"].value is None
+        with pytest.raises(OSError, match="Remote I/O"):
+            hardware.i2c(1).read_byte_data(0x41, 0)
+        operator.break_chip(1, 0x40)
+        with pytest.raises(OSError, match="Remote I/O"):
+            hardware.i2c(1).write_byte_data(0x40, 0, 0)
+        hardware.close()

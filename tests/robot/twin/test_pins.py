@@ -1,0 +1,158 @@
+"""gpiozero devices on the twin's pins, from processes that start and die."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+from gpiozero import DigitalOutputDevice, Motor, PWMOutputDevice
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.twin.hardware import connect
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.signals import read_ledger
+from shapechanger.robot.twin.start import start_board
+from tests.robot.twin.robots import CAR, die, process
+
+pytestmark = pytest.mark.realtime
+
+_MOTOR = """
+import sys
+from gpiozero import Motor, DigitalOutputDevice
+from shapechanger.robot.twin.hardware import connect
+hardware = connect(sys.argv[1])
+factory = hardware.pin_factory()
+lamp = DigitalOutputDevice(25, initial_value=True, pin_factory=factory)
+motor = Motor(22, 27, pin_factory=factory)
+for device in (motor.forward_device, motor.backward_device):
+    device.frequency = 50
+motor.value = float(sys.argv[2])
+print("runs", flush=True)
+sys.stdin.read()
+hardware.close()
+"""
+
+
+def test_a_motor_of_another_process_is_seen(tmp_path: Path) -> None:
+    """The board records the duties set by another process, with its pid."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_MOTOR, board.socket_path, "-0.4") as robot:
+            assert operator.levels().duties == {22: 0.0, 25: 1.0, 27: 0.4}
+        last = [line for line in read_ledger(board.ledger_path) if line.pin == 27 and line.duty]
+        assert [(line.duty, line.hz, line.pid) for line in last[:1]] == [(0.4, 50, robot.pid)]
+
+
+@pytest.mark.parametrize(("value", "possible"), [("0.4", {0.0, 1.0}), ("1", {1.0}), ("0", {0.0})])
+def test_pins_of_a_killed_process_keep_their_level(
+    tmp_path: Path, value: str, possible: set[float]
+) -> None:
+    """A pin keeps its level when its process dies; software PWM freezes at either level."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_MOTOR, board.socket_path, value) as robot:
+            robot.send_signal(signal.SIGKILL)
+            robot.wait()
+            levels = operator.levels()
+        assert levels.duties[25] == 1.0
+        assert levels.duties[22] in possible
+        assert levels.duties[27] == 0.0
+        ledger = read_ledger(board.ledger_path)
+        gone = [line.kind for line in ledger].index("gone")
+        assert ledger[gone].pid == robot.pid
+        after = [(line.kind, line.pin, line.hz) for line in ledger[gone + 1 :]]
+        assert after == [("pin", 22, 0), ("pin", 25, 0), ("pin", 27, 0)]
+
+
+def test_frozen_pwm_is_high_in_proportion_to_its_duty(tmp_path: Path) -> None:
+    """PWM at 40 % freezes high, which is full power, in about 40 % of deaths."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        high = 0
+        for _ in range(200):
+            hardware = connect(board.socket_path)
+            device = PWMOutputDevice(22, pin_factory=hardware.pin_factory())
+            device.value = 0.4
+            die(hardware)
+            high += operator.levels().duties[22] == 1.0
+            device.close()
+        assert 50 < high < 110
+
+
+def test_a_clean_exit_leaves_motors_low_and_keeps_plain_outputs(tmp_path: Path) -> None:
+    """As on a Pi, and the ledger records no dead process."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_MOTOR, board.socket_path, "0.7") as robot:
+            robot.communicate("")
+        assert operator.levels().duties == {22: 0.0, 25: 1.0, 27: 0.0}
+        assert "gone" not in {line.kind for line in read_ledger(board.ledger_path)}
+
+
+def test_an_active_low_output_stays_high_when_opened_and_closed(tmp_path: Path) -> None:
+    """As on a Pi: a low OE input of a PCA9685 would enable stale pulses."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        for _ in range(2):
+            device = DigitalOutputDevice(24, active_high=False, pin_factory=hardware.pin_factory())
+            assert not device.value
+            device.close()
+        hardware.close()
+        assert operator.levels().duties == {24: 1.0}
+        assert {line.duty for line in read_ledger(board.ledger_path) if line.pin == 24} == {1.0}
+
+
+@pytest.mark.parametrize(("asked", "done"), [(0.58, 0.57), (0.076, 0.07), (0.5, 0.5), (1.0, 1.0)])
+def test_pwm_is_rounded_down(tmp_path: Path, asked: float, done: float) -> None:
+    """As gpiozero over lgpio, duty is truncated to whole percent and frequency to whole hertz."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        device = PWMOutputDevice(18, frequency=50.9, pin_factory=hardware.pin_factory())
+        device.value = asked
+        assert operator.levels().duties[18] == done
+        assert device.frequency == 50
+        assert device.value == done
+        hardware.close()
+
+
+def test_a_pin_has_one_owner(tmp_path: Path) -> None:
+    """A pin held by a live process is busy; it is free once the process has died."""
+    with start_board(CAR, "twin", tmp_path) as board:
+        second = connect(board.socket_path)
+        with (
+            process(_MOTOR, board.socket_path, "0.5"),
+            pytest.raises(RobotError, match="GPIO22 is busy"),
+        ):
+            second.pin_factory().pin(22)
+        taken_over = DigitalOutputDevice(22, pin_factory=second.pin_factory())
+        taken_over.on()
+        second.close()
+
+
+def test_opening_a_pin_releases_it_first(tmp_path: Path) -> None:
+    """Opening a pin makes it an input first, so a stuck level falls to its pull-down."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        with process(_MOTOR, board.socket_path, "1"):
+            pass
+        assert operator.levels().duties[22] == 1.0
+        hardware = connect(board.socket_path)
+        Motor(22, 27, pin_factory=hardware.pin_factory())
+        assert operator.levels().duties[22] == 0.0
+        released = [line for line in read_ledger(board.ledger_path) if line.released]
+        assert [line.pin for line in released] == [22, 27]
+        hardware.close()
+
+
+def test_servo_pulses_stop_with_their_process(tmp_path: Path) -> None:
+    """Pulses have whole microseconds; when the process dies, the pin keeps a constant level."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        hardware.servo_pins().pulse(12, 1503, 50)
+        assert operator.levels().pulses[12] == (1503, 50)
+        die(hardware)
+        levels = operator.levels()
+        assert 12 not in levels.pulses
+        assert levels.duties[12] in (0.0, 1.0)
+
+
+def test_connecting_without_a_board_names_the_path(tmp_path: Path) -> None:
+    """Connecting to a missing socket raises an error."""
+    with pytest.raises(RobotError, match="No twin's board answers"):
+        connect(str(tmp_path / "nothing"))

@@ -1,0 +1,125 @@
+"""Worlds for the vehicle of a twin: the plain room, or a MuJoCo course."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import ProfileError, RobotError, UnknownName, WorldError
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.signals import read_ledger
+from shapechanger.robot.twin.start import start_board
+from shapechanger.robot.twin.world.place import Place, open_world
+from shapechanger.robot.twin.world.vehicle import DrivingWorld
+from shapechanger.vehicles.twin import course_place
+from shapechanger.vehicles.world import MujocoWorld
+from tests.robot.twin.robots import CAR
+
+pytestmark = pytest.mark.realtime
+
+_PARTS = {"wheels", "steering"}
+_CORRIDOR = course_place("corridor", "car")
+
+
+def test_the_default_place_is_the_room() -> None:
+    """The default place needs no MuJoCo and reports no counters."""
+    world = open_world(Place(), _PARTS, None, 1)
+    assert isinstance(world, DrivingWorld)
+    assert world.picture().shape == (120, 160, 3)
+    assert world.truth() == {}
+
+
+def test_the_room_does_not_import_mujoco() -> None:
+    """The room works without MuJoCo; other places name the extra to install."""
+    script = (
+        "import sys\n"
+        "sys.modules['mujoco'] = None\n"
+        "from shapechanger.errors import MissingExtra\n"
+        "from shapechanger.robot.twin.world.place import Place, open_world\n"
+        "from shapechanger.vehicles.twin import course_place\n"
+        "open_world(Place(), {'wheels'}, None, 1)\n"
+        "try:\n"
+        "    open_world(course_place('corridor', 'car'), {'wheels', 'steering'}, None, 1)\n"
+        "except MissingExtra as error:\n"
+        "    print(error)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script], check=True, capture_output=True, text=True
+    )
+    assert run.stdout.endswith("run `pip install 'shapechanger[sim]'`.\n")
+
+
+def test_a_place_in_mujoco() -> None:
+    """The world of a place takes the seed as the seed of its course."""
+    world = open_world(_CORRIDOR, _PARTS, None, 7)
+    assert isinstance(world, MujocoWorld)
+    assert (world.seed, world.vehicle.name) == (7, "car")
+    assert world.truth() == {"progress_m": 0.0, "collisions": 0.0}
+
+
+def test_an_invalid_place_is_refused() -> None:
+    """Mismatched parts, unknown names and a boat on land raise errors."""
+    with pytest.raises(ProfileError, match="A tank has no 'steering' or 'wheels'"):
+        open_world(course_place("corridor", "tank"), _PARTS, None, 1)
+    with pytest.raises(UnknownName, match=r"No vehicle matches 'cra'. Did you mean 'car'"):
+        open_world(course_place("corridor", "cra"), _PARTS, None, 1)
+    with pytest.raises(UnknownName, match=r"No world matches 'coridor'. Did you mean 'corridor'"):
+        open_world(course_place("coridor", "car"), _PARTS, None, 1)
+    with pytest.raises(UnknownName, match="No lens matches 'dark'"):
+        open_world(course_place("corridor", "car", ("dark",)), _PARTS, None, 1)
+    with pytest.raises(WorldError, match="A boat floats"):
+        open_world(course_place("corridor", "boat"), {"propeller", "rudder"}, None, 1)
+
+
+def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
+    """Laying out a course moves the vehicle, is recorded in the ledger and is reproducible."""
+    with (
+        start_board(CAR, "twin", tmp_path, seed=4, place=_CORRIDOR) as board,
+        Operator(board.socket_path) as operator,
+    ):
+        first = operator.where()
+        assert first.truth == {"progress_m": 0.0, "collisions": 0.0}
+        operator.lay_out(5)
+        other = operator.where()
+        assert (other.x, other.y) != (first.x, first.y)
+        # The board survives an invalid request.
+        with pytest.raises(RobotError, match="Seeds of courses count from 0"):
+            operator.lay_out(-1)
+        operator.lay_out(4)
+        again = operator.where()
+        assert (again.x, again.y, again.heading) == (first.x, first.y, first.heading)
+        laid_out = [one.seed for one in read_ledger(board.ledger_path) if one.kind == "course"]
+    assert laid_out == [5, 4]
+
+
+def test_an_operator_lays_out_rooms(tmp_path: Path) -> None:
+    """Another seed moves the boxes of the room; the room still reports no counters."""
+    with start_board(CAR, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        first = operator.where()
+        operator.lay_out(5)
+        assert operator.where()[:3] != first[:3]
+        assert operator.where().truth == {}
+
+
+def test_an_invalid_operator_request_keeps_the_board_running(tmp_path: Path) -> None:
+    """An unknown fault is answered with an error, and the board continues."""
+    with (
+        start_board(CAR, "twin", tmp_path, CameraPlan("pipe", fps=20.0)) as board,
+        Operator(board.socket_path) as operator,
+    ):
+        with pytest.raises(RobotError, match="No fault of a camera matches 'of'"):
+            operator.break_camera("of")  # pyright: ignore[reportArgumentType]  # Invalid on purpose.
+        assert operator.advance(0.1) > 0
+
+
+def test_a_board_that_fails_to_start_prints_the_reason(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The reason is on standard error before the board exits."""
+    with pytest.raises(RobotError, match="did not start"):
+        start_board(CAR, "twin", tmp_path, place=course_place("corridor", "tank"))
+    assert "A tank has no 'steering' or 'wheels'" in capfd.readouterr().err

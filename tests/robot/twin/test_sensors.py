@@ -1,0 +1,144 @@
+"""The robot's own sensor drivers on the twin's pins and chips."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from gpiozero import Motor
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.robot.twin.board_client import BoardClient
+from shapechanger.robot.twin.hardware import TwinHardware, connect
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.start import RunningBoard, start_board
+from tests.robot.twin.robots import BUMPER, CAR, ENCODER
+
+pytestmark = pytest.mark.realtime
+
+_SINGLE = replace(ENCODER, settings={**ENCODER.settings, "b": -1})
+_DISTANCE = SensorPlan("sonar", "hcsr04", "distance", {"trigger": 20, "echo": 21, "max_m": 3.0})
+_IMU = SensorPlan("imu", "mpu6050", "imu", {"bus": 1, "address": 0x68})
+_BATTERY = SensorPlan("battery", "ina219", "battery", {"bus": 1, "address": 0x40})
+
+
+class _Rig:
+    """A car with one sensor on the twin's clock."""
+
+    def __init__(self, board: RunningBoard, operator: Operator, sensor: SensorPlan) -> None:
+        self.hardware: TwinHardware = connect(board.socket_path)
+        self.operator = operator
+        self.motor = Motor(22, 27, pin_factory=self.hardware.pin_factory())
+        self.sensor: SensorDriver = open_sensor(sensor, self.hardware)
+        self.seen: dict[str, float] = {}
+
+    def advance(self, seconds: float) -> dict[str, float]:
+        """Advance the clock, deliver edges and read the sensor."""
+        for _ in range(round(seconds * 100)):
+            now_ns = self.operator.advance(0.01)
+            board = self.hardware.board
+            assert isinstance(board, BoardClient)
+            board.drain()
+            board.dispatch()
+            board.now_ns = now_ns
+            self.seen |= self.sensor.read(now_ns, self.motor.value)
+        return self.seen
+
+
+@contextmanager
+def _rig(folder: Path, sensor: SensorPlan) -> Iterator[_Rig]:
+    plan: GuardPlan = replace(CAR, sensors=(sensor,), enable_pin=None)
+    with (
+        start_board(plan, "twin", folder, seed=1) as board,
+        Operator(board.socket_path) as operator,
+    ):
+        rig = _Rig(board, operator, sensor)
+        yield rig
+        rig.sensor.close()
+        rig.hardware.close()
+
+
+@pytest.mark.parametrize("sensor", [ENCODER, _SINGLE])
+@pytest.mark.parametrize("throttle", [0.5, -0.5])
+def test_the_encoder_measures_the_speed(
+    tmp_path: Path, sensor: SensorPlan, throttle: float
+) -> None:
+    """The driver computes the signed speed of the world from the edges."""
+    with _rig(tmp_path, sensor) as rig:
+        rig.motor.value = throttle
+        seen = rig.advance(0.6)
+        assert seen["speed"] == pytest.approx(rig.operator.where().speed, rel=0.1)
+        assert seen["speed"] * throttle > 0.0
+
+
+def test_the_encoder_counts_the_distance(tmp_path: Path) -> None:
+    """A wheel turn of 0.2 m gives 80 edges."""
+    edges: list[int] = []
+    with _rig(tmp_path, ENCODER) as rig:
+        inner = rig.hardware.board.on_edge
+        assert inner is not None
+
+        def count(pin: int, level: int, at_ns: int) -> None:
+            edges.append(at_ns)
+            inner(pin, level, at_ns)
+
+        rig.hardware.board.on_edge = count
+        rig.motor.value = 1.0
+        rig.advance(0.7)
+        travelled = rig.operator.where().travelled_m
+        assert len(edges) == pytest.approx(travelled / 0.2 * 80, abs=1)
+        assert edges == sorted(edges)
+
+
+def test_the_bumper_is_pressed(tmp_path: Path) -> None:
+    """Operators and walls press the bumper."""
+    with _rig(tmp_path, BUMPER) as rig:
+        assert rig.advance(0.02)["bump"] == 0.0
+        rig.operator.press_bumper()
+        assert rig.advance(0.02)["bump"] == 1.0
+        rig.operator.press_bumper(False)
+        assert rig.advance(0.03)["bump"] == 0.0
+        rig.motor.value = 1.0
+        while not rig.operator.where().bumped:
+            rig.advance(0.05)
+        assert rig.advance(0.02)["bump"] == 1.0
+
+
+def test_the_distance_is_measured(tmp_path: Path) -> None:
+    """The echo gives the distance; an operator can override it; a dead sensor raises."""
+    with _rig(tmp_path, _DISTANCE) as rig:
+        truth = rig.operator.where().distance_m
+        assert rig.advance(0.2)["distance"] == pytest.approx(min(truth, 3.0), abs=0.01)
+        rig.operator.set_distance(0.25)
+        assert rig.advance(0.2)["distance"] == pytest.approx(0.25, abs=0.005)
+        rig.operator.set_distance(9.0)
+        assert rig.advance(0.3)["distance"] == 3.0
+        rig.operator.set_distance(None, dead=True)
+        with pytest.raises(RobotError, match="no echo"):
+            rig.advance(2.0)
+
+
+def test_the_imu_measures_acceleration(tmp_path: Path) -> None:
+    """The IMU measures the acceleration of the car, and a dead chip raises an error."""
+    with _rig(tmp_path, _IMU) as rig:
+        assert rig.advance(0.05)["acceleration_x"] == pytest.approx(0.0, abs=0.01)
+        rig.motor.value = 1.0
+        assert rig.advance(0.03)["acceleration_x"] > 3.0
+        rig.operator.break_chip(1, 0x68)
+        with pytest.raises(RobotError):
+            rig.advance(0.02)
+
+
+def test_the_battery_sags_and_runs_down(tmp_path: Path) -> None:
+    """The voltage drops under load and follows an operator's setting."""
+    with _rig(tmp_path, _BATTERY) as rig:
+        idle = rig.advance(0.2)["battery"]
+        rig.motor.value = 1.0
+        assert 6.5 < rig.advance(0.2)["battery"] < idle - 0.2
+        rig.operator.set_battery(6.0)
+        assert rig.advance(0.2)["battery"] < 6.0

@@ -1,0 +1,104 @@
+"""Inverse of each driver: from pin levels back to output values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.output import open_output
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
+from shapechanger.robot.twin.hardware import connect
+from shapechanger.robot.twin.robot import Operator
+from shapechanger.robot.twin.signals import Levels, Pulse
+from shapechanger.robot.twin.start import start_board
+from shapechanger.robot.twin.wiring import TwinWiring
+from tests.robot.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc, hbridge, servo
+
+pytestmark = pytest.mark.realtime
+
+_CHIP = {"over": "pca9685", "bus": 1, "address": 0x40, "channel": 2, "output_enable": -1}
+_PHASE = OutputPlan(
+    "phase",
+    "phase_enable",
+    "wheels",
+    {"throttle": 1.0},
+    0.0,
+    {"phase": 5, "enable": 6, "pwm_hz": 50, "start": 0.2, "full": 0.9},
+)
+_ENABLED = replace(DRIVE, settings={**DRIVE.settings, "enable": 18})
+_OUTPUTS = {
+    "hbridge": DRIVE,
+    "hbridge with enable": _ENABLED,
+    "hbridge with start": hbridge("drive", "wheels", (22, 27), {"throttle": 1.0}, start=0.3),
+    "phase": _PHASE,
+    "servo on a pin": servo("servo", "steering", {"steering": 1.0}, over="lgpio", pin=12),
+    "servo on a chip": servo("servo", "steering", {"steering": 1.0}, **_CHIP),
+    "reversed servo": servo(
+        "servo", "steering", {"steering": 1.0}, left_us=1900.0, right_us=1200.0, **_CHIP
+    ),
+    "esc on a chip": esc("esc", "wheels", {"throttle": 1.0}, arm_s=0.0, reverse="direct", **_CHIP),
+}
+
+
+@pytest.mark.parametrize("kind", _OUTPUTS)
+def test_the_wiring_inverts_each_driver(tmp_path: Path, kind: str) -> None:
+    """The value read from the levels is the value written, within one step of resolution."""
+    output = _OUTPUTS[kind]
+    plan = GuardPlan("robot", ACTIONS, (output,))
+    wiring = TwinWiring(plan)
+    with start_board(plan, "twin", tmp_path) as board, Operator(board.socket_path) as operator:
+        hardware = connect(board.socket_path)
+        driver = open_output(output, hardware)
+        for value in (0.0, 0.05, 0.3, 1.0, -0.05, -0.7, -1.0, 0.0):
+            driver.write(value, 10**9)
+            read = wiring.read(operator.levels(), 10**9)[output.name]
+            assert read.value == pytest.approx(value, abs=0.02), value
+            if "steering" not in output.mix:
+                assert read.at_rest == (value == 0.0)
+        driver.release()
+        read = wiring.read(operator.levels(), 10**9)[output.name]
+        assert read.value == (None if output.driver in ("servo", "esc") else 0.0)
+        assert read.at_rest
+        driver.close()
+        hardware.close()
+
+
+def test_only_outputs_with_throttle_propel() -> None:
+    """The mix decides which outputs propel, not their names."""
+    assert TwinWiring(CAR).propelling == ("drive",)
+    swapped = (replace(DRIVE, mix={"steering": 1.0}), replace(STEER, mix={"throttle": -0.5}))
+    assert TwinWiring(replace(CAR, outputs=swapped)).propelling == ("steer",)
+
+
+def test_wrong_pins_turn_the_wrong_motor() -> None:
+    """Wiring is independent of the served profile: swapped pins steer instead of driving."""
+    levels = Levels()
+    levels.drive(17, 0.8, 0)
+    read = TwinWiring(CAR, None).read(levels, 0)
+    assert (read["drive"].value, read["steer"].value) == (0.0, 0.8)
+
+
+def test_the_one_shot_powers_motors_only() -> None:
+    """The bridge loses power 100 ms after the last edge; a servo keeps its pulses."""
+    turn = servo("turn", "steering", {"steering": 1.0}, over="lgpio", pin=12)
+    wiring = TwinWiring(replace(CAR, outputs=(DRIVE, turn)), 100.0)
+    levels = Levels()
+    levels.drive(22, 1.0, 0)
+    levels.pulse(12, Pulse(2000, 50))
+    assert wiring.read(levels, 0)["drive"].value == 0.0
+    levels.drive(25, 1.0, 50_000_000)
+    assert wiring.read(levels, 149_000_000)["drive"].value == 1.0
+    assert wiring.read(levels, 150_000_000)["drive"].value == 0.0
+    assert wiring.read(levels, 150_000_000)["turn"].value == 1.0
+
+
+def test_an_unsupported_plan_is_refused(tmp_path: Path) -> None:
+    """Unsupported drivers and over-long socket paths raise before anything starts."""
+    kernel = servo("turn", "steering", {"steering": 1.0}, over="sysfs", chip=0, channel=0)
+    with pytest.raises(RobotError, match="no servos over 'sysfs'"):
+        start_board(replace(CAR, outputs=(kernel,)), "twin", tmp_path)
+    with pytest.raises(RobotError, match="too long for a socket"):
+        start_board(CAR, "twin", tmp_path / ("long" * 40))

@@ -1,0 +1,174 @@
+"""Properties of the room and of the vehicles in it, without any process."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.twin.world.vehicle import CAR_SPEED, RADIUS, DrivingWorld
+
+_SIZE = (160, 120)
+_SEEDS = st.integers(0, 10_000)
+_VALUES = st.floats(-1.0, 1.0)
+
+# Outputs that drive each vehicle ahead, and outputs that turn it left.
+_VEHICLES = {
+    "car": ({"wheels": 1.0, "steering": 0.0}, {"wheels": 0.5, "steering": -1.0}),
+    "tank": ({"left track": 1.0, "right track": 1.0}, {"left track": -0.5, "right track": 0.5}),
+    "boat": ({"propeller": 1.0, "rudder": 0.0}, {"propeller": 0.7, "rudder": -1.0}),
+    "twin boat": (
+        {"left propeller": 1.0, "right propeller": 1.0},
+        {"left propeller": 0.0, "right propeller": 0.8},
+    ),
+}
+_EACH_VEHICLE = pytest.mark.parametrize("kind", _VEHICLES)
+
+
+def _run(world: DrivingWorld, outputs: dict[str, float], seconds: float) -> None:
+    for _ in range(round(seconds * 100)):
+        world.advance(0.01, outputs)
+
+
+@_EACH_VEHICLE
+def test_full_throttle_goes_along_the_heading(kind: str) -> None:
+    """Forward outputs move the vehicle along its heading without turning it."""
+    ahead, _ = _VEHICLES[kind]
+    world = DrivingWorld(ahead, _SIZE, seed=1)
+    start = world.inputs().pose
+    _run(world, ahead, 0.8)
+    end = world.inputs().pose
+    along = (end.x - start.x) * math.cos(start.heading) + (end.y - start.y) * math.sin(
+        start.heading
+    )
+    across = (end.y - start.y) * math.cos(start.heading) - (end.x - start.x) * math.sin(
+        start.heading
+    )
+    assert along > 0.1
+    assert across == pytest.approx(0.0, abs=1e-9)
+    assert end.heading == pytest.approx(start.heading)
+    assert world.inputs().travelled_m == pytest.approx(along)
+
+
+@_EACH_VEHICLE
+def test_left_is_counter_clockwise_seen_from_above(kind: str) -> None:
+    """Steering -1 turns left; mirrored outputs turn right by the same angle."""
+    ahead, left = _VEHICLES[kind]
+    turns: list[float] = []
+    mirrored = {"steering": "steering", "rudder": "rudder"}
+    swap = {
+        part: part.replace("left", "?").replace("right", "left").replace("?", "right")
+        for part in left
+    }
+    right = {swap[part]: -value if part in mirrored else value for part, value in left.items()}
+    for outputs in (left, right):
+        world = DrivingWorld(ahead, _SIZE, seed=1)
+        before = world.inputs().pose.heading
+        _run(world, outputs, 0.5)
+        turns.append(math.remainder(world.inputs().pose.heading - before, math.tau))
+        assert world.inputs().yaw_rate * turns[-1] > 0.0
+    assert turns[0] > 0.05
+    assert turns[1] == pytest.approx(-turns[0])
+
+
+@_EACH_VEHICLE
+def test_negated_outputs_reverse_the_vehicle(kind: str) -> None:
+    """Negating all outputs drives the vehicle backward."""
+    ahead, _ = _VEHICLES[kind]
+    world = DrivingWorld(ahead, _SIZE, seed=1)
+    _run(world, {part: -value for part, value in ahead.items()}, 0.3)
+    assert world.inputs().speed < 0.0
+    assert world.inputs().travelled_m < 0.0
+
+
+def test_a_wall_stops_the_car_and_presses_the_bumper() -> None:
+    """At a wall the car stops, decelerates hard, draws current, and can reverse away."""
+    world = DrivingWorld({"wheels", "steering"}, _SIZE, seed=2)
+    hardest = 0.0
+    for _ in range(600):
+        world.advance(0.01, {"wheels": 1.0})
+        hardest = min(hardest, world.inputs().acceleration_x)
+    seen = world.inputs()
+    assert seen.bumped
+    assert seen.speed == 0.0
+    assert world.room.clearance(seen.pose.x, seen.pose.y)[0] == pytest.approx(RADIUS, abs=0.005)
+    assert hardest < -20.0
+    assert seen.battery_v < 7.0
+    travelled = seen.travelled_m
+    _run(world, {"wheels": 1.0}, 1.0)
+    assert world.inputs().travelled_m == pytest.approx(travelled, abs=1e-3)
+    _run(world, {"wheels": -0.5}, 0.5)
+    assert not world.inputs().bumped
+    assert world.inputs().travelled_m < travelled - 0.1
+
+
+@given(seed=_SEEDS, steps=st.lists(st.tuples(_VALUES, _VALUES), min_size=1, max_size=30))
+def test_no_vehicle_passes_through_walls(seed: int, steps: list[tuple[float, float]]) -> None:
+    """For any outputs, the vehicle stays in the room and outside its boxes."""
+    world = DrivingWorld({"left track", "right track"}, _SIZE, seed)
+    for left, right in steps:
+        world.advance(0.2, {"left track": left, "right track": right})
+        pose = world.inputs().pose
+        assert world.room.clearance(pose.x, pose.y)[0] >= RADIUS - 1e-6
+
+
+@given(seed=_SEEDS)
+def test_a_start_has_room_ahead(seed: int) -> None:
+    """A start pose has free space ahead and is reproducible."""
+    world = DrivingWorld({"wheels"}, (8, 6), seed)
+    first = world.inputs()
+    assert not first.bumped
+    assert world.distance_m() > 1.0
+    _run(world, {"wheels": 1.0}, 0.2)
+    world.place(seed)
+    assert world.inputs().pose == first.pose
+    assert world.inputs().speed == 0.0
+
+
+def test_a_servo_without_pulses_keeps_its_angle() -> None:
+    """A servo without pulses does not return to the centre."""
+    world = DrivingWorld({"wheels", "steering"}, _SIZE, seed=1)
+    _run(world, {"wheels": 0.0, "steering": -1.0}, 0.5)
+    before = world.inputs().pose.heading
+    for _ in range(30):
+        world.advance(0.01, {"wheels": 0.5, "steering": None})
+    assert math.remainder(world.inputs().pose.heading - before, math.tau) > 0.1
+
+
+def test_small_values_do_not_move_the_car() -> None:
+    """Friction holds the motor at small values; larger ones act with a first-order lag."""
+    world = DrivingWorld({"wheels"}, _SIZE, seed=1)
+    _run(world, {"wheels": 0.03}, 1.0)
+    assert world.inputs().travelled_m == 0.0
+    world.advance(0.15, {"wheels": 1.0})
+    assert world.inputs().speed == pytest.approx(CAR_SPEED * (1 - math.exp(-1)), rel=1e-6)
+
+
+def test_mixed_parts_are_refused() -> None:
+    """A car with a rudder is refused."""
+    with pytest.raises(RobotError, match="No vehicle has all of these parts: rudder, wheels"):
+        DrivingWorld({"wheels", "rudder"}, _SIZE, seed=1)
+
+
+def test_the_picture_turns_with_the_car() -> None:
+    """The image shifts to the right when the car turns left."""
+    world = DrivingWorld({"left track", "right track"}, _SIZE, seed=1)
+    before = world.picture()
+    assert before.shape == (120, 160, 3)
+    assert before.dtype == np.uint8
+    while abs(math.remainder(world.inputs().pose.heading - _START_1, math.tau)) < 0.1:
+        world.advance(0.001, {"left track": -0.2, "right track": 0.2})
+    after = world.picture()
+    row = 61
+    shifted = [
+        float(np.abs(after[row, 20:140].astype(int) - before[row, 20 - s : 140 - s]).mean())
+        for s in range(-16, 17)
+    ]
+    assert 3 <= int(np.argmin(shifted)) - 16 <= 16
+
+
+_START_1 = DrivingWorld({"wheels"}, _SIZE, seed=1).inputs().pose.heading
