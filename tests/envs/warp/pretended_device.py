@@ -21,7 +21,7 @@ import torch
 from torch.overrides import TorchFunctionMode
 from torch.utils._pytree import tree_leaves
 
-from shapechanger.envs.warp import devices, make, noise, worlds
+from shapechanger.envs.warp import devices, env, make, noise, worlds
 from shapechanger.envs.warp.devices import wp
 
 _CPU = torch.device("cpu")
@@ -178,6 +178,8 @@ def pretended_device(monkeypatch: pytest.MonkeyPatch) -> Iterator[PretendedDevic
     monkeypatch.setattr(make, "find_device", lambda name: "cuda:0")
     monkeypatch.setattr(worlds, "on", on)
     monkeypatch.setattr(noise, "on", on)
+    # There are no streams without a GPU.
+    monkeypatch.setattr(env, "Streams", lambda count, device: devices.Streams(count, "cpu"))
     monkeypatch.setattr(worlds, "as_torch", lambda array: _mark(devices.as_torch(array)))
     monkeypatch.setattr(noise, "as_warp", as_warp)
     monkeypatch.setattr(worlds.Worlds, "_run", run)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from shapechanger.errors import MissingExtra, UnknownName
 
@@ -18,6 +18,8 @@ try:
     import warp
 except ImportError as error:
     raise MissingExtra("mujoco-warp", "gpu") from error
+
+_Result = TypeVar("_Result")
 
 wp: Any = warp
 """The module `warp`."""
@@ -89,3 +91,34 @@ def on(device: str) -> Generator[None]:
                 wp.stream_from_torch(cast("Any", torch.cuda.current_stream(device)))
             ):
                 yield
+
+
+class Streams:
+    """Streams of a GPU, one for each of some independent calls, which alone would not fill it.
+
+    Args:
+        count: Number of calls.
+        device: Name of the device; calls on a CPU run one after another.
+    """
+
+    def __init__(self, count: int, device: str) -> None:
+        self._device = device
+        self._streams = (
+            [torch.cuda.Stream(device) for _ in range(count)]
+            if count > 1 and device != "cpu"
+            else []
+        )
+
+    def run(self, calls: Sequence[Callable[[], _Result]]) -> list[_Result]:
+        """Return the result of each call, for torch's current stream."""
+        if not self._streams:
+            return [call() for call in calls]
+        current = torch.cuda.current_stream(self._device)
+        results: list[_Result] = []
+        for stream, call in zip(self._streams, calls, strict=True):
+            stream.wait_stream(current)
+            with torch.cuda.stream(stream):
+                results.append(call())
+        for stream in self._streams:
+            current.wait_stream(stream)
+        return results

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final, cast
 
 import gymnasium as gym
@@ -17,7 +18,7 @@ from torch import Tensor
 from shapechanger.envs.vector.checks import masked_options, one_seed_each
 from shapechanger.envs.warp.batch import BatchKind, WarpBatch, require_fitting
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
-from shapechanger.envs.warp.devices import without_gradients
+from shapechanger.envs.warp.devices import Streams, without_gradients
 from shapechanger.envs.warp.reader import Reader
 from shapechanger.errors import BadAction, UnknownName, VectorEnvError
 from shapechanger.layout import Layout
@@ -108,6 +109,7 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             )
             for group in self._groups
         )
+        self._streams = Streams(len(self.batches), device)
         first = self.batches[0]
         self.observation_layout: Layout = first.observation_layout
         self.action_layout: Layout = first.action_layout
@@ -263,10 +265,11 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
             Observations of each batch, and infos of all worlds; rows outside the mask are of the
             present state.
         """
-        starts = [
-            batch.start(*(self._rows(batch, each) for each in (mask, self._seeds, self._episodes)))
-            for batch in self.batches
-        ]
+        every = (mask, self._seeds, self._episodes)
+        rows = [[self._rows(batch, each) for each in every] for batch in self.batches]
+        starts = self._streams.run(
+            [partial(batch.start, *row) for batch, row in zip(self.batches, rows, strict=True)]
+        )
         self._episodes += mask
         self._elapsed.masked_fill_(mask, 0)
         infos = self._gathered([info for _, info in starts]) if self._task_infos else {}
@@ -292,7 +295,9 @@ class WarpVectorEnv(VectorEnv[Any, Any, Any]):
         if not self._begun:
             raise gym.error.ResetNeeded("No episode is under way: call `reset` first.")
         each = self._checked(actions)
-        steps = [batch.step(action) for batch, action in zip(self.batches, each, strict=True)]
+        steps = self._streams.run(
+            [partial(batch.step, action) for batch, action in zip(self.batches, each, strict=True)]
+        )
         observations = [step.observations for step in steps]
         rewards = self._gathered_one([step.rewards for step in steps])
         terminated = self._gathered_one([step.terminated for step in steps])
