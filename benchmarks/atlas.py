@@ -23,10 +23,6 @@ from benchmarks.row import Row
 from shapechanger.cli.suite import RunSuite, load_suite, suite_tasks
 from shapechanger.errors import StudyError
 from shapechanger.files import read_json, write_json
-from shapechanger.reports.curves import sweep_chart
-from shapechanger.reports.numbers import estimate_text
-from shapechanger.reports.suite import gain_over_scratch
-from shapechanger.reports.verdict import direction, finals
 from shapechanger.transfer.metrics import (
     estimate_difference,
     jumpstart,
@@ -34,6 +30,9 @@ from shapechanger.transfer.metrics import (
     total_reward_gain,
 )
 from shapechanger.transfer.plan import SOURCE, Run
+from shapechanger.transfer.report.curves import sweep_chart
+from shapechanger.transfer.report.suite import gain_over_scratch
+from shapechanger.transfer.report.verdict import direction, estimate_text, finals
 from shapechanger.transfer.runs import RunResult, learner_of
 from shapechanger.transfer.study import STUDY_FILE, Study
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from benchmarks.row import Row
 from shapechanger.cli.suite import RunSuite
-from shapechanger.reports.numbers import estimate_text
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.metrics.intervals import estimate_difference
+from shapechanger.transfer.report.verdict import estimate_text
 from shapechanger.transfer.suite import StudyOutcome
 from shapechanger.vehicles.envs.ranges import COLLISION_REWARD
 

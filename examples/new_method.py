@@ -14,10 +14,10 @@ import tyro
 from stable_baselines3.common.callbacks import BaseCallback
 
 from shapechanger import TransferTask, make_plan, run_study
-from shapechanger.reports.verdict import verdict
 from shapechanger.transfer import EnvRef
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.methods import Method, MethodRun, register
+from shapechanger.transfer.report.verdict import verdict
 
 
 class OnlyLastLayer(BaseCallback):

@@ -13,10 +13,10 @@ import tyro
 
 from shapechanger import TransferTask, make_plan, run_study
 from shapechanger.cli.transfer import write_study_report
-from shapechanger.reports.verdict import verdict
 from shapechanger.transfer import EnvRef
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.ray_executor import RayCluster
+from shapechanger.transfer.report.verdict import verdict
 
 
 def main(

@@ -11,7 +11,6 @@ import pytest
 
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
-from shapechanger.reports.study import study_html
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners import DemonstrationFile, cloning
 from shapechanger.transfer.learners.cloning import (
@@ -24,6 +23,7 @@ from shapechanger.transfer.learners.evaluation import Evaluation, evaluation_env
 from shapechanger.transfer.learners.presets import LEARNERS, learner_settings
 from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import ARMS, Plan, TransferTask
+from shapechanger.transfer.report.study import study_html
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
 from tests.transfer.studies import BIG

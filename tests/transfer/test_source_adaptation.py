@@ -14,10 +14,10 @@ from shapechanger.errors import RobotError, StudyError
 from shapechanger.finger.identify import result
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.reach import FingerReachEnv
-from shapechanger.reports.verdict import arm_rows, caveats
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.plan import ARMS, Run, TransferTask
+from shapechanger.transfer.report.verdict import arm_rows, caveats
 from shapechanger.transfer.runs import load_result, perform_run
 from shapechanger.transfer.study import Study, default_arms, inspect_task, run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan

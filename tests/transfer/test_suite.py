@@ -20,8 +20,8 @@ from shapechanger.transfer.executor import Executor, Job, OnProgress, Serial
 from shapechanger.transfer.plan import Plan, TransferTask
 from shapechanger.transfer.study import Study, make_plan, run_study
 from shapechanger.transfer.suite import StudyOutcome, open_study_folder, study_outcome
-from tests.reports.studies import make_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
+from tests.transfer.report.studies import make_study
 from tests.transfer.studies import files_of
 
 _KINDS = ("source", "random", "zero-action", "scratch", "zero-shot", "fine-tune")

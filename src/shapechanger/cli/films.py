@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from shapechanger.cli.pictures import write_film
 from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, measures_of
 from shapechanger.envs.catalogue import CATALOGUE
-from shapechanger.reports.suite import FilmStrip
-from shapechanger.reports.verdict import finals
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act
 from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import SOURCE, Run
+from shapechanger.transfer.report.suite import FilmStrip
+from shapechanger.transfer.report.verdict import finals
 from shapechanger.transfer.runs import learner_of
 
 if TYPE_CHECKING:

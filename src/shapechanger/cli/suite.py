@@ -42,13 +42,13 @@ from shapechanger.cli.transfer import run_steps, write_study_report
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import FailedRuns, RenderError, StudyError, UnknownName
 from shapechanger.files import place_of, read_json, read_text, write_json
-from shapechanger.reports.numbers import estimate_text
+from shapechanger.reports.numbers import interval_text
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.plan import SOURCE, Plan, TransferTask
 
 if TYPE_CHECKING:
-    from shapechanger.reports.suite import FilmStrip
+    from shapechanger.transfer.report.suite import FilmStrip
     from shapechanger.transfer.study import Study, TaskTraits
     from shapechanger.transfer.suite import StudyOutcome
 
@@ -484,7 +484,7 @@ class _Page:
         """Add a study that has ended, or replace it; write its report and the page."""
         from shapechanger.cli.films import film_study
         from shapechanger.files import write_atomic
-        from shapechanger.reports.suite import Sweep, suite_html
+        from shapechanger.transfer.report.suite import Sweep, suite_html
 
         write_study_report(study, self._out / name)
         self._studies[name] = study
@@ -546,6 +546,9 @@ def _table(found: list[StudyOutcome]) -> Table:
             f"{outcome.arm_final:.4g}",
             f"{outcome.scratch_steps:,.0f}",
             "never" if steps is None else f"{steps:,.0f}",
-            *(estimate_text(gain, signed=True) for gain in outcome.gains.values()),
+            *(
+                interval_text(gain.value, gain.low, gain.high, signed=True)
+                for gain in outcome.gains.values()
+            ),
         )
     return table

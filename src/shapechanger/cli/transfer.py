@@ -239,7 +239,7 @@ def write_study_report(study: Study, out: Path) -> Path:
         The page.
     """
     from shapechanger.files import write_atomic
-    from shapechanger.reports.study import study_html
+    from shapechanger.transfer.report.study import study_html
 
     path = out / "report.html"
     pictures, note = None, ""
@@ -307,7 +307,7 @@ def _way_on(plan: Plan, out: Path) -> str:
 
 def _print(study: Study) -> None:
     """Print the table of measures and the verdict."""
-    from shapechanger.reports.verdict import (
+    from shapechanger.transfer.report.verdict import (
         measure_rows,
         other_arms,
         verdict,

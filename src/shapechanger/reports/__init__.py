@@ -1,1 +1,1 @@
-"""Reports as self-contained HTML files: of studies, demonstrations, clones and fingers."""
+"""What pages are made of: a template, pictures, charts and formatted numbers."""

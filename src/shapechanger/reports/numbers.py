@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from shapechanger.transfer.metrics import Estimate
 
 UNDEFINED: Final = "undefined"
 CONFIDENCE: Final = 0.95
@@ -45,15 +42,21 @@ def count(value: float) -> str:
     return number(value, 0)
 
 
-def interval_text(value: float, low: float, high: float, *, signed: bool = False) -> str:
+def interval_text(
+    value: float | None, low: float | None, high: float | None, *, signed: bool = False
+) -> str:
     """Format an estimate with its interval, as in `+0.31 [+0.22, +0.40]`.
 
     Args:
-        value: The estimate.
-        low: Lower end of the interval.
-        high: Upper end of the interval.
+        value: The estimate; None if it is undefined.
+        low: Lower end of the interval; None without one.
+        high: Upper end of the interval; None without one.
         signed: Whether numbers above zero get a plus sign.
     """
+    if value is None:
+        return UNDEFINED
+    if low is None or high is None:
+        return f"{number(value, signed=signed)} (no interval)"
     decimals = _decimals(high - low, 2)
     # An end other than zero must not be rounded to zero: it decides whether the interval has 0.
     while decimals < _MAX_DECIMALS and any(
@@ -62,20 +65,6 @@ def interval_text(value: float, low: float, high: float, *, signed: bool = False
         decimals += 1
     texts = (number(x, decimals, signed=signed) for x in (value, low, high))
     return "{} [{}, {}]".format(*texts)
-
-
-def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
-    """Format an estimate, with or without a value and an interval.
-
-    Args:
-        estimate: The estimate.
-        signed: Whether numbers above zero get a plus sign.
-    """
-    if estimate.value is None:
-        return UNDEFINED
-    if estimate.low is None or estimate.high is None:
-        return f"{number(estimate.value, signed=signed)} (no interval)"
-    return interval_text(estimate.value, estimate.low, estimate.high, signed=signed)
 
 
 def list_text(values: Sequence[float]) -> str:
@@ -147,7 +136,7 @@ def spread_text(values: NDArray[np.float64]) -> str:
         values: Shape (n_seeds,).
     """
     if values.size == 1:
-        return f"{number(float(values[0]))} (no interval)"
+        return interval_text(float(values[0]), None, None)
     mean, low, high = (float(x[0]) for x in t_interval(values[:, np.newaxis]))
     return interval_text(mean, low, high)
 

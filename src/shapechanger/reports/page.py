@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 import functools
 import io
-from typing import TYPE_CHECKING, Any, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,30 +17,33 @@ from shapechanger.reports.numbers import count
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+_TEMPLATES: Final = Path(__file__).parent / "templates"
 
-def render(template: str, **values: Any) -> str:
-    """Render a page from a template in `shapechanger/reports/templates`.
+
+def render(template: str | Path, **values: Any) -> str:
+    """Render a page from a template, which may use those in `shapechanger/reports/templates`.
 
     Values are escaped, except those of type `markupsafe.Markup`.
 
     Args:
-        template: File name, such as "study.html".
+        template: Its file, or the name of one in that folder.
         **values: Variables of the template. A missing one is an error.
 
     Raises:
         MissingExtra: If Jinja2 is not installed.
     """
-    return _environment().get_template(template).render(values)
+    path = _TEMPLATES / template
+    return _environment(path.parent).get_template(path.name).render(values)
 
 
 @functools.cache
-def _environment() -> Environment:
+def _environment(folder: Path) -> Environment:
     try:
-        from jinja2 import Environment, PackageLoader, StrictUndefined
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
     except ImportError as error:
         raise MissingExtra("jinja2", "report") from error
     environment = Environment(
-        loader=PackageLoader("shapechanger.reports"),
+        loader=FileSystemLoader([folder, _TEMPLATES]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

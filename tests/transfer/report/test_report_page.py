@@ -14,10 +14,10 @@ import pytest
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import MissingExtra
-from shapechanger.reports.study import study_html
-from shapechanger.reports.verdict import measure_rows, verdict
+from shapechanger.transfer.report.study import study_html
+from shapechanger.transfer.report.verdict import measure_rows, verdict
 from shapechanger.transfer.study import Study
-from tests.reports.studies import make_study, rising, same_body
+from tests.transfer.report.studies import make_study, rising, same_body
 
 FLAT = rising(-50.0, -50.0, 1e3)
 EVIL = "<script>alert(1)</script>&\"'"
@@ -246,8 +246,8 @@ def test_without_matplotlib_the_extra_is_named(
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    for name in ("charts", "curves"):
-        monkeypatch.delitem(sys.modules, f"shapechanger.reports.{name}", raising=False)
+    for name in ("reports.charts", "transfer.report.curves"):
+        monkeypatch.delitem(sys.modules, f"shapechanger.{name}", raising=False)
     assert measure_rows(study)
     assert verdict(study)
     with pytest.raises(MissingExtra, match=r"shapechanger\[report\]"):

@@ -8,9 +8,9 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from shapechanger.reports.curves import Counting, learning_curves
+from shapechanger.transfer.report.curves import Counting, learning_curves
 from shapechanger.transfer.study import Study
-from tests.reports.studies import make_study, rising
+from tests.transfer.report.studies import make_study, rising
 
 COUNTINGS: tuple[Counting, ...] = ("target", "total")
 

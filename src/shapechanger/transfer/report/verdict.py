@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import UnknownName
 from shapechanger.reports.numbers import (
     count,
-    estimate_text,
+    interval_text,
     list_text,
     number,
     share_text,
@@ -57,6 +57,16 @@ EXPLANATIONS: Final[dict[str, str]] = {
     "time. Runs that never reach it count with the whole budget; none are dropped. Above 0: "
     f"transfer helped. ({_TAYLOR_STONE}; Royston & Parmar, BMC Med. Res. Methodol. 13, 2013)",
 }
+
+
+def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
+    """Format an estimate, with or without a value and an interval.
+
+    Args:
+        estimate: The estimate.
+        signed: Whether numbers above zero get a plus sign.
+    """
+    return interval_text(estimate.value, estimate.low, estimate.high, signed=signed)
 
 
 class MeasureRow(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -10,9 +11,8 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
-from shapechanger.reports.numbers import count, estimate_text, number
+from shapechanger.reports.numbers import count, number
 from shapechanger.reports.page import jpeg_uri, render, svg_uri
-from shapechanger.reports.verdict import direction, finals, is_flat, machine_text, verdict
 from shapechanger.transfer.metrics import (
     Estimate,
     Reference,
@@ -20,6 +20,14 @@ from shapechanger.transfer.metrics import (
     jumpstart,
     probability_of_improvement,
     total_reward_gain,
+)
+from shapechanger.transfer.report.verdict import (
+    direction,
+    estimate_text,
+    finals,
+    is_flat,
+    machine_text,
+    verdict,
 )
 from shapechanger.transfer.study import Study
 
@@ -81,7 +89,7 @@ def suite_html(
     """
     if not studies:
         raise StudyError(f"The suite {name} has no finished study to make a page of.")
-    from shapechanger.reports.curves import learning_curves, sweep_chart
+    from shapechanger.transfer.report.curves import learning_curves, sweep_chart
 
     first = next(iter(studies.values()))
     arm, plan = first.headline_arm, first.plan
@@ -90,7 +98,7 @@ def suite_html(
         by_value = {sweep.values[one]: study for one, study in studies.items()}
         swept = svg_uri(sweep_chart(by_value, sweep.name))
     return render(
-        "suite.html",
+        Path(__file__).with_name("suite.html"),
         title=name,
         arm=arm,
         measure=plan.measure,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from shapechanger.reports.study import study_html
+from shapechanger.transfer.report.study import study_html
 from shapechanger.transfer.study import Study
-from tests.reports.studies import make_study
+from tests.transfer.report.studies import make_study
 
 
 @pytest.fixture(scope="session")

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.reports.numbers import estimate_text
-from shapechanger.reports.verdict import MeasureRow, arm_rows, measure_rows
 from shapechanger.transfer.metrics import DEFAULT_THRESHOLDS
+from shapechanger.transfer.report.verdict import MeasureRow, arm_rows, estimate_text, measure_rows
 from shapechanger.transfer.study import Study
-from tests.reports.studies import STEPS, make_study, rising
+from tests.transfer.report.studies import STEPS, make_study, rising
 
 # Straight lines, so that areas and crossings are easy to compute. Scratch rises from 0 to 1000 in
 # 10,240 steps, and its final value is the mean of the last three evaluations: 900.

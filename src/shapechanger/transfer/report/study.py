@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Final, cast
 
 import msgspec
@@ -11,7 +12,12 @@ from numpy.typing import NDArray
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.reports.numbers import UNDEFINED, count, number
 from shapechanger.reports.page import png_uri, render, svg_uri
-from shapechanger.reports.verdict import (
+from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
+from shapechanger.transfer.body_map.rules import SAME_NAME
+from shapechanger.transfer.learners.presets import tuning_text
+from shapechanger.transfer.learners.settings import CloningSettings, Settings
+from shapechanger.transfer.metrics import Reference, Summary
+from shapechanger.transfer.report.verdict import (
     ASYMPTOTIC_GAIN,
     EXPLANATIONS,
     GOOD,
@@ -28,11 +34,6 @@ from shapechanger.reports.verdict import (
     verdict,
     weak_individuals,
 )
-from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
-from shapechanger.transfer.body_map.rules import SAME_NAME
-from shapechanger.transfer.learners.presets import tuning_text
-from shapechanger.transfer.learners.settings import CloningSettings, Settings
-from shapechanger.transfer.metrics import Reference, Summary
 from shapechanger.transfer.study import Study
 
 Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
@@ -53,14 +54,14 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
     """
-    from shapechanger.reports.curves import learning_curves
+    from shapechanger.transfer.report.curves import learning_curves
 
     plan = study.plan
     measures = measure_rows(study)
     arms = arm_rows(study)
     notes = list(dict.fromkeys(row.note for row in measures if _defined(row) and row.note))
     return render(
-        "study.html",
+        Path(__file__).with_name("study.html"),
         title=f"{_short_name(plan.task.source)} → {_short_name(plan.task.target)}",
         plan=plan,
         verdict=verdict(study),

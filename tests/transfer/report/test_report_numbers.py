@@ -7,7 +7,6 @@ import pytest
 
 from shapechanger.reports.numbers import (
     count,
-    estimate_text,
     interval_text,
     list_text,
     number,
@@ -15,6 +14,7 @@ from shapechanger.reports.numbers import (
     t_interval,
 )
 from shapechanger.transfer.metrics import Estimate, undefined
+from shapechanger.transfer.report.verdict import estimate_text
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ import pytest
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
-from shapechanger.reports.suite import FilmStrip, Sweep, suite_html
+from shapechanger.transfer.report.suite import FilmStrip, Sweep, suite_html
 from shapechanger.transfer.study import Study
-from tests.reports.studies import make_study, rising
-from tests.reports.test_report_page import EVIL, Reader
+from tests.transfer.report.studies import make_study, rising
+from tests.transfer.report.test_report_page import EVIL, Reader
 
 ANTS = [EnvRef(f"shapechanger/{name}-v1") for name in ("Ant", "BigAnt", "ExtendedAnt")]
 

@@ -6,7 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.reports.verdict import (
+from shapechanger.transfer.metrics import Estimate
+from shapechanger.transfer.report.verdict import (
     Direction,
     caveats,
     direction,
@@ -16,9 +17,8 @@ from shapechanger.reports.verdict import (
     verdict,
     weak_individuals,
 )
-from shapechanger.transfer.metrics import Estimate
 from shapechanger.transfer.study import Study
-from tests.reports.studies import make_study, rising
+from tests.transfer.report.studies import make_study, rising
 
 SCRATCH = rising(0.0, 1000.0, 3000.0)
 FLAT = rising(997.0, 1005.0, 3000.0, noise=2.0)

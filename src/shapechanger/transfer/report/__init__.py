@@ -1,0 +1,1 @@
+"""Pages of studies and suites; need the extra `report`."""
