@@ -29,10 +29,9 @@ from shapechanger.demos.exchange.files import (
     cannot_read,
     inside,
     parse_json,
-    parse_json_object,
     read_bytes,
+    read_json_object,
     read_table,
-    read_text,
 )
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
@@ -147,7 +146,7 @@ def _read_all(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]
             continue
         if context.hz is not None:
             raise DemosError("The format csv states the rate itself: leave out --hz.")
-        fields = parse_json_object(read_text(path), str(path))
+        fields = read_json_object(path)
         try:
             header = EpisodeHeader.from_json(fields)
             columns = _columns(header)

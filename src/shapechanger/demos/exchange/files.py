@@ -1,8 +1,7 @@
-"""File access for imports and exports: sources are never changed, targets appear atomically.
+"""The loader: sources are never changed, targets appear atomically, strangers have one budget.
 
-Files of strangers are read here, within one budget: `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES`
-and `MAX_PIXELS` of a picture, `MAX_UNPACKED` of anything compressed, regular files inside the
-folder only.
+The budget is `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of a picture,
+`MAX_UNPACKED` of anything compressed, and regular files inside the folder only.
 """
 
 from __future__ import annotations
@@ -11,15 +10,19 @@ import codecs
 import csv
 import io
 import json
+import math
 import os
 import re
 import secrets
 import shutil
-from collections.abc import Generator
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from shapechanger.demos.episodes.files import MAX_TEXT_BYTES, read_file
 from shapechanger.errors import DemosError, MissingExtra, OutputError
@@ -41,6 +44,8 @@ UNIT_UNKNOWN: Final = "?"
 
 _SEPARATORS: Final = (",", "\t", ";")
 _SEPARATOR_LINE: Final = re.compile(r"sep=([,;\t])")  # As Excel writes it.
+_ROWS: Final = 256  # Of Parquet in memory at once; fewer if the values of a column are large.
+_MAX_TEXT: Final = 4096  # Characters of a text in Parquet.
 
 
 class UnpacksToTooMuch(DemosError):
@@ -81,8 +86,7 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
     made = [parent for parent in out.absolute().parents if not parent.exists()]
     part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        part.mkdir()
+        part.mkdir(parents=True)
     except OSError as error:
         raise cannot_write(out, error) from error
     try:
@@ -121,15 +125,15 @@ def inside(folder: Path, name: str, named_by: object) -> Path:
     Raises:
         DemosError: If there is no such file, or the name leads out of the folder.
     """
-    path = folder / name
     if not name or not is_inside(folder, name):
         problem = "leaves the folder" if name else "is empty"
         raise DemosError(f"{named_by}: the name {name!r} {problem}.")
-    if not path.is_file():
+    if not (folder / name).is_file():
         raise DemosError(
-            f"There is no {path}: {named_by} names {name!r}, which is not in {folder}. Restore it."
+            f"There is no {folder / name}: {named_by} names {name!r}, which is not in {folder}. "
+            "Restore it."
         )
-    return path
+    return folder / name
 
 
 def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
@@ -177,11 +181,9 @@ def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[
     text = read_text(path)
     first = next((line for line in text.splitlines() if line.strip()), "")
     stated = _SEPARATOR_LINE.fullmatch(first.strip())
-    separator = stated[1] if stated else _SEPARATORS[0]
-    if not stated:
-        found = [mark for mark in _SEPARATORS if first.count(mark) >= max(1, columns - 1)]
-        # Decimal commas stand between semicolons, so the last one that fits separates.
-        separator = found[-1] if found else _SEPARATORS[0]
+    found = [mark for mark in _SEPARATORS if first.count(mark) >= max(1, columns - 1)]
+    # Decimal commas stand between semicolons, so the last one that fits separates.
+    separator = stated[1] if stated else found[-1] if found else _SEPARATORS[0]
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
     lines: list[tuple[int, list[str]]] = []
     try:
@@ -205,15 +207,15 @@ def parse_json(text: str, where: str) -> Any:
         raise DemosError(f"{where} is not valid JSON ({error}).") from error
 
 
-def parse_json_object(text: str, where: str) -> dict[str, Any]:
-    """Parse a JSON object.
+def read_json_object(path: Path) -> dict[str, Any]:
+    """Read a file that holds a JSON object.
 
     Raises:
-        DemosError: If it is not valid, or not an object; `where` names it.
+        DemosError: If it cannot be read, is not valid, or holds something else.
     """
-    value = parse_json(text, where)
+    value = parse_json(read_text(path), str(path))
     if not isinstance(value, dict):
-        raise DemosError(f"{where} is not a JSON object.")
+        raise DemosError(f"{path} is not a JSON object.")
     return cast("dict[str, Any]", value)
 
 
@@ -233,12 +235,219 @@ def own_headers(section: object, where: object) -> list[dict[str, Any]]:
         raise DemosError(
             f"{where} was written by another version of Shapechanger: this one reads format 1 only."
         )
-    plain = cast("list[Any]", headers)
-    if not all(isinstance(header, dict) for header in plain):
+    if not all(isinstance(header, dict) for header in cast("list[Any]", headers)):
         raise DemosError(f"{where} has a header that is not a JSON object.")
-    return plain
+    return cast("list[dict[str, Any]]", headers)
 
 
 def cannot_read(path: Path, error: OSError) -> DemosError:
     """Return the error to raise when a file cannot be read."""
     return DemosError(f"{path} cannot be read: {error.strerror or error}.")
+
+
+@contextmanager
+def open_hdf5(path: Path) -> Generator[Any]:
+    """Open an HDF5 file for reading, as an `h5py.File`."""
+    h5py = library("h5py")
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise DemosError(f"{path} is not an intact HDF5 file: {error}.") from error
+    try:
+        yield file
+    except (OSError, RuntimeError) as error:  # Raised by h5py for inconsistent bytes.
+        raise DemosError(f"{path} is damaged: {error}.") from error
+    finally:
+        file.close()
+
+
+def _row_bytes(column: Any) -> int:
+    """Return the memory of one entry of a dataset, bytes."""
+    return math.prod(column.shape[1:]) * column.dtype.itemsize
+
+
+def chunk_of(columns: Iterable[Any], most: int) -> int:
+    """Return how many entries of columns to read at once: at most as many as fit, at least one."""
+    return max(1, min(most, MAX_UNPACKED // max(1, sum(map(_row_bytes, columns)))))
+
+
+def column(file: Any, name: str, length: int = 0) -> Any:
+    """Return a dataset in an HDF5 file; no link is followed.
+
+    Args:
+        file: An open `h5py.File`.
+        name: Path of the dataset in the file.
+        length: Minimum number of entries.
+
+    Raises:
+        DemosError: If it is missing, elsewhere, too short, or unpacks to too much.
+    """
+    h5py = library("h5py")
+    where, found = file.filename, file
+    for part in name.split("/"):
+        link = found.get(part, getlink=True) if isinstance(found, h5py.Group) else None
+        if isinstance(link, h5py.ExternalLink):
+            raise DemosError(f"{where} has {name!r} in another file, which is not opened.")
+        if isinstance(link, h5py.SoftLink):  # It may lead through a link to another file.
+            raise DemosError(f"{where} has a link for {name!r}, and links are not followed.")
+        if link is None or (found := found.get(part)) is None:
+            raise DemosError(f"{where} has no {name!r}, so the dataset is incomplete.")
+    if not isinstance(found, h5py.Dataset):
+        raise DemosError(f"{where}: {name!r} is not an array.")
+    if found.external or found.is_virtual:
+        raise DemosError(f"{where} has {name!r} in another file, which is not opened.")
+    # HDF5 unpacks whole chunks, and a step may claim any shape.
+    unpacked = max(_row_bytes(found), math.prod(found.chunks or ()) * found.dtype.itemsize)
+    if unpacked > MAX_UNPACKED:
+        raise DemosError(
+            f"{where}: {name!r} unpacks to {unpacked} bytes at once, more than the limit of "
+            f"{MAX_UNPACKED}."
+        )
+    if not found.shape or found.shape[0] < length:
+        have = found.shape[0] if found.shape else 0
+        raise DemosError(f"{where}: {name!r} has {have} entries, but {length} are needed.")
+    return found
+
+
+def names_in(file: Any, *groups: str) -> list[str]:
+    """Return the names in a group of groups; no link is followed."""
+    h5py = library("h5py")
+    found: Any = file
+    for part in groups:
+        if not isinstance(found.get(part, getlink=True), h5py.HardLink):
+            return []
+        found = found[part]
+        if not isinstance(found, h5py.Group):
+            return []
+    return [str(name) for name in found]
+
+
+@contextmanager
+def _open_parquet(path: Path) -> Generator[Any]:
+    """Open a Parquet file as a `pyarrow.parquet.ParquetFile`."""
+    arrow = library("pyarrow", "lerobot")
+    try:
+        # Without `buffer_size` a whole row group is in memory, which may be an episode of pictures.
+        opened = library("pyarrow.parquet", "lerobot").ParquetFile
+        with opened(path, pre_buffer=False, buffer_size=1 << 20) as file:
+            size = path.stat().st_size
+            claimed = sum(_sizes_of(file, range(file.metadata.num_row_groups)))
+            if claimed > MAX_UNPACKED + MAX_PACKED * size or file.metadata.num_rows > size:
+                raise UnpacksToTooMuch(
+                    f"{path} has {size} bytes, but claims to unpack to {claimed}."
+                )
+            yield file
+    except (arrow.ArrowException, OSError) as error:
+        reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
+        raise DemosError(f"{path} is not an intact Parquet file: {reason}.") from error
+
+
+def _sizes_of(file: Any, groups: Iterable[int]) -> Iterator[int]:
+    """Yield the size of each column of some row groups, bytes."""
+    for group in map(file.metadata.row_group, groups):
+        for column in map(group.column, range(group.num_columns)):
+            yield max(column.total_uncompressed_size, 8 * column.num_values)
+
+
+def _batches(file: Any, columns: Sequence[str], groups: Sequence[int] | None = None) -> Any:
+    """Return the rows of some row groups, or of all, a few at a time."""
+    groups = range(file.metadata.num_row_groups) if groups is None else groups
+    # Many rows may share one large value, which is in memory once for each.
+    largest = max(_sizes_of(file, groups), default=1)
+    rows = max(1, min(_ROWS, MAX_UNPACKED // max(1, largest)))
+    return file.iter_batches(rows, row_groups=groups, columns=columns)
+
+
+def all_rows(path: Path, columns: set[str] | None) -> list[dict[str, Any]]:
+    """Return the rows of a small Parquet table.
+
+    Args:
+        path: The file.
+        columns: Names of the columns to read, if they are there; None for all.
+
+    Raises:
+        DemosError: If it is damaged, or has a very long text.
+    """
+    found: list[dict[str, Any]] = []
+    with _open_parquet(path) as file:
+        known = set(file.schema_arrow.names)
+        for batch in _batches(file, sorted(known if columns is None else columns & known)):
+            for row in cast("list[dict[str, Any]]", batch.to_pylist()):
+                for value in row.values():  # A text, or a list of texts.
+                    texts = cast("list[Any]", value) if isinstance(value, list) else [value]
+                    if any(isinstance(text, str) and len(text) > _MAX_TEXT for text in texts):
+                        raise DemosError(f"{path} has a text of more than {_MAX_TEXT} characters.")
+                found.append(row)
+    return found
+
+
+def _vectors(column: Any, size: int, what: str) -> NDArray[np.float64]:
+    """Return the numbers of a column, shape (n, size)."""
+    types = library("pyarrow.types", "lerobot")
+    rows = len(column)
+    values: Any = getattr(column, "storage", column)  # Of arrays in an extension type.
+    even = not types.is_list(values.type) or len(np.unique(values.value_lengths())) == 1
+    while types.is_list(values.type) or types.is_fixed_size_list(values.type):
+        values = values.flatten()
+    if even and len(values) == rows * size:
+        try:
+            return np.asarray(values.to_numpy(zero_copy_only=False), np.float64).reshape(rows, size)
+        except (TypeError, ValueError) as error:
+            raise DemosError(f"{what} is not numeric ({error}).") from error
+    raise DemosError(f"{what} does not have {size} numbers in each row.")
+
+
+def number_columns(
+    path: Path, names: Sequence[str]
+) -> tuple[dict[str, NDArray[np.float64]], set[str]]:
+    """Return Parquet columns of single numbers, shape (n,) each, and the names of all columns.
+
+    Those that the file lacks are left out.
+    """
+    with _open_parquet(path) as file:
+        known = [name for name in names if name in file.schema_arrow.names]
+        parts: dict[str, list[NDArray[np.float64]]] = {name: [np.empty(0)] for name in known}
+        for batch in _batches(file, known):
+            for name in known:
+                parts[name].append(_vectors(batch.column(name), 1, f"{path}: {name!r}")[:, 0])
+        columns = {name: np.concatenate(found) for name, found in parts.items()}
+        return columns, set(file.schema_arrow.names)
+
+
+def rows_at(
+    path: Path, rows: NDArray[np.int64], sizes: Mapping[str, int], stored: Sequence[str]
+) -> Iterator[dict[str, Any]]:
+    """Yield some rows of a Parquet file, in its order: vectors, and pictures as stored.
+
+    Args:
+        path: The file.
+        rows: Positions of the rows, in ascending order.
+        sizes: Number of values of each column of numbers.
+        stored: Names of other columns.
+
+    Raises:
+        DemosError: If a column is missing, or has other values.
+    """
+    with _open_parquet(path) as file:
+        wanted = [*sizes, *stored]
+        if missing := [key for key in wanted if key not in file.schema_arrow.names]:
+            raise DemosError(f"{path} has no column {missing[0]!r}, which meta/info.json names.")
+        counts = [file.metadata.row_group(n).num_rows for n in range(file.metadata.num_row_groups)]
+        starts = np.cumsum([0, *counts])
+        groups = sorted({int(n) for n in np.searchsorted(starts, rows, "right") - 1})
+        places = np.array([r for n in groups for r in range(starts[n], starts[n + 1])], np.int64)
+        done = 0
+        for batch in _batches(file, wanted, groups):
+            here = np.flatnonzero(np.isin(places[done : done + batch.num_rows], rows))
+            done += batch.num_rows
+            # Not of the pictures: a copy of them may not fit into memory.
+            part = batch.select(list(sizes)).take(library("pyarrow", "lerobot").array(here))
+            numbers = {
+                key: _vectors(part.column(key), size, f"{path}: {key!r}")
+                for key, size in sizes.items()
+            }
+            for number, row in enumerate(here.tolist()):
+                vectors = {key: values[number] for key, values in numbers.items()}
+                yield vectors | {key: batch.column(key)[row].as_py() for key in stored}
+            if places[done - 1] >= rows[-1]:
+                return

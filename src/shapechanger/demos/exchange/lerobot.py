@@ -28,10 +28,11 @@ from shapechanger.demos.exchange.files import (
     MAX_VALUES,
     UNIT_UNKNOWN,
     UnpacksToTooMuch,
+    all_rows,
     inside,
     own_headers,
-    parse_json_object,
-    read_text,
+    read_json_object,
+    rows_at,
 )
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
@@ -41,7 +42,6 @@ from shapechanger.demos.exchange.format import (
 )
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, TASKS, write
 from shapechanger.demos.exchange.lerobot_index import LocatedEpisode, Place, locate, read_places
-from shapechanger.demos.exchange.parquet import all_rows, rows_at
 from shapechanger.demos.exchange.pictures import PictureError, Pictures, as_jpeg
 from shapechanger.demos.exchange.video import read_pictures
 from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
@@ -224,7 +224,7 @@ def _layout(features: Sequence[_Feature], context: ImportContext) -> str:
 def read_lerobot(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a dataset."""
     path = folder / INFO
-    info = parse_json_object(read_text(path), str(path))
+    info = read_json_object(path)
     version = str(info.get("codebase_version", "unknown"))
     if not version.startswith("v3."):
         raise DemosError(
@@ -294,7 +294,7 @@ def _own_headers(folder: Path, count: int) -> list[dict[str, Any]]:
     path = folder / OURS
     if not path.is_file():
         return []
-    headers = own_headers(parse_json_object(read_text(path), str(path)), path)
+    headers = own_headers(read_json_object(path), path)
     if len(headers) != count:
         raise DemosError(
             f"{path} describes {len(headers)} episodes, and the dataset has {count}: remove it if "

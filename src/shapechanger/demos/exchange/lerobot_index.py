@@ -19,10 +19,15 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.demos.exchange.files import UnpacksToTooMuch, inside, is_inside
+from shapechanger.demos.exchange.files import (
+    UnpacksToTooMuch,
+    all_rows,
+    inside,
+    is_inside,
+    number_columns,
+)
 from shapechanger.demos.exchange.format import ImportContext, few
 from shapechanger.demos.exchange.lerobot_export import EPISODES, INFO
-from shapechanger.demos.exchange.parquet import all_rows, number_columns
 from shapechanger.demos.exchange.video import VideoTimes, read_times
 from shapechanger.errors import DemosError
 

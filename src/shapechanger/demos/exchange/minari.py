@@ -35,10 +35,13 @@ from numpy.typing import NDArray
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.exchange.columns import fields_of, name_in
 from shapechanger.demos.exchange.files import (
+    chunk_of,
+    column,
     inside,
+    names_in,
+    open_hdf5,
     own_headers,
-    parse_json_object,
-    read_text,
+    read_json_object,
 )
 from shapechanger.demos.exchange.format import (
     DEFAULT_HZ,
@@ -48,7 +51,6 @@ from shapechanger.demos.exchange.format import (
     ImportContext,
     few,
 )
-from shapechanger.demos.exchange.hdf5 import chunk_of, column, names_in, open_hdf5
 from shapechanger.demos.exchange.minari_export import (
     CUT_OFF,
     DATA,
@@ -96,7 +98,7 @@ def read_minari(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisod
     """Yield the episodes of a dataset."""
     place = _data_folder(folder) or folder
     path = place / METADATA
-    metadata = parse_json_object(read_text(path), str(path))
+    metadata = read_json_object(path)
     if metadata.get("data_format", "hdf5") != "hdf5":
         raise DemosError(
             f"{folder} is stored as {metadata['data_format']!r}, but only 'hdf5' is supported: "

@@ -128,15 +128,14 @@ def read_picture(path: Path) -> tuple[bytes, bool]:
 
 
 def check_pictures(
-    paths: Sequence[Path], names: Sequence[str], what: str, context: ImportContext
+    pictures: Sequence[tuple[Path, str]], what: str, context: ImportContext
 ) -> tuple[list[bool], tuple[int, int] | None]:
     """Decode each picture once, and leave out the records whose pictures are not whole.
 
     All pictures of a data set have one size, which is the most frequent one.
 
     Args:
-        paths: File of each record.
-        names: Name of each record.
+        pictures: File and name of each record.
         what: What a record is called, in the singular.
         context: Findings of the import.
 
@@ -145,7 +144,7 @@ def check_pictures(
     """
     sizes: list[tuple[int, int] | None] = []
     encoded = 0
-    for path, name in zip(paths, names, strict=True):
+    for path, name in pictures:
         try:
             jpeg, is_new = read_picture(path)
             if not is_new:
@@ -153,13 +152,12 @@ def check_pictures(
             encoded += is_new
             sizes.append(picture_size(jpeg, str(path)))
         except DemosError as error:
-            is_known = isinstance(error, PictureError)
-            reason = error.reason if is_known else "with a damaged picture"
+            reason = error.reason if isinstance(error, PictureError) else "with a damaged picture"
             context.leave_out(what, reason, name)
             sizes.append(None)
     counts = Counter(size for size in sizes if size is not None)
     common = counts.most_common(1)[0][0] if counts else None
-    for size, name in zip(sizes, names, strict=True):
+    for size, (_, name) in zip(sizes, pictures, strict=True):
         if size is not None and common is not None and size != common:
             reason = "with a picture of another size than {} x {} pixels".format(*common)
             context.leave_out(what, reason, name)

@@ -1,86 +1,150 @@
-"""Donkeycar tubs: import of versions 1 and 2, export of version 2.
+"""Donkeycar tubs: import of versions 1 and 2.
 
 `user/angle` is -1 at the left and 1 at the right, and a `user/throttle` of 1 is forward, as in
 Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is what a policy wanted. In
 the other modes `pilot/...` drives, except that in "local_angle" the throttle is the person's.
+
+Version 2 is a folder with `manifest.json`, catalogs and `images/`. The manifest has five lines of
+JSON: inputs, types, metadata, more metadata, and an object with `paths` (the catalogs in order),
+`current_index`, `max_len` and `deleted_indexes`, which are values of the records' `_index`. A
+catalog has one JSON object per line; `_timestamp_ms` is Unix time, `_session_id` names the start of
+the car that it belongs to, and `cam/image_array` names a file in `images/`. Beside a catalog,
+`NAME.catalog_manifest` has its `start_index` and the lengths of its lines. Version 1 has a file
+`record_N.json` per record, its picture beside it, optionally `milliseconds` since the start,
+`meta.json` with inputs, types and optionally the Unix time of the start, and `exclude.json` with
+the numbers of deleted records.
+
+Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py for version 2,
+parts/datastore.py for version 1, at the commits 1e831b81, 38a1c2db and b253cef6.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from datetime import UTC, datetime
-from itertools import groupby
+from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
 from pathlib import Path, PurePath
 from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.columns import COMMANDS, name_in
-from shapechanger.demos.exchange.files import UNIT_UNKNOWN, is_inside
+from shapechanger.demos.exchange.files import (
+    UNIT_UNKNOWN,
+    cannot_read,
+    is_inside,
+    parse_json,
+    read_bytes,
+    read_json_object,
+    read_text,
+)
 from shapechanger.demos.exchange.format import (
     ExchangeEpisode,
     ExchangeStep,
-    ExportContext,
     Format,
     ImportContext,
     counted,
     few,
-    kept_steps,
 )
 from shapechanger.demos.exchange.pictures import check_pictures, read_picture
 from shapechanger.demos.exchange.times import TimedDrive, choose_rates, iso_time, split_at_jumps
-from shapechanger.demos.exchange.tub_files import (
+from shapechanger.demos.exchange.tub_export import (
+    ACTIONS,
+    AXES,
+    IMAGE,
     IMAGES,
     LOOP_HZ,
     MANIFEST,
+    MODE,
     NS_PER_MS,
     NS_PER_S,
-    V1_TIME,
-    Tub,
-    TubRecord,
-    is_tub,
-    read_files,
+    PERSON_DRIVES,
+    write,
 )
 from shapechanger.errors import DemosError, UnknownName
 from shapechanger.layout import Feature, Layout
 
-_ACTIONS: Final = Layout((COMMANDS["steering"], COMMANDS["throttle"]))
-_AXES: Final = ("angle", "throttle")
-_IMAGE: Final = name_in("tub", "frame")
-_MODE: Final = name_in("tub", "driver")
-_PERSON_DRIVES: Final = "user"
-_POLICY_DRIVES: Final = "local"
 _POLICY_STEERS: Final = "local_angle"
-_CATALOG_LENGTH: Final = 1000  # Records, as in Donkeycar.
+_V1_TIME: Final = "milliseconds"
+_MAX_TIME: Final = 1e15  # Larger numbers are not a time, in ms or s.
+_MAX_NS: Final = 1 << 61  # Half of what a step can hold: version 1 adds two times.
 _NUMBERS: Final = ("float", "int", "boolean")
 _PICTURES: Final = ("image_array", "image")
 _DEPTH: Final = "gray16_array"
 _KNOWN: Final = (*_NUMBERS, *_PICTURES, _DEPTH, "str", "list", "vector", "nparray")
 _ENDINGS: Final = (".jpg", ".jpeg", ".png", ".bmp")
 _PICTURE_NUMBER: Final = re.compile(r"([0-9]{1,12})_")
+_RECORD_NAME: Final = re.compile(r"record_([0-9]{1,12})\.json")
+_CATALOG_NAME: Final = re.compile(r"catalog_([0-9]{1,9})\.catalog")
+_DAMAGED: Final = "that is not valid JSON"
+
+_Fields = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """A record with its `_index` or the number of its file; its time and picture if known."""
+
+    fields: _Fields
+    number: int
+    time_ns: int | None
+    session: str = ""
+    step: Step | None = None
+    path: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Tub:
+    """The records of a tub that were not deleted, and its declarations.
+
+    Times are Unix times if `is_unix`, or begin at 0 with each start of the car.
+    """
+
+    inputs: dict[str, str]
+    records: list[_Record]
+    deleted: int
+    images: Path
+    start_ns: int | None
+    is_unix: bool
+    stated_hz: float | None
 
 
 def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a tub: its sessions, divided at pauses and where time jumps."""
-    tub = read_files(folder, context)
+    tub = (_read_v2 if (folder / MANIFEST).is_file() else _read_v1)(folder, context)
+    if tub.deleted:
+        context.note(f"{counted(tub.deleted, 'record')} deleted in the tub, and not imported.")
     if not tub.records:
         return
-    columns = _columns(tub)
+    columns: dict[str, str] = {}  # The type of each that a record has, declared or by its values.
+    for record in tub.records:
+        for name, value in record.fields.items():
+            if not name.startswith("_") and name != _V1_TIME and columns.get(name) not in _KNOWN:
+                declared = tub.inputs.get(name, "")
+                columns[name] = declared if declared in _KNOWN else _kind_of(value)
     camera = _camera(columns, folder, context)
-    state = _state_layout(tub.inputs or columns)
-    _note_other_columns(columns, camera, state, context)
-    records, size = [record for r in tub.records if (record := _driven(r, state, context))], None
+    sensed = [
+        name
+        for name, kind in (tub.inputs or columns).items()
+        if name and kind in _NUMBERS and not name.startswith(("user/", "pilot/", "_"))
+    ]
+    state = Layout(tuple(Feature(name, UNIT_UNKNOWN) for name in sensed)) if sensed else None
+    taken = {
+        camera,
+        MODE,
+        *sensed,
+        *(f"{who}/{axis}" for who in ("user", "pilot") for axis in AXES),
+    }
+    if left := [f"{name} ({kind})" for name, kind in columns.items() if name and name not in taken]:
+        context.note(f"Columns that are not imported: {', '.join(left)}.")
+    records, size = [record for r in tub.records if (record := _driven(r, sensed, context))], None
     if camera:
         records, size = _with_pictures(records, tub.images, camera, context)
     if not records:
         return
     parts = list(_drives(records, restarts=not tub.is_unix))
     times = [_times_ns(part, context) for part in parts]
-    names = [[str(record.number) for record in part] for part in parts]
     drives = [
         TimedDrive(known, [record.number for record in part], f"record {part[0].number}")
         for part, known in zip(parts, times, strict=True)
@@ -88,13 +152,14 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     rates, believed = choose_rates(drives, context, tub.stated_hz)
     if not believed:
         drives = [replace(drive, times_ns=()) for drive in drives]
+    names = [[str(record.number) for record in part] for part in parts]
     places = split_at_jumps(drives, names, rates, context)
     for part, known, hz, split in zip(parts, times, rates, places, strict=True):
         timed = bool(known) and believed
         for place in split:
             began_ns = known[place][0] if timed and tub.is_unix else tub.start_ns
             header = EpisodeHeader(
-                action_layout=_ACTIONS.to_json(),
+                action_layout=ACTIONS.to_json(),
                 state_layout="" if state is None else state.to_json(),
                 image_size=size,
                 control_hz=hz,
@@ -111,16 +176,12 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
             )
 
 
-def _columns(tub: Tub) -> dict[str, str]:
-    """Return the type of each column that a record has, declared or by its values."""
-    columns: dict[str, str] = {}
-    for record in tub.records:
-        for name, value in record.fields.items():
-            if name.startswith("_") or name == V1_TIME or columns.get(name) in _KNOWN:
-                continue
-            declared, found = tub.inputs.get(name, ""), _kind_of(value)
-            columns[name] = declared if declared in _KNOWN else found
-    return columns
+def _steps(records: Sequence[_Record], *, timed: bool, is_unix: bool) -> Iterator[ExchangeStep]:
+    for record in records:
+        at_ns = record.time_ns if timed else None
+        wall_ns = at_ns if is_unix else None
+        step = replace(cast("Step", record.step), captured_ns=at_ns, wall_ns=wall_ns)
+        yield ExchangeStep(step=step, jpeg=read_picture(record.path)[0] if record.path else None)
 
 
 def _kind_of(value: Any) -> str:
@@ -148,44 +209,24 @@ def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) ->
             f"The steps have no pictures, because those of {few(deep)} have 16 bits, as of depth, "
             "and only pictures of 8 bits can be imported."
         )
-    if len(cameras) > 1 and _IMAGE not in cameras:
+    if len(cameras) > 1 and IMAGE not in cameras:
         raise DemosError(
             f"{folder} has {len(cameras)} cameras ({', '.join(cameras)}), but an episode has one: "
             f"choose with --camera, such as --camera {cameras[0]}."
         )
-    if len(cameras) == 1 and cameras[0] != _IMAGE:
+    if len(cameras) == 1 and cameras[0] != IMAGE:
         context.note(f"The pictures are those of the column {cameras[0]}.")
-    return _IMAGE if _IMAGE in cameras else "".join(cameras)
+    return IMAGE if IMAGE in cameras else "".join(cameras)
 
 
-def _note_other_columns(
-    columns: Mapping[str, str], camera: str, state: Layout | None, context: ImportContext
-) -> None:
-    taken = {camera, _MODE, *(state.names if state else ())}
-    taken |= {f"{actor}/{axis}" for actor in ("user", "pilot") for axis in _AXES}
-    left = [f"{name} ({kind})" for name, kind in columns.items() if name and name not in taken]
-    if left:
-        context.note(f"Columns that are not imported: {', '.join(left)}.")
-
-
-def _state_layout(inputs: Mapping[str, str]) -> Layout | None:
-    """Return the layout of the state in a tub with these inputs, by type; None without a state."""
-    names = [
-        name
-        for name, kind in inputs.items()
-        if name and kind in _NUMBERS and not name.startswith(("user/", "pilot/", "_"))
-    ]
-    return Layout(tuple(Feature(name, UNIT_UNKNOWN) for name in names)) if names else None
-
-
-def _driven(record: TubRecord, state: Layout | None, context: ImportContext) -> TubRecord | None:
+def _driven(record: _Record, sensed: Sequence[str], context: ImportContext) -> _Record | None:
     """Return a record with its step; None, with a finding, if it has no valid action."""
-    mode = record.fields.get(_MODE, _PERSON_DRIVES)
-    by_person = mode == _PERSON_DRIVES
+    mode = record.fields.get(MODE, PERSON_DRIVES)
+    by_person = mode == PERSON_DRIVES
     actors = ("user" if by_person else "pilot",) * 2
     if mode == _POLICY_STEERS:
         actors = ("pilot", "user")
-    names = [f"{actor}/{axis}" for actor, axis in zip(actors, _AXES, strict=True)]
+    names = [f"{actor}/{axis}" for actor, axis in zip(actors, AXES, strict=True)]
     lacking = [name for name in names if record.fields.get(name) is None]
     action = _pair(record, names)
     if lacking or action is None:
@@ -195,18 +236,18 @@ def _driven(record: TubRecord, state: Layout | None, context: ImportContext) -> 
             reason = f"without {' and '.join(lacking)}{driver}"
         context.leave_out("record", reason, record.number)
         return None
-    wanted, suggested = None, [f"pilot/{axis}" for axis in _AXES]
+    wanted, suggested = None, [f"pilot/{axis}" for axis in AXES]
     if by_person:
         wanted = _pair(record, suggested)
         if wanted is None and None not in map(record.fields.get, suggested):
             reason = "of the pilot that is not a number from -1 to 1, while a person drove"
             context.leave_out("suggestion", reason, record.number)
+    state = tuple(_sensed(record.fields.get(name)) for name in sensed)
     driver = "person" if by_person else "policy"
-    sensed = tuple(_sensed(record.fields.get(name)) for name in state.names) if state else ()
-    return replace(record, step=Step(action=action, driver=driver, wanted=wanted, state=sensed))
+    return replace(record, step=Step(action=action, driver=driver, wanted=wanted, state=state))
 
 
-def _pair(record: TubRecord, names: Sequence[str]) -> tuple[float, float] | None:
+def _pair(record: _Record, names: Sequence[str]) -> tuple[float, float] | None:
     """Return two numbers from -1 to 1; None for anything else."""
     values = [record.fields.get(name) for name in names]
     for value in values:
@@ -224,11 +265,11 @@ def _sensed(value: Any) -> float:
 
 
 def _with_pictures(
-    records: Sequence[TubRecord], images: Path, camera: str, context: ImportContext
-) -> tuple[list[TubRecord], tuple[int, int] | None]:
+    records: Sequence[_Record], images: Path, camera: str, context: ImportContext
+) -> tuple[list[_Record], tuple[int, int] | None]:
     """Return the records whose pictures can be imported, and the size of these."""
     shown = Counter(str(record.fields.get(camera)) for record in records)
-    found: list[TubRecord] = []
+    found: list[_Record] = []
     offsets: dict[int, int] = {}
     for record in records:
         number, name = record.number, record.fields.get(camera)
@@ -251,18 +292,17 @@ def _with_pictures(
             f"{max(map(abs, offsets.values()))} off ({few(list(offsets))}): look whether they "
             "belong together."
         )
-    paths = [record.path for record in found if record.path is not None]
-    good, size = check_pictures(paths, [str(record.number) for record in found], "record", context)
+    pictures = [(cast("Path", record.path), str(record.number)) for record in found]
+    good, size = check_pictures(pictures, "record", context)
     return [record for record, is_good in zip(found, good, strict=True) if is_good], size
 
 
-def _drives(records: Sequence[TubRecord], *, restarts: bool) -> Iterator[list[TubRecord]]:
+def _drives(records: Sequence[_Record], *, restarts: bool) -> Iterator[list[_Record]]:
     """Yield the records of each session, and of each start of the car if times restart with it."""
     for _, session in groupby(records, key=lambda record: record.session):
-        drive: list[TubRecord] = []
+        drive: list[_Record] = []
         for record in session:
-            before_ns = drive[-1].time_ns if drive else None
-            now_ns = record.time_ns
+            before_ns, now_ns = drive[-1].time_ns if drive else None, record.time_ns
             if restarts and now_ns is not None and before_ns is not None and now_ns < before_ns:
                 yield drive
                 drive = []
@@ -270,7 +310,7 @@ def _drives(records: Sequence[TubRecord], *, restarts: bool) -> Iterator[list[Tu
         yield drive
 
 
-def _times_ns(drive: Sequence[TubRecord], context: ImportContext) -> list[int]:
+def _times_ns(drive: Sequence[_Record], context: ImportContext) -> list[int]:
     """Return the time of each record, ns; an empty list if one is unknown."""
     times = [record.time_ns for record in drive if record.time_ns is not None]
     if 0 < len(times) < len(drive):
@@ -281,145 +321,219 @@ def _times_ns(drive: Sequence[TubRecord], context: ImportContext) -> list[int]:
     return times if len(times) == len(drive) else []
 
 
-def _steps(records: Sequence[TubRecord], *, timed: bool, is_unix: bool) -> Iterator[ExchangeStep]:
-    for record in records:
-        at_ns = record.time_ns if timed else None
-        step = replace(
-            cast("Step", record.step), captured_ns=at_ns, wall_ns=at_ns if is_unix else None
-        )
-        jpeg = None if record.path is None else read_picture(record.path)[0]
-        yield ExchangeStep(step=step, jpeg=jpeg)
-
-
-def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
-    """Write episodes as the sessions of one tub of version 2.
-
-    Actions of people, experts and programs become the user's, those of policies the pilot's. Steps
-    of a simulated drive get the times of its own clock, since the recorder's tells how fast the
-    simulation ran; steps without a time follow the one before at the rate of the episode.
-    """
-    states = [_state_names(episode) for episode in episodes]
-    if any(state != states[0] for state in states):
-        raise DemosError("The episodes have different states: export each kind to its own tub.")
-    (folder / IMAGES).mkdir()
-    records: list[dict[str, Any]] = []
-    sessions: list[str] = []
-    for number, episode in enumerate(episodes):
-        began = _began(episode.header)
-        sessions.append(f"{began:%y-%m-%d}_{number}")
-        last_ns: int | None = None
-        first_ns: int | None = None
-        for step, jpeg in kept_steps(episode.rows):
-            if jpeg is None:
-                raise DemosError(f"A step of {episode.name} has no picture: export it to csv.")
-            first_ns = step.clock_ns if first_ns is None else first_ns
-            last_ns = _time_ns(step, episode.header, began, first_ns, last_ns)
-            name = f"{len(records)}_cam_image_array_.jpg"
-            (folder / IMAGES / name).write_bytes(jpeg)
-            fields = _fields(step, states[0], f"{episode.name}, record {len(records)}")
-            fields |= {_IMAGE: name, "_session_id": sessions[-1], "_index": len(records)}
-            records.append(fields | {"_timestamp_ms": round(last_ns / NS_PER_MS)})
-    created_s = _began(episodes[0].header).timestamp()
-    inputs = {_IMAGE: "image_array", "user/angle": "float", "user/throttle": "float", _MODE: "str"}
-    inputs |= {"pilot/angle": "float", "pilot/throttle": "float"}
-    inputs |= dict.fromkeys(states[0], "float")
-    named = {"all_full_ids": sessions, "last_id": len(sessions) - 1, "last_full_id": sessions[-1]}
-    rates = {episode.header.control_hz for episode in episodes}
-    catalogs = {
-        "paths": _write_catalogs(folder, records, created_s),
-        "current_index": len(records),
-        "max_len": _CATALOG_LENGTH,
-        "deleted_indexes": [],
-    }
-    lines: tuple[object, ...] = (
-        list(inputs),
-        list(inputs.values()),
-        {LOOP_HZ: f"{rates.pop():g}"} if len(rates) == 1 else {},
-        {"created_at": created_s, "sessions": named},
-        catalogs,
-    )
-    _write_lines(folder / MANIFEST, [json.dumps(line) for line in lines])
-    return len(records)
-
-
-def _state_names(episode: ExchangeEpisode) -> tuple[str, ...]:
-    """Return the names of the values of the state."""
-    names = Layout.from_json(episode.header.action_layout).names
-    if names != _ACTIONS.names:
-        raise DemosError(
-            f"The actions of {episode.name} are {', '.join(names)}, but those of a tub are "
-            f"{', '.join(_ACTIONS.names)}: export it to minari or csv."
-        )
-    if not episode.header.state_layout:
-        return ()
-    state = Layout.from_json(episode.header.state_layout)
-    if state.size != len(state):
-        raise DemosError(f"The state of {episode.name} has array features: export it to csv.")
-    return state.names
-
-
-def _fields(step: Step, state: Sequence[str], where: str) -> dict[str, Any]:
-    by_policy = step.driver == "policy"
-    if any(abs(value) > 1.0 for value in step.action):
-        raise DemosError(f"{where}: the action {list(step.action)} is not from -1 to 1.")
-    fields: dict[str, Any] = {_MODE: _POLICY_DRIVES if by_policy else _PERSON_DRIVES}
-    # A tub always contains the user's action; while a policy drives, it is 0.
-    user = (0.0, 0.0) if by_policy else step.action
-    fields |= {f"user/{axis}": value for axis, value in zip(_AXES, user, strict=True)}
-    pilot = step.action if by_policy else step.wanted
-    if pilot is not None and all(abs(value) <= 1.0 for value in pilot):
-        fields |= {f"pilot/{axis}": value for axis, value in zip(_AXES, pilot, strict=True)}
-    known = zip(state, step.state, strict=True)
-    return fields | {name: value for name, value in known if math.isfinite(value)}
-
-
-def _time_ns(
-    step: Step, header: EpisodeHeader, began: datetime, first_ns: int | None, last_ns: int | None
-) -> int:
-    """Return the Unix time of a step, ns, after the one before."""
-    began_ns = round(began.timestamp() * NS_PER_S)
-    at_ns = step.wall_ns
-    if header.clock == "twin" or (header.clock == "none" and header.env):  # Simulated.
-        clock_ns = step.clock_ns
-        at_ns = None if clock_ns is None else began_ns + clock_ns - cast("int", first_ns)
-    if at_ns is None or (last_ns is not None and at_ns <= last_ns):
-        return began_ns if last_ns is None else last_ns + round(NS_PER_S / header.control_hz)
-    return at_ns
-
-
-def _began(header: EpisodeHeader) -> datetime:
-    """Return when an episode began; the Unix epoch if unknown."""
+def _numbered(folder: Path, pattern: re.Pattern[str]) -> dict[int, str]:
+    """Return the files whose names match, in the order of their numbers."""
     try:
-        return datetime.fromisoformat(header.created)
-    except ValueError:
-        return datetime.fromtimestamp(0.0, UTC)
+        names = [child.name for child in folder.iterdir()]
+    except OSError as error:
+        raise cannot_read(folder, error) from error
+    return dict(sorted((int(m[1]), m[0]) for m in map(pattern.fullmatch, names) if m))
 
 
-def _write_catalogs(folder: Path, records: Sequence[dict[str, Any]], created_s: float) -> list[str]:
-    """Write the catalogs, each with its manifest; return the names of the catalogs."""
-    paths: list[str] = []
-    for number, start in enumerate(range(0, len(records), _CATALOG_LENGTH)):
-        part = records[start : start + _CATALOG_LENGTH]
-        lines = [json.dumps(record, allow_nan=False, sort_keys=True) for record in part]
-        paths.append(f"catalog_{number}.catalog")
-        _write_lines(folder / paths[-1], lines)
-        beside = f"{paths[-1]}_manifest"
-        kept: dict[str, Any] = {"created_at": created_s, "path": beside, "start_index": start}
-        kept["line_lengths"] = [len(line) + 1 for line in lines]
-        _write_lines(folder / beside, [json.dumps(kept, sort_keys=True)])
-    return paths
+def _read_v2(folder: Path, context: ImportContext) -> _Tub:
+    path = folder / MANIFEST
+    lines = [line.strip(b"\0\r ") for line in read_bytes(path).split(b"\n")]
+    inputs, types, metadata, more, catalogs = map(_parsed, (lines + [b""] * 5)[:5])
+    if not isinstance(inputs, list) or not isinstance(types, list):
+        context.warn(f"{path} is damaged: the columns are those that the records have.")
+        inputs = types = []
+    known = _object(catalogs) or {}
+    if known:
+        names = [str(name) for name in _list(known.get("paths"), f"paths in {path}")]
+        deleted = _numbers(known.get("deleted_indexes", []), f"deleted_indexes in {path}")
+    else:
+        deleted, names = set[int](), [*_numbered(folder, _CATALOG_NAME).values()]
+        context.warn(
+            f"{path} is damaged: all catalogs in the folder are read, and records that were "
+            "deleted cannot be told from the others."
+        )
+    if len(set(names)) < len(names):
+        context.warn(f"{path} names a catalog twice in its paths: it is read once.")
+    rows: list[tuple[int, _Fields]] = []
+    for name in dict.fromkeys(names):
+        if not name or not is_inside(folder, name):
+            raise DemosError(f"{path}: the catalog {name!r} leaves the folder.")
+        _read_catalog(folder / name, rows, context)
+    records = _with_numbers(rows, context)
+    _report_missing(records, deleted, known.get("current_index"), context)
+    return _Tub(
+        inputs=_typed(inputs, types, path),
+        records=[record for record in records if record.number not in deleted],
+        deleted=len(deleted & {record.number for record in records}),
+        images=folder / IMAGES,
+        start_ns=_in_ns((_object(more) or {}).get("created_at"), NS_PER_S),
+        is_unix=True,
+        stated_hz=_stated_hz(metadata),
+    )
 
 
-def _write_lines(path: Path, lines: Sequence[str]) -> None:
-    path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
+def _read_catalog(path: Path, rows: list[tuple[int, _Fields]], context: ImportContext) -> None:
+    """Append the records of a catalog, each with its number by counting."""
+    if not path.is_file():
+        context.leave_out("catalog", "that is missing", path.name)
+        return
+    beside = path.with_suffix(".catalog_manifest")
+    about = _object(_parsed(read_bytes(beside))) if beside.is_file() else None
+    start = (about or {}).get("start_index")
+    if not isinstance(start, int) or isinstance(start, bool):
+        start = rows[-1][0] + 1 if rows else 0
+    try:
+        lines = read_bytes(path).split(b"\n")
+    except DemosError as error:
+        context.leave_out("catalog", f"that cannot be read ({error})", path.name)
+        return
+    whole = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    for position, (number, line) in enumerate(whole, start):
+        if (fields := _object(_parsed(line))) is not None:
+            rows.append((position, fields))
+        else:
+            reason = _DAMAGED if line.strip(b"\0\r") else "of NUL bytes, as after a power cut"
+            context.leave_out("line", reason, f"{path.name}, line {number}")
+
+
+def _with_numbers(rows: Sequence[tuple[int, _Fields]], context: ImportContext) -> list[_Record]:
+    """Return records in the order of their `_index`, without those whose number is unclear."""
+    has_index = any("_index" in fields for _, fields in rows)
+    records: list[_Record] = []
+    for position, fields in rows:
+        number = fields.get("_index") if has_index else position
+        if isinstance(number, bool) or not isinstance(number, int):
+            context.leave_out("record", "without a valid _index", f"the one at position {position}")
+            continue
+        session = fields.get("_session_id")
+        time_ns = _in_ns(fields.get("_timestamp_ms"), NS_PER_MS)
+        records.append(_Record(fields, number, time_ns, "" if session is None else str(session)))
+    falls = [(a.number, b.number) for a, b in pairwise(records) if b.number < a.number]
+    if falls:
+        context.warn(
+            f"The _index falls in {counted(len(falls), 'place')}, first from {falls[0][0]} to "
+            f"{falls[0][1]}: the records are read in its order."
+        )
+    unique: list[_Record] = []
+    ordered = sorted(records, key=lambda record: record.number)
+    for number, group in groupby(ordered, key=lambda record: record.number):
+        first, *others = group
+        same = sum(record.fields == first.fields for record in others)
+        for _ in range(same):
+            context.leave_out("record", "that repeats another", number)
+        if same == len(others):
+            unique.append(first)
+            continue
+        # Of those with one number and different content, nothing says which one counts.
+        for _ in range(1 + len(others) - same):
+            context.leave_out("record", "with the _index of another record", number)
+    return unique
+
+
+def _report_missing(
+    records: Sequence[_Record], deleted: set[int], count: Any, context: ImportContext
+) -> None:
+    """Report numbers that the manifest has and no record."""
+    numbers = {record.number for record in records}
+    last = max(numbers, default=-1)
+    if isinstance(count, int) and not isinstance(count, bool):
+        last = max(last, min(count, last + 1_000_000) - 1)
+        if last >= count:
+            context.warn(
+                f"The manifest counts {count} records, and the last one has the _index {last}."
+            )
+    missing = [number for number in range(last + 1) if number not in numbers]
+    if missing:
+        runs = [
+            [number for _, number in run]
+            for _, run in groupby(enumerate(missing), key=lambda pair: pair[1] - pair[0])
+        ]
+        named = few([f"{r[0]} to {r[-1]}" if len(r) > 1 else f"{r[0]}" for r in runs])
+        context.note(f"{len(missing)} of the records 0 to {last} are in no catalog: {named}.")
+    if strange := sorted(deleted - numbers - set(missing)):
+        context.warn(f"{len(strange)} of the deleted indexes belong to no record: {few(strange)}.")
+
+
+def _read_v1(folder: Path, context: ImportContext) -> _Tub:
+    path, exclude = folder / "meta.json", folder / "exclude.json"
+    meta = read_json_object(path) if path.is_file() else {}
+    deleted = set[int]()
+    if exclude.is_file():
+        deleted = _numbers(parse_json(read_text(exclude), str(exclude)), f"numbers in {exclude}")
+    start_ns = _in_ns(meta.get("start"), NS_PER_S)
+    names = _numbered(folder, _RECORD_NAME)
+    records: list[_Record] = []
+    for number in sorted(names.keys() - deleted):
+        record_path = folder / names[number]
+        if not is_inside(folder, names[number]):
+            raise DemosError(f"{record_path} is a link that leaves the folder.")
+        if (fields := _object(_parsed(read_bytes(record_path)))) is None:
+            context.leave_out("record", _DAMAGED, number)
+            continue
+        time_ns = _in_ns(fields.get(_V1_TIME), NS_PER_MS)
+        time_ns = None if time_ns is None else time_ns + (start_ns or 0)
+        records.append(_Record(fields, number, time_ns))
+    return _Tub(
+        inputs=_typed(meta.get("inputs", []), meta.get("types", []), path),
+        records=records,
+        deleted=len(deleted & names.keys()),
+        images=folder,
+        start_ns=start_ns,
+        is_unix=start_ns is not None,
+        stated_hz=_stated_hz(meta),
+    )
+
+
+def _parsed(line: bytes) -> Any:
+    """Return the value of a line of JSON; None if it is damaged."""
+    try:
+        return parse_json(line.decode("utf-8-sig"), "a line")
+    except (DemosError, UnicodeDecodeError):
+        return None
+
+
+def _object(value: Any) -> _Fields | None:
+    return cast("_Fields", value) if isinstance(value, dict) else None
+
+
+def _typed(inputs: Any, types: Any, path: Path) -> dict[str, str]:
+    names, kinds = _list(inputs, f"inputs in {path}"), _list(types, f"types in {path}")
+    if len(names) != len(kinds):
+        raise DemosError(f"{path} has {len(names)} inputs, but {len(kinds)} types.")
+    return {str(name): str(kind) for name, kind in zip(names, kinds, strict=True)}
+
+
+def _list(value: Any, what: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise DemosError(f"The {what} must be a list.")
+    return cast("list[Any]", value)
+
+
+def _numbers(value: Any, what: str) -> set[int]:
+    for number in _list(value, what):
+        if isinstance(number, bool) or not isinstance(number, int):
+            raise DemosError(f"The {what} must be integers, got {number!r}.")
+    return set(value)
+
+
+def _stated_hz(metadata: Any) -> float | None:
+    """Return the rate in the metadata of a tub; None if they do not state it."""
+    try:
+        hz = float(metadata[LOOP_HZ])
+    except (LookupError, TypeError, ValueError, OverflowError):
+        return None
+    return hz if 0.0 < hz < math.inf else None
+
+
+def _in_ns(value: Any, unit_ns: int) -> int | None:
+    """Return a time as ns; None for anything that cannot be a time."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    in_ns = round(value * unit_ns) if abs(value) < _MAX_TIME else _MAX_NS
+    return in_ns if abs(in_ns) < _MAX_NS else None
 
 
 FORMAT: Final = Format(
     name="tub",
     title="Donkeycar",
     sign=f"{MANIFEST} or record_0.json",
-    detect=is_tub,
+    detect=lambda path: (path / MANIFEST).is_file() or bool(_numbered(path, _RECORD_NAME)),
     read=_read,
-    write=_write,
+    write=write,
     options=frozenset({"camera", "hz"}),
 )
