@@ -11,9 +11,6 @@ index of the picture in the episode, the same for steps that share one; `more` i
 rest. `cut_off` says whether an end was added. The headers of the episodes, the layouts and the rate
 are in `metadata.json`.
 
-Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
-encodes each picture again at JPEG quality 75, and needs the whole episode in memory.
-
 Of a dataset of others, at most one part of an observation may be a picture; all other values become
 the state, in order. Pictures that are not JPEG are encoded with quality 100. The driver is unknown
 and taken to be an "expert". The rate is that of the key `control_hz`, that of `--hz`, or 20 Hz.
@@ -27,20 +24,27 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.exchange.columns import fields_of, name_in
 from shapechanger.demos.exchange.files import (
+    MAX_FEATURES,
+    MAX_UNPACKED,
+    MAX_VALUES,
+    UNIT_UNKNOWN,
     chunk_of,
     column,
     inside,
+    library,
     names_in,
     open_hdf5,
     own_headers,
+    parse_json,
     read_json_object,
 )
 from shapechanger.demos.exchange.format import (
@@ -61,31 +65,26 @@ from shapechanger.demos.exchange.minari_export import (
     OBSERVATIONS,
     OURS,
     UNKNOWN_NS,
+    stored_as_jpeg,
     write_minari,
 )
-from shapechanger.demos.exchange.minari_spaces import (
-    Leaf,
-    colours_first,
-    is_imported,
-    layout_of,
-    picture_size,
-    read_leaves,
-    stored_as_jpeg,
-)
 from shapechanger.demos.exchange.pictures import Pictures
-from shapechanger.demos.jpeg import encode_picture
-from shapechanger.errors import DemosError, UnknownName
+from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
+from shapechanger.errors import DemosError, MissingExtra, UnknownName
+from shapechanger.layout import Feature, Layout
 
 _CHUNK: Final = 64  # Steps in memory at once; pictures may be stored as pixels.
+_MIN_PICTURE: Final = 8  # Pixels. A smaller grid is a map, not a picture.
+_CHANNELS: Final = (1, 3)
+_DEEP: Final = (np.uint16, np.int16, np.uint32)
 _TIMES: Final = fields_of("time")
-_ACTION, _REWARD, _TERMINATED, _TRUNCATED, _DRIVER, _STOP, _MORE = (
-    name_in("minari", field)
-    for field in ("action", "reward", "terminated", "truncated", "driver", "stop_reason", "terms")
+_ACTION, _REWARD, _TERMINATED, _TRUNCATED = (
+    name_in("minari", field) for field in ("action", "reward", "terminated", "truncated")
 )
-_APPLIED, _WANTED = (name_in("minari", field) for field in ("applied", "wanted"))
+_DRIVER, _STOP, _MORE = (name_in("minari", field) for field in ("driver", "stop_reason", "terms"))
 _INFOS: Final = (
     *(f"infos/{name}" for name in ("rewarded", "has_applied", "has_wanted", *_TIMES)),
-    *(_APPLIED, _WANTED, _DRIVER, _STOP, _MORE),
+    *("infos/applied", "infos/wanted", _DRIVER, _STOP, _MORE),
 )
 
 
@@ -109,16 +108,16 @@ def read_minari(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisod
     if not isinstance(count, int) or isinstance(count, bool) or count < 1:
         raise DemosError(f"{path}: total_episodes must be a positive integer, got {count!r}.")
     _require_stored(main, count)
-    ours = own_headers(metadata[OURS], path) if OURS in metadata else None
-    if ours is not None and len(ours) != count:
+    ours = own_headers(metadata[OURS], path) if OURS in metadata else []
+    if OURS in metadata and len(ours) != count:
         raise DemosError(
             f"{path} has the headers of {len(ours)} episodes, but total_episodes is {count}."
         )
-    theirs = _foreign(main, path, metadata, context) if ours is None else None
+    theirs = None if ours else _foreign(main, path, metadata, context)
     for number in range(count):
         try:
             with open_hdf5(main) as file:
-                parts = theirs or _own(file, number, (ours or [])[number])
+                parts = theirs or _own(file, number, ours[number])
                 steps = parts.require_whole(file, number, context)
         except DemosError as error:
             why = str(error).removesuffix(".")
@@ -130,8 +129,14 @@ def read_minari(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisod
             name=f"{main}, episode_{number}",
             outcome=str(ours[number].get("outcome", "")) if ours else "",
         )
-    if ours is None:
-        _report_more(main, count, context)
+    if not ours:
+        with open_hdf5(main) as file:
+            groups = [name for name in names_in(file) if name.startswith("episode_")]
+            more = {name for group in groups for name in names_in(file, group, "infos")}
+        if len(groups) != count:
+            context.warn(f"total_episodes is {count}, and {main.name} has {len(groups)} episodes.")
+        if more:
+            context.note(f"The infos are not imported: {few(sorted(more))}.")
 
 
 def _require_stored(main: Path, count: int) -> None:
@@ -139,8 +144,7 @@ def _require_stored(main: Path, count: int) -> None:
 
     HDF5 stores empty arrays of any size in no bytes, and one array under any number of names.
     """
-    size = main.stat().st_size
-    claimed = 0
+    size, claimed = main.stat().st_size, 0
     with open_hdf5(main) as file:
         for number in range(count):
             for name in (_REWARD, _TERMINATED, _TRUNCATED):
@@ -154,13 +158,8 @@ def _require_stored(main: Path, count: int) -> None:
 class _Parts:
     """Where the parts of a step are in the group of an episode.
 
-    Attributes:
-        header: Header of the episode.
-        action: Columns of the action, each with its number of values.
-        state: Those of the state.
-        picture: Column of the picture; "" without one.
-        is_jpeg: Whether that holds JPEGs, or pixels.
-        infos: Columns of our own; () in a dataset of others.
+    `action` and `state` are columns, each with its number of values; `picture` is "" without one,
+    and has JPEGs or pixels. `infos` are columns of our own; () in a dataset of others.
     """
 
     header: EpisodeHeader
@@ -207,16 +206,13 @@ def _own(file: Any, number: int, plain: dict[str, Any]) -> _Parts:
     header = EpisodeHeader.from_json(plain)
     infos = names_in(file, f"episode_{number}", "infos")
     pictured = "frame" in infos
-    both = pictured and bool(header.state_layout)
-    state = name_in("minari", "state") if both else OBSERVATIONS
-    picture = name_in("minari", "frame") if both else OBSERVATIONS
-    if "jpeg" in infos:
-        picture = JPEG
+    both = pictured and header.state_layout
+    state, picture = (name_in("minari", f) if both else OBSERVATIONS for f in ("state", "frame"))
     return _Parts(
         header=header,
         action=[(_ACTION, header.action_size)],
         state=[(state, header.state_size)] if header.state_layout else [],
-        picture=picture if pictured else "",
+        picture=(JPEG if "jpeg" in infos else picture) if pictured else "",
         is_jpeg=True,
         infos=(*_INFOS, FRAME) if pictured else _INFOS,
     )
@@ -224,54 +220,50 @@ def _own(file: Any, number: int, plain: dict[str, Any]) -> _Parts:
 
 def _foreign(main: Path, path: Path, metadata: dict[str, Any], context: ImportContext) -> _Parts:
     """Return where the parts of the episodes of a dataset of others are."""
-    observed = read_leaves(metadata, "observation_space", path)
-    acted = read_leaves(metadata, "action_space", path)
-    pictured = [leaf for leaf in observed if picture_size(leaf.space)]
+    observed, acted = (
+        _leaves_in(metadata, f"{of}_space", path) for of in ("observation", "action")
+    )
+    pictured = {name: space for name, space in observed.items() if _picture_size(space)}
     if len(pictured) > 1:
         raise DemosError(
-            f"An observation in {main} has {len(pictured)} pictures "
-            f"({', '.join(leaf.name for leaf in pictured)}), but an episode has one camera: keep "
-            "one of them in the dataset."
+            f"An observation in {main} has {len(pictured)} pictures ({', '.join(pictured)}), but "
+            "an episode has one camera: keep one of them in the dataset."
         )
-    sensed = [leaf for leaf in observed if leaf not in pictured and is_imported(leaf, context)]
+    sensed = {
+        name: space
+        for name, space in observed.items()
+        if name not in pictured and _is_imported(name, space, context)
+    }
     hz = metadata.get("control_hz", context.hz)
     known = isinstance(hz, int | float) and math.isfinite(hz) and hz > 0.0
     if not known:
         context.note(f"The rate is unknown and taken to be {DEFAULT_HZ:g} Hz; --hz states it.")
+    camera = next(iter(pictured.values()), None)
     header = EpisodeHeader(
-        action_layout=layout_of(acted, "action").to_json(),
-        state_layout=layout_of(sensed, "observation").to_json() if sensed else "",
-        image_size=picture_size(pictured[0].space) if pictured else None,
-        control_hz=float(hz) if isinstance(hz, int | float) and known else DEFAULT_HZ,
+        action_layout=_layout_of(acted, "action").to_json(),
+        state_layout=_layout_of(sensed, "observation").to_json() if sensed else "",
+        image_size=None if camera is None else _picture_size(camera),
+        control_hz=float(cast("float", hz)) if known else DEFAULT_HZ,
         clock="none",
         source="minari",
         notes={"dataset": str(metadata.get("dataset_id", "")), "rate_is_known": known},
     )
 
-    def places(leaves: Sequence[Leaf], part: str) -> list[tuple[str, int]]:
-        sizes = [max(1, math.prod(leaf.space.shape or ())) for leaf in leaves]
-        names = ["/".join((part, *leaf.path)) for leaf in leaves]
-        return list(zip(names, sizes, strict=True))
+    def places(leaves: dict[str, spaces.Space[Any]], part: str) -> list[tuple[str, int]]:
+        return [
+            (f"{part}/{name}" if name else part, max(1, math.prod(space.shape or ())))
+            for name, space in leaves.items()
+        ]
 
-    jpeg = bool(metadata.get("jpeg_encoding", True))
     return _Parts(
         header=header,
         action=places(acted, _ACTION),
         state=places(sensed, OBSERVATIONS),
         picture=next((name for name, _ in places(pictured, OBSERVATIONS)), ""),
-        is_jpeg=jpeg and bool(pictured) and stored_as_jpeg(pictured[0].space),
+        is_jpeg=bool(metadata.get("jpeg_encoding", True))
+        and camera is not None
+        and stored_as_jpeg(camera),
     )
-
-
-def _report_more(main: Path, count: int, context: ImportContext) -> None:
-    """Report totals that contradict the file, and what is never imported."""
-    with open_hdf5(main) as file:
-        groups = [name for name in names_in(file) if name.startswith("episode_")]
-        if len(groups) != count:
-            context.warn(f"total_episodes is {count}, and {main.name} has {len(groups)} episodes.")
-        more = {name for group in groups for name in names_in(file, group, "infos")}
-        if more:
-            context.note(f"The infos are not imported: {few(sorted(more))}.")
 
 
 def _rows(
@@ -281,6 +273,12 @@ def _rows(
     pictures = Pictures(parts.header.image_size)
     group, done = f"episode_{number}", 0
     read, shown, jpeg, fault = -1, -1, b"", ""
+
+    def leave_out(error: DemosError, left: range) -> None:
+        why = str(error).removesuffix(".")
+        for step in left:
+            context.leave_out("step", f"that cannot be read ({why})", f"{step} of {group}")
+
     try:
         with open_hdf5(main) as file:
             columns = parts.columns(file, number)
@@ -309,7 +307,7 @@ def _rows(
                             raise DemosError("The action is not finite.")
                         row = _step(at, action, tuple(states[place].tolist()))
                     except DemosError as error:
-                        _leave_out(context, error, range(done - 1, done), group)
+                        leave_out(error, range(done - 1, done))
                         continue
                     if cut_off and done == steps:
                         row = replace(row, step=replace(row.step, truncated=False))
@@ -317,14 +315,7 @@ def _rows(
                         row, shown = replace(row, jpeg=jpeg), frame
                     yield row
     except DemosError as error:
-        _leave_out(context, error, range(done, steps), group)
-
-
-def _leave_out(context: ImportContext, error: DemosError, steps: range, group: str) -> None:
-    """Report steps that cannot be read, and why."""
-    why = str(error).removesuffix(".")
-    for step in steps:
-        context.leave_out("step", f"that cannot be read ({why})", f"{step} of {group}")
+        leave_out(error, range(done, steps))
 
 
 def _flat(
@@ -340,10 +331,9 @@ def _flat(
             raise DemosError(f"{main}: {name!r} is not numeric ({error}).") from error
         if numbers.shape[1] != size:
             raise DemosError(
-                f"{main}: {name!r} has {numbers.shape[1]} values per step, but its space has "
-                f"{size}."
+                f"{main}: {name!r} has {numbers.shape[1]} values per step, but its space {size}."
             )
-        flat.append(numbers[:steps])
+        flat.append(numbers)
     return np.concatenate(flat, axis=1)
 
 
@@ -355,7 +345,7 @@ def _picture(stored: Any, parts: _Parts, pictures: Pictures) -> bytes:
     pixels = np.asarray(stored)
     if pixels.ndim == 2:
         pixels = pixels[..., None]
-    elif pixels.ndim == 3 and colours_first(pixels.shape):
+    elif pixels.ndim == 3 and _colours_first(pixels.shape):
         pixels = np.moveaxis(pixels, 0, -1)
     size = parts.header.image_size
     if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[1::-1] != size:
@@ -366,37 +356,146 @@ def _picture(stored: Any, parts: _Parts, pictures: Pictures) -> bytes:
 def _step(at: dict[str, Any], action: tuple[float, ...], state: tuple[float, ...]) -> ExchangeStep:
     """Return a step, without its picture; the infos of others are not known."""
     reward = float(at[_REWARD]) if _REWARD in at else math.nan
-    step = Step(
-        action=action,
-        driver="expert",
-        state=state,
-        reward=None if math.isnan(reward) else reward,
-        terminated=bool(at[_TERMINATED]),
-        truncated=bool(at[_TRUNCATED]),
-    )
-    if _MORE not in at:
-        return ExchangeStep(step=step, jpeg=None)
-    try:
-        more = json.loads(at[_MORE])
-        driver = at[_DRIVER].decode()
-        known = {name: int(at[f"infos/{name}"]) for name in _TIMES}
-        actions = {
-            name: tuple(at[f"infos/{name}"].tolist()) if at[f"infos/has_{name}"] else None
-            for name in ("applied", "wanted")
-        }
-        fields: dict[str, Any] = {n: ns for n, ns in known.items() if ns != UNKNOWN_NS} | actions
-        fields["reward"] = reward if at["infos/rewarded"] else None
-        fields["terms"] = {name: float(value) for name, value in more.get("terms", {}).items()}
-        fields["stop_reason"] = str(more.get("stop_reason", at[_STOP].decode()))
-        marks = tuple(map(str, more.get("marks", ())))
-        dropped = more.get("dropped")
-    except (ValueError, TypeError, AttributeError, LookupError) as error:
-        raise DemosError(f"The infos cannot be read: {error}.") from error
-    if driver not in DRIVERS:
-        raise DemosError(str(UnknownName("driver", driver, DRIVERS)))
-    step = replace(step, driver=driver, **fields)
-    dropped = None if dropped is None else str(dropped)
+    fields: dict[str, Any] = {
+        "driver": "expert",
+        "reward": None if math.isnan(reward) else reward,
+        "terminated": bool(at[_TERMINATED]),
+        "truncated": bool(at[_TRUNCATED]),
+    }
+    marks, dropped = (), None
+    if _MORE in at:
+        try:
+            more = json.loads(at[_MORE])
+            fields["driver"] = at[_DRIVER].decode()
+            times = {name: int(at[f"infos/{name}"]) for name in _TIMES}
+            fields |= {name: ns for name, ns in times.items() if ns != UNKNOWN_NS}
+            for name in ("applied", "wanted"):
+                if at[f"infos/has_{name}"]:
+                    fields[name] = tuple(at[f"infos/{name}"].tolist())
+            fields["reward"] = reward if at["infos/rewarded"] else None
+            fields["terms"] = {name: float(v) for name, v in more.get("terms", {}).items()}
+            fields["stop_reason"] = str(more.get("stop_reason", at[_STOP].decode()))
+            marks = tuple(map(str, more.get("marks", ())))
+            dropped = None if more.get("dropped") is None else str(more["dropped"])
+        except (ValueError, TypeError, AttributeError, LookupError) as error:
+            raise DemosError(f"The infos cannot be read: {error}.") from error
+    if fields["driver"] not in DRIVERS:
+        raise DemosError(str(UnknownName("driver", fields["driver"], DRIVERS)))
+    step = Step(action=action, state=state, **fields)
     return ExchangeStep(step=step, jpeg=None, marks=marks, dropped=dropped)
+
+
+def _leaves_in(metadata: dict[str, Any], name: str, path: Path) -> dict[str, spaces.Space[Any]]:
+    """Return the spaces without subspaces in a space of the metadata, by their paths there."""
+    text = metadata.get(name)
+    if not isinstance(text, str):
+        raise DemosError(
+            f"{path} has no {name}, so its values cannot be interpreted: create the dataset again "
+            "with this space."
+        )
+    if _largest(parse_json(text, f"The {name} in {path}")) > MAX_UNPACKED:
+        raise DemosError(f"The {name} in {path} claims more than {MAX_UNPACKED} values.")
+    try:
+        return dict(_leaves(library("minari.serialization").deserialize_space(text)))
+    except MissingExtra:
+        raise
+    except Exception as error:  # Its errors for invalid text are not documented.
+        raise DemosError(f"The {name} in {path} cannot be read: {error}.") from error
+
+
+def _largest(space: Any) -> int:
+    """Return the number of values that the shapes in the JSON of a space claim."""
+    if isinstance(space, list):
+        return sum(map(_largest, cast("list[Any]", space)))
+    if not isinstance(space, dict):
+        return 0
+    fields = cast("dict[str, Any]", space)
+    shape = cast("list[Any]", s) if isinstance(s := fields.get("shape"), list) else []
+    own = math.prod(n for n in shape if isinstance(n, int))
+    return own + sum(_largest(value) for key, value in fields.items() if key != "shape")
+
+
+def _leaves(space: spaces.Space[Any], path: str = "") -> Iterator[tuple[str, spaces.Space[Any]]]:
+    """Yield the leaves of a tree of spaces, in the order and with the keys of Minari's files."""
+    parts: dict[str, spaces.Space[Any]] = {}
+    if isinstance(space, spaces.Dict):
+        parts = cast("Any", space).spaces
+    elif isinstance(space, spaces.Tuple):
+        parts = {f"_index_{n}": inner for n, inner in enumerate(cast("Any", space).spaces)}
+    else:
+        yield path, space
+    for key, inner in parts.items():
+        yield from _leaves(inner, f"{path}/{key}" if path else key)
+
+
+def _is_imported(name: str, space: spaces.Space[Any], context: ImportContext) -> bool:
+    """Return whether a part of an observation is numbers; others are reported."""
+    shape, about = space.shape or (), f"{name or 'the observation'} ({space})"
+    numbers = spaces.Box | spaces.Discrete | spaces.MultiDiscrete | spaces.MultiBinary
+    deep = isinstance(space, spaces.Box) and cast("Any", space).dtype in _DEEP
+    if not isinstance(space, numbers):
+        context.note(f"The observation {about} is not imported.")
+    elif deep and len(shape) in {2, 3} and min(shape[:2]) >= _MIN_PICTURE:
+        context.leave_out("observation", "with pictures of an unknown kind or of depth", about)
+    elif math.prod(shape) > MAX_VALUES:
+        context.leave_out("observation", f"of more than {MAX_VALUES} values", about)
+    else:
+        return True
+    return False
+
+
+def _layout_of(leaves: dict[str, spaces.Space[Any]], what: str) -> Layout:
+    """Return a layout for the values of leaves, of an "action" or "observation", in order."""
+    features: list[Feature] = []
+    for name, space in leaves.items():
+        match space:
+            case spaces.Box():
+                low, high = space.low, space.high
+            case spaces.Discrete():
+                low, high = space.start, space.start + space.n - 1
+            case spaces.MultiDiscrete():
+                low, high = space.start, space.start + space.nvec - 1
+            case spaces.MultiBinary():
+                low, high = np.zeros(space.shape), np.ones(space.shape)
+            case _:
+                raise DemosError(
+                    f"The {what} has {name or 'a space'!r} of the type {type(space).__name__}, "
+                    "which cannot be imported: use Box, Discrete, MultiDiscrete or MultiBinary."
+                )
+        lows, highs = (np.ravel(np.asarray(end, np.float64)).tolist() for end in (low, high))
+        if not lows:
+            raise DemosError(f"The {what} has {name or 'a space'!r} without any values.")
+        if len(lows) > MAX_FEATURES:
+            shape = (len(lows),)
+            features.append(Feature(name or what, UNIT_UNKNOWN, min(lows), max(highs), shape=shape))
+            continue
+        for number, (least, most) in enumerate(zip(lows, highs, strict=True)):
+            numbered = (name or what) + ("" if len(lows) == 1 else f"/{number}")
+            features.append(Feature(numbered, UNIT_UNKNOWN, least, most))
+    return Layout(tuple(features))
+
+
+def _picture_size(space: spaces.Space[Any]) -> tuple[int, int] | None:
+    """Return the width and height of the pictures of a space; None if it has no pictures."""
+    shape = space.shape or ()
+    if not isinstance(space, spaces.Box) or cast("Any", space).dtype != np.uint8:
+        return None
+    if len(shape) == 3 and _colours_first(shape):
+        shape = shape[1:]
+    elif len(shape) != 2 and (len(shape) != 3 or shape[2] not in _CHANNELS):
+        return None
+    height, width = shape[:2]
+    if height * width > MAX_PIXELS:
+        raise DemosError(
+            f"The pictures of the dataset have {width} x {height} pixels, more than the limit of "
+            f"{MAX_PIXELS}: make them smaller."
+        )
+    return (width, height) if min(height, width) >= _MIN_PICTURE else None
+
+
+def _colours_first(shape: tuple[int, ...]) -> bool:
+    """Return whether the first of three axes is that of the colours."""
+    return shape[0] in _CHANNELS and shape[2] not in _CHANNELS
 
 
 FORMAT: Final = Format(

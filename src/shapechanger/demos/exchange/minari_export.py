@@ -1,4 +1,8 @@
-"""Export of recordings as Minari datasets; `minari` describes what they hold."""
+"""Export of recordings as Minari datasets; `minari` describes what they hold.
+
+Minari's own writer (`MinariStorage.update_episodes`) is not used for the steps: it decodes and
+encodes each picture again at JPEG quality 75, and needs the whole episode in memory.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import chain, islice
-from pathlib import Path
-from typing import Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
@@ -22,22 +25,19 @@ from shapechanger.demos.exchange.columns import fields_of, name_in
 from shapechanger.demos.exchange.exporting import require_alike
 from shapechanger.demos.exchange.files import library
 from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext
-from shapechanger.demos.exchange.minari_spaces import stored_as_jpeg
 from shapechanger.demos.exchange.pictures import Pictures
 from shapechanger.demos.jpeg import decode_picture, is_grey, picture_size
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 DATA: Final = "data"
 METADATA: Final = "metadata.json"
 MAIN: Final = "main_data.hdf5"
-
-OURS: Final = "shapechanger"
-"""Key of our own section in `metadata.json`."""
-
+OURS: Final = "shapechanger"  # Key of our own section in `metadata.json`.
 UNKNOWN_NS: Final = -(2**63)
-"""Placeholder for an unknown time, ns."""
-
 FRAME: Final = "infos/frame"
 JPEG: Final = "infos/jpeg"
 CUT_OFF: Final = "infos/cut_off"
@@ -45,28 +45,15 @@ OBSERVATIONS: Final = "observations"
 
 _NAME: Final = re.compile(r"[\w-]+-v[0-9]+")
 _CHUNK: Final = 256  # Steps in memory at once.
-_FLAGS: Final = fields_of("flag")
-_TIMES: Final = fields_of("time")
+_MIN_JPEG: Final = 32
+_BRIGHTEST: Final = 255
 
 
 def write_minari(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
-    """Write episodes into an existing folder, as one dataset.
+    """Write episodes into an existing folder, as one dataset, and return the number of steps.
 
     Episodes without steps are left out, because Minari does not support them. Neither Minari's own
-    folder nor the network is used.
-
-    Args:
-        episodes: The episodes, with one layout, one rate and one picture size.
-        folder: Where to write.
-        context: Its `out` is the name of the dataset, which ends in a version.
-
-    Returns:
-        Number of steps written.
-
-    Raises:
-        DemosError: If the name has no version, the episodes differ, a step lacks a picture that
-            others have, or there are neither pictures nor states.
-        MissingExtra: If Minari or h5py is not installed.
+    folder nor the network is used. The name of the dataset, `context.out`, ends in a version.
     """
     name = context.out.name
     if not _NAME.fullmatch(name):
@@ -85,10 +72,9 @@ def write_minari(episodes: Sequence[ExchangeEpisode], folder: Path, context: Exp
         raise DemosError("There are no steps to export.")
     observed = _observed(*begun[0][:2])
     storage = storages.MinariStorage.new(
-        # Minari cannot measure the size of a relative folder.
-        (folder / DATA).absolute(),
+        (folder / DATA).absolute(),  # Minari cannot measure the size of a relative folder.
         observation_space=observed.space,
-        action_space=_box(Layout.from_json(begun[0][0].header.action_layout)),
+        action_space=_box(begun[0][0].header.action_layout),
         data_format="hdf5",
     )
     total, drivers = 0, set[str]()
@@ -116,6 +102,7 @@ def write_minari(episodes: Sequence[ExchangeEpisode], folder: Path, context: Exp
 def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str]) -> dict[str, Any]:
     header = episodes[0].header
     plain = header.to_json()
+    own = [e.header.to_json() | {"outcome": e.outcome} for e in episodes]
     found: dict[str, Any] = {
         "dataset_id": name,
         "minari_version": version("minari"),
@@ -127,10 +114,7 @@ def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str])
         "action_layout": plain["action_layout"],
         "observation_layout": plain["state_layout"],
         "control_hz": header.control_hz,
-        OURS: {
-            "format": 1,
-            "episodes": [e.header.to_json() | {"outcome": e.outcome} for e in episodes],
-        },
+        OURS: {"format": 1, "episodes": own},
     }
     envs = [(episode.header.env, episode.header.env_kwargs) for episode in episodes]
     if header.env in gym.registry and all(env == envs[0] for env in envs):
@@ -142,9 +126,22 @@ def _metadata(name: str, episodes: Sequence[ExchangeEpisode], drivers: set[str])
     return found
 
 
-def _box(layout: Layout) -> spaces.Box:
+def _box(layout: str) -> spaces.Box:
     """Return the space of the values of a layout, in 64 bits, so that nothing is rounded."""
-    return spaces.Box(layout.low, layout.high, dtype=np.float64)
+    named = Layout.from_json(layout)
+    return spaces.Box(named.low, named.high, dtype=np.float64)
+
+
+def stored_as_jpeg(space: spaces.Space[Any]) -> bool:
+    """Return whether Minari stores a space as JPEG: `is_image_space` of its minari_storage.py."""
+    box = cast("Any", space)
+    return (
+        isinstance(space, spaces.Box)
+        and len(box.shape) in {2, 3}
+        and min(box.shape[:2]) >= _MIN_JPEG
+        and box.dtype == np.uint8
+        and bool(np.all(box.low == 0) and np.all(box.high == _BRIGHTEST))
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,9 +149,9 @@ class _Observed:
     """The observation of each step: the space of its state and of its picture, if any."""
 
     state: spaces.Box | None
-    picture: spaces.Box | None
-    is_grey: bool
-    size: tuple[int, int] | None
+    picture: spaces.Box | None = None
+    is_grey: bool = False
+    size: tuple[int, int] | None = None
 
     @property
     def space(self) -> spaces.Space[Any]:
@@ -172,32 +169,28 @@ class _Observed:
 def _observed(episode: ExchangeEpisode, row: ExchangeStep) -> _Observed:
     """Return the observation of the first step, and therefore of all."""
     header = episode.header
-    state = _box(Layout.from_json(header.state_layout)) if header.state_layout else None
-    if row.jpeg is None and header.image_size is not None:
-        raise DemosError(
-            f"The first step of {episode.name} has no picture, but Minari needs one at every "
-            "step: drop the steps before the first picture, or export to csv."
-        )
-    if row.jpeg is None and state is None:
-        raise DemosError(
-            f"{episode.name} has neither pictures nor a state, so it has no observations for "
-            "Minari: export it to csv."
-        )
+    state = _box(header.state_layout) if header.state_layout else None
     if row.jpeg is None:
-        return _Observed(state, None, is_grey=False, size=None)
+        if header.image_size is not None:
+            raise DemosError(
+                f"The first step of {episode.name} has no picture, but Minari needs one at every "
+                "step: drop the steps before the first picture, or export to csv."
+            )
+        if state is None:
+            raise DemosError(
+                f"{episode.name} has neither pictures nor a state, so it has no observations for "
+                "Minari: export it to csv."
+            )
+        return _Observed(state)
     where = f"of the first step of {episode.name}"
     width, height = header.image_size or picture_size(row.jpeg, where)
     grey = is_grey(row.jpeg, where)
     shape = (height, width) if grey else (height, width, 3)
-    return _Observed(state, spaces.Box(0, 255, shape, np.uint8), grey, (width, height))
+    return _Observed(state, spaces.Box(0, _BRIGHTEST, shape, np.uint8), grey, (width, height))
 
 
 class _EpisodeColumns:
-    """Columns of one episode, in an empty `h5py.Group`.
-
-    Attributes:
-        steps: Number of steps written.
-    """
+    """Columns of one episode, in an empty `h5py.Group`."""
 
     def __init__(self, group: Any, episode: ExchangeEpisode, observed: _Observed) -> None:
         self.steps = 0
@@ -215,39 +208,32 @@ class _EpisodeColumns:
         self._blob = library("h5py").vlen_dtype(np.uint8)
 
     def add(self, rows: Sequence[ExchangeStep]) -> None:
-        """Append steps.
-
-        Raises:
-            DemosError: If one has no picture, or one that does not fit.
-        """
+        """Append steps."""
         steps = [row.step for row in rows]
         if self._observed.picture is not None:
             self._add_pictures(rows)
         if self._observed.state is not None:
             self._append(self._observed.column("state"), [s.state for s in steps], np.float64)
-        self._append(name_in("minari", "action"), [step.action for step in steps], np.float64)
-        rewards = [math.nan if step.reward is None else step.reward for step in steps]
-        self._append(name_in("minari", "reward"), rewards, np.float64)
+
+        def append(field: str, values: Sequence[Any], dtype: Any) -> None:
+            self._append(name_in("minari", field), values, dtype)
+
+        append("action", [step.action for step in steps], np.float64)
+        append("reward", [math.nan if s.reward is None else s.reward for s in steps], np.float64)
         self._append("infos/rewarded", [step.reward is not None for step in steps], np.bool_)
-        for field in _FLAGS:
-            self._append(name_in("minari", field), [getattr(s, field) for s in steps], np.bool_)
+        for field in fields_of("flag"):
+            append(field, [getattr(step, field) for step in steps], np.bool_)
         for field in ("applied", "wanted"):
             values = [getattr(step, field) for step in steps]
-            known = [self._unknown if value is None else value for value in values]
-            self._append(name_in("minari", field), known, np.float64)
+            append(field, [self._unknown if v is None else v for v in values], np.float64)
             self._append(f"infos/has_{field}", [value is not None for value in values], np.bool_)
-        for field in _TIMES:
+        for field in fields_of("time"):
             times = [getattr(step, field) for step in steps]
-            known = [UNKNOWN_NS if time is None else time for time in times]
-            self._append(name_in("minari", field), known, np.int64)
-        texts = {
-            "driver": [step.driver for step in steps],
-            # HDF5 cannot store NUL in a text.
-            "stop_reason": [step.stop_reason.replace("\0", "") for step in steps],
-            "terms": [_more(row) for row in rows],
-        }
-        for field, words in texts.items():
-            self._append(name_in("minari", field), words, self._text)
+            append(field, [UNKNOWN_NS if time is None else time for time in times], np.int64)
+        append("driver", [step.driver for step in steps], self._text)
+        # HDF5 cannot store NUL in a text.
+        append("stop_reason", [step.stop_reason.replace("\0", "") for step in steps], self._text)
+        append("terms", [_more(row) for row in rows], self._text)
         self._ends = steps[-1].terminated or steps[-1].truncated
         self.steps += len(rows)
 
@@ -260,9 +246,8 @@ class _EpisodeColumns:
         for field, there in (("frame", self._observed.picture), ("state", self._observed.state)):
             if there is not None:
                 column = self._group[self._observed.column(field)]
-                last = column[-1]
                 column.resize(len(column) + 1, axis=0)
-                column[-1] = last
+                column[-1] = column[-2]
         self._append(CUT_OFF, [not self._ends], np.bool_)
         if not self._ends:
             self._group[name_in("minari", "truncated")][-1] = True
@@ -285,9 +270,7 @@ class _EpisodeColumns:
                 if not self._as_jpeg:
                     self._pixels = decode_picture(row.jpeg, where, grey=self._observed.is_grey)
             if self._picture is None:
-                raise DemosError(
-                    f"There is no picture {where}, but Minari needs one: drop the step."
-                )
+                raise DemosError(f"There is no picture {where}, but Minari needs one: drop it.")
             jpegs.append(np.frombuffer(self._picture, np.uint8))
             frames.append(self._frame)
             if self._pixels is not None:
@@ -316,14 +299,9 @@ class _EpisodeColumns:
 
 
 def _more(row: ExchangeStep) -> str:
-    """Return everything without a column of its own, as JSON."""
-    more: dict[str, Any] = {}
-    if row.step.terms:
-        # JSON has neither NaN nor infinity.
-        more["terms"] = {
-            name: value if math.isfinite(value) else repr(value)
-            for name, value in row.step.terms.items()
-        }
+    """Return everything without a column of its own, as JSON, which has no NaN and infinity."""
+    terms = {n: v if math.isfinite(v) else repr(v) for n, v in row.step.terms.items()}
+    more: dict[str, Any] = {"terms": terms} if terms else {}
     if row.marks:
         more["marks"] = list(row.marks)
     if row.dropped is not None:
