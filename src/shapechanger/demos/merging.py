@@ -83,7 +83,7 @@ def _episodes_in(out: Path) -> tuple[Path, ...]:
 def _identity(episode: Episode) -> tuple[object, ...]:
     """Return fields that identify an episode, and that marks and drops do not change."""
     first = episode.steps[0] if episode.steps else None
-    seen = (first.wall_ns, first.captured_ns, first.frame_crc, first.action) if first else ()
+    seen = (first.wall_ns, first.captured_ns, first.picture, first.action) if first else ()
     return (episode.header.created, len(episode.steps), *seen)
 
 

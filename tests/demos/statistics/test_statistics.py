@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -90,7 +90,8 @@ def test_an_episode_lasts_as_long_as_its_times_say(tmp_path: Path) -> None:
     """A robot that is commanded at a fourth of its rate drives four times as long."""
     with EpisodeWriter.create(tmp_path, header(), spare_bytes=0) as writer:
         for number in range(100):
-            writer.add(replace(step(number), captured_ns=number * 200_000_000, decided_ns=None))
+            at_ns = number * 200_000_000
+            writer.add(msgspec.structs.replace(step(number), captured_ns=at_ns, decided_ns=None))
     episode = read_episode(writer.path)
     assert episode.header.control_hz == 20.0
     assert episode.seconds == pytest.approx(99 * 0.2 + 0.05)

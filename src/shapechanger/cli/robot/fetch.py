@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 import contextlib
 import os
 import sys
@@ -25,7 +24,7 @@ from shapechanger.demos.episodes.files import (
     write_all,
 )
 from shapechanger.demos.episodes.reader import read_header
-from shapechanger.demos.episodes.records import Step, decode_line, split_lines
+from shapechanger.demos.episodes.records import Frame, Step, decode_line, split_lines
 from shapechanger.errors import DemosError, OutputError, RobotRefused, UnknownName
 from shapechanger.files import cannot_write, write_atomic
 from shapechanger.robot.client.known_robots import recall
@@ -218,21 +217,21 @@ def _checked(piece: Piece, folder: Path) -> list[bytes]:
                 f"Line {number} of {piece.episode} is damaged on the robot, because {error}; "
                 "repair it there."
             ) from error
-        if step is not None and step.frame:
-            _keep_picture(folder / FRAMES, step, jpeg)
+        if step is not None and step.picture is not None:
+            _keep_picture(folder / FRAMES, step, step.picture, jpeg)
     return lines
 
 
-def _keep_picture(frames: Path, step: Step, jpeg: bytes | None) -> None:
+def _keep_picture(frames: Path, step: Step, picture: Frame, jpeg: bytes | None) -> None:
     """Write the frame of a step, unless it exists."""
     # A robot's data must not escape the folder.
     if not (step.frame.endswith(".jpg") and step.frame[:-4].isdecimal()):
         raise DemosError(f"A step names the picture {step.frame!r}.")
     file = frames / step.frame
     if jpeg is None:
-        is_here = file.is_file() and file.stat().st_size == step.frame_bytes
+        is_here = file.is_file() and file.stat().st_size == picture.size
     else:
-        is_here = len(jpeg) == step.frame_bytes and binascii.crc32(jpeg) == step.frame_crc
+        is_here = picture.fits(jpeg)
     if not is_here:
         raise DemosError(f"The picture {step.frame} of step {step.index} is damaged on the robot.")
     if jpeg is not None:

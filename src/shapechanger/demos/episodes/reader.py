@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 import json
 import math
 import os
@@ -11,7 +10,9 @@ import stat
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, Literal, NamedTuple, cast
+
+import msgspec
 
 from shapechanger.demos.episodes.files import (
     FRAMES,
@@ -29,6 +30,7 @@ from shapechanger.demos.episodes.files import (
 )
 from shapechanger.demos.episodes.records import (
     EpisodeHeader,
+    Frame,
     Step,
     decode_line,
     durations_s,
@@ -42,8 +44,7 @@ from shapechanger.files import cannot_write, write_atomic
 _FRAME_NAME: Final = re.compile(r"[0-9]{6,}\.jpg")
 
 
-@dataclass(frozen=True, slots=True)
-class StepLine:
+class StepLine(NamedTuple):
     """One line of `steps.jsonl`.
 
     Attributes:
@@ -73,7 +74,7 @@ def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine
         raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
     sizes = header.action_size, header.state_size
     lines: list[StepLine] = []
-    seen: dict[tuple[str, int, int], str] = {}
+    seen: dict[Frame, str] = {}
     newest = -1
     for raw in split_lines(content):
         try:
@@ -87,69 +88,63 @@ def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine
             wrong = step.refusal(*sizes)
             if not wrong and step.index <= newest:
                 wrong = f"it comes after step {newest}"
-            if not wrong and step.frame:
-                picture = (step.frame, step.frame_bytes, step.frame_crc)
-                if picture not in seen:
-                    seen[picture] = _wrong_with(path / FRAMES, step, thorough=thorough)
-                wrong = seen[picture]
+            if not wrong and step.picture is not None:
+                if step.picture not in seen:
+                    seen[step.picture] = _wrong_with(path / FRAMES, step.picture, thorough=thorough)
+                wrong = seen[step.picture]
             newest = max(newest, step.index)
         lines.append(StepLine(raw, fields, step, wrong))
     return lines
 
 
-def _wrong_with(frames: Path, step: Step, *, thorough: bool) -> str:
+def _wrong_with(frames: Path, picture: Frame, *, thorough: bool) -> str:
     """Return what is wrong with the picture of a step, as part of a sentence; "" for nothing."""
-    if not _FRAME_NAME.fullmatch(step.frame):
-        return f"its picture has the invalid name {step.frame!r}"
+    name, size = picture.name, picture.size
+    if not _FRAME_NAME.fullmatch(name):
+        return f"its picture has the invalid name {name!r}"
     try:
-        found = (frames / step.frame).stat()
-        size = found.st_size
+        found = (frames / name).stat()
         if not stat.S_ISREG(found.st_mode):
-            return f"its picture {step.frame} is not a regular file"
-        if size > MAX_PICTURE_BYTES:
-            return f"its picture {step.frame} has more than {MAX_PICTURE_BYTES} bytes"
-        if size != step.frame_bytes:
-            return f"its picture {step.frame} has {size} bytes instead of {step.frame_bytes}"
-        if (
-            thorough
-            and binascii.crc32(read_file(frames / step.frame, MAX_PICTURE_BYTES)) != step.frame_crc
-        ):
-            return f"its picture {step.frame} was changed"
+            return f"its picture {name} is not a regular file"
+        if found.st_size > MAX_PICTURE_BYTES:
+            return f"its picture {name} has more than {MAX_PICTURE_BYTES} bytes"
+        if found.st_size != size:
+            return f"its picture {name} has {found.st_size} bytes instead of {size}"
+        if thorough and not picture.fits(read_file(frames / name, MAX_PICTURE_BYTES)):
+            return f"its picture {name} was changed"
     except FileNotFoundError:
-        return f"its picture {step.frame} is missing"
+        return f"its picture {name} is missing"
     except OSError as error:
-        return f"its picture {step.frame} cannot be read ({error.strerror})"
+        return f"its picture {name} cannot be read ({error.strerror})"
     return ""
 
 
-@dataclass(frozen=True, slots=True)
-class EpisodeMark:
-    """A bookmark set by the operator.
-
-    Attributes:
-        step: Index of the step.
-        text: Free text.
-    """
+class EpisodeMark(msgspec.Struct, frozen=True):
+    """A bookmark set by the operator, at the step with an index."""
 
     step: int
-    text: str
+    text: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Drop:
+class Drop(msgspec.Struct, frozen=True):
     """A range of steps to exclude, or to include again.
 
     Attributes:
         first: Index of the first step.
         last: Index of the last step, inclusive.
         why: Such as "undo", "cut" or "bad".
-        keep: Whether the steps are included again.
+        kind: Whether the steps are excluded, or included again.
     """
 
     first: int
     last: int
-    why: str
-    keep: bool = False
+    why: str = ""
+    kind: Literal["drop", "keep"] = "drop"
+
+    @property
+    def keep(self) -> bool:
+        """Whether the steps are included again."""
+        return self.kind == "keep"
 
 
 @dataclass(frozen=True)
@@ -203,13 +198,13 @@ class Episode:
         Raises:
             BrokenEpisode: If the file is missing or was modified.
         """
-        if not step.frame:
+        if step.picture is None:
             return None
         try:
             data = read_file(self.path / FRAMES / step.frame, MAX_PICTURE_BYTES)
         except OSError as error:
             raise _broken(self.path, f"the picture {step.frame} cannot be read") from error
-        if binascii.crc32(data) != step.frame_crc:
+        if not step.picture.fits(data):
             raise _broken(self.path, f"the picture {step.frame} was changed")
         return data
 
@@ -282,20 +277,16 @@ def _assemble(
     marks: list[EpisodeMark] = []
     drops: list[Drop] = []
     for line in lines:
-        fields = line.fields
         try:
-            match fields.get("kind"):
+            match line.fields.get("kind"):
                 case "mark":
-                    marks.append(EpisodeMark(int(fields["step"]), str(fields.get("text", ""))))
+                    marks.append(msgspec.convert(line.fields, EpisodeMark))
                 case "drop" | "keep":
-                    first, last = int(fields["first"]), int(fields["last"])
-                    drops.append(
-                        Drop(first, last, str(fields.get("why", "")), fields["kind"] == "keep")
-                    )
+                    drops.append(msgspec.convert(line.fields, Drop))
                 case _:  # A step, or a kind that a later version added.
                     pass
-        except (LookupError, TypeError, ValueError, OverflowError) as error:
-            raise _broken(path, f"it has the invalid line {fields}") from error
+        except msgspec.ValidationError as error:
+            raise _broken(path, f"it has the invalid line {line.fields}") from error
     return Episode(
         path=path,
         header=header,
@@ -317,8 +308,7 @@ _CUT_OFF: Final = "cut off"
 """Outcome of an episode that was not closed before `repair`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Repair:
+class Repair(NamedTuple):
     """Result of a repair.
 
     Attributes:

@@ -6,9 +6,11 @@ import binascii
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import Any, Final, Literal, cast
+
+import msgspec
 
 from shapechanger.errors import DemosError
 
@@ -126,21 +128,16 @@ class EpisodeHeader:
                 f"the episode has format {plain.get('format')}, but this version of Shapechanger "
                 f"reads format {_FORMAT} only."
             )
-        known = {name: plain[name] for name in (f.name for f in fields(cls)) if name in plain}
+        layouts = {
+            # As `Layout.to_json` writes it.
+            name: json.dumps(layout, separators=(",", ":"), ensure_ascii=False) if layout else ""
+            for name in ("action_layout", "state_layout")
+            if (layout := plain.get(name)) is not None or name in plain
+        }
         try:
-            for name in ("action_layout", "state_layout"):
-                known[name] = _compact(known[name])
-            if known.get("image_size") is not None:
-                width, height = known["image_size"]
-                known["image_size"] = (int(width), int(height))
-            return cls(**known)
-        except (KeyError, TypeError, ValueError) as error:
+            return msgspec.convert(plain | layouts, cls)
+        except msgspec.ValidationError as error:
             raise DemosError(f"the header is invalid ({error}).") from error
-
-
-def _compact(layout: dict[str, Any] | None) -> str:
-    """Return a layout as `Layout.to_json` writes it; "" for none."""
-    return json.dumps(layout, separators=(",", ":"), ensure_ascii=False) if layout else ""
 
 
 def _layout_size(layout: str) -> int:
@@ -157,18 +154,36 @@ Driver = Literal["person", "policy", "expert", "program"]
 
 DRIVERS: Final[tuple[Driver, ...]] = ("person", "policy", "expert", "program")
 
-_INFINITIES: Final = {math.inf: "inf", -math.inf: "-inf"}
 _NS: Final = ("captured_ns", "decided_ns", "wall_ns")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
+class Frame(msgspec.Struct, frozen=True, array_like=True):
+    """The picture of a step: file name, size in bytes, and CRC-32 as eight hexadecimal digits."""
+
+    name: str
+    size: int
+    crc: str
+
+    @classmethod
+    def of(cls, name: str, jpeg: bytes) -> Frame:
+        """Return the record of a picture."""
+        return cls(name, len(jpeg), f"{binascii.crc32(jpeg):08x}")
+
+    def fits(self, jpeg: bytes) -> bool:
+        """Return whether a picture is the recorded one."""
+        return self == Frame.of(self.name, jpeg)
+
+
+class Step(
+    msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="kind", tag="step"
+):
     """One step of an episode.
 
     Attributes:
+        index: Position in the episode, from 0; -1 before the step is written.
+        driver: Who decided the action.
         action: The action decided for this step's observation, in the order and units of the action
             layout.
-        driver: Who decided the action.
         applied: What the outputs did, after caps, slew limits and reflexes; None if unknown.
         wanted: What a policy would have done while somebody else drove; None without a policy.
         state: Values of the state layout; NaN where nothing measured one.
@@ -180,14 +195,12 @@ class Step:
         terminated: Whether the task ended with this step.
         truncated: Whether the episode was cut short at this step.
         stop_reason: Why the robot overrode the action; "" if it did not.
-        index: Position in the episode, from 0; -1 before the step is written.
-        frame: File name of the picture; "" for none.
-        frame_bytes: Size of that file, bytes.
-        frame_crc: CRC-32 of that file.
+        picture: Its picture on disk; None for none.
     """
 
-    action: tuple[float, ...]
+    index: int = msgspec.field(default=-1, name="step")
     driver: Driver
+    action: tuple[float, ...]
     applied: tuple[float, ...] | None = None
     wanted: tuple[float, ...] | None = None
     state: tuple[float, ...] = ()
@@ -195,14 +208,16 @@ class Step:
     decided_ns: int | None = None
     wall_ns: int | None = None
     reward: float | None = None
-    terms: dict[str, float] = field(default_factory=dict[str, float])
+    terms: dict[str, float] = {}
     terminated: bool = False
     truncated: bool = False
     stop_reason: str = ""
-    index: int = -1
-    frame: str = ""
-    frame_bytes: int = 0
-    frame_crc: int = 0
+    picture: Frame | None = msgspec.field(default=None, name="frame")
+
+    @property
+    def frame(self) -> str:
+        """File name of the picture; "" for none."""
+        return "" if self.picture is None else self.picture.name
 
     @property
     def clock_ns(self) -> int | None:
@@ -236,27 +251,7 @@ class Step:
 
     def to_json(self) -> dict[str, Any]:
         """Return the step as JSON can hold it; empty fields are left out."""
-        plain: dict[str, Any] = {"kind": "step", "step": self.index, "driver": self.driver}
-        plain["action"] = _written(self.action)
-        for name in ("applied", "wanted"):
-            values = getattr(self, name)
-            if values is not None:
-                plain[name] = _written(values)
-        if self.state:
-            plain["state"] = _written(self.state)
-        for name in _NS:
-            if getattr(self, name) is not None:
-                plain[name] = getattr(self, name)
-        if self.reward is not None:
-            plain["reward"] = _written((self.reward,))[0]
-        if self.terms:
-            plain["terms"] = dict(zip(self.terms, _written(self.terms.values()), strict=True))
-        for name in ("terminated", "truncated", "stop_reason"):
-            if getattr(self, name):
-                plain[name] = getattr(self, name)
-        if self.frame:
-            plain["frame"] = [self.frame, self.frame_bytes, f"{self.frame_crc:08x}"]
-        return plain
+        return {name: _as_json(value) for name, value in msgspec.to_builtins(self).items()}
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> Step:
@@ -265,29 +260,39 @@ class Step:
         Raises:
             ValueError: If a field is missing or invalid.
         """
+        known = {name: _from_json(value) for name, value in plain.items()}
         try:
-            frame, size, crc = plain.get("frame", ("", 0, "0"))
-            terms = cast("dict[str, Any]", plain.get("terms", {}))
-            reward = plain.get("reward", ...)
-            return cls(
-                action=_read(plain["action"]),
-                driver=plain["driver"],
-                applied=_read(plain["applied"]) if "applied" in plain else None,
-                wanted=_read(plain["wanted"]) if "wanted" in plain else None,
-                state=_read(plain.get("state", ())),
-                **{name: int(plain[name]) for name in _NS if name in plain},
-                reward=None if reward is ... else _read((reward,))[0],
-                terms=dict(zip(terms, _read(terms.values()), strict=True)),
-                terminated=bool(plain.get("terminated", False)),
-                truncated=bool(plain.get("truncated", False)),
-                stop_reason=str(plain.get("stop_reason", "")),
-                index=int(plain["step"]),
-                frame=str(frame),
-                frame_bytes=int(size),
-                frame_crc=int(crc, 16),
-            )
-        except (LookupError, TypeError, AttributeError, OverflowError) as error:
+            return msgspec.convert(known, cls, strict=False)
+        except msgspec.ValidationError as error:
             raise ValueError(f"it is not a valid step ({error})") from error
+
+
+def _as_json(value: Any) -> Any:
+    """Return numbers as JSON can hold them: null for NaN, strings for infinities."""
+    match value:
+        case float():
+            return value if math.isfinite(value) else None if math.isnan(value) else str(value)
+        case dict():
+            items = cast("dict[str, Any]", value).items()
+            return {name: _as_json(number) for name, number in items}
+        case list() | tuple():
+            return [_as_json(number) for number in cast("Sequence[Any]", value)]
+        case _:
+            return value
+
+
+def _from_json(value: Any) -> Any:
+    """Return NaN for null, also in lists and dictionaries."""
+    match value:
+        case None:
+            return math.nan
+        case dict():
+            items = cast("dict[str, Any]", value).items()
+            return {name: math.nan if number is None else number for name, number in items}
+        case list():
+            return [math.nan if n is None else n for n in cast("list[Any]", value)]
+        case _:
+            return value
 
 
 _PAUSE_PERIODS: Final = 30.0
@@ -315,15 +320,6 @@ def durations_s(times_ns: Sequence[int | None], control_hz: float) -> list[float
         passed_s = -1.0 if now is None or later is None else (later - now) / _NS_PER_S
         found.append(passed_s if 0.0 <= passed_s <= longest_s else period_s)
     return [*found, period_s] if times_ns else []
-
-
-def _written(values: Any) -> list[float | str | None]:
-    """Return numbers as JSON can hold them: null for NaN, strings for infinities."""
-    return [None if math.isnan(value) else _INFINITIES.get(value, float(value)) for value in values]
-
-
-def _read(values: Any) -> tuple[float, ...]:
-    return tuple(math.nan if value is None else float(value) for value in values)
 
 
 _MAX_LINE: Final = 1 << 20

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 import contextlib
 import math
 import os
@@ -15,6 +14,8 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Final, Self
 
+import msgspec
+
 from shapechanger.demos.episodes.files import (
     FRAMES,
     FULL_BYTES,
@@ -25,7 +26,7 @@ from shapechanger.demos.episodes.files import (
     write_all,
     write_header,
 )
-from shapechanger.demos.episodes.records import EpisodeHeader, Step, encode_line
+from shapechanger.demos.episodes.records import EpisodeHeader, Frame, Step, encode_line
 from shapechanger.errors import DemosError, OutputError
 from shapechanger.files import cannot_write
 
@@ -230,7 +231,7 @@ class EpisodeWriter:
             raise DemosError(f"Step {self.steps} of {self.path} cannot be recorded: {refusal}.")
         if self.steps % _SPACE_CHECK_STEPS == 0:
             _require_space(self.path, self._spare_bytes)
-        step = replace(step, index=self.steps, **self._frame(jpeg))
+        step = msgspec.structs.replace(step, index=self.steps, picture=self._frame(jpeg))
         self._append(step.to_json())
         self._before = step
         self._times.append((step.index, self._time_ns(step)))
@@ -311,21 +312,15 @@ class EpisodeWriter:
             raise cannot_write(self.path / STEPS, error) from error
         self._bytes += len(line)
 
-    def _frame(self, jpeg: bytes | None) -> dict[str, object]:
-        """Write a picture, and return the fields of the step that name it."""
+    def _frame(self, jpeg: bytes | None) -> Frame | None:
+        """Write a picture, and return its record; None for no new one keeps that of the step before."""
         before = self._before
         jpeg = self._jpeg if jpeg is None and before is None else jpeg
         if jpeg is None:
-            if before is None:
-                return {}
-            return {
-                "frame": before.frame,
-                "frame_bytes": before.frame_bytes,
-                "frame_crc": before.frame_crc,
-            }
+            return None if before is None else before.picture
         self._jpeg = jpeg
-        name = f"{self.steps:06d}.jpg"
-        path = self.path / FRAMES / name
+        frame = Frame.of(f"{self.steps:06d}.jpg", jpeg)
+        path = self.path / FRAMES / frame.name
         try:
             with path.open("wb", buffering=0) as file:
                 write_all(file.fileno(), jpeg)
@@ -335,7 +330,7 @@ class EpisodeWriter:
             raise cannot_write(path, error) from error
         if self._syncer is not None:
             self._syncer.add(path)
-        return {"frame": name, "frame_bytes": len(jpeg), "frame_crc": binascii.crc32(jpeg)}
+        return frame
 
     def _disorder(self, step: Step) -> str:
         """Return which time runs backwards, as part of a sentence; "" for none."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import entry_points
@@ -13,6 +13,8 @@ from itertools import groupby
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
+
+from msgspec import structs
 
 from shapechanger.demos.episodes import (
     EpisodeHeader,
@@ -194,7 +196,7 @@ def import_episodes(
         if context.strict:
             context.require_whole(path)
         kept = enumerate(kept_steps(episode.rows))
-        yield episode.header, ((replace(step, index=n), jpeg) for n, (step, jpeg) in kept)
+        yield episode.header, ((structs.replace(step, index=n), jpeg) for n, (step, jpeg) in kept)
     if context.strict:
         context.require_whole(path)
 

@@ -20,6 +20,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
+from msgspec import structs
+
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
 from shapechanger.demos.exchange.columns import BY_FIELD, COLUMNS, COMMANDS, fields_of, name_in
@@ -191,7 +193,9 @@ def _read_others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpiso
     (hz,), believed = choose_rates([drive], context)
     if not (timed and believed):
         drive = replace(drive, times_ns=())
-        parsed = [replace(line, step=replace(line.step, captured_ns=None)) for line in parsed]
+        parsed = [
+            replace(line, step=structs.replace(line.step, captured_ns=None)) for line in parsed
+        ]
     size = None
     if shown := next((line.frame for line in parsed if line.frame), ""):
         size = picture_size(read_bytes(inside(folder, shown, path), MAX_PICTURE_BYTES), shown)

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, cast
 
+import msgspec
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -310,7 +311,7 @@ def _rows(
                         leave_out(error, range(done - 1, done))
                         continue
                     if cut_off and done == steps:
-                        row = replace(row, step=replace(row.step, truncated=False))
+                        row = replace(row, step=msgspec.structs.replace(row.step, truncated=False))
                     if frame != shown:
                         row, shown = replace(row, jpeg=jpeg), frame
                     yield row

@@ -29,6 +29,8 @@ from itertools import groupby, pairwise
 from pathlib import Path, PurePath
 from typing import Any, Final, cast
 
+import msgspec
+
 from shapechanger.demos.episodes import EpisodeHeader, Step
 from shapechanger.demos.exchange.files import (
     UNIT_UNKNOWN,
@@ -180,7 +182,9 @@ def _steps(records: Sequence[_Record], *, timed: bool, is_unix: bool) -> Iterato
     for record in records:
         at_ns = record.time_ns if timed else None
         wall_ns = at_ns if is_unix else None
-        step = replace(cast("Step", record.step), captured_ns=at_ns, wall_ns=wall_ns)
+        step = msgspec.structs.replace(
+            cast("Step", record.step), captured_ns=at_ns, wall_ns=wall_ns
+        )
         yield ExchangeStep(step=step, jpeg=read_picture(record.path)[0] if record.path else None)
 
 
