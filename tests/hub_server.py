@@ -50,8 +50,6 @@ class FakeHub(ThreadingHTTPServer):
         repositories: Repositories by their type and name, such as "models/ada/ant".
         requests: Method and path of each request.
         cut: Number of bytes after which transfers of a file end, by its name.
-        endless: Names of files that never end.
-        sent: Number of bytes of endless files that were sent.
     """
 
     daemon_threads = True
@@ -61,8 +59,6 @@ class FakeHub(ThreadingHTTPServer):
         self.repositories: dict[str, Repository] = {}
         self.requests: list[str] = []
         self.cut: dict[str, int] = {}
-        self.endless: set[str] = set()
-        self.sent = 0
         self.blobs: dict[str, bytes] = {}
 
     @property
@@ -171,9 +167,21 @@ class _Handler(BaseHTTPRequestHandler):
         if (commit := self._commit_of(found, revision or "")) is None:
             return
         files = found.commits.get(commit, {})
-        siblings = [{"rfilename": file} for file in (".gitattributes", *files)]
+        files = {".gitattributes": b""} | files
+        siblings = [{"rfilename": name, "size": len(content)} for name, content in files.items()]
         about = {"_id": "0", "id": name.partition("/")[2], "sha": commit, "siblings": siblings}
         self._send(200, about | {"private": found.private, "tags": [], "downloads": 0, "likes": 0})
+
+    def _tree(self, name: str, revision: str) -> None:
+        if (found := self._repository(name)) is None:
+            return
+        if (commit := self._commit_of(found, revision)) is None:
+            return
+        files = [
+            {"type": "file", "path": path, "size": len(content), "oid": "0"}
+            for path, content in found.commits.get(commit, {}).items()
+        ]
+        self._send(200, files)
 
     def _validate(self) -> None:
         self._send(200, {"errors": [], "warnings": []})
@@ -185,7 +193,7 @@ class _Handler(BaseHTTPRequestHandler):
             {
                 "path": file["path"],
                 "uploadMode": "lfs"
-                if file["path"].endswith((".tar", ".safetensors"))
+                if file["path"].endswith((".jsonl", ".safetensors"))
                 else "regular",
                 "shouldIgnore": False,
                 "oid": None,
@@ -241,17 +249,6 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_response(206 if start else 200)
         self.send_header("X-Repo-Commit", commit)
         self.send_header("ETag", f'"{hashlib.sha256(content).hexdigest()}"')
-        if file in self.server.endless:
-            self.send_header("Connection", "close")
-            self.end_headers()
-            while self.command == "GET":
-                try:
-                    self.wfile.write(bytes(1 << 16))
-                except OSError:
-                    break
-                self.server.sent += 1 << 16
-            self.close_connection = True
-            return
         self.send_header("Content-Length", str(len(content) - start))
         self.end_headers()
         if self.command == "GET":
@@ -265,6 +262,7 @@ _ROUTES = (
     (r"POST /api/repos/create", "_create"),
     (r"POST /api/validate-yaml", "_validate"),
     (rf"GET /api/{_REPOSITORY}(?:/revision/(.+))?", "_info"),
+    (rf"GET /api/{_REPOSITORY}/tree/(\w+)", "_tree"),
     (rf"POST /api/{_REPOSITORY}/preupload/main", "_preupload"),
     (rf"POST /api/{_REPOSITORY}/commit/main", "_commit"),
     (r"POST /(?:datasets/)?[\w.-]+/[\w.-]+\.git/info/lfs/objects/batch", "_batch"),

@@ -14,13 +14,14 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Literal, cast
+
+import msgspec
 
 from shapechanger.errors import HubError, MissingExtra, OutputError, ShapechangerError
 
@@ -30,34 +31,38 @@ POLICY: Final = "policy.safetensors"
 """Name of the file of a policy."""
 
 EPISODES: Final = "episodes"
-"""Folder of the archives of episodes."""
+"""Folder of the episodes."""
 
 _LIST: Final = "shapechanger.json"
 _CARD: Final = "README.md"
 _FORMAT: Final = 1
 _TYPES: Final[dict[Kind, str]] = {"policy": "model", "demonstrations": "dataset"}
+_PLACES: Final[dict[Kind, str]] = {"policy": POLICY, "demonstrations": f"{EPISODES}/*"}
+_EPISODE_FILE: Final = r"(episode\.json|steps\.jsonl|frames/\w[\w-]{0,63}\.jpg)"
 _NAMES: Final[dict[Kind, re.Pattern[str]]] = {
     "policy": re.compile(re.escape(POLICY)),
-    "demonstrations": re.compile(EPISODES + r"/\w[\w.-]{0,127}\.tar", re.ASCII),
+    "demonstrations": re.compile(rf"{EPISODES}/\w[\w.-]{{0,127}}/{_EPISODE_FILE}", re.ASCII),
 }
-_MAX_LIST_BYTES: Final = 16 << 20
-_CHUNK: Final = 1 << 20
+_MAX_LIST_BYTES: Final = 64 << 20
 _UNAUTHORIZED: Final = 401
 _FORBIDDEN: Final = 403
 _LOG_IN: Final = "log in with `hf auth login`, or set HF_TOKEN"
 
 
-@dataclass(frozen=True, slots=True)
-class Pulled:
-    """Result of a pull.
+class _File(msgspec.Struct):
+    """Size in bytes and SHA-256 of a file."""
 
-    Attributes:
-        revision: Commit that was pulled.
-        paths: The files, in the order of their names.
-    """
+    bytes: int
+    sha256: str
 
-    revision: str
-    paths: tuple[Path, ...]
+
+class _Listed(msgspec.Struct):
+    """Content of `shapechanger.json`."""
+
+    kind: str
+    files: dict[str, _File]
+    format: int = _FORMAT
+    version: str = ""
 
 
 def sha256_of(path: Path) -> str:
@@ -66,13 +71,11 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def push(
-    files: Mapping[str, Path], card: str, repo: str, kind: Kind, *, public: bool = False
-) -> str:
-    """Upload files in one commit, in place of those of an earlier push.
+def push(folder: Path, card: str, repo: str, kind: Kind, *, public: bool = False) -> str:
+    """Upload a folder in place of an earlier push.
 
     Args:
-        files: The files, by their names in the repository.
+        folder: The files, by their names in the repository; card and list are added to it.
         card: What they are, in Markdown.
         repo: Name of the repository, such as "ada/ant"; it is made if there is none.
         kind: Kind of the files.
@@ -85,14 +88,16 @@ def push(
         HubError: If the Hub refuses, or the repository holds something else.
         MissingExtra: If huggingface_hub is not installed.
     """
-    hub, errors = _library(), _errors()
-    _require_name(repo)
+    hub, errors = _library(), import_module("huggingface_hub.errors")
     repo_type = _TYPES[kind]
-    about = {
-        name: {"bytes": path.stat().st_size, "sha256": sha256_of(path)}
-        for name, path in files.items()
+    files = {
+        str(path.relative_to(folder)): _File(path.stat().st_size, sha256_of(path))
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
     }
-    listed = {"format": _FORMAT, "kind": kind, "version": version("shapechanger"), "files": about}
+    listed = _Listed(kind, files, version=version("shapechanger"))
+    (folder / _CARD).write_bytes(card.encode(errors="replace"))
+    (folder / _LIST).write_bytes(msgspec.json.format(msgspec.json.encode(listed), indent=1))
     with _answers(repo, kind):
         api = hub.HfApi()
         try:
@@ -107,22 +112,17 @@ def push(
                 f"{repo} holds files that Shapechanger did not push, such as {min(strange)}: "
                 "choose another name."
             )
-        add = hub.CommitOperationAdd
-        operations: list[Any] = [add(name, str(path)) for name, path in files.items()]
-        operations.append(add(_CARD, card.encode(errors="replace")))
-        operations.append(add(_LIST, json.dumps(listed, indent=1).encode()))
-        gone = sorted(name for name in there - files.keys() if _NAMES[kind].fullmatch(name))
-        operations += [hub.CommitOperationDelete(name) for name in gone]
-        done = api.create_commit(
-            repo,
-            operations,
-            commit_message=f"Push {kind} with Shapechanger",
+        done = api.upload_folder(
+            repo_id=repo,
+            folder_path=folder,
             repo_type=repo_type,
+            delete_patterns=_PLACES[kind],
+            commit_message=f"Push {kind} with Shapechanger",
         )
         return str(done.commit_url)
 
 
-def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: int) -> Pulled:
+def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: int) -> str:
     """Download the files of a push, and check their sizes and hashes.
 
     Args:
@@ -132,6 +132,9 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
         revision: Commit, branch or tag; "" for the newest commit.
         max_bytes: Largest size of all files together.
 
+    Returns:
+        The commit that was pulled.
+
     Raises:
         HubError: If the Hub refuses, or the files are not those that the repository lists, are of
             another kind, or larger.
@@ -139,105 +142,73 @@ def pull(repo: str, kind: Kind, folder: Path, *, revision: str = "", max_bytes: 
         MissingExtra: If huggingface_hub is not installed.
     """
     hub = _library()
-    _require_name(repo)
     repo_type = _TYPES[kind]
     with _answers(repo, kind):
-        found = hub.HfApi().repo_info(repo, repo_type=repo_type, revision=revision or None)
+        found = hub.HfApi().repo_info(
+            repo, repo_type=repo_type, revision=revision or None, files_metadata=True
+        )
         commit = str(found.sha)
-        if _LIST not in {file.rfilename for file in found.siblings or ()}:
+        sizes = {file.rfilename: file.size or 0 for file in found.siblings or ()}
+        if _LIST not in sizes:
             raise HubError(f"{repo} has no {_LIST}, so Shapechanger did not push it.")
-        prefix = "datasets/" if repo_type == "dataset" else ""
-        files = hub.HfFileSystem(skip_instance_cache=True)
-
-        def chunks(name: str) -> Generator[bytes]:
-            # A stream: nothing is fetched that is not asked for, whatever its size is said to be.
-            with files.open(f"{prefix}{repo}@{commit}/{name}", block_size=0) as file:
-                while chunk := cast("bytes", file.read(_CHUNK)):
-                    yield chunk
-
-        listed = _listed(_read_list(chunks(_LIST), repo), repo, kind, max_bytes)
-        paths: list[Path] = []
-        for name, (size, digest) in sorted(listed.items()):
-            path = folder / name
-            try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                file = path.open("xb")
-            except OSError as error:
-                raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
-            with file:
-                _fetch(chunks(name), file, f"{name} of {repo}", size, digest)
-            paths.append(path)
-    return Pulled(commit, tuple(paths))
-
-
-def _require_name(repo: str) -> None:
-    """Refuse a name without an owner, an address, or a path."""
-    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo, re.ASCII):
-        raise _no_name(repo)
-
-
-def _no_name(repo: str) -> HubError:
-    return HubError(
-        f"{repo!r} is no name of a repository: give its owner and its name, such as ada/ant."
-    )
-
-
-def _fetch(chunks: Generator[bytes], file: Any, name: str, size: int, digest: str) -> None:
-    """Write what comes to a file, and refuse what was not listed."""
-    found, got = hashlib.sha256(), 0
-    for chunk in chunks:
-        got += len(chunk)
-        if got > size:
-            chunks.close()
-            raise HubError(f"{name} is larger than the {size} bytes that {_LIST} says.")
-        found.update(chunk)
-        try:
-            file.write(chunk)
-        except OSError as error:
-            raise OutputError(f"Cannot write {file.name}: {error.strerror or error}.") from error
-    if got < size:
-        raise HubError(f"The transfer of {name} was cut after {got} of {size} bytes: try again.")
-    if found.hexdigest() != digest:
-        raise HubError(f"{name} does not have the SHA-256 that {_LIST} says: it was changed.")
-
-
-def _read_list(chunks: Generator[bytes], repo: str) -> Any:
-    content = b""
-    for chunk in chunks:
-        content += chunk
-        if len(content) > _MAX_LIST_BYTES:
-            chunks.close()
+        if sizes[_LIST] > _MAX_LIST_BYTES:
             raise HubError(f"{_LIST} of {repo} has more than {_MAX_LIST_BYTES} bytes.")
+
+        def fetch(pattern: str) -> None:
+            hub.snapshot_download(
+                repo,
+                repo_type=repo_type,
+                revision=commit,
+                local_dir=folder,
+                allow_patterns=pattern,
+            )
+
+        fetch(_LIST)
+        listed = _listed((folder / _LIST).read_bytes(), repo, kind)
+        here = {name: size for name, size in sizes.items() if _NAMES[kind].match(name)}
+        for name, about in listed.items():
+            if here.get(name) != about.bytes:
+                raise HubError(
+                    f"{name} of {repo} has {here.get(name, 0)} bytes, and {_LIST} says "
+                    f"{about.bytes}."
+                )
+        place = _PLACES[kind].rstrip("*")
+        if more := sorted(n for n in sizes.keys() - listed.keys() if n.startswith(place)):
+            raise HubError(f"{repo} has {more[0][:80]!r}, which {_LIST} does not name.")
+        if (total := sum(here.values())) > max_bytes:
+            raise HubError(
+                f"The files of {repo} have {total} bytes, more than the limit of {max_bytes}."
+            )
+        fetch(_PLACES[kind])
+        for name, about in listed.items():
+            if sha256_of(folder / name) != about.sha256:
+                raise HubError(
+                    f"{name} of {repo} does not have the SHA-256 that {_LIST} says: it was changed."
+                )
+    return commit
+
+
+def _listed(content: bytes, repo: str, kind: Kind) -> dict[str, _File]:
+    """Return the size and the SHA-256 of each file that a repository lists."""
     try:
-        return json.loads(content)
+        plain = json.loads(content)
     except (ValueError, RecursionError) as error:
         raise HubError(f"{_LIST} of {repo} is not valid JSON.") from error
-
-
-def _listed(plain: Any, repo: str, kind: Kind, max_bytes: int) -> dict[str, tuple[int, str]]:
-    """Return the size and the SHA-256 of each file that a repository lists."""
     fields = cast("dict[str, Any]", plain) if isinstance(plain, dict) else {}
     if fields.get("format") != _FORMAT:
         raise HubError(f"{repo} was pushed by another version of Shapechanger.")
-    if fields.get("kind") != kind:
-        raise HubError(f"{repo} holds {str(fields.get('kind'))[:40]!r}, and not {kind!r}.")
-    listed: dict[str, tuple[int, str]] = {}
     try:
-        for name, about in fields["files"].items():
-            listed[name] = int(about["bytes"]), str(about["sha256"])
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        listed = msgspec.convert(fields, _Listed)
+    except msgspec.ValidationError as error:
         raise HubError(f"{_LIST} of {repo} does not list its files.") from error
-    for name in listed:
+    if listed.kind != kind:
+        raise HubError(f"{repo} holds {listed.kind[:40]!r}, and not {kind!r}.")
+    for name in listed.files:
         if not _NAMES[kind].fullmatch(name):
             raise HubError(f"{_LIST} of {repo} names {name[:80]!r}, which is no {kind} file.")
-    sizes = [size for size, _ in listed.values()]
-    if not sizes or min(sizes) < 0:
+    if not listed.files:
         raise HubError(f"{_LIST} of {repo} does not list its files.")
-    if sum(sizes) > max_bytes:
-        raise HubError(
-            f"The files of {repo} have {sum(sizes)} bytes, more than the limit of {max_bytes}."
-        )
-    return listed
+    return listed.files
 
 
 def _library() -> Any:
@@ -252,20 +223,21 @@ def _library() -> Any:
     return hub
 
 
-def _errors() -> Any:
-    return import_module("huggingface_hub.errors")
-
-
 @contextmanager
 def _answers(repo: str, kind: Kind) -> Generator[None]:
     """Turn what the Hub answers, and errors of the transport, into sentences."""
-    errors = _errors()
+    errors = import_module("huggingface_hub.errors")
+    no_name = HubError(
+        f"{repo!r} is no name of a repository: give its owner and its name, such as ada/ant."
+    )
+    if not re.fullmatch(r"[\w.-]+/[\w.-]+", repo, re.ASCII):  # No address, and no path.
+        raise no_name
     try:
         yield
     except ShapechangerError:
         raise
     except errors.HFValidationError as error:
-        raise _no_name(repo) from error
+        raise no_name from error
     except errors.RevisionNotFoundError as error:
         raise HubError(f"{repo} has no such revision.") from error
     except errors.RepositoryNotFoundError as error:
@@ -282,6 +254,8 @@ def _answers(repo: str, kind: Kind) -> Generator[None]:
                 f"The Hub forbids this for {repo}: use a token that may write to it."
             ) from error
         raise HubError(f"The Hub answered {code} for {repo}: try again later.") from error
+    except PermissionError as error:
+        raise OutputError(f"Cannot write {error.filename}: {error.strerror}.") from error
     except Exception as error:  # Of the transport, whose package differs between versions.
         raise HubError(
             f"The connection to the Hub failed ({type(error).__name__}): try again."

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapechanger.demos.episodes import Step
-from shapechanger.demos.overlay import COLOURS, overlay
+from shapechanger.demos.jpeg import COLOURS, overlay
 from tests.demos.episodes.making import ACTIONS
 
 PICTURE = np.full((30, 40, 3), 7, np.uint8)

@@ -13,6 +13,7 @@ import tyro
 from shapechanger.cli.console import counted, say
 from shapechanger.cli.env_arguments import require_file
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
+from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS
 from shapechanger.errors import HubError, StudyError
 from shapechanger.files import write_atomic
 from shapechanger.layout import Layout
@@ -40,7 +41,9 @@ class PushPolicy:
         from shapechanger import hub
 
         card = _policy_card(self.file, self.repo)
-        address = hub.push({hub.POLICY: self.file}, card, self.repo, "policy", public=self.public)
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / hub.POLICY).symlink_to(self.file.resolve())
+            address = hub.push(Path(folder), card, self.repo, "policy", public=self.public)
         say(f"pushed {self.file} to {address}")
 
 
@@ -62,14 +65,14 @@ class PullPolicy:
         if self.out.exists():
             raise HubError(f"{self.out} exists already: choose another name, or move it away.")
         with tempfile.TemporaryDirectory() as folder:
-            pulled = hub.pull(
+            commit = hub.pull(
                 self.repo,
                 "policy",
                 Path(folder),
                 revision=self.revision,
                 max_bytes=_MAX_POLICY_BYTES,
             )
-            (path,) = pulled.paths
+            path = Path(folder) / hub.POLICY
             try:
                 described = _described_policy(path)
             except StudyError as error:
@@ -78,7 +81,7 @@ class PullPolicy:
                 ) from error
             require_file(self.out)
             write_atomic(self.out, path.read_bytes())
-        say(f"wrote {self.out}: {described['env']}, revision {pulled.revision}")
+        say(f"wrote {self.out}: {described['env']}, revision {commit}")
 
 
 @dataclass(frozen=True)
@@ -93,22 +96,23 @@ class PushDemonstrations:
     """Let everybody read a new repository; it is private, if not given."""
 
     def run(self) -> None:
-        """Check and pack the episodes, upload them, and print where they are."""
+        """Check the episodes, upload them, and print where they are."""
         from shapechanger import hub
-        from shapechanger.demos.exchange.archive import pack_episode
 
         with tempfile.TemporaryDirectory() as folder:
-            files: dict[str, Path] = {}
-            episodes: list[Episode] = []
-            for path in episodes_of(self.data):
-                archive = Path(folder) / f"{path.resolve().name}.tar"
-                pack_episode(path, archive)
-                files[f"{hub.EPISODES}/{archive.name}"] = archive
-                episodes.append(read_episode(path))
-            hashes = {name: hub.sha256_of(path) for name, path in files.items()}
+            episodes = [read_episode(path) for path in episodes_of(self.data)]
+            hashes: dict[str, str] = {}
+            for episode in episodes:
+                name = f"{hub.EPISODES}/{episode.path.resolve().name}"
+                frames = {f"{FRAMES}/{step.frame}" for step in episode.steps if step.frame}
+                for file in (HEADER, STEPS, *frames):  # Without `lost/`.
+                    link = Path(folder) / name / file
+                    link.parent.mkdir(parents=True, exist_ok=True)
+                    link.symlink_to((episode.path / file).resolve())
+                hashes[f"{name}/{STEPS}"] = hub.sha256_of(episode.path / STEPS)
             card = _recording_card(episodes, hashes, self.repo)
-            address = hub.push(files, card, self.repo, "demonstrations", public=self.public)
-        say(f"pushed {counted(len(files), 'episode')} of {self.data} to {address}")
+            address = hub.push(Path(folder), card, self.repo, "demonstrations", public=self.public)
+        say(f"pushed {counted(len(episodes), 'episode')} of {self.data} to {address}")
 
 
 @dataclass(frozen=True)
@@ -125,9 +129,8 @@ class PullDemonstrations:
     """Largest recording to download, GiB."""
 
     def run(self) -> None:
-        """Download, check and unpack the episodes, and print their revision."""
+        """Download and check the episodes, and print their revision."""
         from shapechanger import hub
-        from shapechanger.demos.exchange.archive import unpack_episodes
         from shapechanger.demos.exchange.files import new_folder
 
         if not 0.0 < self.max_gib < float("inf"):
@@ -136,17 +139,20 @@ class PullDemonstrations:
             new_folder(self.out) as folder,
             tempfile.TemporaryDirectory(dir=folder) as place,
         ):
-            pulled = hub.pull(
+            commit = hub.pull(
                 self.repo,
                 "demonstrations",
                 Path(place),
                 revision=self.revision,
                 max_bytes=round(self.max_gib * _GIB),
             )
-            steps = unpack_episodes(pulled.paths, folder)
+            episodes = [read_episode(path) for path in (Path(place) / hub.EPISODES).iterdir()]
+            for episode in episodes:
+                episode.path.rename(folder / episode.path.name)
+        steps = sum(len(episode.steps) for episode in episodes)
         say(
-            f"wrote {self.out}: {counted(len(pulled.paths), 'episode')}, {counted(steps, 'step')}, "
-            f"revision {pulled.revision}"
+            f"wrote {self.out}: {counted(len(episodes), 'episode')}, {counted(steps, 'step')}, "
+            f"revision {commit}"
         )
 
 

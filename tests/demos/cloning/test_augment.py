@@ -7,8 +7,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from shapechanger.demos.cloning.batches import augmented, plain
-from shapechanger.demos.cloning.demonstrations import STEERING
+from shapechanger.demos.cloning.examples import STEERING, augmented, plain
 from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.settings import Augmentation
 

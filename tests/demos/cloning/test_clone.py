@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from shapechanger.demos.cloning.demonstrations import held_out
+from shapechanger.demos.cloning.examples import held_out
 from shapechanger.demos.cloning.learn import MemberCheck, Training, clone
 from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.demos.cloning.policy import CameraPolicy

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.demos.cloning.demonstrations import STEERING, mirror_of
+from shapechanger.demos.cloning.examples import STEERING, mirror_of
 from shapechanger.demos.cloning.pictures import CloningError
 from shapechanger.layout import Feature, Layout
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapechanger.demos.cloning.demonstrations import judged_steps, stretch
+from shapechanger.demos.cloning.examples import judged_steps, stretch
 from shapechanger.demos.cloning.pictures import CloningError
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.cloning.card import CloneCard
-from shapechanger.demos.cloning.demonstrations import (
+from shapechanger.demos.cloning.examples import (
     Examples,
     Mirror,
     held_out,
@@ -34,7 +34,7 @@ try:
     from torch import Tensor
     from torch.nn import functional
 
-    from shapechanger.demos.cloning.batches import Batches
+    from shapechanger.demos.cloning.examples import Batches
     from shapechanger.demos.cloning.network import CameraNetwork, joined
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error

@@ -88,7 +88,7 @@ def export_clone(
     operators: Any = opset18
     import torch
 
-    from shapechanger.demos.cloning.batches import scaled
+    from shapechanger.demos.cloning.examples import scaled
 
     card = policy.card
     inputs: dict[str, Any] = {}

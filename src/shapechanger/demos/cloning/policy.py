@@ -26,7 +26,7 @@ try:
     import torch
     from torch import Tensor
 
-    from shapechanger.demos.cloning.batches import plain
+    from shapechanger.demos.cloning.examples import plain
     from shapechanger.demos.cloning.network import CameraNetwork
 except ImportError as error:
     raise MissingExtra("torch", "learn") from error

@@ -313,7 +313,7 @@ class EpisodeWriter:
         self._bytes += len(line)
 
     def _frame(self, jpeg: bytes | None) -> Frame | None:
-        """Write a picture, and return its record; None for no new one keeps that of the step before."""
+        """Write a picture, and return its record; without a new one, keep that before."""
         before = self._before
         jpeg = self._jpeg if jpeg is None and before is None else jpeg
         if jpeg is None:

@@ -24,7 +24,6 @@ from msgspec import structs
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
 from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
-from shapechanger.demos.exchange.columns import BY_FIELD, COLUMNS, COMMANDS, fields_of, name_in
 from shapechanger.demos.exchange.exporting import value_names
 from shapechanger.demos.exchange.files import (
     UNIT_UNKNOWN,
@@ -36,11 +35,16 @@ from shapechanger.demos.exchange.files import (
     read_table,
 )
 from shapechanger.demos.exchange.format import (
+    BY_FIELD,
+    COLUMNS,
+    COMMANDS,
     ExchangeEpisode,
     ExchangeStep,
     ExportContext,
     Format,
     ImportContext,
+    fields_of,
+    name_in,
 )
 from shapechanger.demos.exchange.pictures import Pictures
 from shapechanger.demos.exchange.times import TimedDrive, choose_rates, split_at_jumps

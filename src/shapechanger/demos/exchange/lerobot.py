@@ -20,7 +20,6 @@ import numpy as np
 
 from shapechanger.demos.episodes import DRIVERS, Driver, EpisodeHeader, Step
 from shapechanger.demos.episodes.files import MAX_PICTURE_BYTES
-from shapechanger.demos.exchange.columns import name_in
 from shapechanger.demos.exchange.files import (
     MAX_FEATURES,
     MAX_PACKED,
@@ -39,6 +38,7 @@ from shapechanger.demos.exchange.format import (
     ExchangeStep,
     Format,
     ImportContext,
+    name_in,
 )
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, TASKS, write
 from shapechanger.demos.exchange.lerobot_index import LocatedEpisode, Place, locate, read_places

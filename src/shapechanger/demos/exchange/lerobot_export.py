@@ -32,10 +32,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import EpisodeHeader
-from shapechanger.demos.exchange.columns import name_in
 from shapechanger.demos.exchange.exporting import require_alike, value_names
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext
+from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext, name_in
 from shapechanger.demos.exchange.video import VideoWriter
 from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import DemosError
@@ -76,22 +75,9 @@ _Stats = dict[str, NDArray[Any]]
 
 
 def write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportContext) -> int:
-    """Write episodes into an existing folder, as one dataset.
+    """Write episodes into an existing folder, as one dataset, and return the number of steps.
 
     Episodes without steps are left out, because LeRobot does not support them.
-
-    Args:
-        episodes: The episodes, with one layout, one rate and one picture size.
-        folder: Where to write.
-        context: The task, "" for what the episodes say; whether pictures are stored as they were
-            recorded, in place of video; and whether there are rewards.
-
-    Returns:
-        Number of steps written.
-
-    Raises:
-        DemosError: If the episodes differ, or a step lacks a picture that others have.
-        MissingExtra: If a package that is needed is not installed.
     """
     require_alike(episodes, "a LeRobot dataset")
     dataset = _Dataset(episodes[0].header, folder, context)
@@ -109,12 +95,7 @@ def write(episodes: Sequence[ExchangeEpisode], folder: Path, context: ExportCont
 
 
 class _Dataset:
-    """A dataset that is being written into an empty folder.
-
-    Attributes:
-        places: A row for each episode, with what LeRobot wants to know of it.
-        steps: Number of steps written.
-    """
+    """A dataset that is being written into an empty folder; `places` has a row for each episode."""
 
     def __init__(self, header: EpisodeHeader, folder: Path, context: ExportContext) -> None:
         self.places: list[dict[str, Any]] = []
@@ -296,7 +277,8 @@ class _Dataset:
             self._table_path = path = self._next_file(_DATA_PATH, self._tables)
             self._table = self._parquet.ParquetWriter(path, self._schema, compression="snappy")
         full = video is None or (
-            video.bytes_written >= _VIDEO_FILE_MB * _MB or video.seconds >= _VIDEO_FILE_S
+            video.bytes_written >= _VIDEO_FILE_MB * _MB
+            or video.frames >= _VIDEO_FILE_S * self._rate
         )
         if self._filmed and self._size is not None and full:
             if video is not None:
@@ -355,12 +337,11 @@ class _Dataset:
             if row.jpeg is not None:
                 pixels = decode_picture(row.jpeg, where)
                 if pixels.shape[1::-1] != self._size:
-                    sizes = "{} x {} pixels, and not {} x {}".format(
-                        *pixels.shape[1::-1], *(self._size or ())
-                    )
                     raise DemosError(
-                        f"The picture {where} has {sizes} like the others: a LeRobot dataset has "
-                        "one size."
+                        "The picture {} has {} x {} pixels, and not {} x {} like the others: a "
+                        "LeRobot dataset has one size.".format(
+                            where, *pixels.shape[1::-1], *(self._size or ())
+                        )
                     )
                 written.shown = (row.jpeg, pixels, _histograms(pixels))
             if written.shown is None:
@@ -382,27 +363,14 @@ class _Dataset:
 
 @dataclass(slots=True)
 class _Written:
-    """What was written of the newest episode.
+    """What was written of the newest episode: columns of numbers, in parts of shape (n, k)."""
 
-    Attributes:
-        first: Number of its first step in the dataset.
-        task: Number of its task.
-        name: How to name it in errors.
-        steps: Number of steps.
-        numbers: Columns of numbers, in parts of shape (n, k).
-        histograms: Number of pixels of each value, shape (3, 256).
-        drivers: Driver of each step.
-        shown: The newest picture, its pixels and their histograms.
-    """
-
-    first: int
+    first: int  # Number of its first step in the dataset.
     task: int
     name: str
     steps: int = 0
     numbers: dict[str, list[NDArray[Any]]] = field(default_factory=dict[str, list[NDArray[Any]]])
-    histograms: NDArray[np.int64] = field(
-        default_factory=lambda: np.zeros((_COLOURS, _LEVELS), np.int64)
-    )
+    histograms: Any = 0  # Number of pixels of each value, shape (3, 256).
     drivers: list[str] = field(default_factory=list[str])
     shown: tuple[bytes, NDArray[np.uint8], NDArray[np.int64]] | None = None
 
@@ -445,12 +413,7 @@ def _number_stats(values: NDArray[Any]) -> _Stats:
 
 
 def _picture_stats(histograms: NDArray[np.int64], count: int) -> _Stats:
-    """Return the statistics of each colour from 0 to 1, shape (3, 1, 1) each.
-
-    Args:
-        histograms: Number of pixels of each value, shape (3, 256).
-        count: Number of pictures.
-    """
+    """Return the statistics of each colour from 0 to 1, shape (3, 1, 1) each."""
     levels = np.arange(_LEVELS) / (_LEVELS - 1)
     shares = histograms / histograms.sum(axis=1, keepdims=True)
     below = shares.cumsum(axis=1)

@@ -49,18 +49,18 @@ Place = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class LocatedEpisode:
-    """An episode whose keys agree.
+    """An episode whose keys agree: arrays with an entry for each step.
 
     Attributes:
         place: Its row of `meta/episodes`.
-        frames: The `frame_index` of each step, ascending, shape (n,).
-        times_ns: Time of each step since the start, shape (n,).
-        files: File of each step, of `paths`, shape (n,).
-        rows: Row of each step in its file, shape (n,).
+        frames: The `frame_index`, ascending.
+        times_ns: Time since the start.
+        files: The file, of `paths`.
+        rows: The row in its file.
         paths: All data files.
         video: The video; None without one.
         times: Its times; None without one.
-        ticks: Time of each picture in the video, shape (n,).
+        ticks: Time of the picture in the video.
     """
 
     place: Place
@@ -98,13 +98,7 @@ class _Contradiction(Exception):
 def read_places(folder: Path, camera: str, context: ImportContext) -> tuple[list[Place], set[int]]:
     """Return the rows of `meta/episodes` in order, and the numbers that are there twice.
 
-    Args:
-        folder: Folder of the dataset.
-        camera: Key of the video that is imported; "" without one.
-        context: Findings of the import.
-
-    Raises:
-        DemosError: If there is none, or a column is missing.
+    `camera` is the key of the video that is imported; "" without one.
     """
     paths = sorted((folder / EPISODES).glob("*/*.parquet"))
     if not paths:
@@ -147,20 +141,7 @@ def locate(
     size: tuple[int, int] | None,
     context: ImportContext,
 ) -> Iterator[LocatedEpisode]:
-    """Yield the episodes whose keys agree; the others are reported.
-
-    Args:
-        folder: Folder of the dataset.
-        info: Content of `info.json`.
-        places: Rows of `meta/episodes`.
-        twice: Numbers of episodes that are there twice.
-        camera: Key of the video that is imported; "" without one.
-        size: Width and height of the pictures, pixels; None without any.
-        context: Findings of the import.
-
-    Raises:
-        DemosError: If `info.json` leads out of the folder.
-    """
+    """Yield the episodes whose keys agree; the others are reported."""
     tables = _Tables(folder, info, places, twice, context)
     videos = _Videos(folder, info, places, camera, size) if camera else None
     for place in places:

@@ -32,7 +32,6 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from shapechanger.demos.episodes import DRIVERS, EpisodeHeader, Step
-from shapechanger.demos.exchange.columns import fields_of, name_in
 from shapechanger.demos.exchange.files import (
     MAX_FEATURES,
     MAX_UNPACKED,
@@ -55,6 +54,8 @@ from shapechanger.demos.exchange.format import (
     Format,
     ImportContext,
     few,
+    fields_of,
+    name_in,
 )
 from shapechanger.demos.exchange.minari_export import (
     CUT_OFF,

@@ -21,10 +21,15 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from shapechanger.demos.exchange.columns import fields_of, name_in
 from shapechanger.demos.exchange.exporting import require_alike
 from shapechanger.demos.exchange.files import library
-from shapechanger.demos.exchange.format import ExchangeEpisode, ExchangeStep, ExportContext
+from shapechanger.demos.exchange.format import (
+    ExchangeEpisode,
+    ExchangeStep,
+    ExportContext,
+    fields_of,
+    name_in,
+)
 from shapechanger.demos.exchange.pictures import Pictures
 from shapechanger.demos.jpeg import decode_picture, is_grey, picture_size
 from shapechanger.errors import DemosError

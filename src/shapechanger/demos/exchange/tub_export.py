@@ -10,8 +10,13 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.exchange.columns import COMMANDS, name_in
-from shapechanger.demos.exchange.format import ExchangeEpisode, ExportContext, kept_steps
+from shapechanger.demos.exchange.format import (
+    COMMANDS,
+    ExchangeEpisode,
+    ExportContext,
+    kept_steps,
+    name_in,
+)
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
 

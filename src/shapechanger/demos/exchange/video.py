@@ -15,7 +15,7 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import IO, Final, cast
+from typing import IO, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,25 +68,22 @@ class VideoWriter:
                 f"A video needs an even width and height, and the pictures have {width} x "
                 f"{height} pixels: export them with --images."
             )
+        _ffmpeg([])
         self.frames = 0
         self._path = path
-        self._rate = rate
-        hz = f"{rate.numerator}/{rate.denominator}"
-        raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", hz]
-        coding = ["-c:v", "libx264", "-crf", str(_QUALITY), "-g", str(_KEY_FRAMES), "-bf", "0"]
-        out = ["-pix_fmt", self.PIXELS, "-movflags", "+faststart", f"file:{path.absolute()}"]
-        self._log = tempfile.TemporaryFile()  # Closed by `close`.  # noqa: SIM115
-        self._process = subprocess.Popen(
-            _ffmpeg([*raw, "-i", "pipe:0", *coding, *out]),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=self._log,
+        coding = ["-crf", str(_QUALITY), "-g", str(_KEY_FRAMES), "-bf", "0"]
+        self._pictures: Any = library("imageio_ffmpeg", "lerobot").write_frames(
+            str(path.absolute()),
+            size,
+            fps=float(rate),
+            quality=None,
+            codec="libx264",
+            macro_block_size=1,
+            ffmpeg_log_level="quiet",
+            # Which of two rates counts is the last one; the first is rounded.
+            input_params=["-r", f"{rate.numerator}/{rate.denominator}"],
+            output_params=[*coding, "-movflags", "+faststart"],
         )
-
-    @property
-    def seconds(self) -> float:
-        """Duration of what is written, s."""
-        return float(self.frames / self._rate)
 
     @property
     def bytes_written(self) -> int:
@@ -99,29 +96,28 @@ class VideoWriter:
         Raises:
             OutputError: If it cannot be written.
         """
-        assert self._process.stdin is not None
         try:
-            self._process.stdin.write(np.ascontiguousarray(pixels).data)
+            if not self.frames:
+                self._pictures.send(None)  # It starts FFmpeg.
+            self._pictures.send(np.ascontiguousarray(pixels))
         except OSError as error:
-            raise self._failure() from error
+            raise OutputError(f"Cannot write {self._path}: FFmpeg ended.") from error
         self.frames += 1
 
     def close(self) -> None:
-        """Finish the file.
+        """Finish the file, and check that it is whole.
 
         Raises:
-            OutputError: If it cannot be written.
+            OutputError: If it is not.
         """
-        try:
-            self._process.communicate()
-            if self._process.returncode:
-                raise self._failure()
-        finally:
-            self._log.close()
-
-    def _failure(self) -> OutputError:
-        self._process.wait()
-        return OutputError(f"Cannot write {self._path}: {_last_line(self._log) or 'FFmpeg ended'}.")
+        self._pictures.close()
+        written = 0
+        with contextlib.suppress(DemosError, OSError):
+            written = len(read_times(self._path).ticks) if self.frames else 0
+        if self.frames != written:
+            raise OutputError(
+                f"Cannot write {self._path}: it has {written} of {self.frames} pictures."
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,13 +154,14 @@ def read_times(path: Path) -> VideoTimes:
     ticks: list[int] = []
     about: dict[str, str] = {}
     most = path.stat().st_size  # Each picture has at least one byte.
-    with tempfile.TemporaryFile() as log, _running(command, log) as process:
-        for line in iter(lambda: _stream(process).readline(_LONGEST_LINE), b""):
+    with tempfile.TemporaryFile() as log, _running(command, log) as (process, stream):
+        for line in iter(lambda: stream.readline(_LONGEST_LINE), b""):
             if line.startswith(b"#"):
                 name, _, value = line[1:].decode(errors="replace").partition(":")
                 about[name.strip()] = value.strip()
             elif not (flags := _FLAGS.search(line)) or not int(flags[1], 16) & _LEFT_OUT:
-                ticks.append(_tick(line))
+                # A packet: "stream, decoding time, presentation time, ...".
+                ticks.append(int(line.split(b",")[2]))
             if len(ticks) > most:
                 raise DemosError(f"{path} claims more pictures than it has bytes.")
         process.wait()
@@ -228,12 +225,12 @@ def read_pictures(
     with (
         tempfile.TemporaryFile() as log,
         os.fdopen(read_fd, "rb") as lines,
-        _running(command, log, write_fd) as process,
+        _running(command, log, write_fd) as (process, stream),
     ):
         for tick in wanted:
-            shown, data = _next_picture(path, size, lines, process)
+            shown, data = _next_picture(path, size, lines, stream)
             while data and shown < tick:
-                shown, data = _next_picture(path, size, lines, process)
+                shown, data = _next_picture(path, size, lines, stream)
             if seek and tick == wanted[0] and shown != tick:  # That was no key frame.
                 yield from read_pictures(path, times, wanted, size, from_start=True)
                 return
@@ -248,14 +245,13 @@ def read_pictures(
 
 
 def _next_picture(
-    path: Path, size: tuple[int, int], lines: IO[bytes], process: subprocess.Popen[bytes]
+    path: Path, size: tuple[int, int], lines: IO[bytes], stream: IO[bytes]
 ) -> tuple[int, bytes]:
     """Return the time of the next picture in ticks, and its pixels; b"" at the end."""
     line = lines.readline(_LONGEST_LINE)
     if not line.strip():
         return 0, b""
     # Each picture is a PPM: "P6", width and height, 255, and the pixels.
-    stream = _stream(process)
     head = [stream.readline(_LONGEST_LINE) for _ in range(3)]
     width, height = size
     if head[0] and head != [b"P6\n", f"{width} {height}\n".encode(), b"255\n"]:
@@ -277,7 +273,7 @@ def _reading(path: Path, seek: Sequence[str] = ()) -> list[str]:
 @contextlib.contextmanager
 def _running(
     command: Sequence[str], log: IO[bytes], *fds: int
-) -> Generator[subprocess.Popen[bytes]]:
+) -> Generator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
     """Run FFmpeg, to which some further descriptors are handed over, and end it."""
     with subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, pass_fds=fds
@@ -285,20 +281,11 @@ def _running(
         for fd in fds:
             os.close(fd)
         try:
-            yield process
+            assert process.stdout is not None
+            yield process, process.stdout
         finally:
             with contextlib.suppress(OSError):
                 process.kill()
-
-
-def _stream(process: subprocess.Popen[bytes]) -> IO[bytes]:
-    assert process.stdout is not None
-    return process.stdout
-
-
-def _tick(line: bytes) -> int:
-    """Return the time of a packet in ticks: "stream, decoding time, presentation time, ..."."""
-    return int(line.split(b",")[2])
 
 
 def _last_line(log: object) -> str:

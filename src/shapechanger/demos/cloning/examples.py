@@ -1,10 +1,12 @@
-"""Batches of augmented training examples."""
+"""Training examples: mirror images, held-out splits, and batches with random changes."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple, cast
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, NamedTuple, cast
 
 import numpy as np
 import torch
@@ -12,8 +14,230 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from shapechanger.demos.cloning.demonstrations import Examples
+from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
 from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
+from shapechanger.layout import Layout
+
+# Parts of names, between slashes. In the mirror image, the first change their sign and the second
+# do not. Positive yaw is to the left, and y points to the left.
+_NEGATED: Final = frozenset({"steering", "bearing", "yaw_rate", "acceleration_y"})
+_KEPT: Final = frozenset(
+    {"throttle", "forward", "backward", "speed", "distance", "acceleration_x"}
+    | {"bump", "stall", "collision", "battery", "temperature"}
+)
+_SIDES: Final = {"left": "right", "right": "left"}
+_SIDE: Final = re.compile(r"(?<![a-z])(left|right)(?![a-z])")
+_ROUNDING: Final = 1e-5  # Of actions in single precision.
+
+SplitBy = Literal["time", "episode"]
+"""Hold out the end of the recording by time, or whole episodes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mirror:
+    """Effect of mirroring the world on the values of a layout.
+
+    Attributes:
+        order: Index of the value that each value comes from.
+        signs: Sign of each value, 1 or -1.
+        rightward: 1 if a larger value steers to the right, -1 to the left, 0 neither.
+    """
+
+    order: tuple[int, ...]
+    signs: tuple[float, ...]
+    rightward: tuple[float, ...]
+
+    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the mirrored values, shape (n, size) in and out."""
+        return values[:, list(self.order)] * np.asarray(self.signs, np.float32)
+
+    def balance(self, actions: NDArray[np.float32]) -> float:
+        """Return how evenly actions steer to both sides: 0 for one side only, 1 for equal shares.
+
+        In a drive that turns to one side only, the mirror image would teach the wrong turn.
+        """
+        aside = actions @ np.asarray(self.rightward, np.float32)
+        right, left = float(aside.clip(min=0.0).sum()), float((-aside).clip(min=0.0).sum())
+        return min(right, left) / max(right, left) if max(right, left) else 1.0
+
+
+STEERING: Final = Mirror((0, 1), (-1.0, 1.0), (1.0, 0.0))
+"""Mirror of steering and throttle."""
+
+
+def mirror_of(layout: Layout) -> Mirror:
+    """Return the mirror of a layout: steering changes its sign, left and right are swapped.
+
+    Raises:
+        CloningError: If the mirror image of a value is unknown; the message is part of a sentence.
+    """
+    values: list[tuple[int, float, float]] = []
+    names = layout.names
+    for place, feature in enumerate(layout):
+        parts = set(feature.name.split("/"))
+        other = _SIDE.sub(lambda found: _SIDES[found[0]], feature.name)
+        if feature.shape:
+            raise CloningError(f"the mirror image of the array {feature.name} is unknown")
+        if other != feature.name and other in names:
+            rightward = 1.0 if _SIDE.findall(feature.name) == ["right"] else -1.0
+            values.append((names.index(other), 1.0, rightward))
+        elif parts & _NEGATED and feature.low == -feature.high:
+            values.append((place, -1.0, 1.0))
+        elif parts & _KEPT:
+            values.append((place, 1.0, 0.0))
+        else:
+            raise CloningError(f"the mirror image of {feature.name} is unknown")
+    return Mirror(*zip(*values, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Examples:
+    """Training examples, with their mirror images.
+
+    Attributes:
+        pictures: Prepared pictures, shape (n, height, width, 3); None for none.
+        states: Shape (n, k); None for none.
+        targets: Target outputs: actions, shape (n, m), or class indices, shape (n,).
+        mirrored_states: The mirrored states.
+        mirrored_targets: The mirrored targets.
+    """
+
+    pictures: NDArray[np.uint8] | None
+    states: NDArray[np.float32] | None
+    targets: NDArray[Any]
+    mirrored_states: NDArray[np.float32] | None
+    mirrored_targets: NDArray[Any]
+
+    def __len__(self) -> int:
+        """Return the number of examples."""
+        return len(self.targets)
+
+    def part(self, which: NDArray[np.bool_]) -> Examples:
+        """Return the examples selected by a mask of shape (n,)."""
+        arrays = {name: getattr(self, name) for name in self.__slots__}
+        return replace(
+            self, **{n: array[which] for n, array in arrays.items() if array is not None}
+        )
+
+
+def steering_examples(
+    pictures: NDArray[np.uint8], actions: NDArray[np.floating], framing: Framing
+) -> Examples:
+    """Return examples of steering and throttle from pictures.
+
+    Args:
+        pictures: Shape (n, H, W, 3), raw or prepared.
+        actions: Shape (n, 2), in [-1, 1].
+        framing: Crop and resolution.
+
+    Raises:
+        CloningError: If there are no examples, or an array is invalid.
+    """
+    if actions.ndim != 2 or actions.shape[1] != 2:
+        raise CloningError(
+            f"Actions must be steering and throttle, shape (n, 2), got shape {actions.shape}."
+        )
+    if len(pictures) != len(actions):
+        raise CloningError(
+            f"Each picture needs an action: there are {len(pictures)} pictures and "
+            f"{len(actions)} actions."
+        )
+    if not len(actions):
+        raise CloningError("There is no picture to learn from.")
+    wrong = ~(np.abs(actions) <= 1.0 + _ROUNDING).all(axis=1)  # Also finds NaN.
+    if wrong.any():
+        first = int(wrong.argmax())
+        raise CloningError(
+            f"Steering and throttle must be in [-1, 1], but action {first} is "
+            f"{actions[first].tolist()}."
+        )
+    wanted = actions.astype(np.float32)
+    return Examples(prepare(pictures, framing), None, wanted, None, STEERING(wanted))
+
+
+def held_out(n: int, episodes: Sequence[int], share: float) -> NDArray[np.bool_]:
+    """Return a mask of the examples to hold out: the last ones of each episode.
+
+    The last ones are taken because neighbours in time look alike: a picture between two training
+    pictures would test nothing.
+
+    Args:
+        n: Number of examples.
+        episodes: Length of each episode in order; () for a single one.
+        share: Share of each episode, in [0, 1); rounded down.
+
+    Raises:
+        CloningError: If the lengths do not add up to n.
+    """
+    lengths = list(episodes) or [n]
+    if min(lengths) < 0 or sum(lengths) != n:
+        raise CloningError(
+            f"The episodes have {sum(lengths)} pictures in total, but there are {n} pictures."
+        )
+    mask = np.zeros(n, np.bool_)
+    end = 0
+    for length in lengths:
+        end += length
+        mask[end - math.floor(share * length) : end] = True
+    return mask
+
+
+def judged_steps(episodes: Sequence[int], by: SplitBy, share: float) -> NDArray[np.bool_]:
+    """Return a mask of the steps to hold out for judging a policy: the last ones.
+
+    Args:
+        episodes: Number of steps of each episode, in order.
+        by: "time" takes the last share of all steps; "episode" takes whole episodes from the end
+            until they have that share, but at least one, and leaves at least one.
+        share: Share of the steps, in [0, 1).
+
+    Returns:
+        Shape (sum(episodes),).
+
+    Raises:
+        CloningError: If the share is out of range, or there is one episode only.
+    """
+    if not 0.0 <= share < 1.0:
+        raise CloningError(f"The held-out share must be in [0, 1), got {share}.")
+    n = sum(episodes)
+    mask = np.zeros(n, np.bool_)
+    if not share:
+        return mask
+    if by == "time":
+        mask[n - math.floor(share * n) :] = True
+        return mask
+    lengths = [length for length in episodes if length]
+    if len(lengths) < 2:
+        raise CloningError(
+            "There is one episode only, so none can be held out: split by time instead of episode."
+        )
+    last = 0
+    for length in reversed(lengths[1:]):
+        if last and last >= share * n:
+            break
+        last += length
+    mask[n - last :] = True
+    return mask
+
+
+def stretch(n: int, member: int, members: int, share: float) -> NDArray[np.bool_]:
+    """Return a mask of the steps with which a member decides when to stop.
+
+    Args:
+        n: Number of training steps.
+        member: Index of the member.
+        members: Number of members; the last one takes the end.
+        share: Length of the stretch as a share of n, in [0, 1); at most n / (members + 1) steps.
+
+    Returns:
+        Shape (n,).
+    """
+    length = min(math.floor(share * n), n // (members + 1))
+    start = round((n - length) * (member + 1) / members)
+    mask = np.zeros(n, np.bool_)
+    mask[start : start + length] = True
+    return mask
+
 
 _BRIGHTEST: Final = 255.0
 
