@@ -20,10 +20,13 @@ import pyarrow.parquet  # noqa: F401
 import simplejpeg  # noqa: F401
 
 from shapechanger.cli import main
-from shapechanger.demos import merging, recording  # noqa: F401
+from shapechanger.demos import (  # noqa: F401
+    merging,
+    recording,
+    report,
+)
 from shapechanger.demos.cloning import learn  # noqa: F401
 from shapechanger.demos.exchange import import_recording  # noqa: F401
-from shapechanger.reports import demonstrations  # noqa: F401
 
 MEMORY = 384 << 20
 """Bytes that a command may allocate. A picture of the largest allowed size needs 48 MiB."""

@@ -100,7 +100,7 @@ class ShowEpisodes:
 
     def run(self) -> None:
         """Print the summary and write the page."""
-        from shapechanger.reports.demonstrations import distributions
+        from shapechanger.demos.report import distributions
 
         episodes: list[Episode] = []
         broken: list[str] = []
@@ -120,7 +120,7 @@ class ShowEpisodes:
             say(sentence)
         if self.out is None:
             return
-        from shapechanger.reports.demonstrations import recording_html
+        from shapechanger.demos.report import recording_html
 
         name = self.data.resolve().name
         write_atomic(self.out, recording_html(name, episodes, broken).encode())

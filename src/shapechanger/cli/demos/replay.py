@@ -16,8 +16,7 @@ from shapechanger.cli.demos.recordings import episode_at
 from shapechanger.cli.env_arguments import env_ref, opened
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.episodes import Episode, Step
-from shapechanger.demos.jpeg import decode_picture
-from shapechanger.demos.overlay import blank, overlay
+from shapechanger.demos.jpeg import blank, decode_picture, overlay
 from shapechanger.demos.statistics import gaps_s, is_same_rate, rate_jitter
 from shapechanger.errors import DemosError, LinkError, RobotRefused
 from shapechanger.layout import Layout

@@ -65,12 +65,11 @@ class TrainClone:
         """Train, evaluate and write the files."""
         self._require_files()
         # The report comes last; check its requirements before the work.
-        import_module("shapechanger.reports.clone")
-        from shapechanger.demos.cloning.demonstrations import judged_steps
-        from shapechanger.demos.cloning.judge import judge
+        import_module("shapechanger.demos.cloning.report")
+        from shapechanger.demos.cloning.examples import judged_steps
+        from shapechanger.demos.cloning.judge import duration_s, judge, outlook
         from shapechanger.demos.cloning.learn import learn, settings_for
-        from shapechanger.demos.cloning.outlook import duration_s, outlook
-        from shapechanger.reports.clone import clone_html, write_numbers
+        from shapechanger.demos.cloning.report import clone_html, write_numbers
         from shapechanger.transfer.learners.presets import LEARNERS
         from shapechanger.transfer.learners.sb3 import use_one_thread
 
@@ -308,7 +307,7 @@ class Evaluate:
                 note += f" On the others its accuracy is {unseen.accuracy:.3f}."
             say(note)
         if self.report is not None:
-            from shapechanger.reports.clone import clone_html, write_numbers
+            from shapechanger.demos.cloning.report import clone_html, write_numbers
 
             require_file(self.report)
             page = clone_html(self.policy.name, policy, data, judgement, None, note)

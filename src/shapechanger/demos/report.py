@@ -12,8 +12,7 @@ import numpy as np
 import simplejpeg
 
 from shapechanger.demos.episodes import DRIVERS, Driver, Episode, Step
-from shapechanger.demos.jpeg import decode_picture
-from shapechanger.demos.overlay import COLOURS
+from shapechanger.demos.jpeg import COLOURS, decode_picture
 from shapechanger.demos.statistics import Distribution, EpisodeStatistics, gaps_s, spread, summary
 from shapechanger.errors import DemosError
 from shapechanger.layout import Layout
