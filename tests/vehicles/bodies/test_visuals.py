@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
 
 from shapechanger.vehicles.bodies import VEHICLES, add_vehicle
-from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
+from shapechanger.vehicles.bodies.visuals import (
+    OUTSIDE_VIEW,
+    OWN_VIEW,
+    normals,
+    read_obj,
+    shading,
+)
 from tests.vehicles.bodies.grounds import ALL
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
@@ -84,3 +92,53 @@ def test_brightness_does_not_change_with_the_heading(name: str, yaw: float) -> N
         assert light.min() > -1e-5
         brightest.append(float(light.max()))
     assert max(brightest) == pytest.approx(1.0, abs=1e-5)
+
+
+_CUBE = """# A cube, its top as two triangles.
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 0 0 1
+v 1 0 1
+v 1 1 1
+v 0 1 1
+vt 0.25 0.5
+o cube
+usemtl side
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+usemtl top
+f 5/1 6/1 7/1
+f 5/1 7/1 8/1
+o floor
+usemtl side
+f 4 3 2 1
+"""
+
+
+def test_meshes_are_read_by_object_and_material(tmp_path: Path) -> None:
+    """The last corner of a triangle is there twice; texture coordinates are those of corners."""
+    path = tmp_path / "cube.obj"
+    path.write_text(_CUBE)
+    objects = read_obj(path)
+    assert list(objects) == ["cube", "floor"]
+    assert list(objects["cube"]) == ["side", "top"]
+    faces, uvs = objects["cube"]["top"]
+    np.testing.assert_array_equal(faces[0], [(0, 0, 1), (1, 0, 1), (1, 1, 1), (1, 1, 1)])
+    np.testing.assert_array_equal(uvs, np.full((2, 4, 2), (0.25, 0.5)))
+
+
+def test_the_top_is_brightest_and_the_bottom_darkest(tmp_path: Path) -> None:
+    """Brightness under an open sky falls from the top over the sides to the bottom."""
+    path = tmp_path / "cube.obj"
+    path.write_text(_CUBE)
+    objects = read_obj(path)
+    sides, top = (objects["cube"][name].faces for name in ("side", "top"))
+    np.testing.assert_allclose(normals(top), [(0, 0, 1), (0, 0, 1)])
+    assert shading(top) == pytest.approx(1.0)
+    bottom, around = shading(objects["floor"]["side"].faces), shading(sides)
+    assert bottom.max() < around.min() < around.max() < 0.9
+    assert len(set(around.round(3))) == 4  # So that edges between them are visible.

@@ -69,7 +69,7 @@ def add_vehicle(
     # vehicle at rest from creeping.
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
-    model.build(spec, Paint(spec, light))
+    model.build(spec, Paint(spec, name, light))
     # Poses of what never moves are then computed once, not in each step. The vehicle itself never
     # sleeps, so that its motion is the same.
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP

@@ -10,11 +10,8 @@ follow T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import mujoco
@@ -27,17 +24,7 @@ from shapechanger.vehicles.bodies.parts import (
     add_camera,
     add_hull,
 )
-from shapechanger.vehicles.bodies.shapes import (
-    Faces,
-    block,
-    extrude,
-    hull,
-    loft,
-    moved,
-    rod,
-    section,
-)
-from shapechanger.vehicles.bodies.visuals import Paint, add_shadow, dress, joined
+from shapechanger.vehicles.bodies.visuals import Paint, add_shadow, dress
 
 _WATER_DENSITY: Final = 1000.0  # kg/m3, fresh
 # Share of its full speed that the wash has reached at the rudder: 0.6 for hulls in H. Yasukawa and
@@ -397,56 +384,12 @@ def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
     add_hull(chassis, "vehicle/hull", box, (-0.06, 0.0, 0.02), (0.24, _WIDTH / 2, 0.05), 0.0)
     bow = (0.16, 0.0, 0.02), (0.14, _WIDTH / 2, 0.05)
     add_hull(chassis, "vehicle/bow", ellipsoid, *bow, 0.0)
-    dress(chassis, _bodywork(), paint)
+    dress(chassis, "chassis", paint)
     add_shadow(chassis, (-0.29, -0.08), (0.20, 0.08), paint)
     for part, (_, y) in _PROPELLERS.items():
         _add_propeller(spec, chassis, part, y)
     _add_rudder(spec, chassis, paint)
     add_camera(chassis, _CAMERA)
-
-
-@functools.cache
-def _bodywork() -> Mapping[str, Faces]:
-    """A workboat above its waterline, with the camera on its foredeck: colours and faces."""
-    deep = 0.058
-    cabin = ((-0.17, 0.108), (0.01, 0.108), (0.045, 0.056))
-    house = [section(x, [(0.062, 0.054), (0.056, z)]) for x, z in cabin]
-    screen = [
-        section(x, [(0.050, z - 0.001), (0.050, z)]) for x, z in ((0.0165, 0.101), (0.038, 0.069))
-    ]
-    z = _CAMERA.z
-    parts = [
-        ("white", hull(_LENGTH, 0.192, deep)),
-        ("orange", hull(_LENGTH + 0.004, 0.198, deep, low=0.72)),  # Rubbing strake.
-        ("deck", hull(0.94 * _LENGTH, 0.164, deep + 0.002, low=0.9)),
-        ("white", loft(house)),
-        ("glass", moved(loft(screen), (0.003, 0.0, 0.002))),
-        ("orange", block((-0.185, -0.064, 0.107), (0.022, 0.064, 0.113))),
-        ("dark", rod((-0.03, 0.0, 0.113), (-0.03, 0.0, 0.20), 0.003, 8)),  # Mast.
-        ("white", block((-0.034, -0.028, 0.165), (-0.026, 0.028, 0.172))),  # Radar.
-        ("dark", rod((-0.12, 0.0, 0.112), (-0.128, 0.0, 0.150), 0.014, 10)),  # Funnel.
-        ("orange", rod((-0.121, 0.0, 0.122), (-0.123, 0.0, 0.134), 0.0148, 10)),
-        ("grey", block((-0.275, -0.045, 0.058), (-0.205, 0.045, 0.072))),  # Hatch.
-        ("dark", rod((0.15, 0.0, 0.06), (0.15, 0.0, z - 0.006), 0.004, 8)),
-        ("dark", block((0.134, -0.013, z - 0.011), (0.157, 0.013, z + 0.011))),
-        ("steel", rod((0.156, 0.0, z), (0.1595, 0.0, z), 0.007)),
-    ]
-    for side in (-1.0, 1.0):
-        y = side * 0.0612
-        parts += [
-            ("glass", block((x, y - 0.003, 0.078), (x + 0.032, y + 0.0025, 0.099)))
-            for x in (-0.155, -0.110, -0.065, -0.020)
-        ]
-        along = (-0.26, -0.19, -0.10, 0.0, 0.09, 0.18, 0.26)
-        posts = zip(along, (0.079, 0.088, 0.091, 0.089, 0.082, 0.058, 0.024), strict=True)
-        tops = [(x, side * w, 0.088 + 0.03 * max(0.0, x)) for x, w in posts]
-        parts += [("steel", rod((x, v, 0.055), (x, v, h), 0.0013, 5)) for x, v, h in tops]
-        parts += [("steel", rod(a, b, 0.0013, 5)) for a, b in pairwise(tops)]
-        parts += [
-            ("dark", rod((x, 1.62 * y, 0.018), (x, 1.62 * y, 0.045), 0.008, 8))
-            for x in (-0.18, -0.02)
-        ]
-    return joined(parts)
 
 
 def _add_propeller(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, part: str, y: float) -> None:
@@ -474,11 +417,7 @@ def _add_rudder(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> N
         name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0],
         damping=HOBBY_SERVO.damping, armature=2e-4,
     )  # fmt: skip
-    # The rudder's head turns behind the transom.
-    head = extrude(
-        [(-0.058, 0.042), (-0.034, 0.042), (-0.036, 0.105), (-0.050, 0.105)], -0.003, 0.003
-    )
-    dress(stock, {"deck": head}, paint, ground_z=_DRAUGHT)
+    dress(stock, "rudder", paint, ground_z=_DRAUGHT)  # Its head turns behind the transom.
     HOBBY_SERVO.add(spec, name, name)
 
 

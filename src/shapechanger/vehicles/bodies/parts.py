@@ -136,7 +136,7 @@ def add_wheel(
     aside = (90.0, 0.0, 0.0)
     size, black = (radius, width / 2), paint(tyre)
     add_look(wheel, mujoco.mjtGeom.mjGEOM_CYLINDER, (0.0, 0.0, 0.0), size, black, euler_deg=aside)
-    dress_wheel(wheel, radius, width, paint, tyre)
+    dress_wheel(wheel, radius, paint)
     return wheel
 
 

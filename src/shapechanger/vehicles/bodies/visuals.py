@@ -1,16 +1,19 @@
-"""Looks of vehicles: their colours, and what is seen of them from outside."""
+"""Looks of vehicles: their colours, and the meshes that are seen from outside."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shapechanger.vehicles.bodies.shapes import Faces, fan, loft, shading
+Faces = NDArray[np.float64]
+"""Corners of faces, (n, 4, 3), m, counter-clockwise seen from outside; the last corner of a
+triangle is there twice."""
 
 OWN_VIEW: Final = 1
 """Group of the geoms that only the vehicle's own camera sees.
@@ -43,19 +46,78 @@ _COLOURS: Final = {
 }
 
 
+class Solids(NamedTuple):
+    """Faces of one object and material of an OBJ file.
+
+    Attributes:
+        faces: Corners of the faces.
+        uvs: Texture coordinates of the corners, (n, 4, 2); empty without any.
+    """
+
+    faces: Faces
+    uvs: NDArray[np.float64]
+
+
+@functools.cache
+def read_obj(path: Path) -> Mapping[str, Mapping[str, Solids]]:
+    """Read an OBJ file of triangles and quads: solids keyed by object and material."""
+    numbers: dict[str, list[list[float]]] = {"v": [], "vt": []}
+    objects: dict[str, dict[str, list[list[list[int]]]]] = {}
+    materials, faces = dict[str, list[list[list[int]]]](), list[list[list[int]]]()
+    for line in path.read_text("utf-8").splitlines():
+        kind, _, rest = line.partition(" ")
+        if kind in numbers:
+            numbers[kind].append([float(word) for word in rest.split()])
+        elif kind == "o":
+            materials = objects[rest] = {}
+        elif kind == "usemtl":
+            faces = materials[rest] = []
+        elif kind == "f":
+            corners = [[int(i) - 1 for i in word.split("/")] for word in rest.split()]
+            faces.append([*corners, corners[-1]][:4])
+    points, uvs = (np.array(numbers[kind]).reshape(-1, n) for kind, n in (("v", 3), ("vt", 2)))
+
+    def solids(faces: list[list[list[int]]]) -> Solids:
+        at = np.array(faces)
+        return Solids(points[at[..., 0]], uvs[at[..., -1]] if at.shape[2] > 1 else np.empty(0))
+
+    return {
+        name: {material: solids(faces) for material, faces in materials.items()}
+        for name, materials in objects.items()
+    }
+
+
+def normals(faces: Faces) -> NDArray[np.float64]:
+    """Unit vectors outwards, (n, 3)."""
+    across = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
+    return across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+
+
+def shading(faces: Faces) -> NDArray[np.float64]:
+    """Brightness of each face under an open sky, 0 to 1, (n,): the top is brightest."""
+    x, y, up = normals(faces).T
+    light = 0.72 + np.where(up > 0.0, 0.28, 0.4) * up
+    return np.clip(light + (0.07 * x + 0.1 * y) * (1.0 - np.abs(up)), 0.05, 1.0)
+
+
 class Paint:
-    """Makes materials.
+    """Materials and meshes of a vehicle.
 
     Args:
         spec: Model that the materials are added to.
+        vehicle: Name of the vehicle, whose meshes are in `meshes/`.
         light: Red, green and blue of the light on what is seen from outside, each 0 to 1.
 
     Attributes:
         spec: The model.
+        meshes: Faces seen from outside, keyed by object, such as "wheel", and colour.
     """
 
-    def __init__(self, spec: mujoco.MjSpec, light: ArrayLike = (1.0, 1.0, 1.0)) -> None:
+    def __init__(
+        self, spec: mujoco.MjSpec, vehicle: str, light: ArrayLike = (1.0, 1.0, 1.0)
+    ) -> None:
         self.spec = spec
+        self.meshes = read_obj(Path(__file__).parent / "meshes" / f"{vehicle}.obj")
         self._light = np.asarray(light, float)
         self._made: set[str] = set()
 
@@ -133,30 +195,16 @@ def _add_shape(
     )  # fmt: skip
 
 
-def joined(solids: Iterable[tuple[str, Faces]]) -> Mapping[str, Faces]:
-    """Join the faces of each colour."""
-    by_colour: dict[str, list[Faces]] = {}
-    for colour, faces in solids:
-        by_colour.setdefault(colour, []).append(faces)
-    return {colour: np.concatenate(parts) for colour, parts in by_colour.items()}
-
-
-def dress(
-    body: mujoco.MjsBody,
-    solids: Mapping[str, Faces],
-    paint: Paint,
-    *,
-    ground_z: float = 0.0,
-) -> None:
+def dress(body: mujoco.MjsBody, name: str, paint: Paint, *, ground_z: float = 0.0) -> None:
     """Add what is seen of a body from outside, and its reflection in a glossy ground.
 
     Args:
         body: Body to extend.
-        solids: Faces by colour, m, (n, 4, 3).
-        paint: Materials.
+        name: Object in the vehicle's meshes, such as "chassis".
+        paint: Materials and meshes.
         ground_z: Height of the ground in the frame of the body, m.
     """
-    for colour, faces in solids.items():
+    for colour, (faces, _) in paint.meshes[name].items():
         below = faces[:, [0, 3, 2, 1]] * (1.0, 1.0, -1.0) + (0.0, 0.0, 2.0 * ground_z)
         both, light = np.concatenate([faces, below]), np.tile(shading(faces), 2)
         _add_shape(body, f"{body.name}/{colour}", both, light, paint.shaded(colour), paint)
@@ -201,65 +249,23 @@ def _layers(low: tuple[float, float], high: tuple[float, float], ground_z: float
         flat = middle + np.sign(direction) * (half - 0.03) + direction * (0.03 + spread)
         height = ground_z + 0.001 + _LAYER_RISE_M * number
         ring = np.column_stack([flat, np.full(len(flat), height)])
-        layers.append(fan(ring))
+        first = np.broadcast_to(ring[0], (len(ring) - 2, 3))
+        layers.append(np.stack([first, ring[1:-1], ring[2:], ring[2:]], axis=1))
     return np.concatenate(layers)
 
 
-_TYRE_SIDES: Final = 20
-_SPOKES: Final = 5
-
-
-def dress_wheel(
-    wheel: mujoco.MjsBody, radius: float, width: float, paint: Paint, tyre: str
-) -> None:
+def dress_wheel(wheel: mujoco.MjsBody, radius: float, paint: Paint) -> None:
     """Add tyre and rim of a wheel, which are seen from outside only.
 
     Args:
         wheel: Body of the wheel, whose axle is its y axis.
         radius: Radius, m.
-        width: Width, m.
-        paint: Materials.
-        tyre: "tyre", or "track" for a road wheel within a track.
+        paint: Materials and meshes.
     """
-    for colour, faces in _wheel(radius, width, tyre == "track").items():
+    for colour, (faces, _) in paint.meshes["wheel"].items():
         name = f"vehicle/{colour} of wheels"
         dark, material = np.zeros(len(faces)), paint.even(colour)
         _add_shape(wheel, name, faces, dark, material, paint)
         # Its reflection does not turn.
         mirrored = wheel.pos - (0.0, 0.0, 2.0 * radius)
         _add_shape(wheel.parent, name, faces, dark, material, paint, mirrored)
-
-
-@functools.cache
-def _wheel(radius: float, width: float, inside: bool) -> Mapping[str, Faces]:
-    """Faces of a wheel by colour, m; `inside` a track it is smaller."""
-    outer, half = (0.74 * radius, 0.52 * width) if inside else (radius, 0.5 * width)
-    angle = np.linspace(0.0, 2.0 * np.pi, 2 * _TYRE_SIDES, endpoint=False)
-
-    def ring(share: float, y: float) -> NDArray[np.float64]:
-        """Circle, counter-clockwise seen from the left."""
-        x, z = -share * outer * np.cos(angle), share * outer * np.sin(angle)
-        return np.stack([x, np.full(len(angle), y), z], axis=1)
-
-    tread = loft([ring(1.0, -half), ring(1.0, half)], closed=False)
-    sides = [ring(1.0, half), ring(0.64, half)], [ring(0.64, -half), ring(1.0, -half)]
-    walls = [loft(pair, closed=False) for pair in sides]
-    proud = half + 0.0006
-    discs = [fan(ring(0.66, proud)), fan(ring(0.66, -proud)[::-1])]
-    # Openings between the spokes: sectors of a slightly larger radius near the rim.
-    openings: list[Faces] = []
-    for start in np.arange(_SPOKES) * (len(angle) // _SPOKES):
-        for y, way in ((proud + 0.0004, 1), (-proud - 0.0004, -1)):
-            arc = slice(start, start + 5)
-            corners = np.concatenate([ring(0.56, y)[arc], ring(0.24, y)[arc][::-1]])
-            openings.append(fan(corners[::way]))
-    tyre = [*walls, tread[::4], tread[1::4]]
-    rim = "olive" if inside else "rim"
-    return joined(
-        [
-            *(("tyre", faces) for faces in tyre),
-            *(("tread", faces) for faces in (tread[2::4], tread[3::4])),
-            *((rim, faces) for faces in discs),
-            *(("dark", faces) for faces in openings),
-        ]
-    )

@@ -8,20 +8,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from shapechanger.vehicles.bodies.shapes import (
-    Faces,
-    block,
-    hull,
-    loft,
-    rod,
-    section,
-)
+from shapechanger.vehicles.bodies.visuals import read_obj, shading
 from shapechanger.vehicles.courses.course import Course, Obstacle, Wall
-from shapechanger.vehicles.courses.quad_mesh import Array, QuadMesh, Template
+from shapechanger.vehicles.courses.quad_mesh import Array, QuadMesh
 
 BANK_M: Final = 0.4
 """Width of quays and rocks; two parts of the lane are at least twice this apart."""
@@ -105,51 +99,54 @@ def fittings(course: Course) -> QuadMesh:
             continue
         x0, y0 = np.asarray(wall.start) + place * along / length
         if draws[0] < _BOLLARD:
-            _bollard().add_to(mesh, (x0, y0, wall.height), yaw, reflected=False)
+            add_solids(mesh, "bollard", (x0, y0, wall.height), yaw, reflected=False)
         x1, y1 = np.asarray(wall.end) - place * along / length
         if draws[1] < _TYRE:
-            _tyre().add_to(mesh, (x1, y1, 0.55 * wall.height), yaw)
+            add_solids(mesh, "tyre", (x1, y1, 0.55 * wall.height), yaw)
         elif draws[1] < _TYRE + _LADDER:
-            _ladder().add_to(mesh, (x1, y1, 0.0), yaw, (1.0, 1.0, wall.height))
+            add_solids(mesh, "ladder", (x1, y1, 0.0), yaw, (1.0, 1.0, wall.height))
     for boat in moored(course):
-        _boat(boat.kind).add_to(mesh, (boat.x, boat.y, 0.0), boat.yaw, boat.length)
+        add_solids(mesh, boat.kind, (boat.x, boat.y, 0.0), boat.yaw, boat.length)
     _add_village(mesh, course, rng)
     return mesh
 
 
-# The wall is along x, with the lane at y > 0.
+_SOLIDS: Final = Path(__file__).parent / "meshes" / "harbour.obj"
+
+
+def add_solids(
+    mesh: QuadMesh,
+    name: str,
+    place: tuple[float, float, float],
+    yaw: float,
+    scale: float | tuple[float, float, float] = 1.0,
+    light: float = 1.0,
+    *,
+    reflected: bool = True,
+) -> None:
+    """Add an object of `meshes/harbour.obj` at a place.
+
+    Args:
+        mesh: Mesh to extend.
+        name: Name of the object. The wall of a fitting is along x, with the lane at y > 0.
+        place: Position of its origin, m.
+        yaw: Rotation about the vertical axis, rad.
+        scale: Factor on all sizes, or on each of them.
+        light: Brightness, 0 to 1.
+        reflected: See `QuadMesh.add`.
+    """
+    faces, uvs, bright = _solid(name)
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    corners = faces * scale @ turn + np.asarray(place, float)
+    mesh.add(corners, uvs, light * bright, reflected=reflected)
 
 
 @functools.cache
-def _bollard() -> Template:
-    """A bollard on a quay at z = 0."""
-    y = -0.12
-    neck = rod((0.0, y, 0.0), (0.0, y, 0.12), 0.045, 6)[:6]
-    head = block((-0.075, y - 0.05, 0.12), (0.075, y + 0.05, 0.17))
-    return Template.of([(neck, "iron"), (head, "iron")])
-
-
-@functools.cache
-def _tyre() -> Template:
-    """A tyre around the origin."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
-    rings = [
-        np.stack([-r * np.cos(angle), np.full(8, y), r * np.sin(angle)], axis=1)
-        for r, y in ((0.16, 0.0), (0.14, 0.02), (0.07, 0.012))
-    ]
-    return Template.of([(loft(rings, closed=False), "rubber")])
-
-
-@functools.cache
-def _ladder() -> Template:
-    """A ladder of height 1 with flat bars: a vehicle can come as near as the wall."""
-    bars = [((side, 0.0), (side + 0.025, 1.0)) for side in (-0.14, 0.115)]
-    bars += [((-0.12, z), (0.12, z + 0.042)) for z in (0.1, 0.27, 0.44, 0.61, 0.78, 0.95)]
-    faces = [
-        [(x1, 0.01, z0), (x0, 0.01, z0), (x0, 0.01, z1), (x1, 0.01, z1)]
-        for (x0, z0), (x1, z1) in bars
-    ]
-    return Template.of([(np.array(faces), "rust")])
+def _solid(name: str) -> tuple[Array, Array, Array]:
+    """Faces, texture coordinates and brightness of an object."""
+    faces, uvs = read_obj(_SOLIDS)[name][name]
+    return faces, uvs, shading(faces)[:, None]
 
 
 class MooredBoat(NamedTuple):
@@ -204,39 +201,6 @@ def moored(course: Course) -> list[MooredBoat]:
     return placed
 
 
-@functools.cache
-def _boat(kind: str) -> Template:
-    """A boat of length 1 at the origin, ahead along x."""
-    wide, deep = _BEAM, 0.15
-    skin = {"sail": "white hull", "motor": "blue hull", "fishing": "green hull"}[kind]
-    made: list[tuple[Faces, str]] = [(hull(1.0, wide, deep), skin)]
-
-    def add(rear: float, front: float, half: float, low: float, top: float, material: str) -> None:
-        ends = (rear, -half * wide, low * deep), (front, half * wide, top * deep)
-        made.append((block(*ends), material))
-
-    def spar(x0: float, z0: float, x1: float, z1: float, thick: float, material: str) -> None:
-        made.append((rod((x0, 0.0, z0), (x1, 0.0, z1), thick, 4), material))
-
-    add(-0.47, 0.3, 0.36, 0.85, 1.06, "deck")
-    if kind == "sail":
-        add(-0.12, 0.22, 0.26, 1.0, 1.5, "cabin")
-        spar(0.08, 0.15, 0.08, 1.1, 0.009, "spar")
-        spar(-0.4, 0.30, 0.06, 0.32, 0.025, "canvas")
-    elif kind == "motor":
-        add(-0.25, 0.2, 0.36, 1.0, 1.9, "cabin")
-        add(-0.28, 0.1, 0.38, 1.9, 2.0, "white hull")
-        add(-0.15, 0.05, 0.28, 2.0, 2.5, "panes")
-        spar(-0.2, 0.3, -0.24, 0.5, 0.006, "spar")
-    else:
-        add(0.02, 0.24, 0.30, 1.0, 2.6, "cabin")
-        add(0.0, 0.27, 0.34, 2.6, 2.75, "red hull")
-        add(-0.42, -0.1, 0.26, 1.0, 1.25, "rust")
-        spar(-0.08, 0.15, -0.08, 0.68, 0.008, "spar")
-        spar(-0.08, 0.3, -0.4, 0.57, 0.006, "spar")
-    return Template.of(made)
-
-
 def add_dinghy(mesh: QuadMesh, obstacle: Obstacle, light: float) -> None:
     """Add a dinghy, blunt at both ends and so nearly as wide as its collision box.
 
@@ -245,40 +209,9 @@ def add_dinghy(mesh: QuadMesh, obstacle: Obstacle, light: float) -> None:
         obstacle: Its place and size.
         light: Brightness, 0 to 1.
     """
-    # Half of them have a cabin.
-    model = _dinghy(has_cabin=round(1000.0 * obstacle.length) % 2 == 1)
+    kind = "cabin dinghy" if round(1000.0 * obstacle.length) % 2 else "dinghy"  # Half of them.
     size = obstacle.length, obstacle.width, obstacle.height
-    model.add_to(mesh, (obstacle.x, obstacle.y, 0.0), obstacle.yaw, size, light)
-
-
-@functools.cache
-def _dinghy(*, has_cabin: bool) -> Template:
-    """A dinghy of length, width and height 1 at the origin, ahead along x."""
-    # Position, half width of deck and waterline, and height of the deck.
-    stations = (
-        (-0.5, 0.46, 0.43, 0.60),
-        (-0.25, 0.5, 0.48, 0.58),
-        (0.25, 0.5, 0.48, 0.60),
-        (0.5, 0.40, 0.36, 0.70),
-    )
-    skin = [section(x, [(water, 0.0), (deck, top)]) for x, deck, water, top in stations]
-    made = [(loft(skin), "hull")]
-
-    def add(rear: float, front: float, half: float, low: float, top: float, material: str) -> None:
-        made.append((block((rear, -half, low), (front, half, top)), material))
-
-    if has_cabin:
-        add(-0.05, 0.30, 0.34, 0.55, 0.92, "hull")
-        add(-0.08, 0.33, 0.38, 0.92, 1.0, "wood")
-        add(0.29, 0.305, 0.28, 0.66, 0.88, "black")
-        add(-0.02, 0.26, 0.345, 0.70, 0.86, "black")
-        add(-0.44, -0.12, 0.38, 0.55, 0.63, "wood")
-    else:
-        add(-0.44, 0.40, 0.40, 0.55, 0.635, "dark wood")
-        for x in (-0.3, 0.0, 0.26):
-            add(x - 0.04, x + 0.04, 0.46, 0.55, 0.70, "wood")
-    add(-0.5, -0.44, 0.10, 0.2, 0.8 if has_cabin else 1.0, "metal")  # Outboard motor.
-    return Template.of(made)
+    add_solids(mesh, kind, (obstacle.x, obstacle.y, 0.0), obstacle.yaw, size, light)
 
 
 def extent(course: Course) -> tuple[Array, float]:
@@ -309,23 +242,6 @@ def far_shore(course: Course) -> QuadMesh:
     return mesh
 
 
-@functools.cache
-def _house() -> Template:
-    """A house of length, depth and height of the walls 1 at the origin."""
-    walls = block((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))[:4]
-    gable = [(-0.55, 1.0), (0.55, 1.0), (0.0, 1.35)]
-    roof = loft([[(x, y, z) for y, z in gable] for x in (-0.55, 0.55)])
-    return Template.of([(walls, "house"), (roof, "roof")])
-
-
-@functools.cache
-def _lighthouse() -> Template:
-    foot, gallery, top = ((0.0, 0.0, z) for z in (0.0, 8.0, 9.2))
-    return Template.of(
-        [(rod(foot, gallery, 0.9, 8), "tower"), (rod(gallery, top, 0.6, 8), "panes")]
-    )
-
-
 def _add_village(mesh: QuadMesh, course: Course, rng: np.random.Generator) -> None:
     """Add houses in two groups at the foot of the hills, and a lighthouse."""
     (x, y), radius = extent(course)
@@ -336,7 +252,7 @@ def _add_village(mesh: QuadMesh, course: Course, rng: np.random.Generator) -> No
         long, deep, high = map(float, rng.uniform((2.0, 1.6, 1.6), (3.6, 2.4, 3.2)))
         place = float(x + away * np.cos(angle)), float(y + away * np.sin(angle)), 0.0
         yaw = angle + 0.5 * np.pi + float(rng.normal(0.0, 0.3))
-        _house().add_to(mesh, place, yaw, (long, deep, high), reflected=False)
+        add_solids(mesh, "house", place, yaw, (long, deep, high), reflected=False)
     angle, away = float(centres[0] + 0.9), radius - 6.0
     place = float(x + away * np.cos(angle)), float(y + away * np.sin(angle)), 0.0
-    _lighthouse().add_to(mesh, place, 0.0, reflected=False)
+    add_solids(mesh, "lighthouse", place, 0.0, reflected=False)

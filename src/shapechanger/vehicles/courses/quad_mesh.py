@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.vehicles.bodies.shapes import Faces, moved, normals, shading
 from shapechanger.vehicles.courses.textures import CELLS, ROWS
 
 Array = NDArray[np.float64]
@@ -149,69 +147,6 @@ def add_turned(
     lights = np.tile(light * (0.82 + 0.18 * np.cos(angle - 0.7)), (len(profile), 1))
     lights[0] *= _FOOT
     mesh.add_grid(points, cell(material, uvs), lights)
-
-
-class Template(NamedTuple):
-    """Solids that are added at several places.
-
-    Attributes:
-        faces: Faces, m, (n, 4, 3).
-        uvs: Texture coordinates of their corners, (n, 4, 2).
-        lights: Brightness of each face, 0 to 1, (n, 1).
-    """
-
-    faces: Faces
-    uvs: Array
-    lights: Array
-
-    @staticmethod
-    def of(solids: Iterable[tuple[Faces, str]]) -> Template:
-        """Return a template.
-
-        Args:
-            solids: Faces, m, (n, 4, 3), and the cell of the texture that is stretched, upright,
-                over the whole side or top of each solid.
-        """
-        parts = [_textured(faces, material) for faces, material in solids]
-        faces, uvs = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        return Template(faces, uvs, shading(faces)[:, None])
-
-    def add_to(
-        self,
-        mesh: QuadMesh,
-        place: tuple[float, float, float],
-        yaw: float,
-        scale: float | tuple[float, float, float] = 1.0,
-        light: float = 1.0,
-        *,
-        reflected: bool = True,
-    ) -> None:
-        """Add the solids at a place.
-
-        Args:
-            mesh: Mesh to extend.
-            place: Position of their origin, m.
-            yaw: Rotation about the vertical axis, rad.
-            scale: Factor on all sizes, or on each of them.
-            light: Brightness, 0 to 1.
-            reflected: See `QuadMesh.add`.
-        """
-        faces = moved(self.faces * scale, place, yaw)
-        mesh.add(faces, self.uvs, light * self.lights, reflected=reflected)
-
-
-def _textured(faces: Faces, material: str) -> tuple[Faces, Array]:
-    """Faces of a solid that can be seen from above, and their texture coordinates."""
-    low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
-    faces = faces[normals(faces)[:, 2] > -0.9]  # Nothing looks up from the ground.
-    share: Array = (faces - low) / np.maximum(high - low, 1e-9)
-    across, down, up = share[..., 0], share[..., 1], share[..., 2]
-    # Axis along which each face mostly looks.
-    facing = np.abs(normals(faces)).argmax(axis=1)[:, None]
-    uvs = np.stack(
-        [np.where(facing == 0, down, across), np.where(facing == 2, down, 1.0 - up)], axis=2
-    )
-    return faces, cell(material, uvs)
 
 
 def cell(material: str, uvs: Array) -> Array:
