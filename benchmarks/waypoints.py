@@ -42,11 +42,10 @@ from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
-from shapechanger.vehicles.envs.demonstrators import CLONES, VehicleDemonstrator
+from shapechanger.vehicles.envs.demonstrators import CLONES
 from shapechanger.vehicles.envs.evaluation import DriveResult, DriveScore, drive
-from shapechanger.vehicles.envs.waypoints import WaypointDemonstrator
+from shapechanger.vehicles.envs.waypoints import waypoint_demonstrator
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
-from shapechanger.vehicles.world import MujocoWorld
 
 VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3
@@ -405,16 +404,16 @@ class _Watched(ExpertPilot):
     """Expert that drives by steering, and the waypoints on the path beside it.
 
     Args:
-        world: The world of the vehicle.
+        env: The env of the vehicle.
         seed: Seed of the mistakes.
 
     Attributes:
         waypoints: One for each step.
     """
 
-    def __init__(self, world: MujocoWorld, seed: int) -> None:
-        super().__init__(VehicleDemonstrator(world, seed))
-        self._path = WaypointDemonstrator(world, seed)
+    def __init__(self, env: VehicleEnv, seed: int) -> None:
+        super().__init__(env.demonstrator(seed))
+        self._path = waypoint_demonstrator(env.world, seed)
         self.waypoints: list[NDArray[np.float32]] = []
 
     def begin(self) -> None:
@@ -438,7 +437,7 @@ def _record(seed: int) -> Path:
         "shapechanger/Car-v1", state=True, put_back=True, max_episode_steps=settings.episode_steps
     )
     with closing(env):
-        pilot = _Watched(cast("VehicleEnv", env.unwrapped).world, seed)
+        pilot = _Watched(cast("VehicleEnv", env.unwrapped), seed)
         # Each episode takes the next seed.
         record_steps(RecordEpisodes(env, folder), pilot, settings.steps, 1000 * seed)
     np.save(waypoints, np.stack(pilot.waypoints))

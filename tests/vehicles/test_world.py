@@ -14,7 +14,7 @@ from shapechanger.contract.world import RESTING_V, Pose
 from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles import world as world_module
 from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
-from shapechanger.vehicles.cameras.camera import CameraJitter
+from shapechanger.vehicles.bodies.parts import CameraJitter
 from shapechanger.vehicles.courses.course import HOME, Course
 from shapechanger.vehicles.courses.look import Look
 from shapechanger.vehicles.world import MujocoWorld

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.world import STANDING_MPS, STANDING_RADPS
-from shapechanger.errors import SpaceMismatch, StudyError
+from shapechanger.errors import ShapechangerError, SpaceMismatch, StudyError, WorldError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE
+from shapechanger.vehicles.cameras.rectify import CANONICAL_SIZE, CameraGeometry, Rectifier
 
 AHEAD_M: Final = 0.8
 """Distance of the waypoint, m: what a car looks ahead at 1.8 m/s."""
@@ -192,16 +192,6 @@ ACTION_LAYOUT: Final = Layout(
 """Layout of a waypoint."""
 
 
-def observation_space() -> gym.Space[Any]:
-    """Return the space of rectified frames."""
-    return gym.spaces.Box(0, 255, (_ROWS, _COLUMNS, 3), np.uint8)
-
-
-def action_space() -> gym.Space[Any]:
-    """Return the space of waypoints."""
-    return gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
-
-
 def command(
     action: NDArray[np.float32], response: SteeringResponse, speed: float, *, on_the_spot: bool
 ) -> NDArray[np.float32]:
@@ -227,6 +217,89 @@ def command(
     if on_the_spot:
         throttle = min(throttle, max(_LEAST_THROTTLE, 1.0 - abs(steering)))
     return np.array((steering, throttle), np.float32)
+
+
+def rectifier_of(
+    name: str,
+    pitch_deg: float | None,
+    fovy_deg: float | None,
+    size: tuple[int, int],
+    error: type[ShapechangerError],
+) -> Rectifier:
+    """Return what warps the frames of a robot's camera to the virtual camera.
+
+    Args:
+        name: Name of the robot or its profile, for errors.
+        pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
+        fovy_deg: Vertical field of view, degrees; None if unknown.
+        size: Width and height of its frames, pixels.
+        error: Error to raise if one is unknown, or the camera sees too little.
+    """
+    if pitch_deg is None or fovy_deg is None:
+        numbers = {"pitch_deg": pitch_deg, "fovy_deg": fovy_deg}
+        missing = " and ".join(key for key, value in numbers.items() if value is None)
+        raise error(
+            f"{name}: [camera] does not state {missing}, which waypoints need: `shapechanger robot "
+            "camera` measures them from one picture of a checkerboard, and writes a profile to use."
+        )
+    try:
+        return Rectifier(CameraGeometry(pitch_deg, fovy_deg), size)
+    except WorldError as reason:
+        raise error(f"{name}: {reason}") from reason
+
+
+class WaypointView(gym.Env[Any, NDArray[np.float32]]):
+    """A vehicle, simulated or on the network, with the camera and the action of all vehicles.
+
+    Attributes:
+        response: How the vehicle turns; None before it was measured.
+    """
+
+    response: SteeringResponse | None
+    _env: Any
+
+    def _see(self, rectifier: Rectifier, *, turns_on_the_spot: bool) -> None:
+        """Set the spaces and layouts."""
+        self._rectifier, self._turns_on_the_spot = rectifier, turns_on_the_spot
+        self._speed = 0.0
+        self.observation_space = gym.spaces.Box(0, 255, (_ROWS, _COLUMNS, 3), np.uint8)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.observation_layout, self.action_layout = OBSERVATION_LAYOUT, ACTION_LAYOUT
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+        """Start an episode of the vehicle's own env."""
+        gym.Env.reset(self, seed=seed)  # Sets `np_random`.
+        seen, info = self._env.reset(seed=seed, options=options)
+        return self._rectified(seen), info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.uint8], float, bool, bool, dict[str, Any]]:
+        """Drive towards a waypoint for one control period.
+
+        Raises:
+            SpaceMismatch: If the action is not two finite numbers.
+            ResetNeeded: If `reset` was never called, or the link was lost.
+        """
+        if self.response is None:
+            raise gym.error.ResetNeeded("Call reset() before the first step.")
+        steering = command(action, self.response, self._speed, on_the_spot=self._turns_on_the_spot)
+        seen, reward, terminated, truncated, info = self._env.step(steering)
+        return self._rectified(seen), reward, terminated, truncated, info
+
+    def close(self) -> None:
+        """Release the renderer or the robot."""
+        self._env.close()
+
+    def _rectified(self, seen: Any) -> NDArray[np.uint8]:
+        self._speed, image = self._split(seen)
+        return self._rectifier(image)
+
+    def _split(self, seen: Any) -> tuple[float, NDArray[np.uint8]]:
+        """Return the speed, m/s, and the frame of an observation."""
+        raise NotImplementedError
 
 
 class WaypointLabels(NamedTuple):

@@ -16,13 +16,8 @@ from shapechanger.contract.world import RESTING_V, Pose, Readings
 from shapechanger.errors import WorldError
 from shapechanger.vehicles.bodies import SIM_DT, add_vehicle, vehicle_model
 from shapechanger.vehicles.bodies.model import ContactTracker
-from shapechanger.vehicles.bodies.parts import CameraMount, aim_camera
-from shapechanger.vehicles.cameras.camera import (
-    CameraJitter,
-    OnboardCamera,
-    OutsideCamera,
-    move_camera,
-)
+from shapechanger.vehicles.bodies.parts import CameraJitter, CameraMount, aim_camera, move_camera
+from shapechanger.vehicles.cameras.camera import OnboardCamera, OutsideCamera
 from shapechanger.vehicles.cameras.corruptions import find_corruption
 from shapechanger.vehicles.courses import lay_out, start_pose
 from shapechanger.vehicles.courses.course import HOME, Course, require_element
@@ -267,19 +262,10 @@ class MujocoWorld:
 
     def distance_m(self) -> float:
         """Distance by the shortest of three rays; see `World.distance_m`."""
-        pose = self._motion
-        height = 0.5 * self.vehicle.camera.z
-        start = np.array((pose.x, pose.y, height))
-        hit = np.zeros(1, np.int32)
-        found = math.inf
-        for angle in _CONE:
-            ray = np.array((math.cos(pose.heading + angle), math.sin(pose.heading + angle), 0.0))
-            distance = mujoco.mj_ray(
-                self.model, self.data, start, ray, self._solid, True, self._chassis, hit
-            )
-            if distance >= 0.0:
-                found = min(found, distance)
-        return max(0.0, found - self.vehicle.nose_m)
+        found = self._rays(0.0, np.array(_CONE), mujoco.mjMAXVAL)
+        return max(
+            0.0, float(found.min(where=found >= 0.0, initial=math.inf)) - self.vehicle.nose_m
+        )
 
     def ranges_m(
         self, bearings: NDArray[np.float64], farthest_m: float = 6.0
@@ -294,35 +280,32 @@ class MujocoWorld:
         Returns:
             Distances, m, (n,).
         """
-        pose, nose = self._motion, self.vehicle.nose_m
+        found = self._rays(self.vehicle.nose_m, bearings, farthest_m)
+        found[found < 0.0] = farthest_m
+        return np.minimum(found, farthest_m, out=found)
+
+    def _rays(
+        self, ahead_m: float, bearings: NDArray[np.float64], farthest_m: float
+    ) -> NDArray[np.float64]:
+        """Distances from a point ahead of the vehicle's middle, m, (n,); -1 for nothing."""
+        pose, count = self._motion, len(bearings)
         start = np.array(
             (
-                pose.x + nose * math.cos(pose.heading),
-                pose.y + nose * math.sin(pose.heading),
+                pose.x + ahead_m * math.cos(pose.heading),
+                pose.y + ahead_m * math.sin(pose.heading),
                 0.5 * self.vehicle.camera.z,
             )
         )
         angles = pose.heading + bearings
-        rays = np.zeros((len(angles), 3))
+        rays = np.zeros((count, 3))
         rays[:, 0], rays[:, 1] = np.cos(angles), np.sin(angles)
-        hit = np.empty(len(angles), np.int32)
-        found = np.empty(len(angles))
+        hit, found = np.empty(count, np.int32), np.empty(count)
         mujoco.mj_multiRay(
-            self.model,
-            self.data,
-            start,
-            rays.ravel(),
-            self._solid,
-            True,
-            self._chassis,
-            hit,
-            found,
-            None,
-            len(angles),
-            farthest_m,
-        )
-        found[hit < 0] = farthest_m
-        return np.minimum(found, farthest_m, out=found)
+            self.model, self.data, start, rays.ravel(), self._solid, True, self._chassis, hit,
+            found, None, count, farthest_m,
+        )  # fmt: skip
+        found[hit < 0] = -1.0
+        return found
 
     def picture(self) -> NDArray[np.uint8]:
         """Picture of the front camera; see `World.picture`.
@@ -371,54 +354,30 @@ class MujocoWorld:
             self._outside = camera
             camera.look_at(self.model)
         x, y, heading = self._motion[:3]
-        middle = self.vehicle.nose_m - 0.5 * self.vehicle.length_m
         ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
+        middle = self.vehicle.nose_m - 0.5 * self.vehicle.length_m
         centre = np.array((x, y, _LOOKED_AT_M)) + middle * ahead
         distance = _DISTANCE_PER_REACH * (reach or self.reach)
-        views = (azimuth_rad,) if isinstance(azimuth_rad, int | float) else azimuth_rad
-        view = next(
-            (
-                azimuth
-                for azimuth in views
-                if self._sees(centre, ahead, distance, heading + azimuth, elevation_rad)
-            ),
-            views[0],
-        )
-        return self._outside.picture(
-            self.model,
-            self.data,
-            (centre[0], centre[1], centre[2]),
-            distance,
-            heading + view,
-            elevation_rad,
-        )
+        given = (azimuth_rad,) if isinstance(azimuth_rad, int | float) else azimuth_rad
+        views = [heading + azimuth for azimuth in given]
+        ends = centre + 0.5 * self.vehicle.length_m * np.stack([-ahead, ahead])
 
-    def _sees(
-        self,
-        centre: NDArray[np.float64],
-        ahead: NDArray[np.float64],
-        distance: float,
-        azimuth_rad: float,
-        elevation_rad: float,
-    ) -> bool:
-        """Return whether neither nose nor tail is behind a wall or an obstacle."""
-        flat = math.cos(elevation_rad)
-        eye = centre - distance * np.array(
-            (
-                flat * math.cos(azimuth_rad),
-                flat * math.sin(azimuth_rad),
-                math.sin(elevation_rad),
-            )
-        )
-        hit = np.zeros(1, np.int32)
-        for end in (-0.5 * self.vehicle.length_m, 0.5 * self.vehicle.length_m):
-            ray = centre + end * ahead - eye
-            met = mujoco.mj_ray(
-                self.model, self.data, eye, ray, self._solid, True, self._chassis, hit
-            )
-            if 0.0 <= met < 1.0 and self.model.geom_bodyid[hit[0]] == 0:  # In lengths of the ray.
-                return False
-        return True
+        def sees(view: float) -> bool:
+            """Return whether neither nose nor tail is behind a wall or an obstacle."""
+            flat, rise = math.cos(elevation_rad), math.sin(elevation_rad)
+            eye = centre - distance * np.array((flat * math.cos(view), flat * math.sin(view), rise))
+            hit = np.zeros(1, np.int32)
+            for end in ends:
+                met = mujoco.mj_ray(
+                    self.model, self.data, eye, end - eye, self._solid, True, self._chassis, hit
+                )
+                # In lengths of the ray.
+                if 0.0 <= met < 1.0 and self.model.geom_bodyid[hit[0]] == 0:
+                    return False
+            return True
+
+        view = next(filter(sees, views), views[0])
+        return self._outside.picture(self.model, self.data, centre, distance, view, elevation_rad)
 
     def close(self) -> None:
         """Free the cameras' OpenGL contexts."""

@@ -101,17 +101,17 @@ def test_ctrl_c_leaves_whole_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 130, and the episode is closed."""
-    from shapechanger.vehicles.envs.demonstrators import VehicleDemonstrator
+    from shapechanger.vehicles.envs.demonstrators import Demonstrator
 
-    acts = VehicleDemonstrator.act
+    acts = Demonstrator.act
     calls = iter(range(100))
 
-    def interrupted(self: VehicleDemonstrator) -> object:
+    def interrupted(self: Demonstrator) -> object:
         if next(calls) == 10:
             raise KeyboardInterrupt
         return acts(self)
 
-    monkeypatch.setattr(VehicleDemonstrator, "act", interrupted)
+    monkeypatch.setattr(Demonstrator, "act", interrupted)
     with pytest.raises(SystemExit) as stop:
         main(["demos", "record", "Car", "--out", str(tmp_path / "data"), *SHORT])
     assert stop.value.code == 130

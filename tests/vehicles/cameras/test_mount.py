@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from shapechanger.errors import WorldError
-from shapechanger.vehicles.cameras.camera import CameraJitter, move_camera
+from shapechanger.vehicles.bodies.parts import CameraJitter, move_camera
 
 # Looks along x, with z up, as the cameras of vehicles.
 _MODEL = """

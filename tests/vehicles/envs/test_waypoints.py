@@ -191,7 +191,7 @@ def test_a_profile_without_the_geometry_is_refused(tmp_path: Path) -> None:
     lines = find_profile("lab-car").read_text().splitlines()
     path = tmp_path / "car.toml"
     path.write_text("\n".join(line for line in lines if not line.startswith("pitch_deg")))
-    with pytest.raises(ProfileError, match=r"\[camera\] needs pitch_deg for waypoints: .* camera"):
+    with pytest.raises(ProfileError, match=r"\[camera\] does not state pitch_deg, .* camera"):
         WaypointEnv("car", robot=path)
 
 

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shapechanger.errors import WorldError
 from shapechanger.vehicles.bodies.visuals import OWN_VIEW, Paint, dress_wheel
 
 # Collision bits. MuJoCo lets two geoms collide if the contype of one shares a bit with the
@@ -195,6 +196,75 @@ def aim_camera(camera: mujoco.MjsCamera, mount: CameraMount) -> None:
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, axes.ravel())
     camera.pos, camera.quat, camera.fovy = [mount.x, mount.y, mount.z], quat, mount.fovy_deg
+
+
+# Largest errors of a screwed, printed mount: estimates.
+_HEIGHT_M: Final = 0.015
+_SIDE_M: Final = 0.01
+_ANGLE_RAD: Final = math.radians(3.0)
+
+_LOWEST_M: Final = 0.01  # Above the floor.
+_FARTHEST_M: Final = 1.0  # Still on the vehicle.
+
+
+@dataclass(frozen=True, slots=True)
+class CameraJitter:
+    """Error of a camera's pose.
+
+    Attributes:
+        up_m: Offset upwards, m.
+        left_m: Offset to the left, m.
+        roll_rad: Rotation about the line of sight; positive to the right.
+        pitch_rad: Positive down.
+        yaw_rad: Positive to the left.
+    """
+
+    up_m: float = 0.0
+    left_m: float = 0.0
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rad: float = 0.0
+
+    @staticmethod
+    def random(rng: np.random.Generator) -> CameraJitter:
+        """Draw uniform errors of up to 1.5 cm in height, 1 cm to the side and 3 degrees."""
+        up, left = rng.uniform(-1.0, 1.0, 2) * (_HEIGHT_M, _SIDE_M)
+        roll, pitch, yaw = rng.uniform(-_ANGLE_RAD, _ANGLE_RAD, 3)
+        return CameraJitter(float(up), float(left), float(roll), float(pitch), float(yaw))
+
+
+def move_camera(model: mujoco.MjModel, camera: str, jitter: CameraJitter) -> None:
+    """Add an error to the pose of a camera; a refused error changes nothing.
+
+    Args:
+        model: Compiled model to change.
+        camera: Name of the camera.
+        jitter: The error.
+
+    Raises:
+        WorldError: If the error is not finite, or moves the camera off its vehicle or into the
+            floor.
+    """
+    place = model.camera(camera)
+    position = place.pos + np.array((0.0, jitter.left_m, jitter.up_m))
+    turns = jitter.roll_rad, jitter.pitch_rad, jitter.yaw_rad
+    if not np.isfinite([*position, *turns]).all():
+        raise WorldError(f"The error of a camera's pose must be finite, got {jitter}.")
+    if position[2] < _LOWEST_M or np.abs(position).max() > _FARTHEST_M:
+        where = ", ".join(f"{x:.3f}" for x in position)
+        raise WorldError(f"The camera would be off its vehicle or in the floor, at ({where}) m.")
+    place.pos[:] = position
+    # A MuJoCo camera looks along -z of its frame, with x to the right and y up.
+    turned = np.empty(4)
+    for axis, angle in (
+        ((0.0, 1.0, 0.0), jitter.yaw_rad),
+        ((1.0, 0.0, 0.0), -jitter.pitch_rad),
+        ((0.0, 0.0, 1.0), -jitter.roll_rad),
+    ):
+        turn = np.empty(4)
+        mujoco.mju_axisAngle2Quat(turn, np.array(axis), angle)
+        mujoco.mju_mulQuat(turned, place.quat, turn)
+        place.quat[:] = turned
 
 
 def _three(size: ArrayLike) -> NDArray[np.float64]:

@@ -1,9 +1,8 @@
-"""Drivers for `VehicleEnv`: the course expert, a demonstrator, and the shipped camera policies."""
+"""Drivers of vehicles: experts, demonstrators, and the shipped camera policies."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -42,7 +41,6 @@ CLONES: Final[Mapping[str, Path]] = MappingProxyType(
 Each was cloned from ten minutes of its expert's driving; `clones/README.md` is their model card.
 """
 
-
 WANDER_S: Final = 0.6
 """Correlation time of the wandering, s."""
 
@@ -51,7 +49,6 @@ JERKS_PER_S: Final = 0.25
 
 JERK_S: Final = (0.15, 0.5)
 """Shortest and longest duration of a jerk, s."""
-
 
 THROTTLE_SD: Final = 0.1
 """Standard deviation of the wandering of the throttle."""
@@ -89,20 +86,21 @@ class Disturbance:
     def _jerked(self) -> float:
         """Steering of the current jerk; 0 without one."""
         self._jerk_s -= PERIOD_S
-        if self._jerk_s > 0:
-            return self._jerk
-        if self._rng.random() < JERKS_PER_S * PERIOD_S:
+        if self._jerk_s <= 0:
+            if self._rng.random() >= JERKS_PER_S * PERIOD_S:
+                return 0.0
             self._jerk = float(3 * self._size[0] * self._rng.uniform(-1, 1))
             self._jerk_s = float(self._rng.uniform(*JERK_S))
-            return self._jerk
-        return 0.0
+        return self._jerk
 
 
-class Demonstrator(ABC):
+class Demonstrator:
     """Driver that makes mistakes and recovers from them, for demonstrations.
 
     Args:
         world: The world of the vehicle.
+        begin: Called at the beginning of an episode; returns the driver, whose calls return
+            actions, (2,).
         seed: Seed of the mistakes.
         sway: Size of the mistakes, see `Disturbance`; None for what the expert can correct.
 
@@ -110,8 +108,14 @@ class Demonstrator(ABC):
         WorldError: If the seed is not a whole number from 0.
     """
 
-    def __init__(self, world: MujocoWorld, seed: int, sway: float | None = None) -> None:
-        self._world = world
+    def __init__(
+        self,
+        world: MujocoWorld,
+        begin: Callable[[], Callable[[], NDArray[np.float32]]],
+        seed: int,
+        sway: float | None = None,
+    ) -> None:
+        self._begin = begin
         self._sway = traits_of(world.vehicle.name).sway if sway is None else sway
         kind = "The seed of a driver must be"
         self._seeds = np.random.default_rng(check_seed(seed, WorldError, kind, largest=None))
@@ -120,31 +124,12 @@ class Demonstrator(ABC):
     def begin(self) -> None:
         """Begin an episode."""
         self._disturbance = Disturbance(int(self._seeds.integers(2**31)), self._sway)
+        self._action = self._begin()
 
     def act(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the driver's action, to learn from, and the disturbed one, to take.
-
-        Returns:
-            Each has shape (2,).
-        """
+        """Return the driver's action, to learn from, and the disturbed one, to take, each (2,)."""
         action = self._action()
         return action, self._disturbance.applied(action)
-
-    @abstractmethod
-    def _action(self) -> NDArray[np.float32]:
-        """Return the driver's action, shape (2,)."""
-
-
-class VehicleDemonstrator(Demonstrator):
-    """Expert that knows the whole course; its actions are steering and throttle."""
-
-    def begin(self) -> None:
-        """Begin an episode."""
-        super().begin()
-        self._expert = ExpertDriver(self._world)
-
-    def _action(self) -> NDArray[np.float32]:
-        return self._expert(None)
 
 
 def course_expert(world: MujocoWorld) -> CourseExpert:
@@ -178,26 +163,6 @@ def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
     if not stands or throttle == 0.0 or abs(throttle) >= LEAST_THROTTLE:
         return action
     return np.array((steering, np.copysign(LEAST_THROTTLE, throttle)), action.dtype)
-
-
-class TeacherDemonstrator(Demonstrator):
-    """A policy that sees distances, as a demonstrator; see `observe_ranges`.
-
-    Args:
-        world: The world of the vehicle.
-        act: The policy: maps observations, (n, 11), to actions, (n, 2).
-        seed: Seed of the mistakes.
-    """
-
-    def __init__(
-        self, world: MujocoWorld, act: Callable[[NDArray[Any]], NDArray[Any]], seed: int
-    ) -> None:
-        super().__init__(world, seed)
-        self._policy = act
-
-    def _action(self) -> NDArray[np.float32]:
-        action = self._policy(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)
-        return leave_rest(action, self._world.inputs().stands)
 
 
 class ExpertDriver:

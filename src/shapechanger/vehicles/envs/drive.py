@@ -7,23 +7,25 @@ import math
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final, Literal, cast
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
+from shapechanger.contract.drive import DriveReward
 from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError, check_seed
-from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.layout import Layout
+from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.profile.profile import Profile
 from shapechanger.vehicles.bodies import require_fit, vehicle_model
-from shapechanger.vehicles.cameras.camera import CameraJitter
+from shapechanger.vehicles.bodies.parts import CameraJitter
 from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
 from shapechanger.vehicles.courses.look import Look
-from shapechanger.vehicles.envs.demonstrators import Demonstrator, ExpertDriver, VehicleDemonstrator
+from shapechanger.vehicles.envs.demonstrators import Demonstrator, ExpertDriver
 from shapechanger.vehicles.expert.traits import PERIOD_S
 from shapechanger.vehicles.world import MujocoWorld
 
@@ -34,34 +36,42 @@ _LEVELS: Final[dict[str, Literal["any", "three"]]] = {"proportional": "any", "ba
 _MAX_PIXELS: Final = 1920  # As in a profile.
 
 
-def check_frame_size(size: Sequence[int]) -> tuple[int, int]:
-    """Return width and height of frames in pixels.
+class SimulatedRobot(NamedTuple):
+    """Numbers of a robot's profile that its simulation and recordings of it need.
 
-    Raises:
-        SpaceMismatch: If it is not two whole numbers in range.
+    Attributes:
+        robot: Name of the profile.
+        body: Kind of vehicle.
+        path: File of the profile.
+        plan: Actions, outputs, sensors and limits.
+        control_hz: Actions per second.
+        reward: Weights of the task.
+        action_layout: Layout of its actions.
+        state_layout: Layout of its state.
+        size: Width and height of its camera's frames, pixels.
+        camera_pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
+        camera_fovy_deg: Vertical field of view, degrees; None if unknown.
     """
-    try:
-        wide, high = (operator.index(pixels) for pixels in size)
-    except (TypeError, ValueError):
-        wide = high = 0
-    if not (1 <= wide <= _MAX_PIXELS and 1 <= high <= _MAX_PIXELS):
-        raise SpaceMismatch(
-            f"The size of a frame is its width and height, each 1 to {_MAX_PIXELS} pixels, "
-            f"got {size}."
-        )
-    return wide, high
+
+    robot: str
+    body: str
+    path: Path
+    plan: GuardPlan
+    control_hz: float
+    reward: Mapping[str, float]
+    action_layout: Layout
+    state_layout: Layout
+    size: tuple[int, int]
+    camera_pitch_deg: float | None
+    camera_fovy_deg: float | None
 
 
-def _seed_of(what: str, seed: Any) -> int:
-    return check_seed(seed, WorldError, f"The seed of a {what} must be", largest=None)
-
-
-def resolve_profile(
+def simulated_robot(
     vehicle: str,
     robot: str | os.PathLike[str] | None,
     size: Sequence[int] | None = None,
     steering: Steering | None = None,
-) -> tuple[Profile, CameraPlan]:
+) -> SimulatedRobot:
     """Load the profile of a vehicle, and set its steering and its camera's frame size.
 
     Args:
@@ -70,10 +80,6 @@ def resolve_profile(
         size: Replaces the width and height of its frames, pixels; None to keep them.
         steering: Replaces the profile's steering; None to keep it.
 
-    Returns:
-        The profile, and its camera, which simulations show as it is stated there. It is upright,
-        because drivers turn the frames of a camera that is mounted upside down.
-
     Raises:
         UnknownName: If there is no such vehicle, profile or steering.
         ProfileError: If it is not the profile of this vehicle with a camera.
@@ -81,9 +87,9 @@ def resolve_profile(
     """
     vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
     profile = load_profile(find_profile(f"lab-{vehicle}" if robot is None else robot))
-    if profile.camera is None:
+    camera, actions = profile.camera, profile.actions
+    if camera is None:
         raise ProfileError(f"{profile.path}: the robot has no camera, and this task needs one.")
-    actions = profile.actions
     if [action.name for action in actions] != ["steering", "throttle"]:
         names = ", ".join(action.name for action in actions)
         raise ProfileError(
@@ -94,9 +100,29 @@ def resolve_profile(
             raise UnknownName("steering", steering, _LEVELS)
         actions = (dataclasses.replace(actions[0], levels=_LEVELS[steering]), *actions[1:])
     require_fit(vehicle, {output.part for output in profile.outputs})
-    wide, high = profile.camera.size if size is None else check_frame_size(size)
-    camera = dataclasses.replace(profile.camera, size=(wide, high), flip=False)
-    return dataclasses.replace(profile, actions=actions, camera=camera), camera
+    try:
+        wide, high = map(operator.index, camera.size if size is None else size)
+    except (TypeError, ValueError):
+        wide = high = 0
+    if not (1 <= wide <= _MAX_PIXELS and 1 <= high <= _MAX_PIXELS):
+        raise SpaceMismatch(
+            f"The size of a frame is its width and height, each 1 to {_MAX_PIXELS} pixels, "
+            f"got {size}."
+        )
+    profile = dataclasses.replace(profile, actions=actions)
+    return SimulatedRobot(
+        robot=profile.name,
+        body=profile.body,
+        path=profile.path,
+        plan=profile.guard_plan(),
+        control_hz=profile.control_hz,
+        reward=profile.reward,
+        action_layout=profile.action_layout(),
+        state_layout=profile.state_layout(),
+        size=(wide, high),
+        camera_pitch_deg=camera.pitch_deg,
+        camera_fovy_deg=camera.fovy_deg,
+    )
 
 
 Courses = Literal["training", "held-out"] | Sequence[int]
@@ -106,8 +132,7 @@ _KINDS: Final = {"training": TRAINING, "held-out": HELD_OUT}
 _OPTIONS: Final = ("course", "start")
 
 
-@dataclass(frozen=True, slots=True)
-class EpisodeSetup:
+class EpisodeSetup(NamedTuple):
     """Course, start and appearance of one episode.
 
     Attributes:
@@ -187,6 +212,10 @@ class CourseSampler:
         )
 
 
+def _seed_of(kind: str, seed: Any) -> int:
+    return check_seed(seed, WorldError, f"The seed of a {kind} must be", largest=None)
+
+
 class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     """The driving task: a vehicle on sampled courses, within its robot's limits.
 
@@ -199,8 +228,45 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
     parts: frozenset[str]
+    action_layout: Layout
     _world: MujocoWorld
     _draw: CourseSampler
+
+    def _set_up(
+        self,
+        robot: SimulatedRobot,
+        vehicle: str,
+        world: str | None,
+        courses: Courses,
+        reward: Mapping[str, float],
+        *,
+        randomise: bool,
+        put_back: bool,
+        has_camera: bool,
+        render_mode: str | None,
+        coarse: bool = False,
+        lenses: Sequence[str] = (),
+    ) -> None:
+        """Open the world, and set what all views of it have; see their arguments."""
+        self.render_mode, self._puts_back = render_mode, put_back
+        self._draw = CourseSampler(courses, randomise)
+        self._world = MujocoWorld(
+            vehicle,
+            world,
+            self._draw.first,
+            size=robot.size if has_camera or render_mode else None,
+            pitch_deg=robot.camera_pitch_deg,
+            fovy_deg=robot.camera_fovy_deg,
+            lenses=lenses,
+            coarse=coarse,
+        )
+        self.parts = frozenset(output.part for output in robot.plan.outputs)
+        ends = {"collision_ends_episode": 0.0} if put_back else {}
+        self._reward = DriveReward.from_weights({**reward, **ends})
+        self.action_layout = robot.action_layout
+        self.action_space = space_of(self.action_layout)
+        self.metadata = {**self.metadata, "render_fps": robot.control_hz}
+        self._needs_reset = True
 
     @property
     def world(self) -> MujocoWorld:
@@ -210,6 +276,77 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def hold_out(self) -> None:
         """Sample held-out courses from the next reset on."""
         self._draw.hold_out()
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: Seed of the sampling of courses, starts and looks.
+            options: `course`, the seed of a course, and `start`, the seed of a start on it; omitted
+                ones are sampled.
+
+        Raises:
+            UnknownName: If there is no such option.
+            WorldError: If a seed is not a whole number from 0, or the vehicle touches something at
+                the start.
+        """
+        super().reset(seed=seed)
+        world = self._world
+        drawn = self._draw.draw(self.np_random, world.course.world, options or {})
+        if drawn.course != world.seed or drawn.look is not None:
+            world.lay_out(drawn.course, drawn.look, drawn.camera)
+        world.zero_odometer()  # So that no episode depends on earlier ones.
+        world.place(drawn.start)
+        self._begin()
+        if world.touches:
+            raise WorldError(
+                f"The {world.vehicle.name} is stuck at start {drawn.start} of course "
+                f"{drawn.course}: choose another."
+            )
+        self._needs_reset = False
+        return self._observe()
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take one step of one control period.
+
+        Raises:
+            SpaceMismatch: If the action is not two finite numbers.
+            ResetNeeded: If `reset` was never called.
+        """
+        if self._needs_reset:
+            raise gym.error.ResetNeeded("Call reset() before the first step.")
+        values = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        if values.shape != (2,) or not np.isfinite(values).all():
+            raise SpaceMismatch(
+                f"An action of a vehicle is steering and throttle, got {np.asarray(action)}."
+            )
+        collided, terms, seen, info = self._advance(values)
+        info |= terms
+        info["reward_terms"] = terms
+        return seen, sum(terms.values()), self._reward.ends(collided), False, info
+
+    def _begin(self) -> None:
+        """Begin an episode of the vehicle's limits and sensors."""
+        raise NotImplementedError
+
+    def _observe(self) -> tuple[Any, dict[str, Any]]:
+        """Return the observation and `info`."""
+        raise NotImplementedError
+
+    def _advance(
+        self, values: NDArray[np.float64]
+    ) -> tuple[bool | None, dict[str, float], Any, dict[str, Any]]:
+        """Drive for a control period.
+
+        Args:
+            values: Steering and throttle, each from -1 to 1.
+
+        Returns:
+            Whether the vehicle collided, the terms of the reward, the observation and `info`.
+        """
+        raise NotImplementedError
 
     def expert(self) -> ExpertDriver:
         """Return the expert that knows the whole course, without mistakes.
@@ -230,7 +367,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             ProfileError: If the robot has another control rate than the expert.
         """
         self._require_rate_of_expert()
-        return VehicleDemonstrator(self._world, seed)
+        return Demonstrator(self._world, lambda: partial(ExpertDriver(self._world), None), seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the camera's picture, shape (height, width, 3); None without a render mode."""
@@ -244,16 +381,7 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def picture(
         self, width: int = 480, height: int = 360, reach: float | None = None
     ) -> NDArray[np.uint8]:
-        """Return a picture of the vehicle in its world from outside, shape (height, width, 3).
-
-        Args:
-            width: Width in pixels.
-            height: Height in pixels.
-            reach: Radius in view around the middle of the vehicle, m; None for its own reach.
-
-        Raises:
-            RenderError: If the size is out of range, or nothing can be drawn here.
-        """
+        """Return a picture of the vehicle in its world from outside; see `MujocoWorld.outside`."""
         return self._world.outside(width, height, reach)
 
     def close(self) -> None:
@@ -273,38 +401,6 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
                 f"choose {1.0 / PERIOD_S:g} actions a second: set control_hz = {1.0 / PERIOD_S:g}."
             )
 
-    def _lay_out(self, options: Mapping[str, Any] | None) -> EpisodeSetup:
-        """Sample the next episode, and lay out its course."""
-        drawn = self._draw.draw(self.np_random, self._world.course.world, options or {})
-        if drawn.course != self._world.seed or drawn.look is not None:
-            self._world.lay_out(drawn.course, drawn.look, drawn.camera)
-        return drawn
-
-    def _require_free(self, drawn: EpisodeSetup) -> None:
-        """Check that the vehicle touches nothing at the start.
-
-        Raises:
-            WorldError: If it does.
-        """
-        if self._world.touches:
-            raise WorldError(
-                f"The {self._world.vehicle.name} is stuck at start {drawn.start} of course "
-                f"{drawn.course}: choose another."
-            )
-
-    def _values(self, action: Any) -> tuple[float, ...]:
-        """Return the values of a command, clipped to -1 to 1.
-
-        Raises:
-            SpaceMismatch: If the action is not two finite numbers.
-        """
-        values = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        if values.shape != (2,) or not np.isfinite(values).all():
-            raise SpaceMismatch(
-                f"An action of a vehicle is steering and throttle, got {np.asarray(action)}."
-            )
-        return tuple(values.tolist())
-
     def _truth(self, progress_m: float) -> dict[str, Any]:
         """Return the entries of `info` that no sensor measures, given the progress, m."""
         world, pose = self._world, self._world.pose
@@ -315,3 +411,8 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             "course": world.seed,
             "standing": world.inputs().stands,
         }
+
+
+def space_of(layout: Layout) -> gym.spaces.Box[np.float32]:
+    """Return the space of a layout's numbers, `float32`."""
+    return gym.spaces.Box(layout.low.astype(np.float32), layout.high.astype(np.float32))

@@ -6,12 +6,10 @@ import os
 from collections.abc import Mapping
 from typing import Any, Final
 
-import gymnasium as gym
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.contract.drive import DriveReward
 from shapechanger.contract.world import STANDING_MPS
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.guard.limits import (
@@ -28,8 +26,7 @@ from shapechanger.vehicles.envs.demonstrators import (
     leave_rest,
     observe_ranges,
 )
-from shapechanger.vehicles.envs.drive import Courses, CourseSampler, DriveEnv, resolve_profile
-from shapechanger.vehicles.world import MujocoWorld
+from shapechanger.vehicles.envs.drive import Courses, DriveEnv, simulated_robot, space_of
 
 COLLISION_REWARD: Final = -3.0
 """Reward of a collision: it costs three metres."""
@@ -174,84 +171,37 @@ class RangesEnv(DriveEnv):
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
-        profile, seen = resolve_profile(vehicle, robot)
-        self.parts = frozenset(output.part for output in profile.outputs)
-        self._draw = CourseSampler(courses, randomise)
-        self.render_mode = render_mode
-        self._world = MujocoWorld(
-            vehicle,
-            world,
-            self._draw.first,
-            size=seen.size if camera or render_mode else None,
-            pitch_deg=seen.pitch_deg,
-            fovy_deg=seen.fovy_deg,
+        profile = simulated_robot(vehicle, robot)
+        self._set_up(
+            profile, vehicle, world, courses, {"collision": COLLISION_REWARD, **(reward or {})},
+            randomise=randomise, put_back=put_back, has_camera=camera, render_mode=render_mode,
             coarse=True,
-        )
-        self._shaper = MeanOutputs(profile.guard_plan())
+        )  # fmt: skip
+        self._shaper = MeanOutputs(profile.plan)
         self._ticks = round(1.0 / (profile.control_hz * self._shaper.tick_s))
         self._period_s = 1.0 / profile.control_hz
-        weights = {"collision": COLLISION_REWARD, **(reward or {})}
-        if put_back:
-            weights["collision_ends_episode"] = 0.0
-        self._reward = DriveReward.from_weights(weights)
-        self._puts_back = put_back
-        self.action_layout = profile.action_layout()
+        bearings = (f"range/{bearing:+d}deg" for bearing in BEARINGS_DEG)
         self.observation_layout = Layout(
             (
-                *(
-                    Feature(f"range/{bearing:+d}deg", "m", low=0.0, high=FARTHEST_M)
-                    for bearing in BEARINGS_DEG
-                ),
+                *(Feature(name, "m", low=0.0, high=FARTHEST_M) for name in bearings),
                 Feature("speed", "m/s", low=-_FASTEST_MPS, high=_FASTEST_MPS),
                 Feature("yaw_rate", "rad/s", low=-_FASTEST_TURN, high=_FASTEST_TURN),
             )
         )
-        self.observation_space, self.action_space = (
-            gym.spaces.Box(layout.low.astype(np.float32), layout.high.astype(np.float32))
-            for layout in (self.observation_layout, self.action_layout)
-        )
-        self._low, self._high = (
-            bound.astype(np.float32)
-            for bound in (self.observation_layout.low, self.observation_layout.high)
-        )
-        self.metadata = {**self.metadata, "render_fps": profile.control_hz}
-        self._needs_reset = True
+        self.observation_space = space = space_of(self.observation_layout)
+        self._low, self._high = space.low, space.high
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; the options are those of `VehicleEnv.reset`.
-
-        Raises:
-            UnknownName: If there is no such option.
-            WorldError: If a seed is not a whole number from 0, or the vehicle touches something at
-                the start.
-        """
-        super().reset(seed=seed)
-        drawn = self._lay_out(options)
-        self._world.place(drawn.start)
-        self._require_free(drawn)
+    def _begin(self) -> None:
         self._shaper.reset()
         self._bumped = False
         self._progress_m = 0.0
-        self._needs_reset = False
-        return self._observe(), self._truth(self._progress_m)
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Take one step of one control period.
-
-        Raises:
-            SpaceMismatch: If the action is not two finite numbers.
-            ResetNeeded: If `reset` was never called.
-        """
-        if self._needs_reset:
-            raise gym.error.ResetNeeded("Call reset() before the first step.")
-        values = self._values(action)
+    def _advance(
+        self, values: NDArray[np.float64]
+    ) -> tuple[bool, dict[str, float], NDArray[np.float32], dict[str, Any]]:
         world, shaper = self._world, self._shaper
         progress, collisions = self._progress_m, world.collisions
-        command = tuple(leave_rest(np.array(values), world.inputs().stands).tolist())
+        command = tuple(leave_rest(values, world.inputs().stands).tolist())
         world.advance(self._period_s, shaper.outputs(command, self._bumped, self._ticks))
         collided = world.collisions > collisions
         self._bumped = world.bumped  # Before it is put back: a robot's reflex outlasts the contact.
@@ -263,14 +213,12 @@ class RangesEnv(DriveEnv):
         if collided and self._puts_back:
             world.put_back()
             self._progress_m = world.progress_m
-        seen = self._observe()
+        seen, info = self._observe()
         nearest = float(seen[: len(BEARINGS_DEG)].min())
         terms["reward_near"] = -_NEAR_COST * self._period_s * max(0.0, 1.0 - nearest / _NEAR_M)
-        terminated = self._reward.ends(collided)
-        info = self._truth(self._progress_m) | terms
-        info["reward_terms"] = terms
-        return seen, sum(terms.values()), terminated, False, info
+        return collided, terms, seen, info
 
-    def _observe(self) -> NDArray[np.float32]:
+    def _observe(self) -> tuple[NDArray[np.float32], dict[str, Any]]:
         seen = observe_ranges(self._world)
-        return np.minimum(np.maximum(seen, self._low, out=seen), self._high, out=seen)
+        seen = np.minimum(np.maximum(seen, self._low, out=seen), self._high, out=seen)
+        return seen, self._truth(self._progress_m)

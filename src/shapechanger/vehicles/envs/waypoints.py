@@ -9,60 +9,35 @@ from __future__ import annotations
 
 import math
 import os
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, partial
 from typing import Any, Final
 
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.errors import ProfileError, WorldError
-from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.profile.profile import Profile
+from shapechanger.errors import ProfileError
 from shapechanger.vehicles.bodies import vehicle_model
-from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
 from shapechanger.vehicles.courses.course import FLOODED
 from shapechanger.vehicles.envs.demonstrators import Demonstrator, course_expert
-from shapechanger.vehicles.envs.drive import Courses, DriveEnv, resolve_profile
+from shapechanger.vehicles.envs.drive import Courses, DriveEnv, simulated_robot
 from shapechanger.vehicles.envs.ranges import RangesEnv
 from shapechanger.vehicles.envs.shift import certify_vehicles
 from shapechanger.vehicles.envs.vehicle import VehicleEnv
+from shapechanger.vehicles.expert.driver import CourseExpert
 from shapechanger.vehicles.waypoints import (
-    ACTION_LAYOUT,
     AHEAD_M,
-    OBSERVATION_LAYOUT,
     WIDEST_RAD,
     SteeringResponse,
-    action_space,
-    command,
+    WaypointView,
     measure_response,
-    observation_space,
+    rectifier_of,
 )
 from shapechanger.vehicles.world import MujocoWorld
 
 # Standard deviation of the bearing's disturbance: the effect of steering by 0.25 in the car.
 _SWAY: Final = 0.18
-
-
-def _rectifier_of(profile: Profile, camera: CameraPlan) -> Rectifier:
-    """Return what warps the frames of a profile's camera.
-
-    Raises:
-        ProfileError: If the profile does not state how the camera looks, or it sees too little.
-    """
-    pitch, fovy = camera.pitch_deg, camera.fovy_deg
-    if pitch is None or fovy is None:
-        missing = " and ".join(
-            name for name, value in (("pitch_deg", pitch), ("fovy_deg", fovy)) if value is None
-        )
-        raise ProfileError(
-            f"{profile.path}: [camera] needs {missing} for waypoints: `shapechanger robot camera` "
-            "measures them from one picture of a checkerboard."
-        )
-    try:
-        return Rectifier(CameraGeometry(pitch, fovy), camera.size)
-    except WorldError as error:
-        raise ProfileError(f"{profile.path}: {error}") from error
 
 
 @lru_cache(maxsize=32)
@@ -81,7 +56,7 @@ def _response_of(
         missing = [name for name in ("speed", "yaw_rate") if name not in places]
         if missing:
             raise ProfileError(
-                f"{resolve_profile(vehicle, robot)[0].path} has no sensor of "
+                f"{simulated_robot(vehicle, robot).path} has no sensor of "
                 f"{' and '.join(missing)}, which waypoints with sensed=True need: add it to the "
                 "profile, or leave out sensed."
             )
@@ -90,7 +65,7 @@ def _response_of(
         env.close()
 
 
-class WaypointEnv(DriveEnv):
+class WaypointEnv(WaypointView, DriveEnv):
     """The driving task with a camera and an action that are the same for all vehicles.
 
     A policy that learned in one vehicle drives another one as it is: pictures are warped to one
@@ -149,53 +124,29 @@ class WaypointEnv(DriveEnv):
     ) -> None:
         arguments = {n: v for n, v in locals().items() if n not in ("self", "__class__", "vehicle")}
         EzPickle.__init__(self, vehicle, **arguments)
-        body = vehicle_model(vehicle)
-        self._rectifier = _rectifier_of(*resolve_profile(vehicle, robot))
+        body, profile = vehicle_model(vehicle), simulated_robot(vehicle, robot)
+        rectifier = rectifier_of(
+            str(profile.path), profile.camera_pitch_deg, profile.camera_fovy_deg, profile.size,
+            ProfileError,
+        )  # fmt: skip
         world = world or (FLOODED if body.floats else "corridor")
         common: dict[str, Any] = {
             "world": world, "robot": robot, "courses": courses, "randomise": randomise,
             "put_back": put_back,
         }  # fmt: skip
         self.response = _response_of(vehicle, world, robot, sensed)
-        self._env: VehicleEnv | RangesEnv = (
+        self._env = env = (
             VehicleEnv(vehicle, state=True, **common)
             if sensed
             else RangesEnv(vehicle, camera=True, **common)
         )
-        self.parts, self._world, self._draw = self._env.parts, self._env.world, self._env._draw
-        self.render_mode = render_mode
-        self._turns_on_the_spot = body.turning_radius_m == 0.0
-        self.observation_space, self.action_space = observation_space(), action_space()
-        self.observation_layout, self.action_layout = OBSERVATION_LAYOUT, ACTION_LAYOUT
-        self.metadata = {**self.metadata, "render_fps": self._env.metadata["render_fps"]}
-        self._speed = 0.0
-        places = self._env.observation_layout.slices
-        self._speed_at = places["speed"].start
-        if sensed:
-            self._speed_at -= places["camera/image"].stop
+        self.parts, self._world, self._draw = env.parts, env.world, env._draw
+        self.render_mode, self.metadata = render_mode, env.metadata
+        self._see(rectifier, turns_on_the_spot=body.turning_radius_m == 0.0)
+        pixels = env.observation_layout.slices["camera/image"].stop if sensed else 0
+        self._speed_at = env.observation_layout.slices["speed"].start - pixels
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-        """Start an episode; see `VehicleEnv.reset`."""
-        super().reset(seed=seed)
-        seen, info = self._env.reset(seed=seed, options=options)
-        return self._observe(seen), info
-
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.uint8], float, bool, bool, dict[str, Any]]:
-        """Drive towards a waypoint for one control period.
-
-        Raises:
-            SpaceMismatch: If the action is not two finite numbers.
-            ResetNeeded: If `reset` was never called.
-        """
-        steering = command(action, self.response, self._speed, on_the_spot=self._turns_on_the_spot)
-        seen, reward, terminated, truncated, info = self._env.step(steering)
-        return self._observe(seen), reward, terminated, truncated, info
-
-    def demonstrator(self, seed: int) -> WaypointDemonstrator:
+    def demonstrator(self, seed: int) -> Demonstrator:
         """Return an expert that knows the whole course and recovers from its own mistakes.
 
         Args:
@@ -205,40 +156,33 @@ class WaypointEnv(DriveEnv):
             ProfileError: If the robot has another control rate than the expert.
         """
         self._require_rate_of_expert()
-        return WaypointDemonstrator(self.world, seed)
+        return waypoint_demonstrator(self.world, seed)
 
-    def close(self) -> None:
-        """Release the pins and the renderer."""
-        self._env.close()
-
-    def _observe(self, seen: Any) -> NDArray[np.uint8]:
+    def _split(self, seen: Any) -> tuple[float, NDArray[np.uint8]]:
         if isinstance(self._env, RangesEnv):
-            self._speed = float(seen[self._speed_at])
-            return self._rectifier(self.world.picture())
-        self._speed = float(np.nan_to_num(seen["state"][self._speed_at]))
-        return self._rectifier(seen["image"])
+            return float(seen[self._speed_at]), self.world.picture()
+        return float(np.nan_to_num(seen["state"][self._speed_at])), seen["image"]
 
 
-class WaypointDemonstrator(Demonstrator):
-    """Expert that points out the free way; its actions are waypoints, bearing and speed.
+def waypoint_demonstrator(world: MujocoWorld, seed: int) -> Demonstrator:
+    """Return an expert that points out the free way; its actions are waypoints, bearing and speed.
 
     Args:
         world: The world of the vehicle.
-        seed: Seed of the mistakes.
+        seed: Seed of its mistakes.
     """
 
-    def __init__(self, world: MujocoWorld, seed: int) -> None:
-        super().__init__(world, seed, _SWAY)
+    def begin() -> Callable[[], NDArray[np.float32]]:
+        return partial(_point, world, course_expert(world))
 
-    def begin(self) -> None:
-        """Begin an episode."""
-        super().begin()
-        self._expert = course_expert(self._world)
+    return Demonstrator(world, begin, seed, _SWAY)
 
-    def _action(self) -> NDArray[np.float32]:
-        pose, path = self._world.pose, self._expert.path
-        station = path.nearest(pose.x, pose.y).station
-        x, y = path.at(station + AHEAD_M)
-        left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
-        share = self._expert.speeds[path.index(station)] / self._world.vehicle.top_speed_mps
-        return np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)
+
+def _point(world: MujocoWorld, expert: CourseExpert) -> NDArray[np.float32]:
+    """Return the waypoint on the expert's path."""
+    pose, path = world.pose, expert.path
+    station = path.nearest(pose.x, pose.y).station
+    x, y = path.at(station + AHEAD_M)
+    left = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
+    share = expert.speeds[path.index(station)] / world.vehicle.top_speed_mps
+    return np.clip((-left / WIDEST_RAD, 2.0 * share - 1.0), -1.0, 1.0).astype(np.float32)

@@ -9,25 +9,21 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import RobotRefused, WorldError
+from shapechanger.errors import RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.link.messages import Welcome
-from shapechanger.vehicles.cameras.rectify import CameraGeometry, Rectifier
 from shapechanger.vehicles.waypoints import (
-    ACTION_LAYOUT,
-    OBSERVATION_LAYOUT,
     SteeringResponse,
-    action_space,
-    command,
+    WaypointView,
     measure_response,
-    observation_space,
+    rectifier_of,
 )
 
 _SENSORS: Final = ("speed", "yaw_rate")
 
 
-class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
+class RemoteWaypointEnv(WaypointView):
     """Drive a vehicle on the network by waypoints, with a policy from any other vehicle.
 
     The camera's frames are warped to the virtual camera of `WaypointEnv`, by the pitch and the
@@ -72,18 +68,23 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
             welcome = self._env.welcome
             if self.response is None and welcome.turning is not None:
                 self.response = SteeringResponse(*welcome.turning)
-            self._rectifier = _rectifier_of(welcome)
+            size, pitch, fovy = (
+                welcome.image_size, welcome.camera_pitch_deg, welcome.camera_fovy_deg
+            )  # fmt: skip
+            if size is None:
+                raise RobotRefused(
+                    f"{welcome.robot} has no camera, which a policy with waypoints needs."
+                )
+            pitch = pitch if pitch is not None and math.isfinite(pitch) else None
+            fovy = fovy if fovy is not None and 0.0 < fovy < 180.0 else None
+            rectifier = rectifier_of(welcome.robot, pitch, fovy, size, RobotRefused)
             self._state_at = _state_places(welcome, self.response is None)
         except BaseException:
             self._env.close()
             raise
         # Only tracks turn a vehicle on the spot.
-        self._on_the_spot = welcome.body == "tank"
-        self._speed = 0.0
-        self.render_mode = self._env.render_mode
-        self.metadata = self._env.metadata
-        self.observation_space, self.action_space = observation_space(), action_space()
-        self.observation_layout, self.action_layout = OBSERVATION_LAYOUT, ACTION_LAYOUT
+        self._see(rectifier, turns_on_the_spot=welcome.body == "tank")
+        self.render_mode, self.metadata = self._env.render_mode, self._env.metadata
 
     @property
     def welcome(self) -> Welcome:
@@ -100,38 +101,16 @@ class RemoteWaypointEnv(gym.Env[NDArray[np.uint8], NDArray[np.float32]]):
             RobotRefused: If the robot was not armed in time, or refuses the client.
             LinkError: If the robot cannot be reached in time.
         """
-        super().reset(seed=seed)
         if self.response is None:
             self.response = measure_response(_Numbers(self._env), *self._state_at)
-        seen, info = self._env.reset(seed=seed, options=options)
-        return self._observe(seen), info
-
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.uint8], float, bool, bool, dict[str, Any]]:
-        """Drive towards a waypoint for one control period; see `RemoteVehicleEnv.step`.
-
-        Raises:
-            SpaceMismatch: If the action is not two finite numbers.
-            ResetNeeded: If the link was lost, or `reset` was never called.
-        """
-        if self.response is None:
-            raise gym.error.ResetNeeded("Call reset() before the first step.")
-        steering = command(action, self.response, self._speed, on_the_spot=self._on_the_spot)
-        seen, reward, terminated, truncated, info = self._env.step(steering)
-        return self._observe(seen), reward, terminated, truncated, info
+        return super().reset(seed=seed, options=options)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the newest frame as the camera took it; see `RemoteVehicleEnv.render`."""
         return self._env.render()
 
-    def close(self) -> None:
-        """Stop the robot, and give control back."""
-        self._env.close()
-
-    def _observe(self, seen: dict[str, Any]) -> NDArray[np.uint8]:
-        self._speed = float(np.nan_to_num(seen["state"][self._state_at[0]]))
-        return self._rectifier(seen["image"])
+    def _split(self, seen: dict[str, Any]) -> tuple[float, NDArray[np.uint8]]:
+        return float(np.nan_to_num(seen["state"][self._state_at[0]])), seen["image"]
 
 
 class _Numbers(gym.ObservationWrapper[Any, Any, Any]):
@@ -139,27 +118,6 @@ class _Numbers(gym.ObservationWrapper[Any, Any, Any]):
 
     def observation(self, observation: dict[str, Any]) -> NDArray[np.float32]:
         return observation["state"]
-
-
-def _rectifier_of(welcome: Welcome) -> Rectifier:
-    """Return what warps the frames of a robot.
-
-    Raises:
-        RobotRefused: If the robot has no camera, does not state how it looks, or has one that sees
-            too little.
-    """
-    size, pitch, fovy = welcome.image_size, welcome.camera_pitch_deg, welcome.camera_fovy_deg
-    if size is None:
-        raise RobotRefused(f"{welcome.robot} has no camera, which a policy with waypoints needs.")
-    if pitch is None or fovy is None or not (math.isfinite(pitch) and 0.0 < fovy < 180.0):
-        raise RobotRefused(
-            f"{welcome.robot} does not state pitch_deg and fovy_deg of its camera: measure them "
-            "with `shapechanger robot camera`, and serve the profile that it writes."
-        )
-    try:
-        return Rectifier(CameraGeometry(pitch, fovy), size)
-    except WorldError as error:
-        raise RobotRefused(f"{welcome.robot}: {error}") from error
 
 
 def _state_places(welcome: Welcome, measures: bool) -> tuple[int, int]:
