@@ -33,65 +33,6 @@ _CONTRACTED: Final = 0.6
 
 
 @dataclass(frozen=True, slots=True)
-class Hull:
-    """Masses, added masses, drag and lift of a hull.
-
-    Attributes:
-        mass: Dry mass, kg.
-        inertia: Dry moment of inertia about the vertical axis, kg·m2.
-        added_surge: Added mass ahead, kg: water that accelerates with the hull.
-        added_sway: Added mass to the side, kg.
-        added_yaw: Added moment of inertia, kg·m2.
-        surge: Linear drag ahead, N·s/m.
-        surge_2: Quadratic drag ahead, N·s2/m2.
-        sway: Linear drag to the side, N·s/m.
-        sway_2: Quadratic drag to the side, N·s2/m2.
-        sway_lift: Lift coefficient of the hull as a wing, times speed and sway, N·s2/m2.
-        yaw: Linear drag of a turn, N·m·s.
-        yaw_2: Quadratic drag of a turn, N·m·s2.
-        yaw_lift: Lift moment of the hull as a wing, times speed and rate of turn, N·s2.
-    """
-
-    mass: float
-    inertia: float
-    added_surge: float
-    added_sway: float
-    added_yaw: float
-    surge: float
-    surge_2: float
-    sway: float
-    sway_2: float
-    sway_lift: float
-    yaw: float
-    yaw_2: float
-    yaw_lift: float
-
-    def acceleration(
-        self, u: float, v: float, r: float, x: float, y: float, n: float
-    ) -> tuple[float, float, float]:
-        """Rates of change of u, v and r under the forces of propellers and rudder.
-
-        These are the manoeuvring equations in three degrees of freedom (Fossen, chapter 6) with
-        the Coriolis terms of different masses along and across.
-
-        Args:
-            u: Surge, m/s.
-            v: Sway, m/s.
-            r: Rate of turn, rad/s.
-            x: Force ahead, N.
-            y: Force to the left, N.
-            n: Moment, N·m.
-        """
-        along, across = self.mass + self.added_surge, self.mass + self.added_sway
-        pace = math.hypot(u, v)
-        x += across * v * r - (self.surge + self.surge_2 * abs(u)) * u
-        y += -along * u * r - (self.sway + self.sway_2 * abs(v) + self.sway_lift * pace) * v
-        n += (along - across) * u * v
-        n -= (self.yaw + self.yaw_2 * abs(r) + self.yaw_lift * pace) * r
-        return x / along, y / across, n / (self.inertia + self.added_yaw)
-
-
-@dataclass(frozen=True, slots=True)
 class Propeller:
     """A propeller whose thrust and torque are linear in the advance ratio J = V / (n D).
 
@@ -192,41 +133,55 @@ _MASS: Final = _WATER_DENSITY * _BLOCK * _LENGTH * _WIDTH * _DRAUGHT
 
 # Radius of gyration in yaw over length: 0.25, the usual estimate for ships (Fossen, chapter 6).
 _INERTIA: Final = _MASS * (0.25 * _LENGTH) ** 2
-# Added masses as shares of the dry ones are those of CyberShip II, a model of 1.26 m: R. Skjetne,
-# T. I. Fossen and P. Kokotović, Adaptive maneuvering, Automatica 41 (2005), table of parameters.
-_ADDED_SURGE: Final = 2.0 / 23.8
-_ADDED_SWAY: Final = 10.0 / 23.8
-_ADDED_YAW: Final = 1.0 / 1.76
+# Mass and inertia with the water that accelerates with the hull: ahead, to the side and in yaw.
+# The shares are those of CyberShip II, a model of 1.26 m: R. Skjetne, T. I. Fossen and P.
+# Kokotović, Adaptive maneuvering, Automatica 41 (2005), table of parameters.
+_ALONG: Final = _MASS + 2.0 / 23.8 * _MASS  # kg
+_ACROSS: Final = _MASS + 10.0 / 23.8 * _MASS  # kg
+_YAW: Final = _INERTIA + 1.0 / 1.76 * _INERTIA  # kg·m2
 # Wetted surface and drag coefficient at a Froude number near 0.5: estimates. Friction alone gives
 # about 0.005 by the ITTC 1957 line, waves the rest.
 _WETTED: Final = 0.8 * _LENGTH * (_WIDTH + 2.0 * _DRAUGHT)  # m2
 _SURGE_COEFFICIENT: Final = 0.0135
 # Cross-flow drag of a hull with rounded bilges, an estimate after Hoerner in Fossen's chapter 6.
 _CROSSFLOW_COEFFICIENT: Final = 0.7
-
-# A hull with drift acts as a low wing. Clarke, Gedling and Hine's formulas (1983; in
-# Fossen, chapter 6) for the derivatives Y_v and N_r, from length L, beam B, draught T and block.
+# Quadratic drag ahead and to the side, N·s2/m2, and of a turn, N·m·s2: cross-flow drag integrated
+# over the length, for a turn about the middle.
+_SURGE_2: Final = 0.5 * _WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT
+_SWAY_2: Final = 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH
+_YAW_2: Final = 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH**4 / 32.0
+# Linear terms are estimates: they equal the quadratic ones at 0.1 m/s, and at 0.5 rad/s in yaw.
+_SURGE_1: Final = 0.1 * 0.5 * _WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT  # N·s/m
+_SWAY_1: Final = 0.1 * 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH  # N·s/m
+_YAW_1: Final = 0.5 * _YAW_2  # N·m·s
+# A hull with drift acts as a low wing, with forces times speed and sway, N·s2/m2, and moments times
+# speed and rate of turn, N·s2. Clarke, Gedling and Hine's formulas (1983; in Fossen, chapter 6) for
+# the derivatives Y_v and N_r, from length L, beam B, draught T and block.
 _WING: Final = math.pi * (_DRAUGHT / _LENGTH) ** 2
-_SWAY_LIFT: Final = _WING * (1.0 + 0.4 * _BLOCK * _WIDTH / _DRAUGHT)
-_YAW_LIFT: Final = _WING * (0.25 + 0.039 * _WIDTH / _DRAUGHT - 0.56 * _WIDTH / _LENGTH)
-
-_HULL: Final = Hull(
-    mass=_MASS,
-    inertia=_INERTIA,
-    added_surge=_ADDED_SURGE * _MASS,
-    added_sway=_ADDED_SWAY * _MASS,
-    added_yaw=_ADDED_YAW * _INERTIA,
-    # Linear terms are estimates: they equal the quadratic ones at 0.1 m/s, and at 0.5 rad/s in yaw.
-    surge=0.1 * 0.5 * _WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT,
-    surge_2=0.5 * _WATER_DENSITY * _WETTED * _SURGE_COEFFICIENT,
-    sway=0.1 * 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH,
-    sway_2=0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH,
-    sway_lift=0.5 * _WATER_DENSITY * _LENGTH**2 * _SWAY_LIFT,
-    # Cross-flow drag integrated over the length, for a turn about the middle.
-    yaw=0.5 * 0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH**4 / 32.0,
-    yaw_2=0.5 * _WATER_DENSITY * _CROSSFLOW_COEFFICIENT * _DRAUGHT * _LENGTH**4 / 32.0,
-    yaw_lift=0.5 * _WATER_DENSITY * _LENGTH**4 * _YAW_LIFT,
+_SWAY_LIFT: Final = (
+    0.5 * _WATER_DENSITY * _LENGTH**2 * (_WING * (1.0 + 0.4 * _BLOCK * _WIDTH / _DRAUGHT))
 )
+_YAW_LIFT: Final = (
+    0.5 * _WATER_DENSITY * _LENGTH**4
+    * (_WING * (0.25 + 0.039 * _WIDTH / _DRAUGHT - 0.56 * _WIDTH / _LENGTH))
+)  # fmt: skip
+
+
+def _acceleration(
+    u: float, v: float, r: float, x: float, y: float, n: float
+) -> tuple[float, float, float]:
+    """Rates of change of u, v and r under the forces of propellers and rudder.
+
+    These are the manoeuvring equations in three degrees of freedom (Fossen, chapter 6) with the
+    Coriolis terms of different masses along and across.
+    """
+    pace = math.hypot(u, v)
+    x += _ACROSS * v * r - (_SURGE_1 + _SURGE_2 * abs(u)) * u
+    y += -_ALONG * u * r - (_SWAY_1 + _SWAY_2 * abs(v) + _SWAY_LIFT * pace) * v
+    n += (_ALONG - _ACROSS) * u * v
+    n -= (_YAW_1 + _YAW_2 * abs(r) + _YAW_LIFT * pace) * r
+    return x / _ALONG, y / _ACROSS, n / _YAW
+
 
 # Linear fits by eye to the open-water curves of a Wageningen B3-50 propeller with a pitch of 0.9
 # diameters (M. Oosterveld and P. van Oossanen 1975). Astern about half is left: an estimate.
@@ -340,34 +295,22 @@ class Floating(BoundVehicle):
             self._push[dof] = -torque
             x += propeller.pushes * thrust
             n -= propeller.pushes * thrust * beside
-            if part == "propeller":
-                flow = _flow_at_rudder(thrust, u)
+            if part == "propeller" and thrust > 0.0 and u >= 0.0:
+                # The wash meets a part of the rudder. Squares of speeds are averaged over its
+                # height, because forces are proportional to them.
+                wet = min(1.0, propeller.diameter / _RUDDER.height)
+                flow = math.sqrt(wet * propeller.wash(thrust, u) ** 2 + (1.0 - wet) * u * u)
         if has_rudder:
             rx, ry, rn = _RUDDER.force(flow, v, r, float(self._qpos[self._rudder]))
             x, y, n = x + rx, y + ry, n + rn
-        du, dv, dr = _HULL.acceleration(u, v, r, x, y, n)
+        du, dv, dr = _acceleration(u, v, r, x, y, n)
         # From rates in the turning frame of the boat to the acceleration in the world. A uniform
         # flow adds nothing, because u and v are relative to it.
-        along, across = _HULL.mass * (du - r * v), _HULL.mass * (dv + r * u)
+        along, across = _MASS * (du - r * v), _MASS * (dv + r * u)
         i = self._qvel0
         self._push[i] = along * cosine - across * sine
         self._push[i + 1] = along * sine + across * cosine
-        self._push[i + 2] = _HULL.inertia * dr
-
-
-def _flow_at_rudder(thrust: float, u: float) -> float:
-    """Speed of the water at the rudder, m/s, part of which is in the propeller's wash.
-
-    Squares of speeds are averaged over the height, because forces are proportional to them.
-
-    Args:
-        thrust: Thrust of the central propeller, N.
-        u: Speed of the boat through the water, m/s.
-    """
-    if thrust <= 0.0 or u < 0.0:
-        return u
-    share = min(1.0, _PROPELLER.diameter / _RUDDER.height)
-    return math.sqrt(share * _PROPELLER.wash(thrust, u) ** 2 + (1.0 - share) * u * u)
+        self._push[i + 2] = _INERTIA * dr
 
 
 def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
@@ -386,39 +329,36 @@ def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
     add_hull(chassis, "vehicle/bow", ellipsoid, *bow, 0.0)
     dress(chassis, "chassis", paint)
     add_shadow(chassis, (-0.29, -0.08), (0.20, 0.08), paint)
-    for part, (_, y) in _PROPELLERS.items():
-        _add_propeller(spec, chassis, part, y)
-    _add_rudder(spec, chassis, paint)
+    for part, (_, y) in _PROPELLERS.items():  # Below the water, and so not drawn.
+        name, armature = f"vehicle/{part}", _MOTOR.rotor_inertia + _PROPELLER_INERTIA
+        place = [_SHAFT_X, y, -_DRAUGHT]
+        _add_massless(chassis, name, place, [1.0, 0.0, 0.0], armature)
+        _MOTOR.add(spec, name).wrap_joint(name, 1.0)
+    place, damping = [_RUDDER.x, 0.0, -_DRAUGHT], HOBBY_SERVO.damping
+    name, axis = "vehicle/rudder", [0.0, 0.0, 1.0]
+    stock = _add_massless(chassis, name, place, axis, 2e-4, damping)
+    dress(stock, "rudder", paint, ground_z=_DRAUGHT)  # Its head turns behind the transom.
+    HOBBY_SERVO.add(spec, name, name)
     add_camera(chassis, _CAMERA)
 
 
-def _add_propeller(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, part: str, y: float) -> None:
-    """Add a propeller, below the water and so not drawn; `y` is its position to the left, m."""
-    name = f"vehicle/{part}"
-    # Its weight is part of the hull's, so that the centre of mass stays amidships.
-    shaft = chassis.add_body(name=name, pos=[_SHAFT_X, y, -_DRAUGHT])
-    shaft.explicitinertial = True
-    shaft.mass = 1e-4
-    shaft.inertia = [1e-8, 1e-8, 1e-8]
-    shaft.add_joint(
-        name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[1.0, 0.0, 0.0],
-        armature=_MOTOR.rotor_inertia + _PROPELLER_INERTIA,
-    )  # fmt: skip
-    _MOTOR.add(spec, name).wrap_joint(name, 1.0)
-
-
-def _add_rudder(spec: mujoco.MjSpec, chassis: mujoco.MjsBody, paint: Paint) -> None:
-    name = "vehicle/rudder"
-    stock = chassis.add_body(name=name, pos=[_RUDDER.x, 0.0, -_DRAUGHT])
-    stock.explicitinertial = True
-    stock.mass = 1e-4
-    stock.inertia = [1e-8, 1e-8, 1e-8]
-    stock.add_joint(
-        name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0],
-        damping=HOBBY_SERVO.damping, armature=2e-4,
-    )  # fmt: skip
-    dress(stock, "rudder", paint, ground_z=_DRAUGHT)  # Its head turns behind the transom.
-    HOBBY_SERVO.add(spec, name, name)
+def _add_massless(
+    chassis: mujoco.MjsBody,
+    name: str,
+    pos: list[float],
+    axis: list[float],
+    armature: float,
+    damping: float = 0.0,
+) -> mujoco.MjsBody:
+    """Add a turning part whose weight belongs to the hull, so that its middle stays amidships."""
+    body = chassis.add_body(name=name, pos=pos)
+    body.explicitinertial = True
+    body.mass = 1e-4
+    body.inertia = [1e-8, 1e-8, 1e-8]
+    body.add_joint(
+        name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, armature=armature, damping=damping
+    )
+    return body
 
 
 BOAT: Final = VehicleModel(

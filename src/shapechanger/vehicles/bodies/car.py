@@ -9,16 +9,9 @@ from typing import Final
 import mujoco
 
 from shapechanger.vehicles.bodies.model import VehicleModel
-from shapechanger.vehicles.bodies.parts import (
-    HOBBY_MOTOR,
-    CameraMount,
-    add_camera,
-    add_chassis,
-    add_hull,
-    add_look,
-)
-from shapechanger.vehicles.bodies.visuals import Paint, add_shadow, dress
-from shapechanger.vehicles.bodies.wheels import Axles, Steered, add_axles
+from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR, CameraMount
+from shapechanger.vehicles.bodies.visuals import Paint
+from shapechanger.vehicles.bodies.wheels import Axles, Rolling, add_axles, add_chassis
 
 # Rounded sizes of a touring car at the scale 1:10; mass with battery and computer. Estimates.
 _LENGTH: Final = 0.40  # m
@@ -42,18 +35,14 @@ _CAMERA: Final = CameraMount(x=0.055, y=0.0, z=0.118, pitch_rad=0.0)
 
 def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
     box, ellipsoid = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_ELLIPSOID
-    chassis = add_chassis(spec)
+    # The bonnet, and the bumper of a camera that leans.
+    seen = (
+        (box, (0.19, 0.0, 0.038), (0.01, 0.095, 0.014), "dark"),
+        (ellipsoid, (0.115, 0.0, 0.050), (0.088, 0.094, 0.027), "red"),
+    )
     # The centre of mass is low. The hull is as wide as the wheels, so that it meets walls first.
-    size = (_LENGTH / 2, _WIDTH / 2, 0.025)
-    add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.045), size, _BODY_KG)
-    # What its own camera sees: the bonnet, and the bumper of a camera that leans.
-    red, dark = paint("red"), paint("dark")
-    add_look(chassis, box, (0.19, 0.0, 0.038), (0.01, 0.095, 0.014), dark)
-    add_look(chassis, ellipsoid, (0.115, 0.0, 0.050), (0.088, 0.094, 0.027), red)
-    dress(chassis, "chassis", paint)
-    add_shadow(chassis, (-_LENGTH / 2, -_WIDTH / 2), (_LENGTH / 2, _WIDTH / 2), paint)
+    chassis = add_chassis(spec, paint, _LENGTH, _WIDTH, 0.045, _BODY_KG, _CAMERA, seen=seen)
     add_axles(spec, chassis, _AXLES, _MOTOR, paint)
-    add_camera(chassis, _CAMERA)
 
 
 CAR: Final = VehicleModel(
@@ -66,5 +55,5 @@ CAR: Final = VehicleModel(
     top_speed_mps=2.0,
     turning_radius_m=_AXLES.turning_radius,
     build=_build,
-    bind=partial(Steered, motors={"wheels": _MOTOR}, axles=_AXLES),
+    bind=partial(Rolling, motors={"wheels": _MOTOR}, radius=_AXLES.radius, axles=_AXLES),
 )

@@ -30,17 +30,6 @@ PI_CAMERA_FOVY_DEG: Final = 48.8
 """Raspberry Pi camera module 2: https://www.raspberrypi.com/documentation/accessories/camera.html"""
 
 
-def add_chassis(spec: mujoco.MjSpec) -> mujoco.MjsBody:
-    """Add the body of a land vehicle, which moves freely.
-
-    Args:
-        spec: Model to extend.
-    """
-    chassis = spec.worldbody.add_body(name="vehicle/chassis")
-    chassis.add_freejoint(name="vehicle/chassis")
-    return chassis
-
-
 def add_look(
     body: mujoco.MjsBody,
     kind: mujoco.mjtGeom,
@@ -355,15 +344,8 @@ class DcMotor:
             solref_friction=[0.01, 1.0],
             solimp_friction=[0.99, 0.999, 0.001, 0.5, 2.0],
         )
-        spec.add_actuator(
-            name=name,
-            trntype=mujoco.mjtTrn.mjTRN_TENDON,
-            target=name,
-            gaintype=mujoco.mjtGain.mjGAIN_FIXED,
-            gainprm=[self.torque_per_current / self.resistance, *[0.0] * 9],
-            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-            biasprm=[0.0, 0.0, -self.damping, *[0.0] * 7],
-        )
+        gain = self.torque_per_current / self.resistance
+        _add_actuator(spec, mujoco.mjtTrn.mjTRN_TENDON, name, name, gain, 0.0, -self.damping)
         return shaft
 
 
@@ -397,17 +379,27 @@ class ServoMotor:
         """
         torque = share * self.stall_torque
         stiffness = torque / self.error_at_stall
-        spec.add_actuator(
-            name=name,
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            target=joint,
-            gaintype=mujoco.mjtGain.mjGAIN_FIXED,
-            gainprm=[stiffness, *[0.0] * 9],
-            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-            biasprm=[0.0, -stiffness, *[0.0] * 8],
-            forcelimited=True,
-            forcerange=[-torque, torque],
+        servo = _add_actuator(
+            spec, mujoco.mjtTrn.mjTRN_JOINT, name, joint, stiffness, -stiffness, 0.0
         )
+        servo.forcelimited, servo.forcerange = True, [-torque, torque]
+
+
+def _add_actuator(
+    spec: mujoco.MjSpec,
+    kind: mujoco.mjtTrn,
+    name: str,
+    target: str,
+    gain: float,
+    stiffness: float,
+    damping: float,
+) -> mujoco.MjsActuator:
+    """Add an actuator whose force is linear in its control, its length and its velocity."""
+    return spec.add_actuator(
+        name=name, trntype=kind, target=target, gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        gainprm=[gain, *[0.0] * 9], biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        biasprm=[0.0, stiffness, damping, *[0.0] * 7],
+    )  # fmt: skip
 
 
 # Pololu item 4801, a motor of 25 mm with a gear of 4.4:1: https://www.pololu.com/product/4801. At

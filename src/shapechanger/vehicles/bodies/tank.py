@@ -9,17 +9,9 @@ from typing import Final
 import mujoco
 
 from shapechanger.vehicles.bodies.model import VehicleModel
-from shapechanger.vehicles.bodies.parts import (
-    HOBBY_MOTOR,
-    CameraMount,
-    add_camera,
-    add_chassis,
-    add_hull,
-    add_look,
-    add_wheel,
-)
-from shapechanger.vehicles.bodies.visuals import Paint, add_shadow, dress
-from shapechanger.vehicles.bodies.wheels import Rolling
+from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR, CameraMount, add_wheel
+from shapechanger.vehicles.bodies.visuals import Paint
+from shapechanger.vehicles.bodies.wheels import Rolling, add_chassis
 
 # Sizes of a toy tank at the scale 1:16 to 1:24; the mass is an estimate.
 _LENGTH: Final = 0.32  # m
@@ -43,41 +35,30 @@ _SIDES: Final = (("left", 1), ("right", -1))
 
 
 def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
+    # In wide pictures its own camera sees the hull.
     box = mujoco.mjtGeom.mjGEOM_BOX
-    chassis = add_chassis(spec)
-    size = (_LENGTH / 2, _WIDTH / 2, 0.025)
-    add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.050), size, _BODY_KG)
-    # What its own camera sees, in wide pictures.
-    add_look(chassis, box, (0.0, 0.0, 0.058), (0.150, 0.072, 0.022), paint("green"))
-    dress(chassis, "chassis", paint)
-    add_shadow(chassis, (-_LENGTH / 2, -_WIDTH / 2), (_LENGTH / 2, _WIDTH / 2), paint)
+    seen = ((box, (0.0, 0.0, 0.058), (0.150, 0.072, 0.022), "green"),)
+    chassis = add_chassis(spec, paint, _LENGTH, _WIDTH, 0.050, _BODY_KG, _CAMERA, seen=seen)
     for side, sign in _SIDES:
-        _add_track(spec, chassis, side, sign * _GAUGE / 2, paint)
-    add_camera(chassis, _CAMERA)
-
-
-def _add_track(
-    spec: mujoco.MjSpec, chassis: mujoco.MjsBody, side: str, y: float, paint: Paint
-) -> None:
-    """Add the three wheels of a track, which turn together."""
-    part = f"vehicle/{side} track"
-    track = _MOTOR.add(spec, part)
-    wheels = {where: f"vehicle/{side} {where} wheel" for where in _WHEEL_XS}
-    for where, x in _WHEEL_XS.items():
-        add_wheel(
-            chassis, wheels[where], (x, y, _RADIUS), _RADIUS, _TRACK_WIDTH, _WHEEL_KG, paint,
-            armature=_MOTOR.rotor_inertia / 3, friction=_TRACK_FRICTION, tyre="track",
-        )  # fmt: skip
-        track.wrap_joint(wheels[where], 1 / 3)
-    for where in ("front", "rear"):
-        spec.add_equality(
-            name=wheels[where],
-            type=mujoco.mjtEq.mjEQ_JOINT,
-            objtype=mujoco.mjtObj.mjOBJ_JOINT,
-            name1=wheels[where],
-            name2=wheels["middle"],
-            data=[0.0, 1.0, *[0.0] * 10],
-        )
+        # Three wheels that turn together.
+        track = _MOTOR.add(spec, f"vehicle/{side} track")
+        wheels = {where: f"vehicle/{side} {where} wheel" for where in _WHEEL_XS}
+        for where, x in _WHEEL_XS.items():
+            place = (x, sign * _GAUGE / 2, _RADIUS)
+            add_wheel(
+                chassis, wheels[where], place, _RADIUS, _TRACK_WIDTH, _WHEEL_KG, paint,
+                armature=_MOTOR.rotor_inertia / 3, friction=_TRACK_FRICTION, tyre="track",
+            )  # fmt: skip
+            track.wrap_joint(wheels[where], 1 / 3)
+        for where in ("front", "rear"):
+            spec.add_equality(
+                name=wheels[where],
+                type=mujoco.mjtEq.mjEQ_JOINT,
+                objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                name1=wheels[where],
+                name2=wheels["middle"],
+                data=[0.0, 1.0, *[0.0] * 10],
+            )
 
 
 TANK: Final = VehicleModel(

@@ -9,16 +9,9 @@ from typing import Final
 import mujoco
 
 from shapechanger.vehicles.bodies.model import VehicleModel
-from shapechanger.vehicles.bodies.parts import (
-    HOBBY_MOTOR,
-    CameraMount,
-    add_camera,
-    add_chassis,
-    add_hull,
-    add_wheel,
-)
+from shapechanger.vehicles.bodies.parts import HOBBY_MOTOR, CameraMount, add_hull, add_wheel
 from shapechanger.vehicles.bodies.visuals import Paint, add_shadow, dress
-from shapechanger.vehicles.bodies.wheels import Axles, Steered, add_axles
+from shapechanger.vehicles.bodies.wheels import Axles, Rolling, add_axles, add_chassis
 
 # Sizes of a tractor and a semi-trailer at the scale 1:14, shortened; masses are estimates.
 _TRACTOR_LENGTH: Final = 0.50  # m
@@ -50,14 +43,10 @@ _CAMERA: Final = CameraMount(x=0.235, y=0.0, z=0.125, pitch_rad=math.radians(4.0
 
 
 def _build(spec: mujoco.MjSpec, paint: Paint) -> None:
-    box = mujoco.mjtGeom.mjGEOM_BOX
-    chassis = add_chassis(spec)
-    size = (_TRACTOR_LENGTH / 2, _WIDTH / 2, 0.025)
-    add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, 0.050), size, _TRACTOR_KG)
-    dress(chassis, "chassis", paint)
-    add_shadow(chassis, (-_TRACTOR_LENGTH / 2, -0.09), (_TRACTOR_LENGTH / 2, 0.09), paint)
+    chassis = add_chassis(
+        spec, paint, _TRACTOR_LENGTH, _WIDTH, 0.050, _TRACTOR_KG, _CAMERA, shadow_m=0.18
+    )
     add_axles(spec, chassis, _AXLES, _MOTOR, paint)
-    add_camera(chassis, _CAMERA)
     _add_trailer(spec, chassis, paint)
 
 
@@ -100,5 +89,5 @@ TRUCK: Final = VehicleModel(
     top_speed_mps=1.5,
     turning_radius_m=_AXLES.turning_radius,
     build=_build,
-    bind=partial(Steered, motors={"wheels": _MOTOR}, axles=_AXLES),
+    bind=partial(Rolling, motors={"wheels": _MOTOR}, radius=_AXLES.radius, axles=_AXLES),
 )

@@ -1,60 +1,24 @@
-"""Land vehicles: rolling wheels, and Ackermann steering of the front ones."""
+"""Land vehicles: their chassis, rolling wheels, and Ackermann steering of the front ones."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
 
 from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs
-from shapechanger.vehicles.bodies.parts import HOBBY_SERVO, DcMotor, add_wheel
-from shapechanger.vehicles.bodies.visuals import Paint
-
-
-class Rolling(BoundVehicle):
-    """A vehicle on land, without steering.
-
-    Args:
-        model: Compiled model with the vehicle.
-        data: Its state.
-        motors: See `BoundVehicle`.
-        radius: Radius of the driven wheels, m.
-    """
-
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        motors: Mapping[str, DcMotor],
-        radius: float,
-    ) -> None:
-        super().__init__(model, data, motors)
-        self._radius = radius
-        root = model.joint("vehicle/chassis")
-        self._qpos0, self._qvel0 = int(root.qposadr[0]), int(root.dofadr[0])
-
-    def _place_chassis(self, x: float, y: float, heading: float) -> None:
-        p, v = self._qpos0, self._qvel0
-        half = heading / 2
-        self._qpos[p : p + 7] = (x, y, 0.0, math.cos(half), 0.0, 0.0, math.sin(half))
-        self._qvel[v : v + 6] = 0.0
-
-    def motion(self) -> Motion:
-        """Current pose and velocity."""
-        p, v = self._qpos0, self._qvel0
-        x, y, _, qw, qx, qy, qz = self._qpos[p : p + 7].tolist()
-        vx, vy, _, _, _, yaw_rate = self._qvel[v : v + 6].tolist()
-        heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        cosine, sine = math.cos(heading), math.sin(heading)
-        return Motion(x, y, heading, vx * cosine + vy * sine, vy * cosine - vx * sine, yaw_rate)
-
-    def travelled_m(self) -> float:
-        """Mean distance that the driven wheels rolled since `place`, m."""
-        turned = sum([drive.turned() for drive in self._drives.values()])
-        return self._radius * turned / len(self._drives)
-
+from shapechanger.vehicles.bodies.parts import (
+    HOBBY_SERVO,
+    CameraMount,
+    DcMotor,
+    add_camera,
+    add_hull,
+    add_look,
+    add_wheel,
+)
+from shapechanger.vehicles.bodies.visuals import Paint, add_shadow, dress
 
 _SIDES = (("left", 1), ("right", -1))
 
@@ -104,6 +68,45 @@ class Axles:
         return math.atan(along / (1.0 - half)), math.atan(along / (1.0 + half))
 
 
+def add_chassis(
+    spec: mujoco.MjSpec,
+    paint: Paint,
+    length_m: float,
+    width_m: float,
+    hull_z: float,
+    mass: float,
+    camera: CameraMount,
+    *,
+    seen: Sequence[tuple[mujoco.mjtGeom, Sequence[float], Sequence[float], str]] = (),
+    shadow_m: float | None = None,
+) -> mujoco.MjsBody:
+    """Add the body of a land vehicle, which moves freely, with its hull, looks and camera.
+
+    Args:
+        spec: Model to extend.
+        paint: Materials and meshes.
+        length_m: Length of the hull, m.
+        width_m: Width of the hull, m.
+        hull_z: Height of its middle, m.
+        mass: Mass without wheels, kg.
+        camera: Mount of its camera.
+        seen: What its own camera sees: shape, position, size and colour of each geom.
+        shadow_m: Width of its shadow, m; None for that of the hull.
+    """
+    chassis = spec.worldbody.add_body(name="vehicle/chassis")
+    chassis.add_freejoint(name="vehicle/chassis")
+    half, size = 0.5 * length_m, (0.5 * length_m, 0.5 * width_m, 0.025)
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    add_hull(chassis, "vehicle/hull", box, (0.0, 0.0, hull_z), size, mass)
+    for shape, pos, sizes, colour in seen:
+        add_look(chassis, shape, pos, sizes, paint(colour))
+    dress(chassis, "chassis", paint)
+    aside = 0.5 * (width_m if shadow_m is None else shadow_m)
+    add_shadow(chassis, (-half, -aside), (half, aside), paint)
+    add_camera(chassis, camera)
+    return chassis
+
+
 def add_axles(
     spec: mujoco.MjSpec, chassis: mujoco.MjsBody, axles: Axles, motor: DcMotor, paint: Paint
 ) -> None:
@@ -142,14 +145,15 @@ def add_axles(
         axle.wrap_joint(rear, 0.5)
 
 
-class Steered(Rolling):
-    """A vehicle on land with Ackermann steering.
+class Rolling(BoundVehicle):
+    """A vehicle on land.
 
     Args:
         model: Compiled model with the vehicle.
         data: Its state.
-        motors: See `Rolling`.
-        axles: Dimensions of its axles.
+        motors: See `BoundVehicle`.
+        radius: Radius of the driven wheels, m.
+        axles: Its axles with Ackermann steering; None for tracks.
     """
 
     def __init__(
@@ -157,24 +161,46 @@ class Steered(Rolling):
         model: mujoco.MjModel,
         data: mujoco.MjData,
         motors: Mapping[str, DcMotor],
-        axles: Axles,
+        radius: float,
+        axles: Axles | None = None,
     ) -> None:
-        super().__init__(model, data, motors, axles.radius)
-        self._axles = axles
-        self._servos = tuple(model.actuator(f"vehicle/{side} steering").id for side, _ in _SIDES)
-        self._steering = 0.0
+        super().__init__(model, data, motors)
+        self._radius = radius
+        root = model.joint("vehicle/chassis")
+        self._qpos0, self._qvel0 = int(root.qposadr[0]), int(root.dofadr[0])
+        self._axles, self._steering = axles, 0.0
+        if axles is not None:
+            names = (f"vehicle/{side} steering" for side, _ in _SIDES)
+            self._servos = [model.actuator(name).id for name in names]
 
-    def place(self, x: float, y: float, heading: float) -> None:
-        """Put the vehicle at a pose, at rest and with straight wheels."""
+    def _place_chassis(self, x: float, y: float, heading: float) -> None:
         self._steering = 0.0
-        super().place(x, y, heading)
+        p, v = self._qpos0, self._qvel0
+        half = heading / 2
+        self._qpos[p : p + 7] = (x, y, 0.0, math.cos(half), 0.0, 0.0, math.sin(half))
+        self._qvel[v : v + 6] = 0.0
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
         """Set the voltages of the motors and the angles of the front wheels."""
         super().drive(outputs, battery_v)
         steering = outputs.get("steering", 0.0)
-        if steering is not None and steering != self._steering:
-            self._steering = steering
-            angles = self._axles.angles(min(1.0, max(-1.0, steering)))
-            for servo, angle in zip(self._servos, angles, strict=True):
-                self._ctrl[servo] = angle
+        if self._axles is None or steering is None or steering == self._steering:
+            return
+        self._steering = steering
+        angles = self._axles.angles(min(1.0, max(-1.0, steering)))
+        for servo, angle in zip(self._servos, angles, strict=True):
+            self._ctrl[servo] = angle
+
+    def motion(self) -> Motion:
+        """Current pose and velocity."""
+        p, v = self._qpos0, self._qvel0
+        x, y, _, qw, qx, qy, qz = self._qpos[p : p + 7].tolist()
+        vx, vy, _, _, _, yaw_rate = self._qvel[v : v + 6].tolist()
+        heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        cosine, sine = math.cos(heading), math.sin(heading)
+        return Motion(x, y, heading, vx * cosine + vy * sine, vy * cosine - vx * sine, yaw_rate)
+
+    def travelled_m(self) -> float:
+        """Mean distance that the driven wheels rolled since `place`, m."""
+        turned = sum([drive.turned() for drive in self._drives.values()])
+        return self._radius * turned / len(self._drives)
