@@ -70,6 +70,8 @@ class Readings:
 class World(Protocol):
     """A vehicle and its surroundings.
 
+    A class that derives from it inherits a body that neither moves nor sees.
+
     Attributes:
         resting_v: Voltage of the battery without load.
     """
@@ -78,7 +80,7 @@ class World(Protocol):
 
     def lay_out(self, seed: int) -> None:
         """Change the surroundings, and put the vehicle at a start in them."""
-        ...
+        self.place(seed)
 
     def truth(self) -> dict[str, float]:
         """Ground truth for evaluation, by name, which no sensor measures; may be empty."""
@@ -90,7 +92,7 @@ class World(Protocol):
 
     def put_back(self) -> None:
         """Put the vehicle, after a collision, at a free place nearby, at rest."""
-        ...
+        self.place(0)
 
     def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
         """Simulate for a time.
@@ -104,12 +106,12 @@ class World(Protocol):
 
     def inputs(self) -> Readings:
         """Quantities that sensors measure."""
-        ...
+        return Readings(Pose(0.0, 0.0, 0.0), battery_v=self.resting_v)
 
     def distance_m(self) -> float:
-        """Distance from the vehicle's nose to the nearest object ahead."""
-        ...
+        """Distance from the vehicle's nose to the nearest object ahead, m."""
+        return 0.0
 
     def picture(self) -> NDArray[np.uint8]:
         """Picture of the front camera, RGB, shape (height, width, 3)."""
-        ...
+        return np.zeros((120, 160, 3), np.uint8)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Collection, Sequence
+from typing import Final
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from shapechanger.contract.world import RESTING_V, Pose, Readings
+from shapechanger.contract.world import RESTING_V, World
 from shapechanger.errors import RobotError
 from shapechanger.finger.anatomy import JOINT_RANGE, JOINT_REST, JOINTS, TENDONS
 from shapechanger.finger.model import FINGERTIP, build_finger
 from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.tensions import drive_of
-
-if TYPE_CHECKING:
-    from shapechanger.robot.twin.servos.rig import Rig
+from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.twin.servos.rig import Rig
+from shapechanger.robot.twin.world.place import Place
 
 # N/m. Chosen, as for every tendon of a twin: a good millimetre for 25 N.
 _CABLE_STIFFNESS: Final = 20e3
@@ -28,8 +27,33 @@ _MAX_STEP_S: Final = 0.001
 _START_SPREAD: Final = 0.1
 
 
-class FingerWorld:
+def finger_place(parameters: FingerParameters) -> Place:
+    """Return the place of a rig that pulls a finger, which `open_finger` opens."""
+    return Place(f"{__name__}:{open_finger.__name__}", {"parameters": parameters.to_json()})
+
+
+def open_finger(
+    parts: Collection[str], camera: CameraPlan | None, seed: int, *, parameters: str
+) -> FingerWorld:
+    """Open the world of a finger.
+
+    Args:
+        parts: Not used: the servos of a rig pull tendons.
+        camera: Not used: nothing is seen of a finger.
+        seed: Seed of the first start.
+        parameters: Parameters of the finger, as JSON.
+
+    Raises:
+        FingerError: If the parameters are invalid.
+    """
+    del parts, camera
+    return FingerWorld(FingerParameters.from_json(parameters), seed)
+
+
+class FingerWorld(World):
     """Bones and joints of a finger; see `World`, `TendonWorld` and `JointWorld`.
+
+    It has no surroundings and no other sensors, and the servo bus moves it by `pull`.
 
     The simulated servos bring motors, spools, gears and their friction. So friction, mass, lag and
     delay of the parameters' drive are left out here, and the tendons stretch as the servos' cables.
@@ -102,10 +126,6 @@ class FingerWorld:
         angle = float(self._data.qpos[JOINTS.index(joint)])
         return angle + self._joint_noise * float(self._noise.standard_normal())
 
-    def lay_out(self, seed: int) -> None:
-        """Place the finger at a start, as it has no surroundings."""
-        self.place(seed)
-
     def truth(self) -> dict[str, float]:
         """Return the position of the fingertip, m, and the angles of the joints, rad."""
         mujoco.mj_kinematics(self._model, self._data)
@@ -125,22 +145,3 @@ class FingerWorld:
         mujoco.mj_forward(self._model, self._data)
         if self._rig is not None:
             self._rig.settle()
-
-    def put_back(self) -> None:
-        """Place the finger at a start, as it cannot collide."""
-        self.place(0)
-
-    def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
-        """Do nothing: the servo bus moves the finger, by `pull`."""
-
-    def inputs(self) -> Readings:
-        """Return the default readings: a finger has none of these sensors."""
-        return Readings(Pose(0.0, 0.0, 0.0), battery_v=self.resting_v)
-
-    def distance_m(self) -> float:
-        """Return 0."""
-        return 0.0
-
-    def picture(self) -> NDArray[np.uint8]:
-        """Return a black picture, shape (120, 160, 3)."""
-        return np.zeros((120, 160, 3), np.uint8)

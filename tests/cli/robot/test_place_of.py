@@ -11,7 +11,8 @@ from shapechanger.cli.robot import serve as serving
 from shapechanger.cli.robot.serve import finger_of, place_of
 from shapechanger.errors import MissingExtra, ProfileError, RobotError, UnknownName, WorldError
 from shapechanger.finger.gap import GAPS
-from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.parameters import NOMINAL
+from shapechanger.finger.twin import finger_place
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.robot import Operator
@@ -35,7 +36,7 @@ def _shipped(name: str) -> Profile:
         ("lab-truck", course_place("yard", "truck")),
         ("lab-boat", course_place("harbour", "boat")),
         ("cat", Place()),
-        ("finger", Place(finger=NOMINAL.to_json())),
+        ("finger", finger_place(NOMINAL)),
         ("finger-pwm", Place()),
     ],
 )
@@ -48,8 +49,7 @@ def test_a_finger_of_a_gap() -> None:
     """The finger is the one that `Finger-v1` draws for the seed."""
     drawn = finger_of(_shipped("finger"), "real-like", 3)
     assert drawn is not None
-    expected = GAPS["real-like"].draw(np.random.default_rng(3))
-    assert FingerParameters.from_json(drawn.finger) == expected
+    assert drawn == finger_place(GAPS["real-like"].draw(np.random.default_rng(3)))
     assert finger_of(_shipped("lab-car"), "", None) is None
 
 

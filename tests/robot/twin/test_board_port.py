@@ -10,13 +10,13 @@ import pytest
 
 from shapechanger.errors import RobotError
 from shapechanger.finger.parameters import NOMINAL
+from shapechanger.finger.twin import finger_place
 from shapechanger.robot.guard.outputs import OutputBank, make_safe
 from shapechanger.robot.guard.sensors import Sensors
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.hardware import TwinHardware, connect
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.start import RunningBoard, start_board
-from shapechanger.robot.twin.world.place import Place
 from tests.robot.twin.robots import CAR
 
 pytestmark = pytest.mark.realtime
@@ -28,7 +28,7 @@ _PULL = (0.5, *(0.0,) * 6)
 @pytest.fixture(scope="module")
 def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningBoard]:
     """A finger on the twin's clock."""
-    place = Place(finger=NOMINAL.to_json())
+    place = finger_place(NOMINAL)
     with start_board(_PLAN, "twin", tmp_path_factory.mktemp("board"), place=place) as started:
         yield started
 

@@ -75,6 +75,14 @@ def test_an_invalid_place_is_refused() -> None:
         open_world(course_place("corridor", "boat"), {"propeller", "rudder"}, None, 1)
 
 
+def test_an_opener_that_does_not_exist_is_refused() -> None:
+    """An unknown module or function of a product is named, with what exists."""
+    with pytest.raises(UnknownName, match=r"'open_cours'. Did you mean 'open_course'"):
+        open_world(Place("shapechanger.vehicles.twin:open_cours"), _PARTS, None, 1)
+    with pytest.raises(RobotError, match=r"opened by cars.twin:open_course, and there is no cars"):
+        open_world(Place("cars.twin:open_course"), _PARTS, None, 1)
+
+
 def test_an_operator_lays_out_courses(tmp_path: Path) -> None:
     """Laying out a course moves the vehicle, is recorded in the ledger and is reproducible."""
     with (

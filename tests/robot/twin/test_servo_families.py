@@ -16,7 +16,7 @@ import pytest
 from shapechanger.errors import ProfileError, RobotError
 from shapechanger.finger.anatomy import JOINTS, MOMENT_ARMS, TENDONS
 from shapechanger.finger.parameters import NOMINAL
-from shapechanger.finger.twin import FingerWorld
+from shapechanger.finger.twin import FingerWorld, finger_place
 from shapechanger.layout import Layout
 from shapechanger.robot.guard import start
 from shapechanger.robot.guard.messages import GuardState, Order, decode_state, encode
@@ -30,7 +30,6 @@ from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.servos.rig import Rig
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
-from shapechanger.robot.twin.world.place import Place
 from tests.robot.profile.texts import finger_text, read
 from tests.robot.twin.robots import until
 
@@ -290,7 +289,7 @@ def test_a_killed_guard_leaves_limp_servos(family: str, tmp_path: Path) -> None:
     plan = read(finger_text(family)).guard_plan()
     daemon, its_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     heartbeat, its_heartbeat = socket.socketpair()
-    place = Place(finger=NOMINAL.to_json())
+    place = finger_place(NOMINAL)
     with (
         start_board(plan, "twin", tmp_path, place=place) as board,
         Operator(board.socket_path) as operator,

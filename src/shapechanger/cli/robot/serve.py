@@ -380,6 +380,7 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
         return None
     from shapechanger.finger.anatomy import TENDONS
     from shapechanger.finger.parameters import NOMINAL
+    from shapechanger.finger.twin import finger_place
 
     if tendons != set(TENDONS):
         if gap:
@@ -389,12 +390,12 @@ def finger_of(profile: Profile, gap: str, seed: int | None) -> Place | None:
             )
         return None
     if not gap:
-        return Place(finger=NOMINAL.to_json())
+        return finger_place(NOMINAL)
     import numpy as np
 
     from shapechanger.finger.gap import resolve_gap
 
-    return Place(finger=resolve_gap(gap).draw(np.random.default_rng(seed or 0)).to_json())
+    return finger_place(resolve_gap(gap).draw(np.random.default_rng(seed or 0)))
 
 
 def place_of(profile: Profile, world: str, lenses: Sequence[str]) -> Place:

@@ -1,4 +1,4 @@
-"""Worlds of a twin: the plain room with its vehicles, a finger, and the choice of a place.
+"""Worlds of a twin: the plain room with its vehicles, and the choice of a place.
 
-Courses in MuJoCo are opened by `shapechanger.vehicles.twin`.
+Products open others: `shapechanger.vehicles.twin` and `shapechanger.finger.twin`.
 """

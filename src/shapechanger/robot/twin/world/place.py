@@ -1,4 +1,4 @@
-"""Place of a twin: the plain room, a finger's rig, or what another package opens."""
+"""Place of a twin: the plain room, or a world that a product opens."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from shapechanger.contract.world import World
+from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.twin.world.vehicle import DrivingWorld
 
@@ -23,12 +24,10 @@ class Place:
         opener: Function that opens the world, as "module:function"; "" for the plain room with
             boxes, which needs no simulator. It is called as `open_world`, without the place.
         arguments: Keyword arguments of the opener, as JSON holds them.
-        finger: Parameters of the finger whose tendons the robot pulls, as JSON; "" for none.
     """
 
     opener: str = ""
     arguments: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    finger: str = ""
 
 
 def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, seed: int) -> World:
@@ -41,20 +40,24 @@ def open_world(place: Place, parts: Collection[str], camera: CameraPlan | None, 
         seed: Seed of the surroundings and of the start.
 
     Raises:
+        UnknownName: If the module of the opener has no such function.
+        RobotError: If there is no such module.
         ShapechangerError: If the opener refuses its arguments or the robot.
-        FingerError: If the parameters of the finger are invalid.
         MissingExtra: If MuJoCo is needed and not installed.
     """
-    if place.finger:
-        from shapechanger.finger.parameters import FingerParameters
-        from shapechanger.finger.twin import FingerWorld
-
-        return FingerWorld(FingerParameters.from_json(place.finger), seed)
     if place.opener:
         module, _, name = place.opener.partition(":")
-        world: World = getattr(importlib.import_module(module), name)(
-            parts, camera, seed, **place.arguments
-        )
+        try:
+            found = importlib.import_module(module)
+        except ModuleNotFoundError as error:
+            raise RobotError(
+                f"The world of this twin is opened by {place.opener}, and there is no "
+                f"{error.name}: install the package that names it."
+            ) from error
+        if not hasattr(found, name):
+            known = [other for other in vars(found) if other.startswith("open_")]
+            raise UnknownName(f"function of {module} that opens a world", name, known)
+        world: World = getattr(found, name)(parts, camera, seed, **place.arguments)
         return world
     size, pitch_deg, fovy_deg = (
         (None, None, None) if camera is None else (camera.size, camera.pitch_deg, camera.fovy_deg)
