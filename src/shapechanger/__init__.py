@@ -37,8 +37,8 @@ from shapechanger.layout import Element, Feature, Layout
 if TYPE_CHECKING:
     from shapechanger.contract.testing import examine
     from shapechanger.demos.dataset import Dataset, load_dataset
+    from shapechanger.envs.make_vec import make_vec
     from shapechanger.envs.own import from_mjcf
-    from shapechanger.envs.vector.make import make_vec
     from shapechanger.finger.identify import load_log
     from shapechanger.morphology import (
         AddFloor,
@@ -134,7 +134,7 @@ _MODULES: Final = {
     "contract.testing": ("examine",),
     "demos.dataset": ("Dataset", "load_dataset"),
     "envs.own": ("from_mjcf",),
-    "envs.vector.make": ("make_vec",),
+    "envs.make_vec": ("make_vec",),
     "finger.identify": ("load_log",),
     "morphology": (
         *("AddLimb", "AddSegment", "Cut", "Damping", "Density", "Friction", "Gear", "Gravity"),

@@ -9,6 +9,7 @@ from typing import Any, Final
 import gymnasium as gym
 import msgspec
 
+from shapechanger.contract.vector import register_make_vec
 from shapechanger.errors import UnknownName
 
 NAMESPACE: Final = "shapechanger"
@@ -213,14 +214,15 @@ _TUNED: Final = ("Ant", "InvertedPendulum")
 
 
 def register_all() -> None:
-    """Register every env of the catalogue with Gymnasium, once."""
+    """Register every env of the catalogue with Gymnasium, once, and how to make many."""
+    register_make_vec("shapechanger.envs.make_vec:make_vec")
     for entry in (*CATALOGUE.values(), *ODRL_ENVS.values()):
         _register(
             entry.id,
             entry.entry_point,
             _EPISODE_STEPS,
             reward_threshold=entry.reward_threshold,
-            vector_entry_point=f"shapechanger.envs.vector.entry_points:{entry.name}",
+            vector_entry_point=f"shapechanger.envs.make_vec:{entry.name}",
             # Their own step requires a reset, and the tests check the envs.
             order_enforce=entry.family not in _TUNED,
             disable_env_checker=entry.family in _TUNED,
@@ -230,7 +232,7 @@ def register_all() -> None:
         OWN_ROBOT,
         "shapechanger.envs.own:OwnRobotEnv",
         _EPISODE_STEPS,
-        vector_entry_point="shapechanger.envs.vector.entry_points:OwnRobot",
+        vector_entry_point="shapechanger.envs.make_vec:OwnRobot",
     )
     for envs, kind, limit in (
         (VEHICLE_ENVS, "vehicle:VehicleEnv", _EPISODE_STEPS),

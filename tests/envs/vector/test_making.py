@@ -16,9 +16,10 @@ from gymnasium.wrappers import vector as wrappers
 
 import shapechanger
 from shapechanger.envs import CATALOGUE
-from shapechanger.envs.vector import ThreadVectorEnv, entry_points
+from shapechanger.envs import make_vec as entry_points
+from shapechanger.envs.checks import require_same_spaces
+from shapechanger.envs.vector import ThreadVectorEnv
 from shapechanger.envs.vector.batch import _work_off
-from shapechanger.envs.vector.checks import require_same_spaces
 from shapechanger.envs.warp import WarpVectorEnv
 from shapechanger.errors import SpaceMismatch, UnknownName, VectorEnvError
 from shapechanger.morphology import Stretch

@@ -4,6 +4,5 @@ from __future__ import annotations
 
 from shapechanger.envs.vector.env import ThreadVectorEnv
 from shapechanger.envs.vector.infos import Restart
-from shapechanger.envs.vector.make import make_vec
 
-__all__ = ["Restart", "ThreadVectorEnv", "make_vec"]
+__all__ = ["Restart", "ThreadVectorEnv"]

@@ -15,13 +15,13 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from shapechanger.envs.actions import check_actions
-from shapechanger.envs.vector.batch import BatchStep, SubEnv
-from shapechanger.envs.vector.checks import (
+from shapechanger.envs.checks import (
     masked_options,
     one_seed_each,
     require_boxes,
     require_same_spaces,
 )
+from shapechanger.envs.vector.batch import BatchStep, SubEnv
 from shapechanger.envs.vector.infos import Restart, StepResults, batched, in_columns
 from shapechanger.envs.vector.threads import EnvThreads, Failures, attempt
 from shapechanger.errors import VectorEnvError

@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
-from shapechanger.envs.vector.checks import masked_options, one_seed_each
+from shapechanger.envs.checks import masked_options, one_seed_each
 from shapechanger.envs.warp.batch import BatchKind, WarpBatch, require_fitting
 from shapechanger.envs.warp.bodies import DeviceBody, differing_arrays
 from shapechanger.envs.warp.devices import Streams, without_gradients

@@ -10,7 +10,7 @@ import gymnasium as gym
 
 from shapechanger.bodies.families import BodyLike
 from shapechanger.envs.catalogue import FINGER_ENVS
-from shapechanger.envs.vector.checks import describe_body
+from shapechanger.envs.checks import describe_body
 from shapechanger.envs.warp.batch import BatchKind
 from shapechanger.envs.warp.bodies import DeviceBody, device_body
 from shapechanger.envs.warp.tasks import DeviceTask, find_device_task

@@ -18,8 +18,8 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-import shapechanger
 from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.contract.vector import make_vec
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.body_map import BodyMap
@@ -192,7 +192,7 @@ class RslLearner(Sb3Learner):
                 require_same_columns(start.card.observation, rows[0].layouts()[0], env.id)
         else:
             made = env
-        worlds = shapechanger.make_vec(
+        worlds = make_vec(
             made.id,
             settings.n_envs,
             backend="warp",

@@ -1,11 +1,16 @@
-"""Make a vector env from an id."""
+"""Make a vector env from an id.
+
+Gymnasium calls a vector entry point without its id, and the JSON of a spec holds a string rather
+than a function. So each name of the catalogue is an attribute of this module too, such as
+`shapechanger.envs.make_vec:BigAnt`: `make_vec` with the id filled in.
+"""
 
 from __future__ import annotations
 
 import copy as copying
 import operator
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal, overload
 
@@ -161,6 +166,13 @@ def make_vec(
         spec.kwargs.update({} if bodies is None else {"bodies": list(bodies)})
         envs.spec = spec
     return envs
+
+
+def __getattr__(name: str) -> Callable[..., Any]:
+    """Return `make_vec` for the env of this name."""
+    if name.startswith("_"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return partial(make_vec, name)
 
 
 def _make(env_id: str, arguments: dict[str, Any]) -> gym.Env[Any, Any]:
