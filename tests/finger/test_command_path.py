@@ -131,7 +131,7 @@ def test_a_path_survives_json() -> None:
 def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:
     """The sentence names the value."""
     with pytest.raises(FingerError, match=words):
-        CommandPath.from_mapping(values)
+        NOMINAL.replace(path=values)
 
 
 def test_an_unknown_value_is_refused() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium as gym
@@ -11,8 +12,8 @@ import pytest
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import RobotError, StudyError
-from shapechanger.finger.identify import result
-from shapechanger.finger.parameters import NOMINAL, FingerParameters
+from shapechanger.finger.identify import log, result
+from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.reach import FingerReachEnv
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.sb3 import Sb3Learner
@@ -33,15 +34,17 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path, list[A
     """A small study of the gap between fingers, its folder, and the identified fingers."""
     moved: list[Any] = []
 
-    def identified(env: gym.Env[Any, Any], actions: str, seed: int) -> FingerParameters:
-        # Identification has its own tests; here only the calls matter.
+    # Identification has its own tests; here only the calls matter.
+    def recorded(env: gym.Env[Any, Any], seconds: float, seed: int, actions: str) -> None:
         moved.append((env.get_wrapper_attr("parameters"), actions, seed))
-        return NOMINAL.replace(tendon_friction=0.25)
+
+    found = SimpleNamespace(parameters=NOMINAL.replace(tendon_friction=0.25))
 
     out = tmp_path_factory.mktemp("gap") / "study"
     task = TransferTask(FINGER, REAL_LIKE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(result, "identify_env", identified)
+        patch.setattr(log, "record_babble", recorded)
+        patch.setattr(result, "identify", lambda log: found)
         plan = tiny_plan(task=task, arms=_EVERY, source_steps=64)
         return run_study(plan, out, executor=Serial()), out, moved
 

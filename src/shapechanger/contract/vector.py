@@ -30,4 +30,5 @@ def make_vec(env_id: str, num_envs: int, **arguments: Any) -> Any:
     Raises:
         ShapechangerError: As `shapechanger.make_vec`.
     """
-    return load_env_creator(_MAKERS[0])(env_id, num_envs, **arguments)
+    maker: Any = load_env_creator(_MAKERS[0])
+    return maker(env_id, num_envs, **arguments)

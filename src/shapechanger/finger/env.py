@@ -26,7 +26,13 @@ from shapechanger.finger.gap import (
     with_gears,
 )
 from shapechanger.finger.model import FingerFigure
-from shapechanger.finger.parameters import NOMINAL, PARAMETER_SETS, FingerParameters, named_set
+from shapechanger.finger.parameters import (
+    NOMINAL,
+    PARAMETER_SETS,
+    FingerParameters,
+    as_numbers,
+    named_set,
+)
 from shapechanger.finger.plant import CONTROL_DT, FingerPlant
 from shapechanger.finger.postures import draw_start
 from shapechanger.finger.task import FingerSenses, FingertipReward
@@ -47,6 +53,8 @@ _CAMERA: Final[Mapping[str, Any]] = {
     "elevation": -15.0,
 }
 _PICTURE: Final = 480
+# Duration of the motions that a finger is identified from, s.
+_BABBLE_S: Final = 10.0
 
 # Weight of the reward in a source for a rig: what changes fast costs, because a rig cannot follow.
 _CALM: Final = {"change": 5.0}
@@ -326,9 +334,10 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
             MissingExtra: If `mujoco.sysid` is not installed.
         """
         # An optimiser, which an env that only steps does not need.
-        from shapechanger.finger.identify.result import identify_env
+        from shapechanger.finger.identify.log import record_babble
+        from shapechanger.finger.identify.result import identify
 
-        found = identify_env(self, self._actions, seed)
+        found = identify(record_babble(self, _BABBLE_S, seed, self._actions)).parameters
         if found.path is None:
             return {"parameters": msgspec.to_builtins(found)}
         return {"gap": msgspec.to_builtins(geared_around(found)), "reward": _CALM}
@@ -378,11 +387,3 @@ def check_posture(value: Any) -> NDArray[np.float64]:
             f"{low.round(3).tolist()} and {high.round(3).tolist()}; got {value}."
         )
     return angles
-
-
-def as_numbers(value: Any) -> NDArray[np.float64]:
-    """Return a value as an array of floats; an empty one if it cannot be converted."""
-    try:
-        return np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        return np.empty(0)

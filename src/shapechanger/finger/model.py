@@ -105,7 +105,12 @@ def build_finger(
         drive = TendonDrive(parameters.least_tension + half, half)
     for i in range(len(TENDONS)):
         _add_tendon(spec, i, parameters, drive)
-    _add_hood(spec)
+    # The extensor hood: a spring that the end joint feels beyond its band.
+    hood = spec.add_tendon(name=HOOD)
+    hood.wrap_joint(JOINTS[2], -DIP_BY_PIP)
+    hood.wrap_joint(JOINTS[3], 1.0)
+    hood.stiffness = [DIP_COUPLING, 0.0, 0.0]
+    hood.springlength = [-DIP_BAND, DIP_BAND]
     mark = spec.worldbody.add_body(name=TARGET, mocap=True)
     mark.add_geom(
         name=TARGET, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_MARK_RADIUS_M, 0, 0], rgba=_MARK
@@ -173,15 +178,6 @@ def _add_path(
     for joint, arm in zip(JOINTS, arms, strict=True):
         path.wrap_joint(joint, -arm)
     return path
-
-
-def _add_hood(spec: mujoco.MjSpec) -> None:
-    """Add the extensor hood: a spring that the end joint feels beyond its band."""
-    hood = spec.add_tendon(name=HOOD)
-    hood.wrap_joint(JOINTS[2], -DIP_BY_PIP)
-    hood.wrap_joint(JOINTS[3], 1.0)
-    hood.stiffness = [DIP_COUPLING, 0.0, 0.0]
-    hood.springlength = [-DIP_BAND, DIP_BAND]
 
 
 def _add_tendon(

@@ -30,6 +30,14 @@ _WHOLE: Final = 1e-6
 Arms = tuple[tuple[float, float, float, float], ...]
 
 
+def as_numbers(value: Any) -> NDArray[np.float64]:
+    """Return a value as an array of floats; an empty one if it cannot be converted."""
+    try:
+        return np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
 class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the commands of a rig become tensions; names and units are those of its profile.
 
@@ -72,17 +80,6 @@ class CommandPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
                 f"tick_hz of a path must be a multiple of control_hz, got {self.tick_hz:g} and "
                 f"{self.control_hz:g}."
             )
-
-    @classmethod
-    def from_mapping(cls, given: Mapping[str, Any]) -> CommandPath:
-        """Create a path from values by name; raise UnknownName or FingerError for others."""
-        for name in given:
-            if name not in cls.__struct_fields__:
-                raise UnknownName("parameter of a command path", str(name), cls.__struct_fields__)
-        try:
-            return msgspec.convert(given, cls)
-        except msgspec.ValidationError as error:
-            raise FingerError(f"A command path is malformed: {str(error).rstrip('.')}.") from error
 
 
 class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -134,8 +131,16 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         numbers = msgspec.structs.asdict(self)
         path: Any = numbers.pop("path")
         if isinstance(path, Mapping):
-            named = cast("Mapping[str, Any]", path)
-            msgspec.structs.force_setattr(self, "path", CommandPath.from_mapping(named))
+            known = CommandPath.__struct_fields__
+            for name in cast("Mapping[str, Any]", path):
+                if name not in known:
+                    raise UnknownName("parameter of a command path", str(name), known)
+            try:
+                path = msgspec.convert(path, CommandPath)
+            except msgspec.ValidationError as error:
+                reason = str(error).rstrip(".")
+                raise FingerError(f"A command path is malformed: {reason}.") from error
+            msgspec.structs.force_setattr(self, "path", path)
         if self.tendon_stiffness is None:
             if self.backlash:
                 raise FingerError("backlash needs a tendon_stiffness: a stiff tendon has none.")
@@ -145,11 +150,7 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
             ("joint_stiffness", "joint_damping", "joint_friction"), (len(JOINTS),)
         )
         for name, value in numbers.items():
-            try:
-                given = np.asarray(value, np.float64)
-            except (TypeError, ValueError) as error:
-                raise FingerError(f"{name} must hold numbers, got {value!r}.") from error
-            shape = sizes.get(name, ())
+            given, shape = as_numbers(value), sizes.get(name, ())
             if given.shape != shape:
                 raise FingerError(f"{name}: the shape must be {shape}, got {given.shape}.")
             if not np.isfinite(given).all():

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.measure import RETURN, SUCCESS
 from shapechanger.errors import FingerError
-from shapechanger.finger.env import SMOOTHNESS, FingerEnv, as_numbers
+from shapechanger.finger.env import SMOOTHNESS, FingerEnv
+from shapechanger.finger.parameters import as_numbers
 from shapechanger.finger.postures import draw_posture
 from shapechanger.finger.task import FingerSenses, features_of_senses, fingertip, place_features
 from shapechanger.layout import Element, Feature, Layout

@@ -41,6 +41,7 @@ _WIDEST: Final = {
 }
 # The same for stiffness and damping of the joints, over the nominal value.
 _WIDEST_OF_NOMINAL: Final = 3.0
+_INTERVAL: Final = "identified, 95 % interval"
 # m. The relative error of a shorter moment arm hardly matters.
 _SMALL_ARM_M: Final = 2e-3
 
@@ -188,26 +189,16 @@ def arms_chart(found: IdentifiedFinger) -> str:
         joints = list(dict.fromkeys(e.name.split("/")[2] for e in found.arms))
         panels = figure.subplots(1, len(joints), sharey=True)
         for panel, joint in zip(panels, joints, strict=True):
-            for e in found.arms:
-                _, tendon, own = e.name.split("/")
-                if own != joint:
-                    continue
-                row = tendons.index(tendon)
-                first = row == 0
-                ends = [1e3 * e.low, 1e3 * e.high]
-                label = "identified, 95 % interval" if first else None
-                panel.plot(ends, [row, row], color=BLUE, linewidth=5.0, alpha=0.4)
-                panel.plot([1e3 * e.value], [row], "o", color=BLUE, markersize=4.5, label=label)
-                panel.plot(
-                    [1e3 * e.nominal],
-                    [row],
-                    "D",
-                    markersize=8.0,
-                    label="nominal" if first else None,
-                    markerfacecolor="none",
-                    markeredgecolor=ORANGE,
-                    markeredgewidth=1.4,
-                )
+            own = [e for e in found.arms if e.name.endswith(f"/{joint}")]
+            rows = [tendons.index(e.name.split("/")[1]) for e in own]
+            lows, values, highs, nominal = (
+                1e3 * np.array([getattr(e, name) for e in own])
+                for name in ("low", "value", "high", "nominal")
+            )
+            panel.hlines(rows, lows, highs, color=BLUE, linewidth=5.0, alpha=0.4)
+            panel.plot(values, rows, "o", color=BLUE, markersize=4.5, label=_INTERVAL)
+            look = {"markerfacecolor": "none", "markeredgecolor": ORANGE, "markeredgewidth": 1.4}
+            panel.plot(nominal, rows, "D", markersize=8.0, label="nominal", **look)
             panel.axvline(0.0, color="#999999", linewidth=0.8)
             panel.set_title(joint.replace("_", " "), fontsize=10.0)
             panel.set_xlabel("mm")

@@ -55,10 +55,10 @@ def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
         # The farthest point says more than the first one out of reach.
         later = range(left, len(points), max(1, len(points) // _LOOKS))
         worst, k = max((angles_for(points[k])[1], k) for k in later)
+        place = "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * points[k]))
         raise PathError(
-            f"The path leaves the finger's reach: at {times[k]:.2f} s it is at "
-            f"{_in_mm(points[k])} mm, {worst * 1e3:.1f} mm beyond. "
-            "The knuckle is at (0, 0, 0); x points to the tip, y to the thumb, z to the back."
+            f"The path leaves the finger's reach: at {times[k]:.2f} s it is at {place} mm, "
+            f"{worst * 1e3:.1f} mm beyond. The knuckle is at (0, 0, 0); x points to the tip, y to the thumb, z to the back."
         )
     if weakness := _weakness(times, angles):
         t, missing = weakness
@@ -95,10 +95,6 @@ def _weakness(
         if not is_enough:
             return float(t), float(np.abs(torque - MOMENT_ARMS.T @ tensions).max())
     return None
-
-
-def _in_mm(point: NDArray[np.float64]) -> str:
-    return "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * point))
 
 
 # Ranges of random paths: radius, m, and speed, m/s, up to a circle of 12 mm once a second.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 import mujoco
@@ -53,7 +53,7 @@ def open_finger(
 class FingerWorld(World):
     """Bones and joints of a finger; see `World`, `TendonWorld` and `JointWorld`.
 
-    It has no surroundings and no other sensors, and the servo bus moves it by `pull`.
+    It has no surroundings and no other sensors.
 
     The simulated servos bring motors, spools, gears and their friction. So friction, mass, lag and
     delay of the parameters' drive are left out here, and the tendons stretch as the servos' cables.
@@ -125,6 +125,9 @@ class FingerWorld(World):
             raise RobotError(f"A finger has the joints {', '.join(JOINTS)}, and no {joint}.")
         angle = float(self._data.qpos[JOINTS.index(joint)])
         return angle + self._joint_noise * float(self._noise.standard_normal())
+
+    def advance(self, dt_s: float, outputs: Mapping[str, float | None]) -> None:
+        """Do nothing: the servo bus moves the finger, by `pull`."""
 
     def truth(self) -> dict[str, float]:
         """Return the position of the fingertip, m, and the angles of the joints, rad."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -22,37 +22,14 @@ _HAND: Final = "hand"
 """Name of the hand's body; its axes are those of the finger, at the knuckle."""
 
 
-class ViaSite(NamedTuple):
-    """A point of a bone that a tendon passes.
-
-    Attributes:
-        body: Name of the bone; x runs along it from its own joint, y is radial, z dorsal.
-        x: Position, mm.
-        y: Position, mm.
-        z: Position, mm.
-    """
-
-    body: str
-    x: float
-    y: float
-    z: float
-
-
-class WrapGeom(NamedTuple):
-    """The back of a joint, which a tendon wraps around when it bends.
-
-    Attributes:
-        joint: "MCP", "PIP" or "DIP".
-    """
-
-    joint: str
-
-
-TendonRoute = tuple[ViaSite | WrapGeom, ...]
+TendonRoute = tuple[tuple[str, float, float, float] | str, ...]
+"""Points that a tendon passes, from the wrist on: the name of a bone and x, y and z, mm, in its own
+axes (x along it from its joint, y radial, z dorsal); or "MCP", "PIP" or "DIP", the joint around
+whose back the tendon wraps when it bends."""
 
 
 def _on(body: str, *points: tuple[float, float, float]) -> TendonRoute:
-    return tuple(ViaSite(body, *point) for point in points)
+    return tuple((body, *point) for point in points)
 
 
 _P, _M, _D = "proximal", "middle", "distal"
@@ -62,11 +39,11 @@ def _extensor(y: float) -> TendonRoute:
     """Route over the knuckle and the middle of the hood to the base of the distal phalanx."""
     return (
         *_on(_HAND, (-58.0, 1.8 * y, 7.0), (-12.0, y, 7.0)),
-        WrapGeom("MCP"),
+        "MCP",
         *_on(_P, (12.0, y, 6.2), (36.0, 0.7 * y, 5.8)),
-        WrapGeom("PIP"),
+        "PIP",
         *_on(_M, (8.0, 0.7 * y, 5.2), (20.0, 0.5 * y, 4.6)),
-        WrapGeom("DIP"),
+        "DIP",
         *_on(_D, (4.5, 0.4 * y, 3.8)),
     )
 
@@ -75,9 +52,9 @@ def _to_the_hood(side: float) -> TendonRoute:
     """Route from the side of the proximal phalanx into the hood, and on as its lateral band."""
     return (
         *_on(_P, (9.0, 7.0 * side, -3.5), (30.0, 5.0 * side, 3.6)),
-        WrapGeom("PIP"),
+        "PIP",
         *_on(_M, (7.0, 3.2 * side, 4.7), (20.0, 1.6 * side, 4.4)),
-        WrapGeom("DIP"),
+        "DIP",
         *_on(_D, (4.5, 1.2 * side, 3.6)),
     )
 
@@ -180,7 +157,15 @@ def add_anatomy(spec: mujoco.MjSpec) -> None:
         _add_bone(bodies[name], name, start, end, i)
     for i, joint in enumerate(_JOINTS):
         _add_back(bodies[list(bodies)[i]], joint, spans[i][1], _HEADS[i])
-    _add_nail(bodies[PHALANGES[-1]])
+    bodies[PHALANGES[-1]].add_geom(
+        name="nail",
+        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        size=[0.0050, 0.0046, 0.0012],
+        pos=[PHALANX_LENGTH_M[-1] - 0.0062, 0.0, 0.0060],
+        euler=[0.0, 8.0, 0.0],
+        mass=0.0,
+        rgba=_NAIL,
+    )
     for tendon in TENDONS:
         for name, course in zip(route_names(tendon), _TENDON_ROUTES[tendon], strict=True):
             _add_course(spec, bodies, name, course, TENDON_COLOURS[tendon])
@@ -245,18 +230,6 @@ def _add_bone(body: mujoco.MjsBody, name: str, start: float, end: float, i: int)
             geom.fromto = fromto
 
 
-def _add_nail(body: mujoco.MjsBody) -> None:
-    body.add_geom(
-        name="nail",
-        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-        size=[0.0050, 0.0046, 0.0012],
-        pos=[PHALANX_LENGTH_M[-1] - 0.0062, 0.0, 0.0060],
-        euler=[0.0, 8.0, 0.0],
-        mass=0.0,
-        rgba=_NAIL,
-    )
-
-
 def _add_back(body: mujoco.MjsBody, joint: str, x: float, radius: float) -> None:
     """Add a hidden cylinder that the tendons at the back of a joint wrap around."""
     body.add_geom(
@@ -280,12 +253,12 @@ def _add_course(
 ) -> None:
     tendon = spec.add_tendon(name=name, rgba=[*colour, 1.0], width=THINNEST_M)
     for i, stop in enumerate(course):
-        if isinstance(stop, ViaSite):
-            place = [1e-3 * stop.x, 1e-3 * stop.y, 1e-3 * stop.z]
-            site = bodies[stop.body].add_site(name=f"{name}/{i}", pos=place, group=_HIDDEN)
-            tendon.wrap_site(site.name)
-        else:
-            tendon.wrap_geom(stop.joint, f"{stop.joint}/back")
+        if isinstance(stop, str):
+            tendon.wrap_geom(stop, f"{stop}/back")
+            continue
+        body, *place = stop
+        site = bodies[body].add_site(name=f"{name}/{i}", pos=1e-3 * np.array(place), group=_HIDDEN)
+        tendon.wrap_site(site.name)
 
 
 # Narrower frames have no legend, pixels: its names would not be legible.

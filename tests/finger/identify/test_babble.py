@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 import pytest
 
@@ -73,7 +74,7 @@ def test_envs_that_give_no_log_are_refused(
 
 
 def test_an_env_is_identified_by_ten_seconds_of_its_motion(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`identify_env` records with the seed and the mode of action, and returns the parameters."""
+    """An env records with the seed and its mode of action, and takes over the parameters."""
     taken: list[FingerLog] = []
 
     def identified(log: FingerLog) -> SimpleNamespace:
@@ -82,5 +83,6 @@ def test_an_env_is_identified_by_ten_seconds_of_its_motion(monkeypatch: pytest.M
 
     monkeypatch.setattr(result, "identify", identified)
     with gym.make("shapechanger/Finger-v1", max_episode_steps=-1, actions="tension") as env:
-        assert result.identify_env(env, "tension", 0) is NOMINAL
+        source = env.unwrapped.identified_source(0)
+    assert source == {"parameters": msgspec.to_builtins(NOMINAL)}
     assert [(log.seconds, log.actions) for log in taken] == [(pytest.approx(10.0), "tension")]

@@ -81,27 +81,38 @@ def lines(*rows: str) -> str:
     [
         ("", "{file} is empty: the columns are t, x, y and z."),
         ("\n\n", "{file} is empty: the columns are t, x, y and z."),
-        ("t,x,y\n0,0,0\n", "{file}, line 1 lacks z: the columns are t, x, y and z."),
+        (
+            "t,x,y\n0,0,0\n",
+            "{file}, line 1 names the columns t, x, y: the columns are t, x, y and z.",
+        ),
         (
             "0,0,0,0\n1,0,0,0\n",
-            "{file}, line 1 lacks t, x, y, z and has the unknown columns '0', '0', '0', '0': "
-            "the columns are t, x, y and z.",
+            "{file}, line 1 names the columns 0, 0, 0, 0: the columns are t, x, y and z.",
         ),
         (
             "t,x,y,z,grip\n",
-            "{file}, line 1 has the unknown columns 'grip': the columns are t, x, y and z.",
+            "{file}, line 1 names the columns t, x, y, z, grip: the columns are t, x, y and z.",
         ),
-        ("t,x,x,y,z\n", "{file}, line 1 has x twice: the columns are t, x, y and z."),
+        (
+            "t,x,x,y,z\n",
+            "{file}, line 1 names the columns t, x, x, y, z: the columns are t, x, y and z.",
+        ),
         ("t,x,y,z\n", "{file} has too few rows: 0, and a path needs 3."),
         (lines("0,0,0,0", "1,0,0,0"), "{file} has too few rows: 2, and a path needs 3."),
         (
             lines("0,0,0,0", "", "1,0,0"),
             "{file}, line 4 has 3 cells, and there are four columns.",
         ),
-        (lines("0,0,zero,0"), "{file}, line 2: y is 'zero', which is not a number."),
-        (lines("0,0,0,0", "1,,0,0"), "{file}, line 3: x is '', which is not a number."),
-        (lines("0,0,0,0", "1,0,0,nan"), "{file}, line 3: z is 'nan', which is not finite."),
-        (lines("0,0,0,0", "-inf,0,0,0"), "{file}, line 3: t is '-inf', which is not finite."),
+        (lines("0,0,zero,0"), "{file}, line 2: y is 'zero', which is not a finite number."),
+        (lines("0,0,0,0", "1,,0,0"), "{file}, line 3: x is '', which is not a finite number."),
+        (
+            lines("0,0,0,0", "1,0,0,nan"),
+            "{file}, line 3: z is 'nan', which is not a finite number.",
+        ),
+        (
+            lines("0,0,0,0", "-inf,0,0,0"),
+            "{file}, line 3: t is '-inf', which is not a finite number.",
+        ),
         (
             lines("0,0,0,0", "0.2,0,0,0", "0.1,0,0,0"),
             "{file}, line 4: time runs backwards, from 0.2 s to 0.1 s.",

@@ -9,9 +9,8 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
-import gymnasium as gym
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from shapechanger.finger.identify.kinematics import (
     fit_kinematics,
     interval_quantile,
 )
-from shapechanger.finger.identify.log import FingerLog, record_babble, require_informative
+from shapechanger.finger.identify.log import FingerLog, require_informative
 from shapechanger.finger.identify.motion import (
     FACTORS,
     MOTOR_KG,
@@ -77,8 +76,6 @@ _UNITS: Final = {
     "joint_damping": "N·m·s/rad",
     "tendon_friction": "N",
 }
-# Duration of the motions of `identify_env`, s.
-_SECONDS: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,21 +216,6 @@ def identify(
         source=log.source,
         seconds=log.seconds,
     )
-
-
-def identify_env(env: gym.Env[Any, Any], actions: str, seed: int) -> FingerParameters:
-    """Move a finger for ten seconds, and identify its parameters.
-
-    Args:
-        env: Env of the finger, without a time limit.
-        actions: What its actions command.
-        seed: Seed of the motions.
-
-    Raises:
-        FingerError: If the motions do not suffice, or observations are not a vector.
-        MissingExtra: If `mujoco.sysid` is not installed.
-    """
-    return identify(record_babble(env, _SECONDS, seed, actions)).parameters
 
 
 def replay(log: FingerLog, parameters: FingerParameters, window: Window) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from numbers import Real
 from typing import Any, Final
 
@@ -16,35 +17,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import PathError
+from shapechanger.finger.parameters import as_numbers
 
 Vector = tuple[float, float, float]
 """x, y and z."""
 
 
-def finite(what: str, value: Any) -> float:
+def number(what: str, value: Any, *, above_zero: bool = False) -> float:
     """Return a finite number; raise PathError, with its name, for anything else."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise PathError(f"{what} must be a finite number, got {value!r}.")
-    return float(value)
+    found = float(value) if isinstance(value, Real) and value is not True else math.nan
+    if value is False or not math.isfinite(found) or (above_zero and not found > 0.0):
+        above = " above 0" if above_zero else ""
+        raise PathError(f"{what} must be a finite number{above}, got {value!r}.")
+    return found
 
 
-def positive(what: str, value: Any) -> float:
-    """Return a finite number above 0; raise PathError, with its name, for anything else."""
-    try:
-        number = finite(what, value)
-    except PathError:
-        number = 0.0
-    if not number > 0.0:
-        raise PathError(f"{what} must be a finite number above 0, got {value!r}.")
-    return number
+positive: Final = partial(number, above_zero=True)
 
 
 def vector(what: str, value: Any) -> Vector:
     """Return three finite numbers, of an array too; raise PathError, with their name, otherwise."""
-    try:
-        numbers = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        numbers = np.empty(0)
+    numbers = as_numbers(value)
     if numbers.shape != (3,) or not np.isfinite(numbers).all():
         raise PathError(f"{what} must be three finite numbers (x, y, z), got {value!r}.")
     x, y, z = numbers.tolist()
@@ -342,7 +335,7 @@ def _closed(
     hz = positive(f"The hz of a {what}", hz)
     motion = Harmonics(
         hz=hz,
-        phase=finite(f"The phase of a {what}", phase),
+        phase=number(f"The phase of a {what}", phase),
         centre=vector(f"The centre of a {what}", centre),
         cosines=tuple(map(_vector, cosines)),
         sines=tuple(map(_vector, sines)),

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from shapechanger.errors import PathError, UnknownName
+from shapechanger.finger.parameters import as_numbers
 from shapechanger.finger.paths.path import (
     CLOSED_M,
     FingertipPath,
@@ -52,10 +53,7 @@ class _Function:
     def point(self, t: float) -> Points:
         """Return the position at one time, m, shape (3,)."""
         given = self.function(t)
-        try:
-            point = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError):
-            point = np.empty(0)
+        point = as_numbers(given)
         if point.shape != (3,) or not np.isfinite(point).all():
             raise PathError(
                 "The function of a path must return three finite numbers (x, y, z) in m, and at "
@@ -165,7 +163,7 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
             The message names the line.
     """
     name = os.fspath(path)
-    where, rows = _rows(name, _text(name))
+    where, rows = _rows(name)
     if len(rows) < _FEWEST_ROWS:
         raise PathError(f"{name} has too few rows: {len(rows)}, and a path needs {_FEWEST_ROWS}.")
     table = np.array(rows)
@@ -179,17 +177,14 @@ def from_csv(path: str | os.PathLike[str]) -> FingertipPath:
     return FingertipPath(cast("Any", spline), float(times[-1]), closed)
 
 
-def _text(name: str) -> str:
+def _rows(name: str) -> tuple[list[str], list[list[float]]]:
+    """Return the file and line of each row, and its t, x, y and z."""
     try:
-        return Path(name).read_text("utf-8-sig")  # Spreadsheets write a mark.
+        text = Path(name).read_text("utf-8-sig")  # Spreadsheets write a mark.
     except OSError as error:
         raise PathError(f"{name} cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
         raise PathError(f"{name} is not UTF-8 text: {error.reason}.") from error
-
-
-def _rows(name: str, text: str) -> tuple[list[str], list[list[float]]]:
-    """Return the file and line of each row, and its t, x, y and z."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         found = [(f"{name}, line {reader.line_num}", cells) for cells in reader if cells]
@@ -197,39 +192,20 @@ def _rows(name: str, text: str) -> tuple[list[str], list[list[float]]]:
         raise PathError(f"{name}, line {reader.line_num}, is not valid CSV: {error}.") from error
     if not found:
         raise PathError(f"{name} is empty: {_HEADER}.")
-    (first, header), *body = found
-    order = _order([cell.strip() for cell in header], first)
+    (first, cells), *body = found
+    header = [cell.strip() for cell in cells]
+    if sorted(header) != sorted(_COLUMNS):
+        raise PathError(f"{first} names the columns {', '.join(header)}: {_HEADER}.")
     rows: list[list[float]] = []
     for where, cells in body:
         if len(cells) != len(_COLUMNS):
             raise PathError(f"{where} has {len(cells)} cells, and there are four columns.")
-        rows.append(
-            [_number(cells[place], c, where) for c, place in zip(_COLUMNS, order, strict=True)]
-        )
+        row = dict(zip(header, cells, strict=True))
+        for column, cell in row.items():
+            if not np.isfinite(as_numbers(cell or None)).all():
+                raise PathError(f"{where}: {column} is {cell!r}, which is not a finite number.")
+        rows.append([float(row[column]) for column in _COLUMNS])
     return [where for where, _ in body], rows
-
-
-def _order(found: Sequence[str], where: str) -> list[int]:
-    """Return the columns of t, x, y and z."""
-    missing = [name for name in _COLUMNS if name not in found]
-    surplus = [name for name in found if name not in _COLUMNS]
-    twice = [name for name in _COLUMNS if found.count(name) > 1]
-    problems = [f"lacks {', '.join(missing)}"] if missing else []
-    problems += [f"has the unknown columns {', '.join(map(repr, surplus))}"] if surplus else []
-    problems += [f"has {', '.join(twice)} twice"] if twice else []
-    if problems:
-        raise PathError(f"{where} {' and '.join(problems)}: {_HEADER}.")
-    return [found.index(name) for name in _COLUMNS]
-
-
-def _number(cell: str, column: str, where: str) -> float:
-    try:
-        number = float(cell)
-    except ValueError as error:
-        raise PathError(f"{where}: {column} is {cell!r}, which is not a number.") from error
-    if not math.isfinite(number):
-        raise PathError(f"{where}: {column} is {cell!r}, which is not finite.")
-    return number
 
 
 def _require_steady(times: Times, where: Sequence[str]) -> None:
