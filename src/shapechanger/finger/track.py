@@ -58,7 +58,8 @@ def require_reachable(path: FingertipPath) -> NDArray[np.float64]:
         place = "({:.1f}, {:.1f}, {:.1f})".format(*(1e3 * points[k]))
         raise PathError(
             f"The path leaves the finger's reach: at {times[k]:.2f} s it is at {place} mm, "
-            f"{worst * 1e3:.1f} mm beyond. The knuckle is at (0, 0, 0); x points to the tip, y to the thumb, z to the back."
+            f"{worst * 1e3:.1f} mm beyond. The knuckle is at (0, 0, 0); x points to the tip, y to "
+            "the thumb, z to the back."
         )
     if weakness := _weakness(times, angles):
         t, missing = weakness
