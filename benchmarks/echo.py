@@ -30,6 +30,7 @@ from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard import messages as wire
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
+from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.twin.camera import with_capture_time
 
 _HZ = 100.0
@@ -50,13 +51,21 @@ class EchoRobot:
         credentials = make_credentials(folder / "credentials", "echo")
         actions = Layout((Feature("steering", "1", -1, 1), Feature("throttle", "1", -1, 1)))
         daemon = DaemonPlan(
-            robot="echo",
-            body="car",
-            action_layout=actions.to_json(),
-            state_layout=Layout((Feature("speed", "m/s"),)).to_json(),
+            card=RobotCard(
+                robot="echo",
+                body="car",
+                action_layout=actions.to_json(),
+                state_layout=Layout((Feature("speed", "m/s"),)).to_json(),
+                image_size=(160, 120),
+                control_hz=_HZ,
+                deadline_ms=250,
+                max_observation_age_ms=400,
+                reward={},
+                reset=(),
+                arming="anyone",
+                clock="real",
+            ),
             camera=CameraPlan("pipe", fps=_HZ, settings={"path": str(folder / "camera.mjpeg")}),
-            control_hz=_HZ,
-            arming="anyone",
             port=0,
             certificate=str(credentials.certificate),
             private_key=str(credentials.private_key),

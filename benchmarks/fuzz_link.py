@@ -22,6 +22,7 @@ from shapechanger.robot.daemon.hub import SessionHub
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.daemon.session import Authenticator, MessageRate, Session
 from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import (
     VERSION,
     Acknowledge,
@@ -45,7 +46,20 @@ from shapechanger.robot.link.messages import (
 
 ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
 PLAN = DaemonPlan(
-    robot="fuzzed", body="car", action_layout=ACTIONS.to_json(), state_layout=ACTIONS.to_json()
+    card=RobotCard(
+        robot="fuzzed",
+        body="car",
+        action_layout=ACTIONS.to_json(),
+        state_layout=ACTIONS.to_json(),
+        image_size=None,
+        control_hz=20.0,
+        deadline_ms=250,
+        max_observation_age_ms=400,
+        reward={},
+        reset=(),
+        arming="person",
+        clock="real",
+    )
 )
 KEY = bytes(range(16))
 

@@ -11,6 +11,7 @@ from shapechanger.layout import Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard.messages import GuardState
+from shapechanger.robot.link.card import RobotCard
 
 SIZE = (160, 120)
 ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
@@ -26,11 +27,22 @@ def car_plan(**changes: Any) -> DaemonPlan:
         "body": "car",
         "action_layout": ACTIONS.to_json(),
         "state_layout": STATE.to_json(),
+        "image_size": SIZE,
+        "control_hz": 20.0,
+        "deadline_ms": 250,
+        "max_observation_age_ms": 400,
+        "reward": {},
+        "reset": (),
+        "arming": "person",
+        "clock": "real",
+        "camera_pitch_deg": 3.0,
+        "camera_fovy_deg": 48.8,
         "camera": CameraPlan("pattern", SIZE, pitch_deg=3.0, fovy_deg=48.8),
         "port": 0,
         "discovery": False,
-    }
-    return DaemonPlan(**(fields | changes))
+    } | changes
+    facts = {name: fields.pop(name) for name in RobotCard.__struct_fields__ if name in fields}
+    return DaemonPlan(card=RobotCard(**facts), **fields)
 
 
 def picture(number: int, size: tuple[int, int] = SIZE) -> bytes:

@@ -202,7 +202,7 @@ async def running(
     reader = lambda *arguments: FrameReader(*arguments, opener=camera.open)  # noqa: E731
     monkeypatch.setattr(process, "FrameReader", reader)
     guard = FakeGuard(clock.now_ns)
-    if plan.clock == "real":
+    if plan.card.clock == "real":
         guard.attach()
     guard.send()
     ready, tell = os.pipe()

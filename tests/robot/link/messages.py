@@ -42,6 +42,7 @@ _texts = st.text(max_size=40)
 _counts = st.integers(0, 2**53)
 _times = st.integers(-(2**63), 2**63 - 1)
 _numbers = st.floats(allow_nan=False)
+_rates = st.floats(0.0, 100_000.0, exclude_min=True)
 _vectors = st.lists(_numbers, max_size=8).map(tuple)
 _episodes = st.from_regex(r"^[0-9A-Za-z][0-9A-Za-z._-]{0,30}\Z")
 _summaries = st.builds(
@@ -95,17 +96,17 @@ robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
     st.builds(Challenge, version=_counts, nonce=st.binary(max_size=64), robot=_texts),
     st.builds(
         Welcome,
-        robot=_texts,
+        robot=st.text(min_size=1, max_size=40),
         body=_texts,
         action_layout=_texts,
         state_layout=_texts,
         image_size=st.none() | st.tuples(_counts, _counts),
-        control_hz=_numbers,
-        tick_hz=_numbers,
+        control_hz=_rates,
+        tick_hz=_rates,
         slew_per_s=_vectors,
         slew_down_per_s=_vectors,
-        deadline_ms=_counts,
-        max_observation_age_ms=_counts,
+        deadline_ms=st.integers(1, 2**53),
+        max_observation_age_ms=st.integers(1, 2**53),
         reward=st.dictionaries(_texts, _numbers, max_size=4),
         reset=st.lists(st.tuples(_vectors, _numbers), max_size=3).map(tuple),
         arming=st.sampled_from(("person", "anyone")),
@@ -114,6 +115,7 @@ robot_messages: st.SearchStrategy[RobotMessage] = st.one_of(
         can_record=st.booleans(),
         camera_pitch_deg=st.none() | _numbers,
         camera_fovy_deg=st.none() | _numbers,
+        turning=st.none() | st.tuples(_numbers, _numbers),
     ),
     st.builds(Refused, reason=_texts, seq=st.none() | _counts, fatal=st.booleans()),
     st.builds(

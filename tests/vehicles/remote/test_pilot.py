@@ -9,9 +9,9 @@ import subprocess
 from collections.abc import Generator
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from shapechanger.cli import main
 from shapechanger.demos.cloning.card import CloneCard
@@ -21,16 +21,33 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import RobotRefused
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
 from shapechanger.vehicles.envs.demonstrators import CLONES
-from shapechanger.vehicles.remote.pilot import Origin, RobotFacts, require_fit
+from shapechanger.vehicles.remote.pilot import Origin, require_fit
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 from tests.robot.twin.robots import until
 
 _STEERING = Layout(tuple(Feature(name, "1", -1.0, 1.0) for name in ("steering", "throttle")))
 _STATE = Layout((Feature("speed", "m/s"),))
-_CAR = RobotFacts("my-car", "car", _STEERING, _STATE, 20.0, (160, 120), True, (1.9, 0.0))
+_CAR = RobotCard(
+    robot="my-car",
+    body="car",
+    action_layout=_STEERING.to_json(),
+    state_layout=_STATE.to_json(),
+    image_size=(160, 120),
+    control_hz=20.0,
+    deadline_ms=250,
+    max_observation_age_ms=400,
+    reward={},
+    reset=(),
+    arming="person",
+    clock="real",
+    camera_pitch_deg=0.0,
+    camera_fovy_deg=48.8,
+    turning=(1.9, 0.0),
+)
 _CLONE = CloneCard(framing=Framing(), channels=(1,), features=1)
 _WAYPOINTS = CloneCard(framing=Framing(), channels=(1,), features=1, action_layout=ACTION_LAYOUT)
 
@@ -40,7 +57,7 @@ def test_policies_that_fit() -> None:
     require_fit(_CLONE, Origin("car", 20.0), _CAR, measures=False)
     require_fit(_CLONE, Origin(), _CAR, measures=False)
     require_fit(_WAYPOINTS, Origin("", 20.0), _CAR, measures=False)
-    require_fit(_WAYPOINTS, Origin(), _CAR._replace(turning=None), measures=True)
+    require_fit(_WAYPOINTS, Origin(), replace(_CAR, turning=None), measures=True)
 
 
 @pytest.mark.parametrize(
@@ -48,14 +65,19 @@ def test_policies_that_fit() -> None:
     [
         (_CLONE, Origin("tank"), _CAR, "learned to steer a tank, and my-car is a car"),
         (_CLONE, Origin("car", 10.0), _CAR, "10 actions a second, and my-car has control_hz = 20"),
-        (_CLONE, Origin(), _CAR._replace(image_size=None), "my-car has no camera"),
-        (_CLONE, Origin(), _CAR._replace(actions=_STATE), "those required here are speed"),
-        (_WAYPOINTS, Origin(), _CAR._replace(has_geometry=False), "pitch_deg and fovy_deg"),
-        (_WAYPOINTS, Origin(), _CAR._replace(turning=None), "turn_deg_per_m or turn_deg_per_s"),
+        (_CLONE, Origin(), replace(_CAR, image_size=None), "my-car has no camera"),
+        (
+            _CLONE,
+            Origin(),
+            replace(_CAR, action_layout=_STATE.to_json()),
+            "those required here are speed",
+        ),
+        (_WAYPOINTS, Origin(), replace(_CAR, camera_pitch_deg=None), "pitch_deg and fovy_deg"),
+        (_WAYPOINTS, Origin(), replace(_CAR, turning=None), "turn_deg_per_m or turn_deg_per_s"),
     ],
 )
 def test_policies_that_do_not_fit(
-    card: CloneCard, origin: Origin, robot: RobotFacts, words: str
+    card: CloneCard, origin: Origin, robot: RobotCard, words: str
 ) -> None:
     """The sentence names what differs."""
     with pytest.raises((PolicyError, RobotRefused)) as refusal:
@@ -77,7 +99,7 @@ def test_a_rate_within_the_jitter_of_the_recording_fits(
     hz: float, jitter: object, fits: bool
 ) -> None:
     """A policy's own demonstrations say how exactly its rate is known."""
-    card = msgspec.structs.replace(_CLONE, data={"rate_jitter": jitter})
+    card = replace(_CLONE, data={"rate_jitter": jitter})
     with contextlib.nullcontext() if fits else pytest.raises(PolicyError, match="control_hz = 20"):
         require_fit(card, Origin("car", hz), _CAR, measures=False)
 

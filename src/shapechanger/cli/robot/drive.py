@@ -302,7 +302,7 @@ class Driving:
 def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
     """Load a policy and check that it can drive the robot."""
     from shapechanger.robot.client.client import RobotClient
-    from shapechanger.vehicles.remote.pilot import Origin, PolicyDriver, RobotFacts, require_fit
+    from shapechanger.vehicles.remote.pilot import Origin, PolicyDriver, require_fit
 
     policy: DrivingPolicy
     origin = Origin()
@@ -316,6 +316,5 @@ def _load_pilot(path: Path, robot: KnownRobot) -> PolicyDriver:
 
         policy = CameraPolicy.load(path)
     with RobotClient.connect(robot, frames=False) as there:
-        facts = RobotFacts.of_welcome(there.welcome)
-    require_fit(policy.card, origin, facts, measures=True)
+        require_fit(policy.card, origin, there.welcome, measures=True)
     return PolicyDriver(policy, path.stem, robot)

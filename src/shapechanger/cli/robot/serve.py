@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import shutil
 import socket
@@ -17,7 +16,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-import msgspec
 import tyro
 
 from shapechanger.cli.console import say
@@ -46,7 +44,7 @@ from shapechanger.robot.daemon.credentials import (
     load_credentials,
     make_credentials,
 )
-from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.daemon.plan import DaemonPlan, card_of
 from shapechanger.robot.daemon.policies import ENDING, policies_in
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd, supervisor_command
 from shapechanger.robot.link.address import Address, is_loopback, parse_address
@@ -228,20 +226,16 @@ class Serve:
         credentials = (
             make_credentials(folder, profile.name) if is_twin else load_credentials(folder)
         )
+        camera = profile.camera
+        if board is not None and camera is not None:
+            camera = board.camera_plan(camera)
         daemon = DaemonPlan(
-            robot=profile.name,
-            body=profile.body,
-            action_layout=profile.action_layout().to_json(),
-            state_layout=profile.state_layout().to_json(),
-            camera=profile.camera,
-            control_hz=profile.control_hz,
-            slew_per_s=tuple(_limit(a.slew_per_s) for a in profile.actions),
-            slew_down_per_s=tuple(_limit(a.slew_down_per_s) for a in profile.actions),
-            deadline_ms=profile.limits.deadline_ms,
-            max_observation_age_ms=profile.max_observation_age_ms,
-            reward=profile.reward,
-            reset=profile.reset,
-            arming="anyone" if self.arm_by_program or is_twin else profile.arming,
+            card=card_of(
+                profile,
+                arming="anyone" if self.arm_by_program or is_twin else "",
+                clock=self.clock if is_twin else "real",
+            ),
+            camera=camera,
             host=self.host or (_HERE if is_twin or self.insecure else _EVERYWHERE),
             port=self.port,
             certificate="" if self.insecure else str(credentials.certificate),
@@ -251,7 +245,6 @@ class Serve:
             discovery=self.announce,
             ready_file=str(ready_file.absolute()) if ready_file else "",
             recordings=str((self.recordings or recordings_folder(profile.name)).absolute()),
-            turning=profile.turning,
             policies=policies,
             policy=policy,
             pilot=_PILOT if policies else "",
@@ -259,8 +252,6 @@ class Serve:
         guard = profile.guard_plan()
         if board is None:
             return ServePlan(guard, daemon.to_dict())
-        camera = board.camera_plan(profile.camera) if profile.camera else None
-        daemon = msgspec.structs.replace(daemon, camera=camera, clock=self.clock)
         patience_ms = _TWIN_PATIENCE_MS if self.clock == "twin" else 0
         return ServePlan(guard, daemon.to_dict(), board.hardware, patience_ms=patience_ms)
 
@@ -276,7 +267,7 @@ class Serve:
         if self.policy is None:
             return
         from shapechanger.demos.cloning.onnx_policy import OnnxClone
-        from shapechanger.vehicles.remote.pilot import Origin, RobotFacts, require_fit
+        from shapechanger.vehicles.remote.pilot import Origin, require_fit
 
         files = [self.policy]
         if self.policy.is_dir():
@@ -297,14 +288,9 @@ class Serve:
             policy = OnnxClone(file)
             origin = Origin(policy.body, policy.control_hz)
             try:
-                require_fit(policy.card, origin, RobotFacts.of_plan(plan), measures=False)
+                require_fit(policy.card, origin, plan.card, measures=False)
             except (PolicyError, RobotRefused) as error:
-                raise PolicyError(f"{file} cannot drive {plan.robot}: {error}") from error
-
-
-def _limit(slew_per_s: float) -> float:
-    """Return a slew as JSON has it: 0 for no limit."""
-    return slew_per_s if math.isfinite(slew_per_s) else 0.0
+                raise PolicyError(f"{file} cannot drive {plan.card.robot}: {error}") from error
 
 
 def _is_reached(ready_file: Path, port: int, served_by: int) -> bool:

@@ -56,7 +56,7 @@ class Timekeeper:
         self._clock = clock
         self._hub = hub
         self._drain = drain
-        self.in_steps = hub.plan.clock == "twin"
+        self.in_steps = hub.plan.card.clock == "twin"
         self._one_at_a_time = asyncio.Lock()
 
     async def step(self, seconds: float) -> None:
@@ -72,7 +72,7 @@ class Timekeeper:
         """Let the guard handle an order that was just given; a real clock needs no help."""
         if self.in_steps and self._hub.unsettled:
             self._hub.unsettled = False
-            await self.step(1.0 / self._hub.plan.tick_hz)
+            await self.step(1.0 / self._hub.plan.card.tick_hz)
 
     async def _one_step(self, seconds: float) -> None:
         async with self._one_at_a_time:
@@ -106,9 +106,9 @@ class ObservationPacer:
         self._session = session
         self._hub = hub
         self._time = time
-        self._period_s = 1.0 / hub.plan.control_hz
+        self._period_s = 1.0 / hub.plan.card.control_hz
         camera = hub.plan.camera
-        ratio = 0.0 if camera is None else camera.fps / hub.plan.control_hz
+        ratio = 0.0 if camera is None else camera.fps / hub.plan.card.control_hz
         self._by_frames = 1.0 / _FRAME_PACE <= ratio <= _FRAME_PACE
         self._due_s = 0.0
 

@@ -38,7 +38,7 @@ async def announce(plan: DaemonPlan, port: int, fingerprint: bytes) -> AsyncZero
     except (Error, OSError, RuntimeError, ValueError) as error:
         _log.warning(
             "%s cannot be announced on the network, so clients need its address: %s",
-            plan.robot,
+            plan.card.robot,
             error or type(error).__name__,
         )
         if zeroconf is not None:
@@ -57,7 +57,7 @@ async def withdraw(zeroconf: AsyncZeroconf) -> None:
 
 
 def _service(plan: DaemonPlan, port: int, fingerprint: bytes) -> ServiceInfo:
-    name = plan.robot.replace(".", " ")  # A dot would start another label.
+    name = plan.card.robot.replace(".", " ")  # A dot would start another label.
     label = name.encode()[:63].decode(errors="ignore")  # RFC 6763: 63 bytes.
     return ServiceInfo(
         SERVICE,
@@ -65,8 +65,8 @@ def _service(plan: DaemonPlan, port: int, fingerprint: bytes) -> ServiceInfo:
         port=port,
         addresses=_addresses(plan.host),
         properties={
-            "id": plan.robot,
-            "body": plan.body,
+            "id": plan.card.robot,
+            "body": plan.card.body,
             "v": str(VERSION),
             "fp": fingerprint_hex(fingerprint),
         },

@@ -84,8 +84,8 @@ class SessionHub:
     ) -> None:
         self.plan = plan
         self.lease = ControlLease()
-        actions = Layout.from_json(plan.action_layout)
-        self.reader = StateReader(Layout.from_json(plan.state_layout), actions)
+        actions = Layout.from_json(plan.card.action_layout)
+        self.reader = StateReader(Layout.from_json(plan.card.state_layout), actions)
         self.action_size = actions.size
         self.state: GuardState | None = None
         self.newest: NumberedFrame | None = None
@@ -182,7 +182,7 @@ class SessionHub:
         if len(self._arrivals) > _ARRIVALS:
             self._arrivals.popitem(last=False)
         values = tuple(command.scale * value for value in command.values)
-        until_ns = now_ns + _NS_PER_MS * min(command.ttl_ms, self.plan.deadline_ms)
+        until_ns = now_ns + _NS_PER_MS * min(command.ttl_ms, self.plan.card.deadline_ms)
         self._command = PendingCommand(client, values, until_ns)
         builder = self.recorder.builder
         if builder is not None and self.state is not None and self.state.armed:
@@ -217,7 +217,7 @@ class SessionHub:
             client: The client that sent it.
             values: One number for each action of the robot.
         """
-        until_ns = self.now_ns() + _NS_PER_MS * self.plan.deadline_ms
+        until_ns = self.now_ns() + _NS_PER_MS * self.plan.card.deadline_ms
         self._suggestion = PendingCommand(client, values, until_ns)
 
     def commanded(self) -> tuple[float, ...]:

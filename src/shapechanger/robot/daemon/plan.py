@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import math
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -10,29 +11,18 @@ from msgspec import Meta
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.link.address import DEFAULT_PORT
+from shapechanger.robot.link.card import RobotCard
+
+if TYPE_CHECKING:  # The daemon needs no profile.
+    from shapechanger.robot.profile.profile import Profile
 
 
 class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Settings of the daemon, type-checked when they are read.
 
     Attributes:
-        robot: Name of the robot.
-        body: Kind of robot, such as "car".
-        action_layout: JSON of the `Layout` of a command's values.
-        state_layout: JSON of the `Layout` of an observation's state. A feature takes the
-            value of the guard's quantity of the same name, "NAME/applied" that of the applied
-            action NAME, and NaN where no sensor measures it.
+        card: Facts of the robot.
         camera: Settings of the camera; None without one.
-        control_hz: Commands per second that the robot expects.
-        tick_hz: Rate of the guard, Hz.
-        slew_per_s: Fastest change of each action away from rest, 1/s; 0 for no limit.
-        slew_down_per_s: Fastest change of each action towards rest, 1/s; 0 for no limit.
-        deadline_ms: Longest time that a command acts, ms; the guard enforces it.
-        max_observation_age_ms: Oldest observation that a command may answer, ms.
-        reward: Weights of the task, by name.
-        reset: Commands that return the robot to the start, each with its duration, s.
-        arming: Who may arm the robot.
-        clock: Source of the robot's time.
         host: Address to listen at.
         port: Port to listen at; 0 for any free port.
         certificate: File of the certificate (PEM); "" for no TLS.
@@ -45,25 +35,10 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         policies: Folder of the policies that may drive on board; "" for none.
         policy: Name of the one that starts with the robot; "" for none.
         pilot: Module of the program that runs one of them; "" for none.
-        turning: Turn at full steering, rad for each metre and for each second; None if not
-            measured.
     """
 
-    robot: Annotated[str, Meta(min_length=1, max_length=64)]
-    body: str
-    action_layout: str
-    state_layout: str
+    card: RobotCard
     camera: CameraPlan | None = None
-    control_hz: Annotated[float, Meta(gt=0.0, le=100_000.0)] = 20.0
-    tick_hz: Annotated[float, Meta(gt=0.0)] = 100.0
-    slew_per_s: tuple[float, ...] = ()
-    slew_down_per_s: tuple[float, ...] = ()
-    deadline_ms: Annotated[int, Meta(ge=1)] = 250
-    max_observation_age_ms: Annotated[int, Meta(ge=1)] = 400
-    reward: dict[str, float] = {}
-    reset: tuple[tuple[tuple[float, ...], float], ...] = ()
-    arming: Literal["person", "anyone"] = "person"
-    clock: Literal["real", "twin"] = "real"
     host: str = "127.0.0.1"
     port: Annotated[int, Meta(ge=0, le=65535)] = DEFAULT_PORT
     certificate: str = ""
@@ -76,7 +51,6 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     policies: str = ""
     policy: str = ""
     pilot: str = ""
-    turning: tuple[float, float] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the plan as values that JSON can hold."""
@@ -93,3 +67,46 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             return msgspec.convert(fields, cls)
         except msgspec.ValidationError as error:
             raise ProfileError(f"Invalid daemon plan: {error}.") from error
+
+
+def card_of(
+    profile: Profile,
+    *,
+    arming: Literal["", "anyone"] = "",
+    clock: Literal["real", "twin"] = "real",
+    pictures: bool = True,
+) -> RobotCard:
+    """Return the card of a robot.
+
+    Args:
+        profile: The robot.
+        arming: Who may arm it, in place of the profile's; "" for the profile's.
+        clock: Source of its time.
+        pictures: Whether its camera is used.
+    """
+    camera = profile.camera if pictures else None
+    return RobotCard(
+        robot=profile.name,
+        body=profile.body,
+        action_layout=profile.action_layout().to_json(),
+        state_layout=profile.state_layout().to_json(),
+        image_size=None if camera is None else camera.size,
+        camera_pitch_deg=None if camera is None else camera.pitch_deg,
+        camera_fovy_deg=None if camera is None else camera.fovy_deg,
+        control_hz=profile.control_hz,
+        tick_hz=profile.tick_hz,
+        slew_per_s=tuple(_limit(action.slew_per_s) for action in profile.actions),
+        slew_down_per_s=tuple(_limit(action.slew_down_per_s) for action in profile.actions),
+        deadline_ms=profile.limits.deadline_ms,
+        max_observation_age_ms=profile.max_observation_age_ms,
+        reward=profile.reward,
+        reset=profile.reset,
+        arming=arming or profile.arming,
+        clock=clock,
+        turning=profile.turning,
+    )
+
+
+def _limit(slew_per_s: float) -> float:
+    """Return a slew as JSON can hold it: 0 for no limit."""
+    return slew_per_s if math.isfinite(slew_per_s) else 0.0

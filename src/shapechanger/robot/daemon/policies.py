@@ -76,7 +76,7 @@ class PolicyRunner:
         """
         host = self._plan.host
         self._robot = {
-            "name": self._plan.robot,
+            "name": self._plan.card.robot,
             "address": str(Address("127.0.0.1" if host in _EVERYWHERE else host, port)),
             "key": Path(self._plan.key_file).read_text().strip() if self._plan.key_file else "",
             "fingerprint": fingerprint_hex(fingerprint) if fingerprint else "insecure",

@@ -109,7 +109,7 @@ class Daemon:
                 self._report_ready(port, fingerprint)
                 if plan.discovery and is_loopback(plan.host):
                     words = "%s is not announced: only this machine reaches %s."
-                    _log.info(words, plan.robot, plan.host)
+                    _log.info(words, plan.card.robot, plan.host)
                 elif plan.discovery:
                     announcement = await announce(plan, port, fingerprint)
             await self._ended.wait()
@@ -171,7 +171,7 @@ class Daemon:
             _log.warning("Camera: %s", text)
             self._call(lambda: self._hub.event("camera", text))
 
-        now_ns = self._clock.now_ns if self._plan.clock == "real" else None
+        now_ns = self._clock.now_ns if self._plan.card.clock == "real" else None
         reader = FrameReader(plan, FrameChecks(now_ns), deliver, report)
         reader.start()
         return reader
@@ -180,7 +180,7 @@ class Daemon:
         """Report the port in the log, and to the process that started this one."""
         plan = self._plan
         secured = f"fingerprint {fingerprint_short(fingerprint)}" if fingerprint else "without TLS"
-        _log.info("%s listens at %s, %s.", plan.robot, Address(plan.host, port), secured)
+        _log.info("%s listens at %s, %s.", plan.card.robot, Address(plan.host, port), secured)
         ready = {"port": port, "fingerprint": fingerprint_hex(fingerprint)}
         line = json.dumps(ready).encode() + b"\n"
         try:

@@ -8,7 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
@@ -20,6 +20,7 @@ from shapechanger.layout import Layout
 from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.observation import NumberedFrame
 from shapechanger.robot.daemon.plan import DaemonPlan
+from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.link.messages import (
     Mark,
     Observation,
@@ -38,6 +39,9 @@ _MAX_JOBS: Final = 256  # Over ten seconds of steps at 20 Hz: memory cards pause
 _MAX_BYTES: Final = 16 << 20  # Bytes of queued frames.
 _CLOSE_S: Final = 5.0
 _NOT_RECORDING: Final = "Nothing is being recorded."
+
+# Facts of the card that an episode keeps, under the same names.
+_SHARED: Final = tuple(f.name for f in fields(EpisodeHeader) if hasattr(RobotCard, f.name))
 
 _Post = Callable[[RobotMessage], None]
 
@@ -344,7 +348,7 @@ class Recorder:
         self._plan = plan
         self._broadcast = broadcast
         self._call = call
-        features = Layout.from_json(plan.action_layout).features
+        features = Layout.from_json(plan.card.action_layout).features
         self._limits = [(f.low, f.high) for f in features for _ in range(f.size)]
         self._thread: EpisodeThread | None = None
         self.builder: StepBuilder | None = None
@@ -379,17 +383,10 @@ class Recorder:
                 f"An episode is being recorded already: {self.state().episode or 'it starts now'}."
             )
         plan = self._plan
+        card = plan.card
         header = EpisodeHeader(
-            action_layout=plan.action_layout,
-            state_layout=plan.state_layout,
-            image_size=None if plan.camera is None else plan.camera.size,
-            control_hz=plan.control_hz,
-            robot=plan.robot,
-            body=plan.body,
-            camera_pitch_deg=None if plan.camera is None else plan.camera.pitch_deg,
-            camera_fovy_deg=None if plan.camera is None else plan.camera.fovy_deg,
+            **{name: getattr(card, name) for name in _SHARED},
             driver=driver or client.name,
-            clock=plan.clock,
             source="shapechanger robot",
             notes={"name": name, "recorded_by": client.name},
         )

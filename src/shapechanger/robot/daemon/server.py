@@ -152,7 +152,7 @@ class Server:
         # fingerprint, which is not secret.
         return web.json_response(
             {
-                "robot": self._hub.plan.robot,
+                "robot": self._hub.plan.card.robot,
                 "version": VERSION,
                 "certificate": fingerprint_hex(self._authenticator.certificate),
                 "open": self._authenticator.is_open,

@@ -257,7 +257,7 @@ class Session:
         self._nonce = new_nonce()
         self._is_known = False
         self._wants_frames = False
-        self._sent = SentObservations(hub.plan.max_observation_age_ms)
+        self._sent = SentObservations(hub.plan.card.max_observation_age_ms)
         self._command_seq = -1
         self._suggestion_seq = -1
         self._observation_seq = 0
@@ -272,7 +272,7 @@ class Session:
 
     def challenge(self) -> Challenge:
         """Return the first message to the client."""
-        return Challenge(version=VERSION, nonce=self._nonce, robot=self._hub.plan.robot)
+        return Challenge(version=VERSION, nonce=self._nonce, robot=self._hub.plan.card.robot)
 
     def introduce(self, data: bytes) -> Welcome:
         """Authenticate the client by its first message.
@@ -302,7 +302,8 @@ class Session:
             self.post(recorded)
         if self._hub.plan.policies:
             self.post(self._hub.policies.state())
-        return self._welcome()
+        can_record = bool(self._hub.plan.recordings)
+        return Welcome.of(self._hub.plan.card, self.client.session, can_record=can_record)
 
     def receive(self, data: bytes) -> None:
         """Handle a message of the client.
@@ -464,7 +465,7 @@ class Session:
             return "No client has control; take control first."
         if self.client.role == "person":
             return ""
-        if self._hub.plan.arming != "anyone":
+        if self._hub.plan.card.arming != "anyone":
             return "Only a person can arm this robot."
         if state is not None and state.emergency:
             return "Only a person can end an emergency stop."
@@ -517,28 +518,3 @@ class Session:
     def _library_answered(self, answer: Answer) -> None:
         self._awaits_library = False
         self.post(answer)
-
-    def _welcome(self) -> Welcome:
-        plan = self._hub.plan
-        return Welcome(
-            robot=plan.robot,
-            body=plan.body,
-            action_layout=plan.action_layout,
-            state_layout=plan.state_layout,
-            image_size=None if plan.camera is None else plan.camera.size,
-            camera_pitch_deg=None if plan.camera is None else plan.camera.pitch_deg,
-            camera_fovy_deg=None if plan.camera is None else plan.camera.fovy_deg,
-            control_hz=plan.control_hz,
-            tick_hz=plan.tick_hz,
-            slew_per_s=plan.slew_per_s,
-            slew_down_per_s=plan.slew_down_per_s,
-            deadline_ms=plan.deadline_ms,
-            max_observation_age_ms=plan.max_observation_age_ms,
-            reward=plan.reward,
-            reset=plan.reset,
-            arming=plan.arming,
-            clock=plan.clock,
-            session=self.client.session,
-            can_record=bool(plan.recordings),
-            turning=plan.turning,
-        )

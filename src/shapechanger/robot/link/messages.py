@@ -32,6 +32,7 @@ import msgspec
 from msgspec import Meta
 
 from shapechanger.errors import LinkError
+from shapechanger.robot.link.card import RobotCard
 
 VERSION: Final = 1
 """Version of the messages, which must be the same on both sides."""
@@ -303,55 +304,22 @@ class Challenge(_Message, frozen=True):
     robot: str
 
 
-class Welcome(_Message, frozen=True):
-    """Description of the robot for an authenticated client.
+class Welcome(RobotCard, frozen=True, kw_only=True, tag_field="kind", tag="welcome"):
+    """Card of the robot for an authenticated client.
 
     Attributes:
-        robot: Name of the robot.
-        body: Kind of robot, such as "car".
-        action_layout: JSON of the `Layout` of `Command.values`.
-        state_layout: JSON of the `Layout` of `Observation.state`.
-        image_size: Width and height of the frames, pixels; None without a camera.
-        camera_pitch_deg: Angle of the camera's optical axis below the horizon, degrees; None if the
-            profile does not state it.
-        camera_fovy_deg: Vertical field of view of the camera, degrees; None likewise.
-        control_hz: Commands per second that the robot expects.
-        tick_hz: Rate of the guard, Hz.
-        slew_per_s: Fastest change of each action away from rest, 1/s; 0 for no limit.
-        slew_down_per_s: Fastest change of each action towards rest, 1/s; 0 for no limit.
-        deadline_ms: Longest time that a command acts, ms.
-        max_observation_age_ms: Oldest observation that a command may answer, ms.
-        reward: Weights of the task, from the robot's profile, by name.
-        reset: Commands that return the robot to the start, from its profile: values and duration,
-            s, of each; empty for none.
-        arming: Who may arm the robot.
-        clock: Source of the robot's time.
         session: Number of this connection.
         can_record: Whether the robot has a folder for recordings.
-        turning: Turn at full steering, rad for each metre and for each second; None if the profile
-            does not state it.
     """
 
-    robot: str
-    body: str
-    action_layout: str
-    state_layout: str
-    image_size: tuple[int, int] | None
-    control_hz: float
-    deadline_ms: int
-    max_observation_age_ms: int
-    reward: dict[str, float]
-    reset: tuple[tuple[tuple[float, ...], float], ...]
-    arming: Literal["person", "anyone"]
-    clock: Literal["real", "twin"]
     session: int
     can_record: bool = False
-    tick_hz: float = 100.0
-    slew_per_s: tuple[float, ...] = ()
-    slew_down_per_s: tuple[float, ...] = ()
-    camera_pitch_deg: float | None = None
-    camera_fovy_deg: float | None = None
-    turning: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, card: RobotCard, session: int, *, can_record: bool = False) -> Welcome:
+        """Return the message of a card."""
+        fields = {name: getattr(card, name) for name in RobotCard.__struct_fields__}
+        return cls(**fields, session=session, can_record=can_record)
 
 
 class Refused(_Message, frozen=True):

@@ -19,6 +19,7 @@ from shapechanger.contract.world import World
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
+from shapechanger.robot.daemon.plan import card_of
 from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
@@ -168,23 +169,8 @@ class InProcessRobot:
         self._reader = StateReader(state_layout, action_layout)
         self._tick_ns = round(1e9 / self._plan.tick_hz)
         self._period_ns = round(1e9 / profile.control_hz)
-        self.welcome = Welcome(
-            robot=profile.name,
-            body=profile.body,
-            action_layout=action_layout.to_json(),
-            state_layout=state_layout.to_json(),
-            image_size=None if camera is None else camera.size,
-            camera_pitch_deg=None if camera is None else camera.pitch_deg,
-            camera_fovy_deg=None if camera is None else camera.fovy_deg,
-            control_hz=profile.control_hz,
-            deadline_ms=profile.limits.deadline_ms,
-            max_observation_age_ms=profile.max_observation_age_ms,
-            reward=profile.reward,
-            reset=profile.reset,
-            arming="anyone",
-            clock="twin",
-            session=_SESSION,
-        )
+        card = card_of(profile, arming="anyone", clock="twin", pictures=pictures)
+        self.welcome = Welcome.of(card, _SESSION)
         self._guard: Guard | None = None
         self._pictured = 0  # Counts through all starts, so that each picture has its own number.
         self._start()

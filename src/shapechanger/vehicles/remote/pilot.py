@@ -25,13 +25,12 @@ from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.client.known_robots import KnownRobot
-from shapechanger.robot.link.messages import Welcome
+from shapechanger.robot.link.card import RobotCard
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
-    from shapechanger.robot.daemon.plan import DaemonPlan
 
 # s. A reset waits in steps of this length, and checks between them whether to end.
 _LOOK_EVERY_S: Final = 1.0
@@ -66,65 +65,12 @@ class Origin(NamedTuple):
     control_hz: float | None = None
 
 
-class RobotFacts(NamedTuple):
-    """What a policy has to fit.
-
-    Attributes:
-        name: Name of the robot.
-        body: Kind of robot.
-        actions: Layout of its actions.
-        state: Layout of its state.
-        control_hz: Actions per second.
-        image_size: Width and height of its pictures, pixels; None without a camera.
-        has_geometry: Whether it states how its camera looks.
-        turning: Turn at full steering, rad for each metre and for each second; None if unknown.
-    """
-
-    name: str
-    body: str
-    actions: Layout
-    state: Layout
-    control_hz: float
-    image_size: tuple[int, int] | None
-    has_geometry: bool
-    turning: tuple[float, float] | None
-
-    @classmethod
-    def of_welcome(cls, welcome: Welcome) -> RobotFacts:
-        """Return the facts of a robot that was reached."""
-        return cls(
-            welcome.robot,
-            welcome.body,
-            Layout.from_json(welcome.action_layout),
-            Layout.from_json(welcome.state_layout),
-            welcome.control_hz,
-            welcome.image_size,
-            None not in (welcome.camera_pitch_deg, welcome.camera_fovy_deg),
-            welcome.turning,
-        )
-
-    @classmethod
-    def of_plan(cls, plan: DaemonPlan) -> RobotFacts:
-        """Return the facts of a robot that is about to be served."""
-        camera = plan.camera
-        return cls(
-            plan.robot,
-            plan.body,
-            Layout.from_json(plan.action_layout),
-            Layout.from_json(plan.state_layout),
-            plan.control_hz,
-            None if camera is None else camera.size,
-            camera is not None and None not in (camera.pitch_deg, camera.fovy_deg),
-            plan.turning,
-        )
-
-
 def points_ways(card: CloneCard) -> bool:
     """Return whether a policy gives waypoints, which any vehicle can follow."""
     return card.action_layout is not None and card.action_layout.names == ACTION_LAYOUT.names
 
 
-def require_fit(card: CloneCard, origin: Origin, robot: RobotFacts, *, measures: bool) -> None:
+def require_fit(card: CloneCard, origin: Origin, robot: RobotCard, *, measures: bool) -> None:
     """Refuse a policy that does not fit a robot; the message names what differs.
 
     Args:
@@ -139,7 +85,7 @@ def require_fit(card: CloneCard, origin: Origin, robot: RobotFacts, *, measures:
     """
     if origin.body and origin.body != robot.body:
         raise PolicyError(
-            f"The policy learned to steer a {origin.body}, and {robot.name} is a {robot.body}: "
+            f"The policy learned to steer a {origin.body}, and {robot.robot} is a {robot.body}: "
             "only policies of waypoints move from one body to another."
         )
     rate = origin.control_hz
@@ -148,24 +94,27 @@ def require_fit(card: CloneCard, origin: Origin, robot: RobotFacts, *, measures:
     if rate is not None and not is_same_rate(rate, robot.control_hz, jitter):
         within = f" (varying by {100 * jitter:.0f} %)" if jitter else ""
         raise PolicyError(
-            f"The policy learned at {rate:g} actions a second{within}, and {robot.name} has "
+            f"The policy learned at {rate:g} actions a second{within}, and {robot.robot} has "
             f"control_hz = {robot.control_hz:g}."
         )
     has_waypoints = points_ways(card)
     if not has_waypoints:
-        card.require_layouts(robot.actions, robot.state)
+        actions, state = (
+            Layout.from_json(one) for one in (robot.action_layout, robot.state_layout)
+        )
+        card.require_layouts(actions, state)
     if card.eyes != "none" and robot.image_size is None:
-        raise RobotRefused(f"{robot.name} has no camera, and the policy drives by pictures.")
+        raise RobotRefused(f"{robot.robot} has no camera, and the policy drives by pictures.")
     if not has_waypoints:
         return
     if not robot.has_geometry:
         raise RobotRefused(
-            f"The profile of {robot.name} does not state pitch_deg and fovy_deg of its camera, "
+            f"The profile of {robot.robot} does not state pitch_deg and fovy_deg of its camera, "
             "which waypoints need: measure them with `shapechanger robot camera`."
         )
     if robot.turning is None and not measures:
         raise RobotRefused(
-            f"The profile of {robot.name} does not state turn_deg_per_m or turn_deg_per_s, which "
+            f"The profile of {robot.robot} does not state turn_deg_per_m or turn_deg_per_s, which "
             "waypoints need on board: `shapechanger robot drive --policy` measures them."
         )
 
@@ -322,8 +271,9 @@ def main() -> int:
 
         policy = OnnxClone(file)
         with RobotClient.connect(robot, frames=False) as there:
-            facts = RobotFacts.of_welcome(there.welcome)
-        require_fit(policy.card, Origin(policy.body, policy.control_hz), facts, measures=False)
+            card = there.welcome
+        origin = Origin(policy.body, policy.control_hz)
+        require_fit(policy.card, origin, card, measures=False)
         driver = PolicyDriver(
             policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
         )

@@ -1,0 +1,62 @@
+"""Card of a robot: the facts that its processes, its clients and its recordings share."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+
+class RobotCard(msgspec.Struct, frozen=True, kw_only=True):
+    """Facts of a robot, made once from its profile; see `shapechanger.robot.daemon.plan.card_of`.
+
+    Attributes:
+        robot: Name of the robot.
+        body: Kind of robot, such as "car".
+        action_layout: JSON of the `Layout` of `Command.values`.
+        state_layout: JSON of the `Layout` of `Observation.state`. A feature takes the value of the
+            guard's quantity of the same name, "NAME/applied" that of the applied action NAME, and
+            NaN where no sensor measures it.
+        image_size: Width and height of the frames, pixels; None without a camera.
+        camera_pitch_deg: Angle of the camera's optical axis below the horizon, degrees; None if the
+            profile does not state it.
+        camera_fovy_deg: Vertical field of view of the camera, degrees; None likewise.
+        control_hz: Commands per second that the robot expects.
+        tick_hz: Rate of the guard, Hz.
+        slew_per_s: Fastest change of each action away from rest, 1/s; 0 for no limit.
+        slew_down_per_s: Fastest change of each action towards rest, 1/s; 0 for no limit.
+        deadline_ms: Longest time that a command acts, ms; the guard enforces it.
+        max_observation_age_ms: Oldest observation that a command may answer, ms.
+        reward: Weights of the task, by name.
+        reset: Commands that return the robot to the start: values and duration, s, of each; empty
+            for none.
+        arming: Who may arm the robot.
+        clock: Source of the robot's time.
+        turning: Turn at full steering, rad for each metre and for each second; None if not
+            measured.
+    """
+
+    robot: Annotated[str, Meta(min_length=1, max_length=64)]
+    body: str
+    action_layout: str
+    state_layout: str
+    image_size: tuple[int, int] | None
+    control_hz: Annotated[float, Meta(gt=0.0, le=100_000.0)]
+    deadline_ms: Annotated[int, Meta(ge=1)]
+    max_observation_age_ms: Annotated[int, Meta(ge=1)]
+    reward: dict[str, float]
+    reset: tuple[tuple[tuple[float, ...], float], ...]
+    arming: Literal["person", "anyone"]
+    clock: Literal["real", "twin"]
+    tick_hz: Annotated[float, Meta(gt=0.0)] = 100.0
+    slew_per_s: tuple[float, ...] = ()
+    slew_down_per_s: tuple[float, ...] = ()
+    camera_pitch_deg: float | None = None
+    camera_fovy_deg: float | None = None
+    turning: tuple[float, float] | None = None
+
+    @property
+    def has_geometry(self) -> bool:
+        """Whether it is known how the camera looks, which policies with waypoints need."""
+        return None not in (self.camera_pitch_deg, self.camera_fovy_deg)
