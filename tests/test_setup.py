@@ -1,4 +1,4 @@
-"""Consistency of pyproject.toml, constraints.txt and typings."""
+"""Consistency of pyproject.toml and constraints.txt."""
 
 import importlib.util
 import tomllib
@@ -52,12 +52,6 @@ def test_all_is_the_sum_of_the_extras_for_users() -> None:
     """`all` has every extra except `dev`, the 0.4 GB of `gpu`, and `ray`, which needs a cluster."""
     (everything,) = map(Requirement, _EXTRAS["all"])
     assert everything.extras == set(_EXTRAS) - {"all", "dev", "gpu", "ray"}
-
-
-def test_stubs_describe_the_pinned_mujoco() -> None:
-    """The stubs were generated from the pinned version of MuJoCo."""
-    header = (_ROOT / "typings/mujoco/__init__.pyi").read_text().splitlines()[0]
-    assert f"Generated from mujoco {_pins()['mujoco']} " in header
 
 
 @pytest.mark.sources

@@ -1,5 +1,3 @@
-"""Generated from mujoco 4.0.0 by scripts/generate_stubs.py; do not edit."""
-
 import typing
 
 import numpy
@@ -8,7 +6,6 @@ from mujoco import _specs
 from mujoco._callbacks import *
 from mujoco._constants import *
 from mujoco._enums import *
-from mujoco._errors import *
 from mujoco._functions import *
 from mujoco._render import *
 from mujoco._specs import *
@@ -51,3 +48,6 @@ MjStruct: typing.TypeAlias = (
 
 def to_zip(spec: _specs.MjSpec, file: str | typing.IO[bytes]) -> None: ...
 def from_zip(file: str | typing.IO[bytes]) -> _specs.MjSpec: ...
+
+class FatalError(Exception): ...
+class UnexpectedError(Exception): ...

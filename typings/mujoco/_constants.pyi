@@ -1,49 +1,9 @@
-"""Generated from mujoco 4.0.0 by scripts/generate_stubs.py; do not edit."""
-
 import builtins
+import collections.abc
 import typing
-
-__all__: list[str] = [
-    "MJTNUM_BYTES",
-    "mjDISABLESTRING",
-    "mjENABLESTRING",
-    "mjFRAMESTRING",
-    "mjLABELSTRING",
-    "mjMAXCONPAIR",
-    "mjMAXFLEXNODES",
-    "mjMAXIMP",
-    "mjMAXLIGHT",
-    "mjMAXLINE",
-    "mjMAXLINEPNT",
-    "mjMAXOVERLAY",
-    "mjMAXPLANEGRID",
-    "mjMAXTREEDEPTH",
-    "mjMAXVAL",
-    "mjMINAWAKE",
-    "mjMINIMP",
-    "mjMINMU",
-    "mjMINVAL",
-    "mjNBIAS",
-    "mjNDYN",
-    "mjNEQDATA",
-    "mjNFLUID",
-    "mjNGAIN",
-    "mjNGROUP",
-    "mjNIMP",
-    "mjNISLAND",
-    "mjNPOLY",
-    "mjNREF",
-    "mjNSENS",
-    "mjNSOLVER",
-    "mjPI",
-    "mjRNDSTRING",
-    "mjSC_IN",
-    "mjSC_INOUT",
-    "mjSC_OUT",
-    "mjTIMERSTRING",
-    "mjVERSION_HEADER",
-    "mjVISSTRING",
-]
+import numpy.typing
+import mujoco._specs
+__all__: list[str] = ['MJTNUM_BYTES', 'mjDISABLESTRING', 'mjENABLESTRING', 'mjFRAMESTRING', 'mjLABELSTRING', 'mjMAXCONPAIR', 'mjMAXFLEXNODES', 'mjMAXIMP', 'mjMAXLIGHT', 'mjMAXLINE', 'mjMAXLINEPNT', 'mjMAXOVERLAY', 'mjMAXPLANEGRID', 'mjMAXTREEDEPTH', 'mjMAXVAL', 'mjMINAWAKE', 'mjMINIMP', 'mjMINMU', 'mjMINVAL', 'mjNBIAS', 'mjNDYN', 'mjNEQDATA', 'mjNFLUID', 'mjNGAIN', 'mjNGROUP', 'mjNIMP', 'mjNISLAND', 'mjNPOLY', 'mjNREF', 'mjNSENS', 'mjNSOLVER', 'mjPI', 'mjRNDSTRING', 'mjSC_IN', 'mjSC_INOUT', 'mjSC_OUT', 'mjTIMERSTRING', 'mjVERSION_HEADER', 'mjVISSTRING']
 MJTNUM_BYTES: int
 mjDISABLESTRING: builtins.tuple[typing.Any, ...]
 mjENABLESTRING: builtins.tuple[typing.Any, ...]

@@ -1,6 +1,0 @@
-"""Generated from mujoco 4.0.0 by scripts/generate_stubs.py; do not edit."""
-
-__all__ = ["FatalError", "UnexpectedError"]
-
-class FatalError(Exception): ...
-class UnexpectedError(Exception): ...
