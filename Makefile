@@ -24,24 +24,25 @@ INSTALLED_ROBOTS := $(ROBOT_FILES)/.installed
 # Written after a successful installation: for the demo, and for everything else.
 INSTALLED_ALL := $(VENV)/.installed-all
 INSTALLED_DEV := $(VENV)/.installed-dev
+STUBS := typings/mujoco/.generated
 # Tests of one module mostly stay on one worker, so that its fixtures are made once.
 PYTEST := $(RUN) -m pytest -n $(JOBS) --dist worksteal
 # The theme would advertise its successor at each build.
 SITE := NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict
-# Tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml). Tracing
-# slows the others down by a third, and they add nothing to it.
-COVERING := test_architecture.py contract/test_drive.py test_errors.py test_layout.py envs/stepping envs/vector \
-	finger/identify finger/paths finger/task \
-	laws morphology robot/guard robot/link robot/profile tasks transfer/body_map transfer/metrics
-COVERING := $(addprefix tests/,$(COVERING))
-
 VERSION_CHECK := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	"Shapechanger needs Python 3.11 or newer, and %s is %d.%d: " % (sys.executable, v[0], v[1]) \
 	+ "name a newer one, as in `make PYTHON=python3.12 test`.")
 
+# uv takes a third of pip's time. It does not read pip's settings, so it is told of its indexes.
+PIP_TO_UV := s/^[^.]+\.find-links=/export UV_FIND_LINKS=/p; s/^[^.]+\.index-url=/export UV_DEFAULT_INDEX=/p; \
+	s/^[^.]+\.extra-index-url=/export UV_INDEX=/p
+INSTALL = $(RUN) -m pip install --quiet -c constraints.txt uv && \
+	eval "$$($(RUN) -m pip config list | sed -nE '$(PIP_TO_UV)')" && UV_INDEX_STRATEGY=unsafe-best-match \
+	$(RUN) -m uv pip install --quiet --python $(RUN) -c constraints.txt
+
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # Two installations at once would interfere.
-.PHONY: help setup demo test test-system test-all test-matrix release test-lerobot test-robots check bench docs gallery clean
+.PHONY: help setup demo test test-system test-ci test-all test-matrix release test-lerobot test-robots check bench docs gallery clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
@@ -55,11 +56,13 @@ demo: $(INSTALLED_ALL)  ## transfer a policy to a pole twice as long; see result
 		--out results/demo
 
 test: $(INSTALLED_DEV)  ## run the fast tests, with the coverage gate
-	$(PYTEST) -m "not slow and not system" $(COVERING) --cov
-	$(PYTEST) -m "not slow and not system" $(addprefix --ignore=,$(COVERING))
+	$(PYTEST) -m "not slow and not system" --cov
 
 test-system: $(INSTALLED_DEV)  ## run the tests of whole programs: processes, browsers, terminals
 	$(PYTEST) -m "system and not slow" -n $(SYSTEM_JOBS)
+
+test-ci: $(INSTALLED_DEV)  ## run what the two before run, in one pool
+	$(PYTEST) -m "not slow" -n $(SYSTEM_JOBS) --cov
 
 test-all: $(INSTALLED_DEV)  ## run all tests, including the slow ones
 	$(PYTEST) --cov
@@ -70,14 +73,14 @@ test-matrix: $(INSTALLED_DEV)  ## run the fast tests against other versions and 
 release: $(INSTALLED_DEV)  ## build wheel and sdist into dist/, and test them on each Python here; an hour
 	$(RUN) scripts/test_matrix.py --release
 
-test-lerobot: $(INSTALLED_LEROBOT)  ## test our robots in LeRobot; installs 6 GB
+test-lerobot: $(INSTALLED_LEROBOT) $(STUBS)  ## test our robots in LeRobot; installs 6 GB
 	$(RUN) -m pyright -p $(LEROBOT)
 	$(LEROBOT_VENV)/bin/python -m pytest -c $(LEROBOT)/pyproject.toml --rootdir . $(LEROBOT)/tests
 
 test-robots: $(INSTALLED_ROBOTS)  ## test robot files of other projects' packages for 20 minutes; installs 1 GB
 	$(RUN) -m pytest tests/envs/test_real_robots.py
 
-check: $(INSTALLED_DEV)  ## check format, lint, imports and types
+check: $(STUBS)  ## check format, lint, imports and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports --no-cache
@@ -105,14 +108,19 @@ $(RUN):
 $(INSTALLED_ALL): pyproject.toml constraints.txt | $(RUN)
 	@$(RUN) -c '$(VERSION_CHECK)'
 	@rm -f $@
-	$(RUN) -m pip install --quiet -c constraints.txt -e '.[all]'
+	$(INSTALL) -e '.[all]'
 	@touch $@
 
 $(INSTALLED_DEV): pyproject.toml constraints.txt | $(RUN)
 	@$(RUN) -c '$(VERSION_CHECK)'
 	@rm -f $@
-	$(RUN) -m pip install --quiet -c constraints.txt -e '.[all,dev]'
+	$(INSTALL) -e '.[all,dev]'
 	@touch $(INSTALLED_ALL) $@
+
+# Type stubs of the installed MuJoCo, which ships none.
+$(STUBS): scripts/generate_stubs.py $(INSTALLED_DEV)
+	$(RUN) $<
+	@touch $@
 
 $(INSTALLED_LEROBOT): pyproject.toml $(LEROBOT)/pyproject.toml $(LEROBOT)/constraints.txt $(INSTALLED_DEV)
 	$(PYTHON) -m venv $(LEROBOT_VENV)

@@ -22,21 +22,40 @@ if TYPE_CHECKING:
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# One thread is fastest for small networks, in each worker and in the processes that tests start.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # No test asserts a wall-clock time. Every run tries the same examples, so that results and coverage
 # are reproducible.
 settings.register_profile("shapechanger", deadline=None, derandomize=True)
 settings.load_profile("shapechanger")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Retry `realtime` tests once, since a pause of the machine can fail a correct one.
+# The tests that cover the packages of the coverage gate (`tool.coverage` in pyproject.toml).
+# Tracing slows the others down by a third, and they add nothing to it.
+COVERING = tuple(
+    f"tests/{path}"
+    for path in (
+        *("test_architecture.py", "test_errors.py", "test_layout.py", "contract/test_drive.py"),
+        *("envs/stepping/", "envs/vector/", "laws/", "morphology/", "tasks/"),
+        *("finger/identify/", "finger/paths/", "finger/task/"),
+        *("robot/guard/", "robot/link/", "robot/profile/"),
+        *("transfer/body_map/", "transfer/metrics/"),
+    )
+)
 
-    These tests start processes, open sockets or kill something. The summary lists each retry as
-    `RERUN`.
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests that are retried, and those that need no tracing.
+
+    `realtime` tests start processes, open sockets or kill something, and a pause of the machine can
+    fail a correct one. They are retried once; the summary lists each retry as `RERUN`.
     """
     for item in items:
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.flaky(reruns=1))
+        if not item.nodeid.startswith(COVERING) or item.get_closest_marker("system"):
+            item.add_marker(pytest.mark.no_cover)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -45,17 +64,6 @@ def no_config_of_the_user(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CONFIG_HOME", str(tmp_path_factory.mktemp("config")))
         yield
-
-
-@pytest.fixture(scope="module")
-def one_thread() -> Iterator[None]:
-    """Limit PyTorch to one thread, which is fastest for small networks on a busy machine."""
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
 
 
 @pytest.fixture(scope="module")

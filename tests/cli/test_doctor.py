@@ -88,7 +88,6 @@ def test_the_reason_of_a_renderer_is_passed_on(monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.gl
-@pytest.mark.usefixtures("one_thread")
 def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
     """The development environment has all extras, and draws."""
     main(["doctor"])

@@ -237,7 +237,6 @@ def test_it_passes_the_exam(robot: _Robot) -> None:
     assert len(list(examine(robot.make))) == len(PROMISES)
 
 
-@pytest.mark.usefixtures("one_thread")
 @each_robot
 def test_it_can_learn(robot: _Robot) -> None:
     """2,048 steps of PPO leave finite weights, and reach both ends of each actuator's range.

@@ -32,9 +32,6 @@ _FRAMING = TINY_CLONING.clone.framing
 _LEARNER = CloneLearner("cloning", TINY_CLONING)
 
 
-pytestmark = pytest.mark.usefixtures("one_thread")
-
-
 def _plan(*more: str) -> Plan:
     task = TransferTask(LANE, SLIPPERY)
     return make_plan(task, "cloning", TINY_CLONING, seeds=2, arms=(*ARMS, *more))

@@ -22,8 +22,6 @@ from shapechanger.transfer.study import make_plan, run_study
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 from tests.transfer.studies import SMALL, TINY, tiny_plan
 
-pytestmark = pytest.mark.usefixtures("one_thread")
-
 
 @pytest.fixture(scope="module")
 def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -42,7 +42,6 @@ def worlds(**arguments: Any) -> Any:
     return shapechanger.make_vec("InvertedPendulum", 4, backend="warp", device="cpu", **arguments)
 
 
-@pytest.mark.usefixtures("one_thread")
 def test_a_short_training_balances_longer(tmp_path: Path) -> None:
     """The return rises, and the policy in the file acts as the trained one, on the CPU env."""
     found: list[Evaluation] = []
@@ -72,7 +71,6 @@ def test_a_study_records_what_steps_its_worlds() -> None:
     assert {"mujoco-warp", "warp-lang", "rsl-rl-lib"} < plan.versions.keys()
 
 
-@pytest.mark.usefixtures("one_thread")
 def test_a_policy_of_any_number_of_worlds_is_loaded(tmp_path: Path) -> None:
     """A device steps more worlds than there may be envs of other learners."""
     few = msgspec.structs.replace(SETTINGS, n_steps=2, batch_size=16, eval_every=16)

@@ -50,9 +50,6 @@ class _Recording(Serial):
         super().run(jobs, on_progress)
 
 
-pytestmark = pytest.mark.usefixtures("one_thread")
-
-
 def _plan(source: EnvRef, target: EnvRef, **more: Any) -> Plan:
     task = TransferTask(source, target)
     return make_plan(task, "cloning", QUICK_CLONING, **{"seeds": 2, **more})

@@ -25,8 +25,6 @@ from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 
-pytestmark = pytest.mark.usefixtures("one_thread")
-
 ANT, EXTENDED = EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1")
 FEW: Final = ANT.having({"bodies": {"count": 2}, "max_episode_steps": 20})
 TINY: Final = LimbSettings(

@@ -28,8 +28,6 @@ from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
 
-pytestmark = pytest.mark.usefixtures("one_thread")
-
 ANT: Final = EnvRef("shapechanger/Ant-v1", {"max_episode_steps": 20})
 EXTENDED: Final = EnvRef("shapechanger/ExtendedAnt-v1", {"max_episode_steps": 20})
 # Bodies of 12 and of 8 limbs, whose observations have 137 and 105 numbers.
