@@ -15,6 +15,8 @@ import pytest
 
 _FOLDER = Path(__file__).parents[1] / "examples"
 _EXAMPLES = sorted(_FOLDER.glob("*.py"))
+# Studies, which train in processes of their own for half a minute.
+_LONG = ("new_method", "study_on_ray")
 _FEW = ("--steps", "64")
 # A study needs as many steps as come before its first evaluation.
 _ARGUMENTS = dict.fromkeys(("new_method", "study_on_ray"), ("--steps", "4096", "--seeds", "2"))
@@ -35,7 +37,13 @@ _SAYS = {
 @pytest.mark.system
 @pytest.mark.realtime
 @pytest.mark.usefixtures("gl")
-@pytest.mark.parametrize("example", _EXAMPLES, ids=lambda example: example.stem)
+@pytest.mark.parametrize(
+    "example",
+    [
+        pytest.param(path, marks=[pytest.mark.slow] if path.stem in _LONG else [], id=path.stem)
+        for path in _EXAMPLES
+    ],
+)
 def test_an_example_runs(example: Path, tmp_path: Path) -> None:
     """Without warnings of ours, in a folder that it has never seen."""
     run = subprocess.run(
@@ -44,7 +52,6 @@ def test_an_example_runs(example: Path, tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         cwd=tmp_path,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
     )
     assert run.returncode == 0, run.stderr
     for words in _SAYS.get(example.stem, ()):
@@ -60,6 +67,7 @@ def test_an_example_is_short(example: Path) -> None:
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 @pytest.mark.system
 @pytest.mark.usefixtures("gl")
 def test_the_cells_of_the_notebook_run(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The same drives on the twin's clock and in real time."""
+"""The same drives on the twin's clock and, as slow tests, in real time."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def profile(tmp_path_factory: pytest.TempPathFactory) -> Profile:
     return write_profile(tmp_path_factory.mktemp("profile"))
 
 
-@pytest.fixture(scope="module", params=["twin", "real"])
+@pytest.fixture(scope="module", params=["twin", pytest.param("real", marks=pytest.mark.slow)])
 def clock(request: pytest.FixtureRequest) -> Clock:
     """The kind of clock."""
     return request.param

@@ -16,6 +16,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import MlpPolicy
 
 from shapechanger.errors import CorruptStudy, StudyError, UnknownName
+from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
 from shapechanger.transfer.learners.presets import resolve_learner
@@ -184,7 +185,9 @@ def test_an_exported_policy_acts_the_same(learner: str, tmp_path: Path) -> None:
 
 def test_a_study_of_sac(tmp_path: Path) -> None:
     """A study of SAC with scratch, zero-shot and fine-tune."""
-    study = run_study(tiny_plan(settings_of("sac"), steps=64, source_steps=32), tmp_path)
+    study = run_study(
+        tiny_plan(settings_of("sac"), steps=64, source_steps=32), tmp_path, executor=Serial()
+    )
     assert len(study.of("fine-tune")) == 2
 
 

@@ -57,6 +57,7 @@ def cluster() -> Iterator[Any]:
         os.environ["PYTHONPATH"] = before
 
 
+@pytest.mark.slow
 def test_a_study_has_the_numbers_of_this_machine(cluster: Any, tmp_path: Path) -> None:
     """Equal seeds give equal numbers, and progress arrives."""
     seen: set[str] = set()
@@ -75,6 +76,7 @@ def test_a_study_has_the_numbers_of_this_machine(cluster: Any, tmp_path: Path) -
     assert seen == {run.name for run in plan.runs()}
 
 
+@pytest.mark.slow
 def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path) -> None:
     """A job whose node is killed is repeated on another."""
     doomed = cluster.add_node(num_cpus=1, object_store_memory=_MEMORY)
@@ -105,6 +107,7 @@ def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path)
     assert attempts() == 3
 
 
+@pytest.mark.slow
 def test_a_failed_job_is_reported_and_others_continue(cluster: Any, tmp_path: Path) -> None:
     """Failed jobs, lost jobs and those that need them are named."""
     mark = tmp_path / "mark"

@@ -30,7 +30,7 @@ def test_the_policies_are_small() -> None:
 
 @pytest.mark.parametrize("env_id", REFERENCES)
 def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
-    """The card is that of the reference, and three episodes are far above the floor."""
+    """The card is that of the reference, and an episode is far above the floor."""
     env, reference = EnvRef(env_id), REFERENCES[env_id]
     policy = load_policy(reference_policy(env_id))
     assert policy.card.env == env
@@ -42,7 +42,7 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
     made = env.make()
     try:
         measures = [measure.name for measure in measures_of(made)]
-        found = evaluate(policy.act, [made], EVALUATION_SEED, episodes=3)
+        found = evaluate(policy.act, [made], EVALUATION_SEED, episodes=1)
     finally:
         made.close()
     assert list(reference.ends) == measures

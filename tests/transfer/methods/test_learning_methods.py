@@ -135,9 +135,10 @@ def test_intermediate_bodies_may_have_other_spaces() -> None:
 
 def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
     """Evolution from Ant to ExtendedAnt, with a rule for the new motors."""
+    short = {"max_episode_steps": 20}
     plan = tiny_plan(
         TINY_NORMALISED,
-        task=TransferTask(ANT, EXTENDED),
+        task=TransferTask(ANT.having(short), EXTENDED.having(short)),
         rules={"foot_*/motor": "copy ankle_*/motor"},
         arms=("scratch", "evolution"),
         steps=64,

@@ -12,6 +12,7 @@ import torch
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
@@ -49,10 +50,10 @@ def test_a_study_with_both(tmp_path: Path) -> None:
     plan = tiny_plan(
         short(n_envs=2),
         steps=64,
-        source_steps=320,
+        source_steps=160,
         arms=("scratch", "prefilled-replay", "off-dynamics"),
     )
-    study = run_study(plan, tmp_path)
+    study = run_study(plan, tmp_path, executor=Serial())
     wanted = study.curves("scratch").steps.tolist()
     for arm in ("prefilled-replay", "off-dynamics"):
         assert study.curves(arm).steps.tolist() == wanted == [0.0, 32.0, 64.0]
