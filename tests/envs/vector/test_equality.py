@@ -15,9 +15,14 @@ from shapechanger.envs import CATALOGUE
 from shapechanger.envs.vector import ThreadVectorEnv
 from tests.envs.vector.sameness import MODES, play_side_by_side, random_bodies, require_same
 
+# Each pair of an env, a mode of autoreset and a number of threads; the slow test has all triples.
 _QUICK = [
-    *("shapechanger/Ant-v1", "shapechanger/ExtendedAnt-v1"),
-    *("shapechanger/InvertedPendulum-v1", "shapechanger/BigInvertedPendulum-v1"),
+    ("shapechanger/Ant-v1", "NextStep", 1),
+    ("shapechanger/Ant-v1", "SameStep", 2),
+    ("shapechanger/ExtendedAnt-v1", "Disabled", 2),
+    ("shapechanger/InvertedPendulum-v1", "Disabled", 1),
+    ("shapechanger/InvertedPendulum-v1", "NextStep", 2),
+    ("shapechanger/BigInvertedPendulum-v1", "SameStep", 1),
 ]
 
 
@@ -45,9 +50,7 @@ def _compare(env_id: str, threads: int, mode: str, steps: int, clock: int) -> in
         theirs.close()
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("env_id", _QUICK)
+@pytest.mark.parametrize(("env_id", "mode", "threads"), _QUICK)
 def test_results_equal_gymnasiums(env_id: str, mode: str, threads: int) -> None:
     """Five random bodies and the plain one agree, through terminations and truncations."""
     assert _compare(env_id, threads, mode, steps=200, clock=90) >= 12
