@@ -24,27 +24,6 @@ Policies are trained on its pictures, so these simple shapes stay as they are.
 OUTSIDE_VIEW: Final = 2
 """Group of the geoms that are only seen from outside."""
 
-_COLOURS: Final = {
-    "blue": (0.08, 0.20, 0.45),
-    "brass": (0.55, 0.42, 0.15),
-    "dark": (0.07, 0.07, 0.08),
-    "deck": (0.58, 0.42, 0.24),
-    "glass": (0.16, 0.20, 0.24),
-    "green": (0.20, 0.27, 0.13),
-    "grey": (0.32, 0.33, 0.34),
-    "lamp": (0.95, 0.93, 0.80),
-    "olive": (0.27, 0.33, 0.17),
-    "orange": (0.85, 0.34, 0.06),
-    "red": (0.62, 0.06, 0.05),
-    "rim": (0.55, 0.55, 0.58),
-    "scarlet": (0.80, 0.09, 0.07),
-    "steel": (0.60, 0.62, 0.65),
-    "track": (0.09, 0.09, 0.09),
-    "tread": (0.13, 0.13, 0.13),
-    "tyre": (0.05, 0.05, 0.05),
-    "white": (0.86, 0.86, 0.84),
-}
-
 
 class Solids(NamedTuple):
     """Faces of one object and material of an OBJ file.
@@ -87,6 +66,19 @@ def read_obj(path: Path) -> Mapping[str, Mapping[str, Solids]]:
     }
 
 
+def read_mtl(path: Path) -> Mapping[str, tuple[float, float, float]]:
+    """Read the colours of an MTL file: red, green and blue, each 0 to 1, by material."""
+    blocks = path.read_text("utf-8").split("newmtl ")[1:]
+    lines = (block.splitlines() for block in blocks)
+    return {
+        name: (float(r), float(g), float(b)) for name, kd in lines for _, r, g, b in [kd.split()]
+    }
+
+
+_MESHES: Final = Path(__file__).parent / "meshes"
+_COLOURS: Final = read_mtl(_MESHES / "colours.mtl")
+
+
 def normals(faces: Faces) -> NDArray[np.float64]:
     """Unit vectors outwards, (n, 3)."""
     across = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
@@ -117,7 +109,7 @@ class Paint:
         self, spec: mujoco.MjSpec, vehicle: str, light: ArrayLike = (1.0, 1.0, 1.0)
     ) -> None:
         self.spec = spec
-        self.meshes = read_obj(Path(__file__).parent / "meshes" / f"{vehicle}.obj")
+        self.meshes = read_obj(_MESHES / f"{vehicle}.obj")
         self._light = np.asarray(light, float)
         self._made: set[str] = set()
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName, WorldError
-from shapechanger.vehicles.courses.channel import HARBOUR, YARD, open_course
+from shapechanger.vehicles.courses.channel import open_course
 from shapechanger.vehicles.courses.corridor import corridor
 from shapechanger.vehicles.courses.course import FLOODED, Course
 from shapechanger.vehicles.courses.geometry import distances_from_obstacle, turn_angles
@@ -23,8 +23,8 @@ _MAKERS: Final[Mapping[str, Callable[[np.random.Generator, int], Course | None]]
     MappingProxyType(
         {
             "corridor": corridor,
-            "yard": partial(open_course, YARD),
-            "harbour": partial(open_course, HARBOUR),
+            "yard": partial(open_course, "yard"),
+            "harbour": partial(open_course, "harbour"),
         }
     )
 )

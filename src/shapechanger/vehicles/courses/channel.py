@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +16,6 @@ from shapechanger.vehicles.courses.furniture import (
     Lane,
     LaneObstacles,
     Scatter,
-    Size,
     place_sun_patches,
     scatter_obstacles,
     weighted_choice,
@@ -210,9 +212,6 @@ def _bank(
     )
 
 
-_QUAY_M: Final = 0.6
-"""Height of a quay above the water, m."""
-
 _SPACING_M: Final = 0.1
 
 
@@ -221,7 +220,6 @@ class OpenWorld:
     """A kind of course in the open.
 
     Attributes:
-        name: Name of the world.
         shape: Ranges of the lane's shape.
         half_width: Range of its final half width, m.
         banks: Kinds of bank.
@@ -231,7 +229,6 @@ class OpenWorld:
         current_mps: Fastest current, m/s; 0 on land.
     """
 
-    name: str
     shape: ChannelShape
     half_width: tuple[float, float]
     banks: tuple[BankKind, ...]
@@ -241,76 +238,24 @@ class OpenWorld:
     current_mps: float = 0.0
 
 
-YARD: Final = OpenWorld(
-    name="yard",
-    shape=ChannelShape(
-        pitch=(5.5, 8.0),
-        cells=(3, 5),
-        blur=(2.1, 4.5),
-        length=(40.0, 88.0),
-        radius=1.9,
-        half_width=(1.6, 2.45),
-        wall=0.25,
-    ),
-    half_width=(1.5, 2.5),
-    banks=(
-        BankKind("hedge", 0.4, (3.0, 12.0), 1.0, (0.9, 1.9)),
-        BankKind("fence", 0.25, (3.0, 10.0), 1.3, (0.9, 1.6)),
-        BankKind("brick", 0.2, (2.5, 8.0), 1.2, (1.2, 2.2)),
-        BankKind("shed", 0.15, (2.0, 4.0), 1.6, (2.1, 2.5)),
-    ),
-    obstacles=(
-        Scatter(Size("cone", (0.22, 0.34), (0.22, 0.34), (0.4, 0.7)), 0.3),
-        Scatter(Size("crate", (0.35, 0.6), (0.3, 0.45), (0.25, 0.5)), 0.2),
-        Scatter(Size("bin", (0.4, 0.55), (0.4, 0.55), (0.8, 1.1)), 0.15),
-        Scatter(Size("post", (0.08, 0.16), (0.08, 0.16), (0.7, 1.2)), 0.15),
-        Scatter(Size("tree", (0.2, 0.4), (0.2, 0.4), (2.5, 4.0)), 0.2),
-    ),
-    per_m=(0.12, 0.4),
-    gap_m=1.2,
+_WORLDS: Final = msgspec.convert(
+    tomllib.loads(Path(__file__).with_name("open_worlds.toml").read_text("utf-8")),
+    dict[str, OpenWorld],
 )
-"""Hedges, fences, sheds and brick walls."""
-
-HARBOUR: Final = OpenWorld(
-    name="harbour",
-    shape=ChannelShape(
-        pitch=(7.0, 10.5),
-        cells=(3, 4),
-        blur=(2.6, 6.0),
-        length=(48.0, 88.0),
-        radius=2.6,
-        half_width=(2.15, 3.4),
-        wall=0.45,
-    ),
-    half_width=(2.0, 3.5),
-    banks=(
-        BankKind("quay", 0.7, (5.0, 16.0), 2.0, (_QUAY_M, _QUAY_M)),
-        BankKind("rock", 0.3, (2.5, 8.0), 0.8, (0.35, 0.9), rough=0.35),
-    ),
-    obstacles=(
-        Scatter(Size("buoy", (0.35, 0.6), (0.35, 0.6), (0.5, 0.9)), 0.4),
-        Scatter(Size("crate", (0.4, 0.7), (0.4, 0.6), (0.25, 0.4)), 0.25),
-        # Most dinghies lie along the quay.
-        Scatter(Size("dinghy", (1.4, 2.0), (0.7, 0.9), (0.4, 0.5)), 0.35, moored=0.75),
-    ),
-    per_m=(0.08, 0.25),
-    gap_m=1.6,
-    current_mps=0.15,
-)
-"""Quays, rocks and a current."""
 
 
-def open_course(world: OpenWorld, rng: np.random.Generator, seed: int) -> Course | None:
+def open_course(name: str, rng: np.random.Generator, seed: int) -> Course | None:
     """Try to lay out a yard or a harbour.
 
     Args:
-        world: Kind of course.
+        name: Kind of course, "yard" or "harbour".
         rng: Random generator.
         seed: Seed to record in the course.
 
     Returns:
         The course, or None if the random layout does not fit.
     """
+    world = _WORLDS[name]
     channel = _dig_channel(rng, world.shape, _SPACING_M)
     if channel is None:
         return None
@@ -328,7 +273,7 @@ def open_course(world: OpenWorld, rng: np.random.Generator, seed: int) -> Course
         angle = float(rng.uniform(-np.pi, np.pi))
         current = (speed * float(np.cos(angle)), speed * float(np.sin(angle)))
     return Course(
-        world=world.name,
+        world=name,
         seed=seed,
         route=lane.route,
         half_width=half_width,

@@ -156,17 +156,15 @@ class LaneObstacles:
         return True
 
 
-@dataclass(frozen=True, slots=True)
-class Scatter:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scatter(Size):
     """A kind of obstacle to scatter.
 
     Attributes:
-        size: Kind and range of sizes.
         share: Weight with which it is drawn.
         moored: Probability of lying along a wall.
     """
 
-    size: Size
     share: float
     moored: float = 0.0
 
@@ -189,7 +187,7 @@ def scatter_obstacles(
         kind = kinds[weighted_choice(rng, shares)]
         i = int(rng.integers(len(route)))
         heading = float(np.arctan2(-left[i, 0], left[i, 1]))
-        obstacle = kind.size.draw(rng, heading)
+        obstacle = kind.draw(rng, heading)
         if rng.random() < kind.moored:
             side = 1.0 if rng.random() < 0.5 else -1.0
             aside = side * (

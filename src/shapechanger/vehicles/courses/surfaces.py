@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections import defaultdict
-from collections.abc import Mapping
-from types import MappingProxyType
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -36,22 +36,12 @@ _GAP: Final = 0.02
 _VERGE_RISE: Final = 0.004
 _VERGE_WIDTH: Final = 0.4
 # Width of repeating textures, m.
-_PERIOD: Final[Mapping[str, float]] = MappingProxyType(
-    {
-        "plaster": 4.0,
-        "panel": 4.0,
-        "brick": 1.2,
-        "hedge": 1.5,
-        "fence": 1.2,
-        "quay": 2.4,
-        "shed": 2.0,
-        "rock": 2.0,
-    }
-)
+_PERIOD: Final = {
+    "plaster": 4.0, "panel": 4.0, "brick": 1.2, "hedge": 1.5, "fence": 1.2, "quay": 2.4,
+    "shed": 2.0, "rock": 2.0,
+}  # fmt: skip
 # Width of textures that show one object, which is fitted into its wall, m.
-_WHOLE: Final[Mapping[str, float]] = MappingProxyType(
-    {"door": 1.0, "window": 1.8, "board": 2.6, "glass": 1.4}
-)
+_WHOLE: Final = {"door": 1.0, "window": 1.8, "board": 2.6, "glass": 1.4}
 # Share of the plastered walls with wooden panels.
 _CLAD: Final = 0.2
 # Height of the brick texture, m, which repeats; the others are stretched to the wall.
@@ -64,48 +54,7 @@ _LONGEST: Final = 0.8
 _ROWS: Final = np.array([0.0, 0.35, 1.0])
 _UPWARDS: Final = np.array([0.86, 1.0, 0.94])
 
-# Boxes of each obstacle: half sizes and centre as shares of its length, width and height, and the
-# texture cell. The whole obstacle is -0.5 to 0.5 in x and y, and 0 to 1 in z.
-_Part = tuple[tuple[float, float, float], tuple[float, float, float], str]
-_LEG: Final = (0.05, 0.06, 0.4)
-_BOXES: Final[Mapping[str, tuple[_Part, ...]]] = MappingProxyType(
-    {
-        "box": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "cardboard"),),
-        "cabinet": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "cabinet"),),
-        "crate": (((0.5, 0.5, 0.5), (0.0, 0.0, 0.5), "crate"),),
-        "bench": (
-            (_LEG, (-0.4, -0.38, 0.4), "black"),
-            (_LEG, (-0.4, 0.38, 0.4), "black"),
-            (_LEG, (0.4, -0.38, 0.4), "black"),
-            (_LEG, (0.4, 0.38, 0.4), "black"),
-            ((0.5, 0.5, 0.15), (0.0, 0.0, 0.85), "dark wood"),
-        ),
-    }
-)
-# Solids of revolution: radius over the diameter, and height over the height.
-_Turned = tuple[tuple[tuple[float, float], ...], str]
-_ROUND: Final[Mapping[str, tuple[_Turned, ...]]] = MappingProxyType(
-    {
-        "bin": ((((0.42, 0.0), (0.5, 0.95), (0.5, 1.0), (0.0, 1.0)), "bin"),),
-        "plant": (
-            (((0.3, 0.0), (0.4, 0.3), (0.0, 0.3)), "clay"),
-            (((0.1, 0.28), (0.5, 0.5), (0.48, 0.75), (0.2, 0.98), (0.0, 1.0)), "leaves"),
-        ),
-        "cone": ((((0.5, 0.0), (0.5, 0.05), (0.36, 0.06), (0.05, 1.0), (0.0, 1.0)), "cone"),),
-        "post": ((((0.5, 0.0), (0.5, 0.96), (0.3, 1.0), (0.0, 1.0)), "post"),),
-        "tree": (
-            (((0.5, 0.0), (0.38, 0.1), (0.34, 0.5), (0.0, 0.5)), "bark"),
-            (((0.3, 0.4), (1.6, 0.55), (1.8, 0.72), (1.0, 0.92), (0.0, 1.0)), "leaves"),
-        ),
-        # As wide as its collision geom where a boat meets it.
-        "buoy": (
-            (((0.5, 0.0), (0.5, 0.06)), "black"),
-            (((0.48, 0.06), (0.48, 0.3), (0.36, 0.4), (0.15, 0.72), (0.0, 0.74)), "buoy"),
-            (((0.03, 0.72), (0.03, 0.82)), "black"),
-            (((0.0, 0.80), (0.17, 0.82), (0.0, 1.0)), "buoy"),
-        ),
-    }
-)
+_SHAPES: Final = tomllib.loads(Path(__file__).with_name("obstacles.toml").read_text("utf-8"))
 
 
 class Surfaces:
@@ -193,7 +142,7 @@ class Surfaces:
             if obstacle.kind == "dinghy":
                 add_dinghy(mesh, obstacle, bright)
             elif obstacle.is_round:
-                for outline, material in _ROUND[obstacle.kind]:
+                for outline, material in _SHAPES["turned"][obstacle.kind]:
                     profile = np.array(outline) * (obstacle.length, obstacle.height)
                     add_turned(mesh, obstacle.x, obstacle.y, profile, material, bright)
             else:
@@ -296,7 +245,7 @@ def _spread(wall: Wall, length: float, low: float, high: float) -> tuple[float, 
 def _add_boxes(mesh: QuadMesh, obstacle: Obstacle, bright: float) -> None:
     size = np.array([obstacle.length, obstacle.width, obstacle.height])
     cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
-    for half, place, material in _BOXES[obstacle.kind]:
+    for half, place, material in _SHAPES["boxes"][obstacle.kind]:
         dx, dy, dz = np.array(place) * size
         middle = np.array([obstacle.x + cos * dx - sin * dy, obstacle.y + sin * dx + cos * dy, dz])
         add_box(mesh, middle, np.array(half) * size, obstacle.yaw, material, bright)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 from zlib import crc32
@@ -12,55 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shapechanger.errors import UnknownName
+from shapechanger.vehicles.bodies.visuals import read_mtl
 from shapechanger.vehicles.courses import paint
 
 ROWS: Final = 4
 """Number of cells in a row of the obstacles' texture, and of rows."""
 
 _CELL: Final = 64
-# Colour of each cell.
-_COLOURS: Final[Mapping[str, tuple[float, float, float]]] = MappingProxyType(
-    {
-        "wood": (0.52, 0.34, 0.18),
-        "dark wood": (0.26, 0.12, 0.07),
-        "cardboard": (0.66, 0.52, 0.34),
-        "metal": (0.50, 0.52, 0.52),
-        "leaves": (0.19, 0.36, 0.12),
-        "clay": (0.58, 0.30, 0.18),
-        "cone": (0.92, 0.36, 0.06),
-        "post": (0.80, 0.78, 0.70),
-        "cabinet": (0.45, 0.47, 0.42),
-        "crate": (0.60, 0.45, 0.26),
-        "bark": (0.30, 0.22, 0.15),
-        "buoy": (0.85, 0.14, 0.08),
-        "hull": (0.86, 0.87, 0.88),
-        "bin": (0.16, 0.22, 0.20),
-        "black": (0.07, 0.07, 0.06),
-        "lamp": (1.0, 1.0, 0.96),
-    }
-)
-
-# The same for what stands or floats behind quays, beyond the vehicle's reach.
-_HARBOUR_COLOURS: Final[Mapping[str, tuple[float, float, float]]] = MappingProxyType(
-    {
-        "white hull": (0.88, 0.89, 0.90),
-        "blue hull": (0.10, 0.22, 0.44),
-        "green hull": (0.08, 0.30, 0.22),
-        "red hull": (0.58, 0.12, 0.08),
-        "deck": (0.66, 0.52, 0.34),
-        "cabin": (0.90, 0.89, 0.85),
-        "panes": (0.10, 0.15, 0.19),
-        "spar": (0.72, 0.72, 0.70),
-        "canvas": (0.16, 0.30, 0.55),
-        "iron": (0.13, 0.12, 0.12),
-        "rubber": (0.06, 0.06, 0.06),
-        "rust": (0.42, 0.22, 0.12),
-        "house": (0.82, 0.78, 0.68),
-        "gable": (0.62, 0.28, 0.18),
-        "roof": (0.46, 0.20, 0.14),
-        "tower": (0.90, 0.88, 0.84),
-    }
-)
+_MESHES: Final = Path(__file__).parent / "meshes"
+# Colours of the cells of the two sheets.
+_COLOURS: Final = read_mtl(_MESHES / "things.mtl")
+_HARBOUR_COLOURS: Final = read_mtl(_MESHES / "harbour.mtl")
 
 CELLS: Final[Mapping[str, int]] = MappingProxyType(
     {name: i for sheet in (_COLOURS, _HARBOUR_COLOURS) for i, name in enumerate(sheet)}
@@ -142,32 +105,13 @@ PAINTERS: Final[Mapping[str, Callable[[np.random.Generator], paint.Field]]] = Ma
     {
         painter.__name__: painter
         for painter in (
-            paint.plaster,
-            paint.panel,
-            paint.door,
-            paint.window,
-            paint.brick,
-            paint.board,
-            paint.glass,
-            paint.floor,
-            paint.ceiling,
-            paint.hedge,
-            paint.fence,
-            paint.shed,
-            paint.quay,
-            paint.rock,
-            paint.asphalt,
-            paint.grass,
-            paint.water,
-            paint.sea,
-            paint.paving,
-            paint.shore,
-            paint.sky,
-            things,
-            harbour,
+            paint.plaster, paint.panel, paint.door, paint.window, paint.brick, paint.board,
+            paint.glass, paint.floor, paint.ceiling, paint.hedge, paint.fence, paint.shed,
+            paint.quay, paint.rock, paint.asphalt, paint.grass, paint.water, paint.sea,
+            paint.paving, paint.shore, paint.sky, things, harbour,
         )
     }
-)
+)  # fmt: skip
 """Painters of the textures by name."""
 
 # Size of the cache: a texture set has at most ten textures, and each world a dozen sets.

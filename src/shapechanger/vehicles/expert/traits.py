@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -67,57 +68,10 @@ class Traits:
 
 TRAITS: Final[Mapping[str, Traits]] = MappingProxyType(
     {
-        "car": Traits(
-            body=VEHICLES["car"],
-            drive="wheels",
-            margin_m=0.13,
-            comfort_m=0.40,
-            cruise=0.9,
-            lateral_limit=2.5,
-            braking=1.5,
-            look_m=0.40,
-            look_s=0.22,
-            turn=math.tan(math.radians(28.0)) / 0.26,
-        ),
-        "tank": Traits(
-            body=VEHICLES["tank"],
-            drive="tracks",
-            margin_m=0.12,
-            comfort_m=0.40,
-            cruise=0.9,
-            lateral_limit=1.0,
-            braking=1.0,
-            look_m=0.35,
-            look_s=0.25,
-            turn=6.0,  # With `dead`, a linear fit to the body at 0.1 to 0.5.
-            dead=0.09,
-            sway=0.12,
-        ),
-        "truck": Traits(
-            body=VEHICLES["truck"],
-            drive="wheels",
-            margin_m=0.25,
-            comfort_m=0.70,
-            cruise=0.9,
-            lateral_limit=1.2,
-            braking=0.8,
-            look_m=0.55,
-            look_s=0.30,
-            turn=math.tan(math.radians(30.0)) / 0.32,
-        ),
-        "boat": Traits(
-            body=VEHICLES["boat"],
-            drive="rudder",
-            margin_m=0.35,
-            comfort_m=1.0,
-            cruise=0.95,
-            lateral_limit=0.5,
-            braking=0.25,
-            look_m=0.8,
-            look_s=0.8,
-            turn=1.2,
-            least_throttle=-0.3,
-        ),
+        name: Traits(body=VEHICLES[name], **numbers)
+        for name, numbers in tomllib.loads(
+            Path(__file__).with_name("traits.toml").read_text("utf-8")
+        ).items()
     }
 )
 """Driving properties by the name of the vehicle."""
