@@ -47,7 +47,7 @@ _KEPT_COURSES: Final = 64
 _ABOVE_RAD: Final = math.radians(-20.0)
 _LOOKED_AT_M: Final = 0.06
 _DISTANCE_PER_REACH: Final = 3.0
-# Farthest distance between two updates of the progress, m: well below `line.WINDOW_M`.
+# Farthest distance between two updates of the progress, m: well below `_WINDOW_M` of `expert.line`.
 _PROGRESS_M: Final = 0.5
 
 

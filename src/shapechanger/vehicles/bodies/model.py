@@ -55,21 +55,13 @@ class MotorDrive:
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, name: str, motor: DcMotor
     ) -> None:
-        self._motor = motor
-        self._actuator = int(model.actuator(name).id)
-        self._tendon = int(model.tendon(name).id)
-        self._ctrl = data.ctrl
-        self._velocity = data.ten_velocity
-        self._angle = data.ten_length
+        self._motor, self._ctrl = motor, data.ctrl
+        self._velocity, self._angle = data.ten_velocity, data.ten_length
+        self._actuator, self._tendon = int(model.actuator(name).id), int(model.tendon(name).id)
         self._is_open = False
 
     def set(self, value: float | None, battery_v: float) -> None:
-        """Set the voltage.
-
-        Args:
-            value: Share of the battery's voltage, -1 to 1; None for a disconnected motor.
-            battery_v: Voltage of the battery.
-        """
+        """Set a share of the battery's voltage, -1 to 1; None disconnects the motor."""
         self._is_open = value is None
         self._ctrl[self._actuator] = (
             self._motor.volts_per_speed * self._velocity[self._tendon]
@@ -81,8 +73,7 @@ class MotorDrive:
         """Current from the battery, A."""
         if self._is_open:
             return 0.0
-        volts, speed = self._ctrl[self._actuator], self._velocity[self._tendon]
-        return self._motor.amperes(float(volts), float(speed))
+        return self._motor.amperes(float(self._ctrl[self._actuator]), self.rate())
 
     def turned(self) -> float:
         """Angle of the shaft, rad."""

@@ -118,15 +118,18 @@ class Paint:
         rgba = [*_COLOURS[colour], 1.0]
         return self._add(colour, rgba=rgba, emission=0.6, specular=0.2, shininess=0.3)
 
-    def shaded(self, colour: str) -> str:
-        """Name of a material for `add_shape`, whose brightness is in the normals of its mesh."""
-        rgba = [*self._light * _COLOURS[colour], 1.0]
-        return self._add(f"{colour}/shaded", rgba=rgba, emission=0.0, specular=0.0, shininess=0.0)
+    def lit(self, colour: str, *, turning: bool = False) -> str:
+        """Name of a material for `_add_shape`, whose brightness is in the normals of its mesh.
 
-    def even(self, colour: str) -> str:
-        """Name of a material for `add_shape` on turning parts, equally bright in any direction."""
-        rgba = [*self._light * _COLOURS[colour], 1.0]
-        return self._add(f"{colour}/even", rgba=rgba, emission=0.85, specular=0.0, shininess=0.0)
+        Args:
+            colour: Name of the colour.
+            turning: Whether its part turns, so that it is equally bright in any direction.
+        """
+        rgba, name = [*self._light * _COLOURS[colour], 1.0], "even" if turning else "shaded"
+        emission = 0.85 if turning else 0.0
+        return self._add(
+            f"{colour}/{name}", rgba=rgba, emission=emission, specular=0.0, shininess=0.0
+        )
 
     def shadow(self) -> str:
         """Name of the material of one layer of a shadow."""
@@ -199,7 +202,7 @@ def dress(body: mujoco.MjsBody, name: str, paint: Paint, *, ground_z: float = 0.
     for colour, (faces, _) in paint.meshes[name].items():
         below = faces[:, [0, 3, 2, 1]] * (1.0, 1.0, -1.0) + (0.0, 0.0, 2.0 * ground_z)
         both, light = np.concatenate([faces, below]), np.tile(shading(faces), 2)
-        _add_shape(body, f"{body.name}/{colour}", both, light, paint.shaded(colour), paint)
+        _add_shape(body, f"{body.name}/{colour}", both, light, paint.lit(colour), paint)
 
 
 # A shadow is a stack of layers, each larger than the next, so that its edge is soft.
@@ -256,7 +259,7 @@ def dress_wheel(wheel: mujoco.MjsBody, radius: float, paint: Paint) -> None:
     """
     for colour, (faces, _) in paint.meshes["wheel"].items():
         name = f"vehicle/{colour} of wheels"
-        dark, material = np.zeros(len(faces)), paint.even(colour)
+        dark, material = np.zeros(len(faces)), paint.lit(colour, turning=True)
         _add_shape(wheel, name, faces, dark, material, paint)
         # Its reflection does not turn.
         mirrored = wheel.pos - (0.0, 0.0, 2.0 * radius)

@@ -17,6 +17,7 @@ from shapechanger.vehicles.bodies.visuals import OUTSIDE_VIEW, OWN_VIEW
 
 _COSTLY: Final = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
 _MOST_GEOMS: Final = 2000
+_BEHIND_ALL_M: Final = 1000.0
 
 
 # Ids of the processes that have rendered. A fork of one would deadlock on threads that it lacks.
@@ -49,6 +50,7 @@ class _Renderer:
         self._camera = mujoco.MjvCamera()
         self._option = mujoco.MjvOption()
         self._option.geomgroup[hidden] = 0
+        self._draws_shadows = hidden == OWN_VIEW
 
     def _open(self, model: mujoco.MjModel) -> None:
         """Create the rendering context of a model."""
@@ -61,7 +63,7 @@ class _Renderer:
             choose_gl()
             self._gl = open_context(self._width, self._height)
             _drawing.add(os.getpid())
-            self._finalizer = weakref.finalize(self, _free, self._gl)
+            self._finalizer = weakref.finalize(self, self._gl.free)
             self._finalizer.atexit = False
         self._gl.make_current()
         if self._context is not None:
@@ -86,22 +88,18 @@ class _Renderer:
         if self._scene is None or self._context is None:
             raise RenderError("The camera has no model: call `look_through` first.")
         self._gl.make_current()
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(
-            model,
-            data,
-            self._option,
-            None,
-            self._camera,
-            mujoco.mjtCatBit.mjCAT_ALL.value,
-            self._scene,
+            model, data, self._option, None, self._camera, everything, self._scene
         )
-        self._arrange(self._scene)
+        # Draw the ground before the shadows on it: MuJoCo draws translucent geoms from far to near,
+        # and takes a large one for near.
+        for geom in self._scene.geoms[: self._scene.ngeom] if self._draws_shadows else ():
+            if geom.rgba[3] < 1.0 and geom.modelrbound > 1.0:
+                geom.modelrbound = -_BEHIND_ALL_M
         mujoco.mjr_render(self._rect, self._scene, self._context)
         mujoco.mjr_readPixels(self._picture, None, self._rect, self._context)
         return self._picture
-
-    def _arrange(self, scene: mujoco.MjvScene) -> None:
-        """Change the geoms of a scene before it is rendered."""
 
     def close(self) -> None:
         """Free the OpenGL context and forget the model."""
@@ -130,12 +128,7 @@ class OnboardCamera(_Renderer):
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
 
     def look_through(self, model: mujoco.MjModel, camera: str) -> None:
-        """Select the model and the camera.
-
-        Args:
-            model: Compiled model; its offscreen buffer is resized.
-            camera: Name of the camera.
-        """
+        """Select the compiled model, whose offscreen buffer is resized, and the camera's name."""
         self._wanted = model
         self._camera.fixedcamid = model.camera(camera).id
 
@@ -157,7 +150,6 @@ class OnboardCamera(_Renderer):
 
 # Pixels of an outside view are the means of squares this wide, so that edges are smooth.
 _SUPERSAMPLED: Final = 2
-_BEHIND_ALL_M: Final = 1000.0
 _LARGEST: Final = 4096  # Width and height; software renderers draw no larger images.
 
 
@@ -183,11 +175,7 @@ class OutsideCamera(_Renderer):
         self.size = size
 
     def look_at(self, model: mujoco.MjModel) -> None:
-        """Select the model.
-
-        Args:
-            model: Compiled model; its offscreen buffer is resized.
-        """
+        """Select the compiled model, whose offscreen buffer is resized."""
         self._wanted = model
 
     def picture(
@@ -223,20 +211,7 @@ class OutsideCamera(_Renderer):
         squares = fine.reshape(self.size[1], _SUPERSAMPLED, self.size[0], _SUPERSAMPLED, 3)
         return (squares.mean(axis=(1, 3)) + 0.5).astype(np.uint8)
 
-    def _arrange(self, scene: mujoco.MjvScene) -> None:
-        """Draw the ground before the shadows on it.
-
-        MuJoCo draws translucent geoms from far to near, and takes a large one for near.
-        """
-        for geom in scene.geoms[: scene.ngeom]:
-            if geom.rgba[3] < 1.0 and geom.modelrbound > 1.0:
-                geom.modelrbound = -_BEHIND_ALL_M
-
 
 def _require_pixels(size: tuple[int, int]) -> None:
     if min(size) < 1:
         raise RenderError(f"A picture cannot be {size[0]} x {size[1]} pixels.")
-
-
-def _free(gl: Any) -> None:
-    gl.free()

@@ -37,14 +37,10 @@ from shapechanger.vehicles.courses.geometry import (
     wall_segments,
 )
 
+# Points of the route while it is shaped, and for pairwise distances.
 _FINE: Final = 1024
-"""Number of points of the route while it is shaped."""
-
 _COARSE: Final = 128
-"""Number of points for pairwise distances."""
-
-_WIND_RAD: Final = 0.4
-"""Smallest sum of the turns to either side, rad."""
+_WIND_RAD: Final = 0.4  # Smallest sum of the turns to either side.
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,20 +19,16 @@ from shapechanger.vehicles.courses.geometry import (
     trace_outline,
 )
 
-DOOR_M: Final = 0.9
-"""Width of a door without its frame, m."""
-
-FRAME_M: Final = 0.06
-"""Width of a door's frame, m."""
-
-RECESS_M: Final = 0.15
-"""Depth of a recessed door, m."""
+# Widths of a door without its frame and of the frame, and depth of a recessed door, m.
+_DOOR_M: Final = 0.9
+_FRAME_M: Final = 0.06
+_RECESS_M: Final = 0.15
 
 _PLAIN_M = (0.4, 2.4)
 
 # Panels in the plaster: surface, share, and range of widths, m.
 _PANELS: tuple[tuple[Surface, float, tuple[float, float]], ...] = (
-    ("door", 0.5, (DOOR_M + 2 * FRAME_M, DOOR_M + 2 * FRAME_M)),
+    ("door", 0.5, (_DOOR_M + 2 * _FRAME_M, _DOOR_M + 2 * _FRAME_M)),
     ("window", 0.2, (1.0, 2.0)),
     ("board", 0.18, (1.0, 2.4)),
     ("glass", 0.12, (0.8, 1.6)),
@@ -82,7 +78,7 @@ def _leg(rng: np.random.Generator, start: _Point, end: _Point, height: float) ->
     """Plaster between two points, with panels in it."""
     length = float(np.hypot(*(end - start)))
     ahead = (end - start) / length
-    back = np.array([ahead[1], -ahead[0]]) * RECESS_M  # Away from the lane.
+    back = np.array([ahead[1], -ahead[0]]) * _RECESS_M  # Away from the lane.
     done = start
     t = float(rng.uniform(*_PLAIN_M))
     while True:
@@ -108,8 +104,7 @@ def _wall(start: _Point, end: _Point, height: float, surface: Surface) -> Wall:
     return Wall((float(start[0]), float(start[1])), (float(end[0]), float(end[1])), height, surface)
 
 
-_CEILING_M: Final = 2.5
-"""Height of the ceiling, and of every wall."""
+_CEILING_M: Final = 2.5  # Height of the ceiling, and of every wall.
 
 _PITCH_M = (4.0, 6.0)
 _WIDTH_M = (1.8, 2.4)

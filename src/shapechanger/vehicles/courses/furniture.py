@@ -38,14 +38,11 @@ def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
     return len(shares) - 1
 
 
-FREE_AHEAD_M: Final = 3.0
-"""Length of the route after its first point that stays free, m."""
-
-FREE_BEHIND_M: Final = 2.0
-"""Length before it that stays free, m; a truck with its trailer is 1 m long."""
-
-_BEFORE_DOORS_M: Final = 0.3
-"""Smallest distance from a door, m."""
+# Lengths of the route after and before its first point that stay free, m; a truck with its trailer
+# is 1 m long.
+_FREE_AHEAD_M: Final = 3.0
+_FREE_BEHIND_M: Final = 2.0
+_BEFORE_DOORS_M: Final = 0.3  # Smallest distance from a door.
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +127,7 @@ class LaneObstacles:
         """
         reach = max(obstacle.length, obstacle.width) / 2.0
         s %= self._round_m
-        if s - reach < FREE_AHEAD_M or self._round_m - s - reach < FREE_BEHIND_M:
+        if s - reach < _FREE_AHEAD_M or self._round_m - s - reach < _FREE_BEHIND_M:
             return False
         far = distances_from_obstacle(obstacle, self._walls)
         left, right = float(far[: self._lefts].min()), float(far[self._lefts :].min())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -81,7 +82,7 @@ def plain(colour: ArrayLike, height: int = _SIZE, width: int = _SIZE) -> Field:
 
 def plaster(rng: np.random.Generator) -> Field:
     """Painted wall, 2.4 m high, with a dark skirting board, and sometimes a socket or a notice."""
-    height, width = _SIZE, _SIZE
+    height = width = _SIZE
     hue = np.array([0.83, 0.79, 0.62]) + rng.uniform(-0.05, 0.05, 3)
     image = plain(hue, height, width)
     image *= 1.0 + 0.03 * clouds(rng, height, width, 2, 3)[..., None]
@@ -140,7 +141,7 @@ def door(rng: np.random.Generator) -> Field:
 
 def window(rng: np.random.Generator) -> Field:
     """Tall panes at night with faint reflections."""
-    height, width = _SIZE, _SIZE
+    height = width = _SIZE
     image = plain((0.035, 0.04, 0.04), height, width)
     glint = np.clip(clouds(rng, height, width, 6, 4), 0.0, 3.0)
     image += 0.03 * glint[..., None]
@@ -156,17 +157,38 @@ def window(rng: np.random.Generator) -> Field:
     return image
 
 
-def brick(rng: np.random.Generator) -> Field:
-    """Courses of red brick, each offset by half a brick."""
-    height, width, rows, columns = _SIZE, _SIZE, 24, 5
-    y = np.arange(height)[:, None] * rows / height
-    x = np.arange(width)[None, :] * columns / width + 0.5 * (y.astype(int) % 2)
+def _stones(
+    rng: np.random.Generator,
+    rows: int,
+    columns: int,
+    low: float,
+    high: float,
+    joints: Sequence[float],
+) -> tuple[Field, Field]:
+    """Brightness of stones in courses that are offset by half a stone, and mask of their joints.
+
+    Args:
+        rng: Random generator.
+        rows: Number of courses.
+        columns: Number of stones in a course.
+        low: Smallest brightness of a stone.
+        high: Largest brightness of a stone.
+        joints: Height and width of a joint over those of a stone.
+    """
+    y = np.arange(_SIZE)[:, None] * rows / _SIZE
+    x = np.arange(_SIZE)[None, :] * columns / _SIZE + 0.5 * (y.astype(int) % 2)
     number = y.astype(int) * columns + x.astype(int) % columns
-    shade = rng.uniform(0.65, 1.2, rows * columns).astype(np.float32)[number]
-    image = np.asarray((0.58, 0.26, 0.14), np.float32) * shade[..., None]
-    image *= 1.0 + 0.10 * grain(rng, height, width)[..., None]
-    joint = ((y % 1.0) < 0.14) | ((x % 1.0) < 0.05)
-    return blend(image, (0.62, 0.55, 0.42), joint.astype(np.float32))
+    shade = rng.uniform(low, high, rows * columns).astype(np.float32)[number]
+    joint = ((y % 1.0) < joints[0]) | ((x % 1.0) < joints[1])
+    return shade[..., None], joint.astype(np.float32)
+
+
+def brick(rng: np.random.Generator) -> Field:
+    """Courses of red brick."""
+    shade, joint = _stones(rng, 24, 5, 0.65, 1.2, (0.14, 0.05))
+    image = np.asarray((0.58, 0.26, 0.14), np.float32) * shade
+    image *= 1.0 + 0.10 * grain(rng, _SIZE, _SIZE)[..., None]
+    return blend(image, (0.62, 0.55, 0.42), joint)
 
 
 def board(rng: np.random.Generator) -> Field:
@@ -184,30 +206,26 @@ def board(rng: np.random.Generator) -> Field:
 
 def glass(rng: np.random.Generator) -> Field:
     """Glass partition in a steel frame: dim, slightly green, brighter above."""
-    height, width = _SIZE, _SIZE
-    image = plain((0.30, 0.36, 0.32), height, width)
-    up = np.linspace(1.3, 0.6, height, dtype=np.float32)[:, None, None]
-    image *= up * (1.0 + 0.08 * clouds(rng, height, width, 1, 5)[..., None])
+    image = plain((0.30, 0.36, 0.32))
+    up = np.linspace(1.3, 0.6, _SIZE, dtype=np.float32)[:, None, None]
+    image *= up * (1.0 + 0.08 * clouds(rng, _SIZE, _SIZE, 1, 5)[..., None])
     image[:8] = image[-10:] = image[:, :6] = image[:, -6:] = np.asarray(_STEEL, np.float32) * 0.6
     return image
 
 
 def floor(rng: np.random.Generator) -> Field:
     """Polished concrete, 3 m wide, with blotches and specks."""
-    height, width = _TALL, _TALL
     hue = np.array([0.56, 0.54, 0.42]) + rng.uniform(-0.04, 0.04, 3)
-    image = plain(hue, height, width)
-    image *= 1.0 + 0.10 * clouds(rng, height, width, 5, 5, 4)[..., None]
-    image *= 1.0 + 0.05 * grain(rng, height, width)[..., None]
-    image *= 1.0 - 0.12 * np.clip(clouds(rng, height, width, 3, 3, 5), 0.0, 2.0)[..., None]
-    return image
+    image = plain(hue, _TALL, _TALL)
+    image *= 1.0 + 0.10 * clouds(rng, _TALL, _TALL, 5, 5, 4)[..., None]
+    image *= 1.0 + 0.05 * grain(rng, _TALL, _TALL)[..., None]
+    return image * (1.0 - 0.12 * np.clip(clouds(rng, _TALL, _TALL, 3, 3, 5), 0.0, 2.0)[..., None])
 
 
 def ceiling(rng: np.random.Generator) -> Field:
     """Pale ceiling tiles, 0.6 m wide."""
-    height, width = _SIZE, _SIZE
-    image = plain((0.60, 0.58, 0.46), height, width)
-    image *= 1.0 + 0.05 * grain(rng, height, width)[..., None]
+    image = plain((0.60, 0.58, 0.46))
+    image *= 1.0 + 0.05 * grain(rng, _SIZE, _SIZE)[..., None]
     image[::64] *= 0.7
     image[:, ::64] *= 0.7
     return image
@@ -252,15 +270,10 @@ def shed(rng: np.random.Generator) -> Field:
 
 def quay(rng: np.random.Generator) -> Field:
     """Stone blocks, pale above, green and wet below."""
-    rows, columns = 4, 3
-    y = np.arange(_SIZE)[:, None] * rows / _SIZE
-    x = np.arange(_SIZE)[None, :] * columns / _SIZE + 0.5 * (y.astype(int) % 2)
-    number = y.astype(int) * columns + x.astype(int) % columns
-    shade = rng.uniform(0.82, 1.12, rows * columns).astype(np.float32)[number]
-    image = np.asarray((0.60, 0.57, 0.51), np.float32) * shade[..., None]
+    shade, joint = _stones(rng, 4, 3, 0.82, 1.12, (0.05, 0.03))
+    image = np.asarray((0.60, 0.57, 0.51), np.float32) * shade
     image *= 1.0 + 0.09 * clouds(rng, _SIZE, _SIZE, 10, 10, 3)[..., None]
-    joint = ((y % 1.0) < 0.05) | ((x % 1.0) < 0.03)
-    image = blend(image, (0.25, 0.24, 0.21), joint.astype(np.float32))
+    image = blend(image, (0.25, 0.24, 0.21), joint)
     edge = 0.70 + 0.04 * clouds(rng, 1, _SIZE, 1, 8, 2)
     down = np.linspace(0.0, 1.0, _SIZE, dtype=np.float32)[:, None]
     return blend(image, (0.13, 0.17, 0.10), np.clip((down - edge) * 8.0, 0.0, 0.85))

@@ -36,42 +36,29 @@ _WALL_FRICTION: Final = 0.3
 
 def _add_collision(spec: mujoco.MjSpec, course: Course) -> None:
     """Add the collision geoms "world/ground", "world/wall/0" ... and "world/thing/0" ...."""
-    body = spec.worldbody
-    body.add_geom(
-        name="world/ground",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0.0, 0.0, 1.0],  # Infinite.
-        friction=[_GROUND_FRICTION.get(course.world, _DEFAULT_FRICTION), 0.005, 0.0001],
-        contype=_GROUND_TYPE,
-        conaffinity=_GROUND_AFFINITY,
+    slide = _GROUND_FRICTION.get(course.world, _DEFAULT_FRICTION)
+    spec.worldbody.add_geom(
+        name="world/ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0],  # Infinite.
+        friction=[slide, 0.005, 0.0001], contype=_GROUND_TYPE, conaffinity=_GROUND_AFFINITY,
         group=_HIDDEN,
-    )
+    )  # fmt: skip
     for number, wall in enumerate(course.walls):
         start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
         length = float(np.hypot(*(end - start)))
         along = (end - start) / length
         behind = np.array([along[1], -along[0]])
         x, y = 0.5 * (start + end) + 0.5 * _THICKNESS * behind
-        _add_solid(
-            spec,
-            f"world/wall/{number}",
-            mujoco.mjtGeom.mjGEOM_BOX,
-            [0.5 * length, 0.5 * _THICKNESS, 0.5 * wall.height],
-            [x, y, 0.5 * wall.height],
-            float(np.arctan2(along[1], along[0])),
-        )
+        half = 0.5 * wall.height
+        size, place = [0.5 * length, 0.5 * _THICKNESS, half], [x, y, half]
+        yaw = float(np.arctan2(along[1], along[0]))
+        _add_solid(spec, f"world/wall/{number}", mujoco.mjtGeom.mjGEOM_BOX, size, place, yaw)
     for number, obstacle in enumerate(course.obstacles):
         half = 0.5 * obstacle.height
-        _add_solid(
-            spec,
-            f"world/thing/{number}",
-            mujoco.mjtGeom.mjGEOM_CYLINDER if obstacle.is_round else mujoco.mjtGeom.mjGEOM_BOX,
-            [0.5 * obstacle.length, half, 0.0]
-            if obstacle.is_round
-            else [0.5 * obstacle.length, 0.5 * obstacle.width, half],
-            [obstacle.x, obstacle.y, half],
-            obstacle.yaw,
-        )
+        shape, size = mujoco.mjtGeom.mjGEOM_BOX, [0.5 * obstacle.length, 0.5 * obstacle.width, half]
+        if obstacle.is_round:
+            shape, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [0.5 * obstacle.length, half, 0.0]
+        place = [obstacle.x, obstacle.y, half]
+        _add_solid(spec, f"world/thing/{number}", shape, size, place, obstacle.yaw)
 
 
 def _add_solid(
@@ -83,16 +70,11 @@ def _add_solid(
     yaw: float,
 ) -> None:
     spec.worldbody.add_geom(
-        name=name,
-        type=shape,
-        size=size,
-        pos=place,
+        name=name, type=shape, size=size, pos=place,
         quat=[np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)],
-        friction=[_WALL_FRICTION, 0.005, 0.0001],
-        contype=_SOLID_TYPE,
-        conaffinity=_SOLID_AFFINITY,
+        friction=[_WALL_FRICTION, 0.005, 0.0001], contype=_SOLID_TYPE, conaffinity=_SOLID_AFFINITY,
         group=_HIDDEN,
-    )
+    )  # fmt: skip
 
 
 # Texture of the ground in each world.
@@ -116,7 +98,15 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
         course: The course.
         look: Light and colours.
     """
-    _set_camera(spec)
+    spec.visual.headlight.active = 0
+    spec.visual.quality.shadowsize = spec.visual.quality.offsamples = 0
+    # The clipping planes are in units of the extent, which would depend on the course.
+    spec.stat.extent = 1.0
+    spec.visual.map.znear, spec.visual.map.zfar = _NEAR, _FAR
+    spec.worldbody.add_light(
+        name="world/light", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=[0.0, 0.0, 1.0],
+        castshadow=False, ambient=[0.0] * 3, diffuse=[1.0] * 3, specular=[0.0] * 3,
+    )  # fmt: skip
     _add_collision(spec, course)
     surfaces = Surfaces(course, look)
     mirrored = look.gloss > 0.0
@@ -152,26 +142,6 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     picture = texture(_GROUND.get(course.world, _DEFAULT_GROUND), look.texture_seed)
     ground, colour = surfaces.ground(), look.tone(look.ground)
     _add_surface(spec, "world/floor", ground, picture, colour, opacity=1.0 - look.gloss)
-
-
-def _set_camera(spec: mujoco.MjSpec) -> None:
-    """Set the light, the clipping planes and the quality."""
-    spec.visual.headlight.active = 0
-    spec.visual.quality.shadowsize = 0
-    spec.visual.quality.offsamples = 0
-    # The clipping planes are in units of the extent, which would depend on the course.
-    spec.stat.extent = 1.0
-    spec.visual.map.znear = _NEAR
-    spec.visual.map.zfar = _FAR
-    spec.worldbody.add_light(
-        name="world/light",
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        dir=[0.0, 0.0, 1.0],
-        castshadow=False,
-        ambient=[0.0, 0.0, 0.0],
-        diffuse=[1.0, 1.0, 1.0],
-        specular=[0.0, 0.0, 0.0],
-    )
 
 
 def _add_texture(

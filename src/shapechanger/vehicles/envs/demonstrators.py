@@ -41,17 +41,10 @@ CLONES: Final[Mapping[str, Path]] = MappingProxyType(
 Each was cloned from ten minutes of its expert's driving; `clones/README.md` is their model card.
 """
 
-WANDER_S: Final = 0.6
-"""Correlation time of the wandering, s."""
-
-JERKS_PER_S: Final = 0.25
-"""Mean rate of jerks, 1/s."""
-
-JERK_S: Final = (0.15, 0.5)
-"""Shortest and longest duration of a jerk, s."""
-
-THROTTLE_SD: Final = 0.1
-"""Standard deviation of the wandering of the throttle."""
+_WANDER_S: Final = 0.6  # Correlation time of the wandering.
+_JERKS_PER_S: Final = 0.25  # Mean rate of jerks.
+_JERK_S: Final = (0.15, 0.5)  # Shortest and longest duration of a jerk.
+_THROTTLE_SD: Final = 0.1  # Standard deviation of the wandering of the throttle.
 
 
 class Disturbance:
@@ -69,7 +62,7 @@ class Disturbance:
     """
 
     def __init__(self, seed: int, sway: float) -> None:
-        self._size = np.array((sway, THROTTLE_SD))
+        self._size = np.array((sway, _THROTTLE_SD))
         self._rng = np.random.default_rng(seed)
         self._wander = np.zeros(2)
         self._jerk, self._jerk_s = 0.0, 0.0
@@ -77,7 +70,7 @@ class Disturbance:
     def applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
         """Add noise to an action, (2,), and clip it to -1 to 1."""
         # The exact discretization, for any period.
-        keep = math.exp(-PERIOD_S / WANDER_S)
+        keep = math.exp(-PERIOD_S / _WANDER_S)
         fresh = self._size * math.sqrt(1 - keep**2)
         self._wander = keep * self._wander + fresh * self._rng.standard_normal(2)
         noise = self._wander + np.array((self._jerked(), 0.0))
@@ -87,10 +80,10 @@ class Disturbance:
         """Steering of the current jerk; 0 without one."""
         self._jerk_s -= PERIOD_S
         if self._jerk_s <= 0:
-            if self._rng.random() >= JERKS_PER_S * PERIOD_S:
+            if self._rng.random() >= _JERKS_PER_S * PERIOD_S:
                 return 0.0
             self._jerk = float(3 * self._size[0] * self._rng.uniform(-1, 1))
-            self._jerk_s = float(self._rng.uniform(*JERK_S))
+            self._jerk_s = float(self._rng.uniform(*_JERK_S))
         return self._jerk
 
 

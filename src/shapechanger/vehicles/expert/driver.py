@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,18 +36,33 @@ def _clipped(value: float) -> float:
     return max(-1.0, min(1.0, value))
 
 
-DRIFT_S: Final = 0.8
-"""Time constant of the drift average, s: longer than turns, so that the current remains."""
-
-STICKING: Final = 0.1
-"""Rate of turn, rad/s, from which a tank's full dead band is compensated; less below it, so that
-it does not twitch on straights."""
-
-ABOUT: Final = 0.9
-"""Angle to the target, rad, above which a tank turns on the spot."""
-
-ABOUT_RATE: Final = 2.5
-"""Rate of that turn over the angle, 1/s; a slower turn gets stuck in friction."""
+# Time constant of the drift average, s: longer than turns, so that the current remains.
+_DRIFT_S: Final = 0.8
+# Rate of turn, rad/s, from which a tank's full dead band is compensated; less below it, so that it
+# does not twitch on straights.
+_STICKING: Final = 0.1
+# Angle to the target, rad, above which a tank turns on the spot, and the rate of that turn over the
+# angle, 1/s; a slower turn gets stuck in friction.
+_ABOUT: Final = 0.9
+_ABOUT_RATE: Final = 2.5
+# Times, s, after which a driven vehicle that stands still is stuck, and one that is slow scrapes
+# along a wall.
+_PATIENCE_S: Final = 0.7
+_SCRAPING_S: Final = 3.0
+_ASKED: Final = 0.25  # Throttle or steering above which a vehicle counts as driven.
+# Shares of the top speed below which it stands still and is slow, and rate of turn, rad/s, above
+# which it does not stand still.
+_STILL: Final = 0.05
+_SLOW: Final = 0.25
+_TURNING: Final = 0.15
+_BACK_AT_MOST_S: Final = 4.0
+_BACK_THROTTLE: Final = -0.6
+_SPEED_GAIN: Final = 1.5  # Of the throttle on the speed error, both relative to their maxima.
+_REACTION_S: Final = 0.15  # From an action to its effect, over which the pose is predicted.
+# Angle to the target, rad, above which a vehicle must turn before it can go on, and clearance ahead
+# of the nose, m, that is too small for that.
+_ASIDE: Final = 0.7
+_BLOCKED_M: Final = 0.15
 
 
 class Pursuit:
@@ -62,10 +77,6 @@ class Pursuit:
         self._before: Pose | None = None
         self._drift = 0.0
 
-    def reset(self) -> None:
-        """Forget the drift."""
-        self._before, self._drift = None, 0.0
-
     def moved(self, pose: Pose) -> None:
         """Update the drift estimate; call it once per period."""
         before, self._before = self._before, pose
@@ -76,7 +87,7 @@ class Pursuit:
         now = _wrap_angle(math.atan2(dy, dx) - pose.heading) if going else 0.0
         if abs(now) > math.pi / 3:  # Astern, or moved by hand.
             now = 0.0
-        self._drift += (now - self._drift) * PERIOD_S / DRIFT_S
+        self._drift += (now - self._drift) * PERIOD_S / _DRIFT_S
 
     def steering(
         self, pose: Pose, speed: float, yaw_rate: float, target: tuple[float, float]
@@ -97,11 +108,11 @@ class Pursuit:
                 return _clipped(-self._curvature(angle, distance) / self._traits.turn)
             case "tracks":
                 rate = max(speed, 0.3 * self._traits.top_speed) * self._curvature(angle, distance)
-                if abs(angle) > ABOUT:
-                    rate = ABOUT_RATE * angle
+                if abs(angle) > _ABOUT:
+                    rate = _ABOUT_RATE * angle
                 # Tracks slip by an unknown amount, so the missing rate of turn is fed back.
                 value = (1.5 * rate - 0.5 * yaw_rate) / self._traits.turn
-                value += self._traits.dead * _clipped(rate / STICKING)
+                value += self._traits.dead * _clipped(rate / _STICKING)
                 return _clipped(-value)
             case "rudder":
                 angle = _wrap_angle(angle - self._drift)
@@ -115,42 +126,6 @@ class Pursuit:
         return 2 * side / distance
 
 
-PATIENCE_S: Final = 0.7
-"""Time after which a driven vehicle that stands still counts as stuck, s."""
-
-SCRAPING_S: Final = 3.0
-"""Time after which a slow vehicle counts as scraping along a wall, s."""
-
-ASKED: Final = 0.25
-"""Throttle or steering above which a vehicle counts as driven."""
-
-STILL: Final = 0.05
-"""Share of the top speed below which it stands still."""
-
-SLOW: Final = 0.25
-"""Share of the top speed below which it is slow."""
-
-TURNING: Final = 0.15
-"""Rate of turn, rad/s, above which it does not stand still."""
-
-BACK_AT_MOST_S: Final = 4.0
-BACK_THROTTLE: Final = -0.6
-
-
-class _Move(NamedTuple):
-    """One part of a recovery.
-
-    Attributes:
-        seconds: Duration.
-        steering: Constant steering.
-        throttle: Constant throttle.
-    """
-
-    seconds: float
-    steering: float
-    throttle: float
-
-
 class Recovery:
     """Detects that a vehicle is stuck, and takes over until it is free.
 
@@ -162,22 +137,12 @@ class Recovery:
     def __init__(self, traits: Traits, rng: np.random.Generator) -> None:
         self._traits = traits
         self._rng = rng
-        self._moves: deque[_Move] = deque()
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget all timers and manoeuvres."""
-        self._moves.clear()
+        self._moves: deque[tuple[float, float, float]] = deque()  # Seconds, steering, throttle.
         self._left_s = 0.0  # Remaining time of the first move.
         self._still_s = 0.0
         self._slow_s = 0.0
         self._free_s = 0.0
         self._tries = 0
-
-    @property
-    def active(self) -> bool:
-        """Return whether a manoeuvre is being driven."""
-        return bool(self._moves)
 
     def watch(
         self, action: tuple[float, float], speed: float, yaw_rate: float, *, blocked: bool
@@ -191,17 +156,17 @@ class Recovery:
             blocked: Whether an obstacle ahead prevents a necessary turn.
         """
         share = abs(speed) / self._traits.top_speed
-        driven = abs(action[1]) > ASKED
-        turned = self._traits.drive == "tracks" and abs(action[0]) > ASKED
-        straight = abs(yaw_rate) < TURNING  # Turning on the spot is progress.
-        still = share < STILL and straight
+        driven = abs(action[1]) > _ASKED
+        turned = self._traits.drive == "tracks" and abs(action[0]) > _ASKED
+        straight = abs(yaw_rate) < _TURNING  # Turning on the spot is progress.
+        still = share < _STILL and straight
         # A boat with its bow at a quay turns until its stern touches as well, and then is stuck for
         # good; a car scrapes along. A tank turns away on the spot.
-        still |= blocked and share < SLOW and action[1] > 0 and self._traits.drive != "tracks"
+        still |= blocked and share < _SLOW and action[1] > 0 and self._traits.drive != "tracks"
         self._still_s = self._still_s + PERIOD_S if still and (driven or turned) else 0.0
-        self._slow_s = self._slow_s + PERIOD_S if share < SLOW and straight and driven else 0.0
-        self._free_s = self._free_s + PERIOD_S if share >= SLOW else 0.0
-        if self._free_s > SCRAPING_S and not self.active:
+        self._slow_s = self._slow_s + PERIOD_S if share < _SLOW and straight and driven else 0.0
+        self._free_s = self._free_s + PERIOD_S if share >= _SLOW else 0.0
+        if self._free_s > _SCRAPING_S and not self._moves:
             self._tries = 0
 
     def action(self, angle: float) -> tuple[float, float] | None:
@@ -210,16 +175,16 @@ class Recovery:
         Args:
             angle: Angle from the heading to the target, rad, counter-clockwise.
         """
-        if self.active:
+        if self._moves:
             self._left_s -= PERIOD_S
-            if self._left_s <= 0 or self._still_s > PATIENCE_S:  # Finished, or stuck again.
+            if self._left_s <= 0 or self._still_s > _PATIENCE_S:  # Finished, or stuck again.
                 self._moves.popleft()
                 self._begin_move()
-        elif self._still_s > PATIENCE_S - PERIOD_S / 2:
+        elif self._still_s > _PATIENCE_S - PERIOD_S / 2:
             self._begin(angle, scraping=False)
-        elif self._slow_s > SCRAPING_S:
+        elif self._slow_s > _SCRAPING_S:
             self._begin(angle, scraping=True)
-        return self._moves[0][1:] if self.active else None
+        return self._moves[0][1:] if self._moves else None
 
     def _begin(self, angle: float, *, scraping: bool) -> None:
         """Choose the moves of a manoeuvre."""
@@ -231,30 +196,17 @@ class Recovery:
         if self._traits.drive == "rudder" and scraping:
             # A rudder swings the stern, which a quay beside it prevents. Steering towards the quay
             # puts the bow there and frees the stern; then the boat backs away.
-            self._moves.append(_Move(1.5 * longer, float(side), 0.5))
+            self._moves.append((1.5 * longer, float(side), 0.5))
         seconds = (2.5 if self._traits.drive == "rudder" else 1.0) * longer
         # Going back, wheels and rudders turn the other way; tracks do not.
         turn = side * min(1.0, 0.4 + abs(angle))
         turn *= -0.5 if self._traits.drive == "tracks" else 1.0
-        self._moves.append(_Move(min(seconds, BACK_AT_MOST_S), turn, BACK_THROTTLE))
+        self._moves.append((min(seconds, _BACK_AT_MOST_S), turn, _BACK_THROTTLE))
         self._begin_move()
 
     def _begin_move(self) -> None:
-        self._left_s = self._moves[0].seconds if self._moves else 0.0
+        self._left_s = self._moves[0][0] if self._moves else 0.0
         self._still_s = self._slow_s = 0.0
-
-
-SPEED_GAIN: Final = 1.5
-"""Gain of the throttle on the speed error, both relative to their maxima."""
-
-REACTION_S: Final = 0.15
-"""Delay from an action to its effect, s, over which the pose is predicted."""
-
-ASIDE: Final = 0.7
-"""Angle to the target, rad, above which a vehicle must turn before it can go on."""
-
-BLOCKED_M: Final = 0.15
-"""Clearance ahead of the nose, m, that is too small for that."""
 
 
 class CourseExpert:
@@ -287,15 +239,13 @@ class CourseExpert:
         self.path = path or plan_path_for(course, traits)
         self.speeds = speed_profile(self.path, traits)
         self._obstacles = ClearanceField(course)
-        self._pursuit = Pursuit(traits)
-        self._recovery = Recovery(traits, np.random.default_rng(seed))
+        self._rng = np.random.default_rng(seed)
         self._station: float | None = None
 
     def reset(self, pose: Pose) -> None:
         """Start at a pose."""
         self._station = self.path.nearest(pose.x, pose.y).station
-        self._pursuit.reset()
-        self._recovery.reset()
+        self._pursuit, self._recovery = Pursuit(self._traits), Recovery(self._traits, self._rng)
 
     def act(self, pose: Pose, speed: float, yaw_rate: float = 0.0) -> NDArray[np.float32]:
         """Choose an action; call it once per period.
@@ -323,13 +273,13 @@ class CourseExpert:
             action = self._driven(steering, spot.station, spot.lateral, angle, speed)
         else:
             action = back
-        blocked = abs(angle) > ASIDE and self._ahead(pose) < BLOCKED_M
+        blocked = abs(angle) > _ASIDE and self._ahead(pose) < _BLOCKED_M
         self._recovery.watch(action, speed, yaw_rate, blocked=blocked)
         return np.array(action, np.float32)
 
     def _ahead(self, pose: Pose) -> float:
-        """Clearance at `BLOCKED_M` ahead of the nose, m."""
-        reach = self._traits.body.nose_m + BLOCKED_M
+        """Clearance at `_BLOCKED_M` ahead of the nose, m."""
+        reach = self._traits.body.nose_m + _BLOCKED_M
         nose = (
             pose.x + reach * math.cos(pose.heading),
             pose.y + reach * math.sin(pose.heading),
@@ -338,12 +288,12 @@ class CourseExpert:
 
     def _soon(self, pose: Pose, speed: float, yaw_rate: float) -> Pose:
         """Predicted pose when the current action takes effect."""
-        ahead = speed * REACTION_S
-        heading = pose.heading + yaw_rate * REACTION_S / 2
+        ahead = speed * _REACTION_S
+        heading = pose.heading + yaw_rate * _REACTION_S / 2
         return Pose(
             pose.x + ahead * math.cos(heading),
             pose.y + ahead * math.sin(heading),
-            pose.heading + yaw_rate * REACTION_S,
+            pose.heading + yaw_rate * _REACTION_S,
         )
 
     def _driven(
@@ -360,7 +310,7 @@ class CourseExpert:
         slowest = 0.1 if traits.drive == "tracks" else 0.4
         wanted *= max(math.cos(angle), slowest)
         throttle = wanted / traits.top_speed
-        throttle += SPEED_GAIN * (wanted - speed) / traits.top_speed
+        throttle += _SPEED_GAIN * (wanted - speed) / traits.top_speed
         throttle = max(traits.least_throttle, min(1.0, throttle))
         if traits.drive == "tracks":  # Saturating one track would prevent the turn.
             throttle = min(throttle, 1.0 - abs(steering))

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import Course
 
-WINDOW_M: Final = 2.0
-"""Distance along the line, m, within which a nearest spot is searched around a hint. Parallel legs
-of a course are much farther apart along the line, so none is mistaken for another."""
+# Distance along the line, m, within which a nearest spot is searched around a hint. Parallel legs
+# of a course are much farther apart along the line, so none is mistaken for another.
+_WINDOW_M: Final = 2.0
 
 
 class Spot(NamedTuple):
@@ -46,7 +46,7 @@ class ClosedLine:
         lengths = np.sqrt(self._squared)
         self.stations: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum(lengths)[:-1]))
         self.length = float(lengths.sum())
-        self._window = int(np.ceil(WINDOW_M / (self.length / len(points))))
+        self._window = int(np.ceil(_WINDOW_M / (self.length / len(points))))
         # Extended beyond both ends by a window, so that each window is a slice.
         around = np.arange(-self._window, len(points) + self._window) % len(points)
         self._around = np.column_stack((points, self._steps, self._squared))[around].T.copy()

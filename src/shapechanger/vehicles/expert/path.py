@@ -23,27 +23,25 @@ from shapechanger.vehicles.courses.geometry import ClearanceField, arc_lengths
 from shapechanger.vehicles.expert.line import ClosedLine
 from shapechanger.vehicles.expert.traits import Traits
 
-STATION_M: Final = 0.2
-OFFSET_M: Final = 0.1
-
-SLOPES: Final = np.arange(-2, 3)
-"""Changes of the offset from one station to the next, in steps of `OFFSET_M`."""
-
-BEND_COST: Final = 0.15
-"""Cost of changing the slope by one."""
-
-SLANT_COST: Final = 0.02
-"""Cost of a slope of one."""
-
-NARROW_COST: Final = 1.0
-"""Cost of a point with the smallest allowed clearance; it is quadratic in what is missing to the
-preferred clearance."""
-
+_STATION_M: Final = 0.2
+_OFFSET_M: Final = 0.1
+_SLOPES: Final = np.arange(-2, 3)  # Changes of the offset between stations, in `_OFFSET_M`.
+# Costs of changing the slope by one, of a slope of one, and of a point with the smallest allowed
+# clearance, which is quadratic in what is missing to the preferred clearance.
+_BEND_COST: Final = 0.15
+_SLANT_COST: Final = 0.02
+_NARROW_COST: Final = 1.0
 _NARROW_SHARE: Final = 2.0 / 3.0
-
-OVERLAP_M: Final = 12.0
-"""Length of the search beyond a whole lap, m. A way hardly depends on its offset that far back, so
-that a lap cut from the middle is closed."""
+# Length of the search beyond a whole lap, m. A way hardly depends on its offset that far back, so
+# that a lap cut from the middle is closed.
+_OVERLAP_M: Final = 12.0
+# Over-relaxation: 1.5 to 1.8 converge faster than 1 (S. Boyd et al., "Distributed Optimization and
+# Statistical Learning via the Alternating Direction Method of Multipliers", 2011, section 3.4.3).
+_ROUNDS: Final = 150
+_RELAXATION: Final = 1.6
+_SPACING_M: Final = 0.1  # Approximate distance between the points of a path.
+_PULL: Final = 0.02  # Weight of the preferred offsets, 1/m^4; see `_least_bent`.
+_ATTEMPTS: Final = 8  # To push a line away from obstacles.
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,7 @@ def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
         obstacles: Its clearances.
     """
     line = ClosedLine(course.route)
-    count = max(round(line.length / STATION_M), 8)
+    count = max(round(line.length / _STATION_M), 8)
     middle = np.array([line.at(line.length * i / count) for i in range(count)])
     half_width = np.interp(
         np.arange(count) * line.length / count,
@@ -84,8 +82,8 @@ def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
     ahead = np.roll(middle, -2, axis=0) - np.roll(middle, 2, axis=0)
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     left = np.stack((-ahead[:, 1], ahead[:, 0]), axis=1)
-    side = int(np.floor(half_width.max() / OFFSET_M))
-    offsets = np.linspace(-side, side, 2 * side + 1) * OFFSET_M
+    side = int(np.floor(half_width.max() / _OFFSET_M))
+    offsets = np.linspace(-side, side, 2 * side + 1) * _OFFSET_M
     points = middle[:, None] + offsets[None, :, None] * left[:, None]
     clearance = obstacles.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
     clearance[np.abs(offsets)[None, :] > half_width[:, None]] = 0.0
@@ -113,9 +111,9 @@ def cheapest_way(lattice: Lattice, least_m: float, comfort_m: float) -> NDArray[
         WorldError: If there is no such way.
     """
     missing = np.clip((comfort_m - lattice.clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
-    cost = np.where(lattice.clearance >= least_m, NARROW_COST * missing**2, np.inf)
+    cost = np.where(lattice.clearance >= least_m, _NARROW_COST * missing**2, np.inf)
     count = len(cost)
-    overlap = min(round(OVERLAP_M / STATION_M), count)
+    overlap = min(round(_OVERLAP_M / _STATION_M), count)
     way = _search(cost, np.arange(count + overlap) % count, None, least_m)
     seam = overlap // 2
     if way[seam] != way[seam + count]:
@@ -140,19 +138,19 @@ def _search(
         WorldError: If there is no way.
     """
     width = cost.shape[1]
-    bends = BEND_COST * (SLOPES[:, None] - SLOPES[None, :]) ** 2  # (from, to)
-    slants = SLANT_COST * SLOPES**2
-    total = np.full((width, len(SLOPES)), np.inf)
+    bends = _BEND_COST * (_SLOPES[:, None] - _SLOPES[None, :]) ** 2  # (from, to)
+    slants = _SLANT_COST * _SLOPES**2
+    total = np.full((width, len(_SLOPES)), np.inf)
     total[:] = cost[stations[0]][:, None]
     if seam is not None:
         total[np.arange(width) != seam] = np.inf
-    came_from = np.empty((len(stations), width, len(SLOPES)), np.int8)
+    came_from = np.empty((len(stations), width, len(_SLOPES)), np.int8)
     for row, station in enumerate(stations[1:], start=1):
         turned = total[:, :, None] + bends  # (offset, slope before, slope after)
         chosen = turned.argmin(axis=1)
         best = np.take_along_axis(turned, chosen[:, None, :], axis=1)[:, 0, :] + slants
         total = np.full_like(total, np.inf)
-        for slope, gain in enumerate(SLOPES):
+        for slope, gain in enumerate(_SLOPES):
             # From offset k to k + gain.
             to = slice(max(gain, 0), width + min(gain, 0))
             of = slice(max(-gain, 0), width + min(-gain, 0))
@@ -161,7 +159,7 @@ def _search(
         if not np.isfinite(total).any():
             raise WorldError(
                 f"The course is blocked for anything {2 * least_m:.2f} m wide "
-                f"{station * STATION_M:.0f} m from its start. Use a narrower vehicle, a smaller "
+                f"{station * _STATION_M:.0f} m from its start. Use a narrower vehicle, a smaller "
                 "margin, or another seed."
             )
     if seam is not None:
@@ -176,14 +174,8 @@ def _search(
     for row in range(len(stations) - 1, -1, -1):
         way[row] = offset
         before = came_from[row, offset, slope] if row else 0
-        offset, slope = offset - SLOPES[slope], before
+        offset, slope = offset - _SLOPES[slope], before
     return way
-
-
-ROUNDS: Final = 150
-RELAXATION: Final = 1.6
-"""Over-relaxation: 1.5 to 1.8 converge faster than 1 (S. Boyd et al., "Distributed Optimization and
-Statistical Learning via the Alternating Direction Method of Multipliers", 2011, section 3.4.3)."""
 
 
 def _least_bent(
@@ -225,9 +217,9 @@ def _least_bent(
     inverse = np.linalg.inv(quadratic + weight * np.eye(count))
     bounded = np.clip(wish, low, high)
     debt = np.zeros(count)
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         free = inverse @ (weight * (bounded - debt) - linear)
-        free = RELAXATION * free + (1 - RELAXATION) * bounded
+        free = _RELAXATION * free + (1 - _RELAXATION) * bounded
         bounded = np.clip(free + debt, low, high)
         debt += free - bounded
     # Exact solution for the points that are not on a bound.
@@ -236,16 +228,6 @@ def _least_bent(
         fixed = quadratic[np.ix_(moves, ~moves)] @ bounded[~moves]
         bounded[moves] = np.linalg.solve(quadratic[np.ix_(moves, moves)], -linear[moves] - fixed)
     return np.clip(bounded, low, high)
-
-
-_SPACING_M: Final = 0.1
-"""Approximate distance between the points of a path, m."""
-
-PULL: Final = 0.02
-"""Weight of the preferred offsets, 1/m^4; see `_least_bent`."""
-
-ATTEMPTS: Final = 8
-"""Number of attempts to push a line away from obstacles."""
 
 
 class CoursePath(ClosedLine):
@@ -324,9 +306,9 @@ def _smoothed(
 ) -> CoursePath | None:
     """A smooth path that passes all obstacles on the same sides as a way, or None."""
     extra = np.zeros(len(way))
-    for _ in range(ATTEMPTS):
+    for _ in range(_ATTEMPTS):
         low, high = _room(lattice, way, least, comfort, extra)
-        offsets = _least_bent(lattice.middle, lattice.left, low, high, lattice.offsets[way], PULL)
+        offsets = _least_bent(lattice.middle, lattice.left, low, high, lattice.offsets[way], _PULL)
         path = _splined(lattice.middle + offsets[:, None] * lattice.left, obstacles)
         short = least - path.clearance
         if short.max() <= 0:

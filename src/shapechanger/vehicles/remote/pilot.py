@@ -277,8 +277,13 @@ def main() -> int:
         driver = PolicyDriver(
             policy, file.stem, robot, lambda note: tell(note=note), waits=_WAITS_ON_BOARD
         )
-        watch = threading.Thread(target=_end_with_input, args=(driver,), daemon=True)
-        watch.start()
+
+        def end_with_input() -> None:  # Which the daemon closes, or which ends with it.
+            while sys.stdin.readline():
+                pass
+            driver.end()
+
+        threading.Thread(target=end_with_input, daemon=True).start()
         driver.run()
     except ShapechangerError as error:
         tell(failed=str(error))
@@ -287,13 +292,6 @@ def main() -> int:
         tell(failed=f"{type(error).__name__}: {error}")
         raise
     return 0
-
-
-def _end_with_input(driver: PolicyDriver) -> None:
-    """End a policy when the process that started it closes its input, or is gone."""
-    while sys.stdin.readline():
-        pass
-    driver.end()
 
 
 if __name__ == "__main__":
