@@ -19,12 +19,12 @@ from typing import Final
 from scipy.stats import binomtest
 
 from benchmarks.clones import sighted
+from benchmarks.driving import DriveResult, DriveScore, drive
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
 from shapechanger.cli import main
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.vehicles.envs import VehicleEnv
-from shapechanger.vehicles.envs.evaluation import DriveResult, DriveScore, drive
 
 LAYOUTS: Final = 100
 MINUTES: Final = 10

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from benchmarks.driving import LIMIT_S, METRES, Act, DriveResult
 from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.vehicles.envs.evaluation import LIMIT_S, METRES, Act, DriveResult
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 
 
@@ -20,7 +20,7 @@ def drive_remote(
     metres: float = METRES,
     limit_s: float = LIMIT_S,
 ) -> DriveResult:
-    """Drive a served twin, as `shapechanger.vehicles.envs.evaluation.drive` does an env.
+    """Drive a served twin, as `benchmarks.driving.drive` does an env.
 
     Args:
         env: The robot, made with `on_reset=operator.place`; a collision must not end the episode.

@@ -17,6 +17,7 @@ import gymnasium as gym
 import mujoco
 
 from benchmarks.clones import blind, find_clone, sighted
+from benchmarks.driving import LIMIT_S, METRES, Act, DriveScore, drive
 from benchmarks.row import Row, asked
 from shapechanger.cli.train import Train
 from shapechanger.demos.cloning.policy import CameraPolicy
@@ -24,7 +25,6 @@ from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_polic
 from shapechanger.vehicles.bodies import VEHICLES
 from shapechanger.vehicles.courses.course import HELD_OUT
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
-from shapechanger.vehicles.envs.evaluation import LIMIT_S, METRES, Act, DriveScore, drive
 
 EXPERT_LAYOUTS: Final = 50
 CLONE_LAYOUTS: Final = 20

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.clones import find_clone, sighted
+from benchmarks.driving import METRES, Act, DriveResult, DriveScore, drive
 from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row
 from benchmarks.vehicles import counted, layouts
@@ -26,7 +27,6 @@ from shapechanger.robot.client.env import RemoteVehicleEnv
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import run_robot
 from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
-from shapechanger.vehicles.envs.evaluation import METRES, Act, DriveResult, DriveScore, drive
 
 LAYOUTS: Final = 10
 _CLOCKS: Final[dict[Literal["twin", "real"], Literal["lockstep", "realtime"]]] = {

@@ -23,6 +23,7 @@ import numpy as np
 import tomlkit
 from numpy.typing import NDArray
 
+from benchmarks.driving import DriveResult, DriveScore, drive
 from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row, asked
 from benchmarks.vehicles import counted
@@ -43,7 +44,6 @@ from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
 from shapechanger.vehicles.envs.demonstrators import CLONES
-from shapechanger.vehicles.envs.evaluation import DriveResult, DriveScore, drive
 from shapechanger.vehicles.envs.waypoints import waypoint_demonstrator
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
 

@@ -36,8 +36,7 @@ from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import STUDY_FILE, Study
 from shapechanger.vehicles.cameras.corruptions import CORRUPTIONS
-from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT, HOME
-from shapechanger.vehicles.courses.look import LOOKS, Look
+from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT, HOME, LOOKS, Look
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from shapechanger.vehicles.world import MujocoWorld
 

@@ -6,10 +6,10 @@ from contextlib import closing
 
 import pytest
 
+from benchmarks.driving import DriveScore, drive
 from shapechanger.vehicles.bodies import VEHICLES
 from shapechanger.vehicles.courses.course import HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv
-from shapechanger.vehicles.envs.evaluation import DriveScore, drive
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)

@@ -15,8 +15,7 @@ from shapechanger.errors import UnknownName, WorldError
 from shapechanger.vehicles import world as world_module
 from shapechanger.vehicles.bodies import SIM_DT, VEHICLES
 from shapechanger.vehicles.bodies.parts import CameraJitter
-from shapechanger.vehicles.courses.course import HOME, Course
-from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.course import HOME, Course, Look
 from shapechanger.vehicles.world import MujocoWorld
 
 _AHEAD: Mapping[str, Mapping[str, float]] = {

@@ -20,8 +20,7 @@ from shapechanger.vehicles.bodies.parts import CameraJitter, CameraMount, aim_ca
 from shapechanger.vehicles.cameras.camera import OnboardCamera, OutsideCamera
 from shapechanger.vehicles.cameras.corruptions import find_corruption
 from shapechanger.vehicles.courses import lay_out, start_pose
-from shapechanger.vehicles.courses.course import HOME, Course, require_element
-from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.course import HOME, Course, Look, require_element
 from shapechanger.vehicles.courses.scene import add_course
 from shapechanger.vehicles.expert.line import CourseProgress
 from shapechanger.vehicles.expert.path import CoursePath, plan_path_for

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.course import Look
 from shapechanger.vehicles.courses.scene import add_course
 from tests.vehicles.courses.scenes import square
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from shapechanger.vehicles.cameras.camera import OnboardCamera
 from shapechanger.vehicles.courses import textures
-from shapechanger.vehicles.courses.course import Course, Wall
-from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.course import Course, Look, Wall
 from shapechanger.vehicles.courses.scene import add_course
 from tests.vehicles.courses.scenes import square, with_walls
 

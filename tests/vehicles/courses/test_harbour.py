@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses import lay_out
-from shapechanger.vehicles.courses.course import Course, Obstacle
+from shapechanger.vehicles.courses.course import Course, Look, Obstacle
 from shapechanger.vehicles.courses.harbour import (
     BANK_M,
     add_banks,
@@ -19,9 +19,8 @@ from shapechanger.vehicles.courses.harbour import (
     fittings,
     moored,
 )
-from shapechanger.vehicles.courses.look import Look
-from shapechanger.vehicles.courses.quad_mesh import QuadMesh
 from shapechanger.vehicles.courses.surfaces import Surfaces
+from shapechanger.vehicles.courses.textures import QuadMesh
 
 _SEEDS = (0, 1, 2, 5, 1_000_000)
 # Tyres and ladders stand out of their wall.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import UnknownName
-from shapechanger.vehicles.courses.look import LOOKS, VARIANTS, Look
+from shapechanger.vehicles.courses.course import LOOKS, VARIANTS, Look
 
 
 @pytest.mark.parametrize("world", LOOKS)

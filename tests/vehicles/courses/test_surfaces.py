@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapechanger.vehicles.courses.course import Course, Lamp, Wall
-from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.course import Course, Lamp, Look, Wall
 from shapechanger.vehicles.courses.surfaces import Surfaces
 from tests.vehicles.courses.scenes import square, with_walls
 

@@ -10,10 +10,8 @@ import mujoco
 
 from shapechanger.errors import ProfileError, UnknownName
 from shapechanger.vehicles.bodies.boat import BOAT
-from shapechanger.vehicles.bodies.car import CAR
+from shapechanger.vehicles.bodies.land import CAR, TANK, TRUCK
 from shapechanger.vehicles.bodies.model import BoundVehicle, Motion, Outputs, VehicleModel
-from shapechanger.vehicles.bodies.tank import TANK
-from shapechanger.vehicles.bodies.truck import TRUCK
 from shapechanger.vehicles.bodies.visuals import Paint
 
 __all__ = [

@@ -15,7 +15,7 @@ import numpy as np
 
 from shapechanger.vehicles.bodies.visuals import read_obj, shading
 from shapechanger.vehicles.courses.course import Course, Obstacle, Wall
-from shapechanger.vehicles.courses.quad_mesh import Array, QuadMesh
+from shapechanger.vehicles.courses.textures import Array, QuadMesh
 
 BANK_M: Final = 0.4
 """Width of quays and rocks; two parts of the lane are at least twice this apart."""

@@ -8,12 +8,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.vehicles.courses.course import FLOODED, Course
+from shapechanger.vehicles.courses.course import FLOODED, Colour, Course, Look
 from shapechanger.vehicles.courses.harbour import far_shore, fittings
-from shapechanger.vehicles.courses.look import Colour, Look
-from shapechanger.vehicles.courses.quad_mesh import QuadMesh
 from shapechanger.vehicles.courses.surfaces import Surfaces
-from shapechanger.vehicles.courses.textures import texture
+from shapechanger.vehicles.courses.textures import QuadMesh, texture
 
 # Two geoms collide if the contype of one shares a bit with the conaffinity of the other.
 _SOLID_TYPE: Final = 1

@@ -9,11 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from shapechanger.vehicles.courses.course import Course, Obstacle, Wall
+from shapechanger.vehicles.courses.course import Course, Look, Obstacle, Wall
 from shapechanger.vehicles.courses.harbour import add_banks, add_dinghy, extent
-from shapechanger.vehicles.courses.look import Look
-from shapechanger.vehicles.courses.quad_mesh import Array, QuadMesh, add_box, add_turned
-from shapechanger.vehicles.courses.textures import CELLS, ROWS
+from shapechanger.vehicles.courses.textures import CELLS, ROWS, Array, QuadMesh, add_box, add_turned
 
 # Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
 _REACH: Final = 1.6

@@ -23,8 +23,7 @@ from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.vehicles.bodies import require_fit, vehicle_model
 from shapechanger.vehicles.bodies.parts import CameraJitter
-from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING
-from shapechanger.vehicles.courses.look import Look
+from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING, Look
 from shapechanger.vehicles.envs.demonstrators import Demonstrator, ExpertDriver
 from shapechanger.vehicles.expert.traits import PERIOD_S
 from shapechanger.vehicles.world import MujocoWorld

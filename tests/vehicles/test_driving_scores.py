@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.driving import DriveResult, DriveScore, drive, poisson_interval
 from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses.course import HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv
-from shapechanger.vehicles.envs.evaluation import DriveResult, DriveScore, drive, poisson_interval
 
 _STRAIGHT = np.array([0.0, 0.5], np.float32)
 _STILL = np.zeros(2, np.float32)
