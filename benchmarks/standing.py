@@ -28,7 +28,7 @@ from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.vehicles.courses.course import HELD_OUT
 from shapechanger.vehicles.envs import RangesEnv
-from shapechanger.vehicles.envs.demonstrators import observe_ranges
+from shapechanger.vehicles.envs.ranges import observe_ranges
 
 OUT: Final = Path("results", "standing")
 SEEDS: Final = 3

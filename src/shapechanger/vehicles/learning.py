@@ -27,7 +27,7 @@ from shapechanger.errors import StudyError
 from shapechanger.transfer.learners.cloning import stated
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.versions import ENV, identify, require_same_env
-from shapechanger.vehicles.envs.demonstrators import LEAST_THROTTLE
+from shapechanger.vehicles.envs.ranges import LEAST_THROTTLE
 
 STUDENT_STEPS: Final = 7200
 """Default steps of a student: six minutes, a third of which the teacher drives."""

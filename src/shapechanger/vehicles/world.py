@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import mujoco
 import numpy as np
@@ -17,14 +17,15 @@ from shapechanger.errors import WorldError
 from shapechanger.vehicles.bodies import SIM_DT, add_vehicle, vehicle_model
 from shapechanger.vehicles.bodies.model import ContactTracker
 from shapechanger.vehicles.bodies.parts import CameraJitter, CameraMount, aim_camera, move_camera
-from shapechanger.vehicles.cameras.camera import OnboardCamera, OutsideCamera
-from shapechanger.vehicles.cameras.corruptions import find_corruption
 from shapechanger.vehicles.courses import lay_out, start_pose
 from shapechanger.vehicles.courses.course import HOME, Course, Look, require_element
 from shapechanger.vehicles.courses.scene import add_course
 from shapechanger.vehicles.expert.line import CourseProgress
-from shapechanger.vehicles.expert.path import CoursePath, plan_path_for
-from shapechanger.vehicles.expert.traits import traits_of
+
+if TYPE_CHECKING:
+    from shapechanger.vehicles.cameras.camera import OnboardCamera, OutsideCamera
+    from shapechanger.vehicles.cameras.corruptions import Corruption
+    from shapechanger.vehicles.expert.path import CoursePath
 
 PORTRAITS_RAD: Final = tuple(
     math.radians(degrees) for degrees in (125.0, -125.0, 150.0, -150.0, 55.0, -55.0, 25.0, -25.0)
@@ -101,10 +102,19 @@ class MujocoWorld:
         self._step_s = _COARSE_DT if coarse and self.vehicle.turning_radius_m > 0.0 else SIM_DT
         self._world = HOME[vehicle] if world is None else world
         self.look: Look = Look.of(self._world) if look is None else look
-        self._camera = None if size is None else OnboardCamera(size)
+        self._camera: OnboardCamera | None = None
+        if size is not None:
+            # Cameras are only loaded where there are pictures, and SciPy for their faults.
+            from shapechanger.vehicles.cameras.camera import OnboardCamera
+
+            self._camera = OnboardCamera(size)
         self._outside: OutsideCamera | None = None
         self.lenses = tuple(lenses)
-        self._distortions = [find_corruption(name) for name in lenses]
+        self._distortions: list[Corruption] = []
+        if lenses:
+            from shapechanger.vehicles.cameras.corruptions import find_corruption
+
+            self._distortions = [find_corruption(name) for name in lenses]
         self.resting_v = RESTING_V
         self._travelled_m = 0.0
         self.placed = 0
@@ -347,6 +357,8 @@ class MujocoWorld:
             RenderError: If the size is out of range, or nothing can be drawn here.
         """
         if self._outside is None or self._outside.size != (width, height):
+            from shapechanger.vehicles.cameras.camera import OutsideCamera
+
             camera = OutsideCamera((width, height))
             if self._outside is not None:
                 self._outside.close()
@@ -454,4 +466,7 @@ def _let_wheels_meet_only_the_ground(spec: mujoco.MjSpec) -> None:
 @lru_cache(maxsize=_KEPT_COURSES)
 def _planned(vehicle: str, world: str, seed: int) -> CoursePath:
     """Return a path around a course for a vehicle."""
+    from shapechanger.vehicles.expert.path import plan_path_for
+    from shapechanger.vehicles.expert.traits import traits_of
+
     return plan_path_for(lay_out(world, seed), traits_of(vehicle))

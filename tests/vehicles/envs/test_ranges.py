@@ -14,13 +14,13 @@ from shapechanger.errors import SpaceMismatch, UnknownName, WorldError
 from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
 from shapechanger.vehicles.courses.course import HELD_OUT, HOME
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
-from shapechanger.vehicles.envs.demonstrators import (
+from shapechanger.vehicles.envs.ranges import (
     BEARINGS_DEG,
     FARTHEST_M,
     LEAST_THROTTLE,
+    MeanOutputs,
     leave_rest,
 )
-from shapechanger.vehicles.envs.ranges import MeanOutputs
 
 _COURSE = {"course": 2, "start": 2}
 _STEPS = 60

@@ -13,7 +13,8 @@ from shapechanger.vehicles.bodies import VEHICLES
 from shapechanger.vehicles.courses import lay_out, start_pose
 from shapechanger.vehicles.courses.course import Course
 from shapechanger.vehicles.envs.demonstrators import Disturbance
-from shapechanger.vehicles.expert import CourseExpert, CourseProgress
+from shapechanger.vehicles.expert.driver import CourseExpert
+from shapechanger.vehicles.expert.line import CourseProgress
 from shapechanger.vehicles.expert.traits import TRAITS
 from tests.vehicles.expert.courses import ring
 from tests.vehicles.expert.kinematic import SIZES, TOP, Kinematic

@@ -12,9 +12,8 @@ from shapechanger.errors import WorldError
 from shapechanger.vehicles.courses import lay_out
 from shapechanger.vehicles.courses.course import Course, Obstacle
 from shapechanger.vehicles.courses.geometry import FAR_M, ClearanceField
-from shapechanger.vehicles.expert import CoursePath, plan_path
 from shapechanger.vehicles.expert.line import ClosedLine
-from shapechanger.vehicles.expert.path import plan_path_for
+from shapechanger.vehicles.expert.path import CoursePath, plan_path, plan_path_for
 from shapechanger.vehicles.expert.traits import TRAITS
 from tests.vehicles.expert.courses import ring
 

@@ -20,15 +20,15 @@ from shapechanger.vehicles.courses.geometry import (
 )
 
 # Widths of a door without its frame and of the frame, and depth of a recessed door, m.
-_DOOR_M: Final = 0.9
-_FRAME_M: Final = 0.06
-_RECESS_M: Final = 0.15
+DOOR_M: Final = 0.9
+FRAME_M: Final = 0.06
+RECESS_M: Final = 0.15
 
 _PLAIN_M = (0.4, 2.4)
 
 # Panels in the plaster: surface, share, and range of widths, m.
 _PANELS: tuple[tuple[Surface, float, tuple[float, float]], ...] = (
-    ("door", 0.5, (_DOOR_M + 2 * _FRAME_M, _DOOR_M + 2 * _FRAME_M)),
+    ("door", 0.5, (DOOR_M + 2 * FRAME_M, DOOR_M + 2 * FRAME_M)),
     ("window", 0.2, (1.0, 2.0)),
     ("board", 0.18, (1.0, 2.4)),
     ("glass", 0.12, (0.8, 1.6)),
@@ -78,7 +78,7 @@ def _leg(rng: np.random.Generator, start: _Point, end: _Point, height: float) ->
     """Plaster between two points, with panels in it."""
     length = float(np.hypot(*(end - start)))
     ahead = (end - start) / length
-    back = np.array([ahead[1], -ahead[0]]) * _RECESS_M  # Away from the lane.
+    back = np.array([ahead[1], -ahead[0]]) * RECESS_M  # Away from the lane.
     done = start
     t = float(rng.uniform(*_PLAIN_M))
     while True:

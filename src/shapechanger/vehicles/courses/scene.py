@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.vehicles.courses.course import FLOODED, Colour, Course, Look
-from shapechanger.vehicles.courses.harbour import far_shore, fittings
 from shapechanger.vehicles.courses.surfaces import Surfaces
 from shapechanger.vehicles.courses.textures import QuadMesh, texture
 
@@ -127,6 +126,8 @@ def add_course(spec: mujoco.MjSpec, course: Course, look: Look) -> None:
     if course.world == "yard":
         show("grass", surfaces.verges(), plain)
     if course.world == "harbour":
+        from shapechanger.vehicles.courses.harbour import far_shore, fittings
+
         show("shore", far_shore(course), plain)
         show("harbour", fittings(course), plain)
     show("things", surfaces.obstacles(), plain)

@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from shapechanger.vehicles.courses.course import Course, Look, Obstacle, Wall
-from shapechanger.vehicles.courses.harbour import add_banks, add_dinghy, extent
 from shapechanger.vehicles.courses.textures import CELLS, ROWS, Array, QuadMesh, add_box, add_turned
 
 # Horizontal distance at which a lamp's light has halved, m: about its height above the ground.
@@ -129,6 +128,8 @@ class Surfaces:
                 name = "panel" if clad and wall.surface == "plaster" else wall.surface
                 self._add_wall(result[name], wall, 0.0, wall.height, offset)
         if self._course.world == "harbour":
+            from shapechanger.vehicles.courses.harbour import add_banks
+
             add_banks(self._course, result, self._light_at)
         return dict(result)
 
@@ -138,6 +139,8 @@ class Surfaces:
         for obstacle in self._course.obstacles:
             bright = float(self._light_at(np.array([obstacle.x, obstacle.y])))
             if obstacle.kind == "dinghy":
+                from shapechanger.vehicles.courses.harbour import add_dinghy
+
                 add_dinghy(mesh, obstacle, bright)
             elif obstacle.is_round:
                 for outline, material in _SHAPES["turned"][obstacle.kind]:
@@ -183,6 +186,8 @@ class Surfaces:
 
     def _open_water(self, tiles: Array) -> Array:
         """Corners of four large tiles around the others, up to the far shore, m, (4, 4, 2)."""
+        from shapechanger.vehicles.courses.harbour import extent
+
         (x0, y0), (x1, y1) = tiles.min(axis=(0, 1)), tiles.max(axis=(0, 1))
         middle, radius = extent(self._course)
         (left, bottom), (right, top) = middle - radius, middle + radius

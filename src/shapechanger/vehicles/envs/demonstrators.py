@@ -11,25 +11,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import WorldError, check_seed
+from shapechanger.errors import ProfileError, WorldError, check_seed
 from shapechanger.vehicles.courses.course import Course
-from shapechanger.vehicles.expert import CourseExpert
+from shapechanger.vehicles.expert.driver import CourseExpert
 from shapechanger.vehicles.expert.traits import PERIOD_S, traits_of
 from shapechanger.vehicles.world import MujocoWorld
-
-BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
-"""Bearings of the distances that a teacher sees, degrees from the heading, positive to the left."""
-
-FARTHEST_M: Final = 6.0
-"""Distance that it sees where nothing is nearer, m."""
-
-LEAST_THROTTLE: Final = 0.25
-"""Least throttle of a teacher's vehicle that stands, in size; it overcomes the friction at rest.
-
-`shapechanger.vehicles.learning` holds its students to the same.
-"""
-
-_BEARINGS: Final = np.radians(BEARINGS_DEG)
 
 _FOLDER: Final = Path(__file__).parent / "clones"
 
@@ -125,37 +111,22 @@ class Demonstrator:
         return action, self._disturbance.applied(action)
 
 
+def require_rate(control_hz: float) -> None:
+    """Check that a robot takes an action when an expert chooses one.
+
+    Raises:
+        ProfileError: If its control rate is another.
+    """
+    if not math.isclose(control_hz * PERIOD_S, 1.0):
+        raise ProfileError(
+            f"This robot has control_hz = {control_hz:g}, and the experts that demonstrate driving "
+            f"choose {1.0 / PERIOD_S:g} actions a second: set control_hz = {1.0 / PERIOD_S:g}."
+        )
+
+
 def course_expert(world: MujocoWorld) -> CourseExpert:
     """Make the expert for the present course of a world."""
     return CourseExpert(world.course, world.vehicle.name, path=world.path())
-
-
-def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
-    """Return what a teacher sees, shape (11,).
-
-    Distances from the middle of the front bumper at `BEARINGS_DEG`, m, up to `FARTHEST_M`; speed
-    along the heading, m/s; rate of turn, rad/s, counter-clockwise.
-    """
-    seen = world.inputs()
-    distances = world.ranges_m(_BEARINGS, FARTHEST_M)
-    return np.array((*distances, seen.speed, seen.yaw_rate), np.float32)
-
-
-def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
-    """Return an action that moves a standing vehicle, unless its throttle is exactly 0.
-
-    A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest.
-    The vehicle then observes the same numbers indefinitely and stands for good. In training,
-    exploration moved it, so training hardly saw this.
-
-    Args:
-        action: Steering and throttle, shape (2,).
-        stands: Whether the vehicle stands.
-    """
-    steering, throttle = action
-    if not stands or throttle == 0.0 or abs(throttle) >= LEAST_THROTTLE:
-        return action
-    return np.array((steering, np.copysign(LEAST_THROTTLE, throttle)), action.dtype)
 
 
 class ExpertDriver:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
@@ -24,9 +23,10 @@ from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.vehicles.bodies import require_fit, vehicle_model
 from shapechanger.vehicles.bodies.parts import CameraJitter
 from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING, Look
-from shapechanger.vehicles.envs.demonstrators import Demonstrator, ExpertDriver
-from shapechanger.vehicles.expert.traits import PERIOD_S
 from shapechanger.vehicles.world import MujocoWorld
+
+if TYPE_CHECKING:
+    from shapechanger.vehicles.envs.demonstrators import Demonstrator, ExpertDriver
 
 Steering = Literal["proportional", "bang"]
 """Steering angles: any, or only full left, straight and full right, as in 2017."""
@@ -353,7 +353,10 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         Raises:
             ProfileError: If the robot has another control rate than the expert.
         """
-        self._require_rate_of_expert()
+        # Experts, and SciPy for their paths, are only loaded where they drive.
+        from shapechanger.vehicles.envs.demonstrators import ExpertDriver, require_rate
+
+        require_rate(self.metadata["render_fps"])
         return ExpertDriver(self._world)
 
     def demonstrator(self, seed: int) -> Demonstrator:
@@ -365,8 +368,10 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         Raises:
             ProfileError: If the robot has another control rate than the expert.
         """
-        self._require_rate_of_expert()
-        return Demonstrator(self._world, lambda: partial(ExpertDriver(self._world), None), seed)
+        from shapechanger.vehicles.envs.demonstrators import Demonstrator
+
+        self.expert()  # Checks the control rate.
+        return Demonstrator(self._world, lambda: partial(self.expert(), None), seed)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the camera's picture, shape (height, width, 3); None without a render mode."""
@@ -386,19 +391,6 @@ class DriveEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
     def close(self) -> None:
         """Release the renderer, if there is one."""
         self._world.close()
-
-    def _require_rate_of_expert(self) -> None:
-        """Check that the robot takes an action when an expert chooses one.
-
-        Raises:
-            ProfileError: If its control rate is another.
-        """
-        rate = self.metadata["render_fps"]
-        if not math.isclose(rate * PERIOD_S, 1.0):
-            raise ProfileError(
-                f"This robot has control_hz = {rate:g}, and the experts that demonstrate driving "
-                f"choose {1.0 / PERIOD_S:g} actions a second: set control_hz = {1.0 / PERIOD_S:g}."
-            )
 
     def _truth(self, progress_m: float) -> dict[str, Any]:
         """Return the entries of `info` that no sensor measures, given the progress, m."""

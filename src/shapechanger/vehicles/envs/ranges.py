@@ -20,13 +20,22 @@ from shapechanger.robot.guard.limits import (
     slewed,
 )
 from shapechanger.robot.guard.plan import GuardPlan, output_values
-from shapechanger.vehicles.envs.demonstrators import (
-    BEARINGS_DEG,
-    FARTHEST_M,
-    leave_rest,
-    observe_ranges,
-)
 from shapechanger.vehicles.envs.drive import Courses, DriveEnv, simulated_robot, space_of
+from shapechanger.vehicles.world import MujocoWorld
+
+BEARINGS_DEG: Final = (-90, -60, -35, -15, 0, 15, 35, 60, 90)
+"""Bearings of the distances that a teacher sees, degrees from the heading, positive to the left."""
+
+FARTHEST_M: Final = 6.0
+"""Distance that it sees where nothing is nearer, m."""
+
+LEAST_THROTTLE: Final = 0.25
+"""Least throttle of a teacher's vehicle that stands, in size; it overcomes the friction at rest.
+
+`shapechanger.vehicles.learning` holds its students to the same.
+"""
+
+_BEARINGS: Final = np.radians(BEARINGS_DEG)
 
 COLLISION_REWARD: Final = -3.0
 """Reward of a collision: it costs three metres."""
@@ -102,6 +111,34 @@ class MeanOutputs:
                 )
         outputs = self._plan.outputs
         return {out.part: one / ticks for out, one in zip(outputs, total, strict=True)}
+
+
+def observe_ranges(world: MujocoWorld) -> NDArray[np.float32]:
+    """Return what a teacher sees, shape (11,).
+
+    Distances from the middle of the front bumper at `BEARINGS_DEG`, m, up to `FARTHEST_M`; speed
+    along the heading, m/s; rate of turn, rad/s, counter-clockwise.
+    """
+    seen = world.inputs()
+    distances = world.ranges_m(_BEARINGS, FARTHEST_M)
+    return np.array((*distances, seen.speed, seen.yaw_rate), np.float32)
+
+
+def leave_rest(action: NDArray[Any], stands: bool) -> NDArray[Any]:
+    """Return an action that moves a standing vehicle, unless its throttle is exactly 0.
+
+    A teacher acts by its means, and a mean throttle near 0 does not overcome the friction at rest.
+    The vehicle then observes the same numbers indefinitely and stands for good. In training,
+    exploration moved it, so training hardly saw this.
+
+    Args:
+        action: Steering and throttle, shape (2,).
+        stands: Whether the vehicle stands.
+    """
+    steering, throttle = action
+    if not stands or throttle == 0.0 or abs(throttle) >= LEAST_THROTTLE:
+        return action
+    return np.array((steering, np.copysign(LEAST_THROTTLE, throttle)), action.dtype)
 
 
 class RangesEnv(DriveEnv):

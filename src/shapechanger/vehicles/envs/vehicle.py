@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from shapechanger.errors import RenderError, UnknownName
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.vehicles.envs.demonstrators import Demonstrator, leave_rest, observe_ranges
 from shapechanger.vehicles.envs.drive import (
     Courses,
     DriveEnv,
@@ -21,8 +20,12 @@ from shapechanger.vehicles.envs.drive import (
     simulated_robot,
     space_of,
 )
+from shapechanger.vehicles.envs.ranges import leave_rest, observe_ranges
 from shapechanger.vehicles.envs.sensed import SensedVehicle
 from shapechanger.vehicles.envs.shift import certify_vehicles
+
+if TYPE_CHECKING:
+    from shapechanger.vehicles.envs.demonstrators import Demonstrator
 
 _MODES: Final = ("rgb_array",)
 _ABSENT: Final = "absent"
@@ -183,7 +186,9 @@ class VehicleEnv(DriveEnv):
         Raises:
             ProfileError: If the robot has another control rate than the teacher.
         """
-        self._require_rate_of_expert()
+        from shapechanger.vehicles.envs.demonstrators import Demonstrator, require_rate
+
+        require_rate(self.metadata["render_fps"])
 
         def teach() -> NDArray[np.float32]:
             action = act(observe_ranges(self._world)[np.newaxis])[0].astype(np.float32)

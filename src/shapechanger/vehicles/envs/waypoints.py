@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from shapechanger.errors import ProfileError
 from shapechanger.vehicles.bodies import vehicle_model
 from shapechanger.vehicles.courses.course import FLOODED
-from shapechanger.vehicles.envs.demonstrators import Demonstrator, course_expert
+from shapechanger.vehicles.envs.demonstrators import Demonstrator, course_expert, require_rate
 from shapechanger.vehicles.envs.drive import Courses, DriveEnv, simulated_robot
 from shapechanger.vehicles.envs.ranges import RangesEnv
 from shapechanger.vehicles.envs.shift import certify_vehicles
@@ -155,7 +155,7 @@ class WaypointEnv(WaypointView, DriveEnv):
         Raises:
             ProfileError: If the robot has another control rate than the expert.
         """
-        self._require_rate_of_expert()
+        require_rate(self.metadata["render_fps"])
         return waypoint_demonstrator(self.world, seed)
 
     def _split(self, seen: Any) -> tuple[float, NDArray[np.uint8]]:
