@@ -57,12 +57,7 @@ class Propeller:
     pushes: float
 
     def loads(self, n: float, u: float) -> tuple[float, float]:
-        """Thrust, N, and torque, N·m.
-
-        Args:
-            n: Turns per second; negative is backwards.
-            u: Speed of the boat through the water, m/s.
-        """
+        """Thrust, N, and torque, N·m, at turns per second and a speed through the water, m/s."""
         inflow = self.wake * u / self.diameter
         common = _WATER_DENSITY * self.diameter**4 * abs(n) * (self.astern if n < 0.0 else 1.0)
         thrust = common * self.thrust * (n - inflow / self.thrust_ends)
@@ -70,12 +65,7 @@ class Propeller:
         return thrust, torque
 
     def wash(self, thrust: float, u: float) -> float:
-        """Speed of the water behind the propeller, m/s, by momentum theory.
-
-        Args:
-            thrust: Thrust, N.
-            u: Speed of the boat through the water, m/s.
-        """
+        """Speed of the water behind the propeller at a thrust, N, by momentum theory, m/s."""
         ahead = self.wake * u
         if thrust <= 0.0 or ahead < 0.0:
             return ahead
@@ -110,13 +100,9 @@ class Fin:
         return 0.5 * _WATER_DENSITY * self.height * self.chord * slope
 
     def force(self, flow: float, v: float, r: float, angle: float) -> tuple[float, float, float]:
-        """Forces X and Y, N, and moment N, N·m.
+        """Forces X and Y, N, and moment N, N·m, in a flow from ahead, m/s.
 
-        Args:
-            flow: Speed of the water from ahead, m/s.
-            v: Sway, m/s.
-            r: Rate of turn, rad/s.
-            angle: Angle of the blade, rad, counter-clockwise; a negative one turns the boat left.
+        `angle` is that of the blade, rad, counter-clockwise; a negative one turns the boat left.
         """
         aside = v + self.x * r
         sine, cosine = math.sin(angle), math.cos(angle)

@@ -61,10 +61,8 @@ class Axles:
     def angles(self, steering: float) -> tuple[float, float]:
         """Angles of the left and the right wheel, rad, positive to the left.
 
-        All wheels roll around one point on the line of the rear axle (Ackermann's condition).
-
-        Args:
-            steering: Output from -1, left, to 1, right.
+        All wheels roll around one point on the line of the rear axle (Ackermann's condition). The
+        output is from -1, left, to 1.
         """
         curvature = math.tan(-steering * self.full_lock) / self.wheelbase
         along, half = self.wheelbase * curvature, curvature * self.gauge / 2

@@ -116,13 +116,7 @@ class BoundVehicle(ABC):
         """Set position and velocity of the chassis; see `place`."""
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Put the vehicle at a pose, at rest and with straight wheels.
-
-        Args:
-            x: Position, m.
-            y: Position, m.
-            heading: Angle from the x axis, rad, counter-clockwise.
-        """
+        """Put the vehicle at a pose, m and rad, at rest and with straight wheels."""
         self._place_chassis(x, y, heading)
         for qpos, qvel in self._joints:
             self._qpos[qpos] = 0.0
@@ -133,12 +127,7 @@ class BoundVehicle(ABC):
         mujoco.mj_forward(self._model, self._data)
 
     def drive(self, outputs: Outputs, battery_v: float) -> None:
-        """Apply outputs and, to a boat, the forces of the water; call it every 10 ms.
-
-        Args:
-            outputs: Output of each part; 0 for those that are missing.
-            battery_v: Voltage of the battery under load.
-        """
+        """Apply outputs and, to a boat, the forces of the water; call it every 10 ms."""
         for part, drive in self._drives.items():
             drive.set(outputs.get(part, 0.0), battery_v)
 
@@ -155,12 +144,7 @@ class BoundVehicle(ABC):
         return sum([drive.current_a() for drive in self._drives.values()])
 
     def set_current(self, vx: float, vy: float) -> None:
-        """Set the flow of the water; land vehicles ignore it, and `place` keeps it.
-
-        Args:
-            vx: Flow along the world's x axis, m/s.
-            vy: Flow along the world's y axis, m/s.
-        """
+        """Set the flow of the water, m/s; land vehicles ignore it, and `place` keeps it."""
         self._flow = (vx, vy)
 
 
@@ -239,13 +223,7 @@ class ContactTracker:
         self._since_s = math.inf
 
     def follow(self, data: mujoco.MjData, motion: Motion, dt_s: float) -> None:
-        """Update from the contacts of a simulation step.
-
-        Args:
-            data: State after the step.
-            motion: Pose of the vehicle.
-            dt_s: Length of the step, s.
-        """
+        """Update from the contacts of a simulation step of this length, s."""
         self._since_s += dt_s
         self.bumped = self.touches = False
         if data.ncon == 0:

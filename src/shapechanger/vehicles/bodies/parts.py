@@ -41,13 +41,7 @@ def add_look(
 ) -> None:
     """Add a simple visual geom for the own camera: without mass and collisions.
 
-    Args:
-        body: Body to extend.
-        kind: Shape.
-        pos: Position, m.
-        size: MuJoCo sizes of the shape, m.
-        material: Name of its material.
-        euler_deg: Orientation, x-y-z Euler angles.
+    Its sizes are MuJoCo's, m; its orientation is x-y-z Euler angles.
     """
     quat = np.empty(4)
     mujoco.mju_euler2Quat(quat, np.radians(euler_deg), "xyz")
@@ -65,16 +59,7 @@ def add_hull(
     size: ArrayLike,
     mass: float,
 ) -> None:
-    """Add a hidden collision geom with mass and slightly soft contacts.
-
-    Args:
-        body: Body to extend.
-        name: Name of the geom.
-        kind: Shape.
-        pos: Position, m.
-        size: MuJoCo sizes of the shape, m.
-        mass: Mass, kg.
-    """
+    """Add a hidden collision geom with a mass, kg, and slightly soft contacts."""
     body.add_geom(
         name=name, type=kind, pos=pos, size=_three(size), mass=mass,
         friction=[HULL_FRICTION, 0.005, 0.0001], priority=1, condim=3,
@@ -149,12 +134,7 @@ class CameraMount:
     fovy_deg: float = PI_CAMERA_FOVY_DEG
 
     def aimed(self, pitch_deg: float | None, fovy_deg: float | None) -> CameraMount:
-        """Return the mount with the pitch and the field of view that a profile states.
-
-        Args:
-            pitch_deg: Angle of the optical axis below the horizon; None to keep the mount's.
-            fovy_deg: Vertical field of view; None to keep the mount's.
-        """
+        """Return the mount with the pitch and the field of view, degrees, that a profile states."""
         return replace(
             self,
             pitch_rad=self.pitch_rad if pitch_deg is None else math.radians(pitch_deg),
@@ -173,12 +153,7 @@ def add_camera(body: mujoco.MjsBody, mount: CameraMount) -> None:
 
 
 def aim_camera(camera: mujoco.MjsCamera, mount: CameraMount) -> None:
-    """Change the pose and the field of view of a camera.
-
-    Args:
-        camera: Camera to change.
-        mount: Its new pose and field of view.
-    """
+    """Change the pose and the field of view of a camera."""
     s, c = math.sin(mount.pitch_rad), math.cos(mount.pitch_rad)
     # The columns are its axes: x to the right, y up, and z backwards, against its view.
     axes = np.array([[0.0, s, -c], [-1.0, 0.0, 0.0], [0.0, c, s]])
@@ -301,12 +276,7 @@ class DcMotor:
         return self.torque_per_current * self.volts_per_speed / self.resistance
 
     def geared(self, ratio: float, efficiency: float = 1.0) -> DcMotor:
-        """The motor with one more gear stage.
-
-        Args:
-            ratio: Turns of this shaft per turn of the next.
-            efficiency: Share of the torque that the stage transmits, 0 to 1.
-        """
+        """The motor with one more gear stage: turns of this shaft per turn of the next."""
         return replace(
             self,
             volts_per_speed=self.volts_per_speed * ratio,
@@ -315,11 +285,9 @@ class DcMotor:
         )
 
     def amperes(self, volts: float, speed: float) -> float:
-        """Current from the battery, A; 0 while the motor brakes through its bridge.
+        """Current from the battery, A, at a voltage and a speed of the shaft, rad/s.
 
-        Args:
-            volts: Voltage at the motor.
-            speed: Speed of the shaft, rad/s.
+        It is 0 while the motor brakes through its bridge.
         """
         current = (volts - self.volts_per_speed * speed) / self.resistance
         return max(0.0, current if volts > 0.0 else -current) if volts else 0.0
@@ -369,14 +337,7 @@ class ServoMotor:
         return self.stall_torque / self.free_rate
 
     def add(self, spec: mujoco.MjSpec, name: str, joint: str, share: float = 1.0) -> None:
-        """Add the servo as an actuator controlled by an angle in rad.
-
-        Args:
-            spec: Model to extend.
-            name: Name of the actuator.
-            joint: Name of its joint.
-            share: Share of the torque that this joint gets.
-        """
+        """Add the servo as an actuator controlled by an angle, rad, with a share of its torque."""
         torque = share * self.stall_torque
         stiffness = torque / self.error_at_stall
         servo = _add_actuator(

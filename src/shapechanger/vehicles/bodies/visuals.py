@@ -191,14 +191,7 @@ def _add_shape(
 
 
 def dress(body: mujoco.MjsBody, name: str, paint: Paint, *, ground_z: float = 0.0) -> None:
-    """Add what is seen of a body from outside, and its reflection in a glossy ground.
-
-    Args:
-        body: Body to extend.
-        name: Object in the vehicle's meshes, such as "chassis".
-        paint: Materials and meshes.
-        ground_z: Height of the ground in the frame of the body, m.
-    """
+    """Add the object of this name, and its reflection in a glossy ground at `ground_z`, m."""
     for colour, (faces, _) in paint.meshes[name].items():
         below = faces[:, [0, 3, 2, 1]] * (1.0, 1.0, -1.0) + (0.0, 0.0, 2.0 * ground_z)
         both, light = np.concatenate([faces, below]), np.tile(shading(faces), 2)
@@ -219,15 +212,7 @@ def add_shadow(
     *,
     ground_z: float = 0.0,
 ) -> None:
-    """Add a soft shadow on the ground, which is seen from outside only.
-
-    Args:
-        body: Body to extend.
-        low: x and y of a corner of the footprint, m.
-        high: x and y of the opposite corner, m.
-        paint: Materials.
-        ground_z: Height of the ground in the frame of the body, m.
-    """
+    """Add a soft shadow of a rectangle on the ground, which is seen from outside only."""
     faces = _layers(low, high, ground_z)
     name = f"{body.name}/shadow"
     _add_shape(body, name, faces, np.zeros(len(faces)), paint.shadow(), paint)
@@ -250,13 +235,7 @@ def _layers(low: tuple[float, float], high: tuple[float, float], ground_z: float
 
 
 def dress_wheel(wheel: mujoco.MjsBody, radius: float, paint: Paint) -> None:
-    """Add tyre and rim of a wheel, which are seen from outside only.
-
-    Args:
-        wheel: Body of the wheel, whose axle is its y axis.
-        radius: Radius, m.
-        paint: Materials and meshes.
-    """
+    """Add tyre and rim of a wheel, which are seen from outside only; its axle is its y axis."""
     for colour, (faces, _) in paint.meshes["wheel"].items():
         name = f"vehicle/{colour} of wheels"
         dark, material = np.zeros(len(faces)), paint.lit(colour, turning=True)

@@ -133,17 +133,9 @@ class OnboardCamera(_Renderer):
         self._camera.fixedcamid = model.camera(camera).id
 
     def picture(self, model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.uint8]:
-        """Render a state.
+        """Render a state of the selected model: RGB, shape (height, width, 3), in a new array.
 
-        Args:
-            model: The selected model.
-            data: Its state.
-
-        Returns:
-            RGB picture, shape (height, width, 3), in a new array.
-
-        Raises:
-            RenderError: If no model was selected, or no OpenGL context can be opened.
+        Raises a `RenderError` if no model was selected, or no OpenGL context can be opened.
         """
         return self._render(model, data)[::-1].copy()
 

@@ -47,12 +47,7 @@ _KEPT: Final = 64
 
 
 def night(picture: Picture, seed: int) -> Picture:
-    """Darken a picture to half of its brightness, bluish, with a raised gain's noise of 9 levels.
-
-    Args:
-        picture: Shape (H, W, 3).
-        seed: Seed of the fault, at least 0.
-    """
+    """Halve the brightness of a picture, bluish, with a raised gain's noise of 9 levels."""
     _require_picture(picture)
     dark = np.empty(picture.shape, np.float32)
     for channel, table in enumerate(_night_tables()):
@@ -62,24 +57,14 @@ def night(picture: Picture, seed: int) -> Picture:
 
 
 def glare(picture: Picture, seed: int) -> Picture:
-    """Add light shining into the lens from the upper half of a picture: up to 230 levels.
-
-    Args:
-        picture: Shape (H, W, 3).
-        seed: Seed of the fault, at least 0.
-    """
+    """Add light shining into the lens from the upper half of a picture: up to 230 levels."""
     _require_picture(picture)
     added = _glare(seed, *picture.shape[:2])
     return _bytes(picture + added)
 
 
 def blur(picture: Picture, seed: int) -> Picture:
-    """Defocus a picture by 1.25 % of its width.
-
-    Args:
-        picture: Shape (H, W, 3).
-        seed: Has no effect.
-    """
+    """Defocus a picture by 1.25 % of its width; the seed has no effect."""
     del seed
     _require_picture(picture)
     variance = (_BLUR * picture.shape[1]) ** 2
@@ -92,12 +77,7 @@ def blur(picture: Picture, seed: int) -> Picture:
 
 
 def dirt(picture: Picture, seed: int) -> Picture:
-    """Add 8 to 14 spots of mud that absorb 45 to 85 % of the light.
-
-    Args:
-        picture: Shape (H, W, 3).
-        seed: Seed of their places, at least 0.
-    """
+    """Add 8 to 14 spots of mud, at places of the seed, that absorb 45 to 85 % of the light."""
     _require_picture(picture)
     keeps, mud = _dirt(seed, *picture.shape[:2])
     return _bytes(picture * keeps + mud)

@@ -73,10 +73,6 @@ def start_pose(course: Course, seed: int) -> Pose:
 
     There is no obstacle within 0.35 m of the route from 1 m behind to 2 m ahead, and the metre
     behind is nearly straight, so that a trailer fits too.
-
-    Args:
-        course: The course.
-        seed: Seed of the draw.
     """
     route = course.route
     free = np.ones(len(route), dtype=bool)

@@ -90,18 +90,10 @@ class BankKind:
 def _dig_channel(
     rng: np.random.Generator, shape: ChannelShape, spacing: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Try to lay out a route.
+    """Try to lay out a route: points, m, (n, 2), and distance from the banks, m, (n,).
 
-    The corners of a loop on a grid are smoothed more and more until the lane fits everywhere.
-
-    Args:
-        rng: Random generator.
-        shape: Ranges of the shape.
-        spacing: Distance between points of the route, m.
-
-    Returns:
-        The route, m, (n, 2), and its distance from the banks, m, (n,); None if the random loop is
-        too tight or too close to itself.
+    The corners of a loop on a grid are smoothed more and more until the lane fits everywhere. None
+    if the random loop is too tight or too close to itself.
     """
     loop = trace_outline(grow_cells(rng, int(rng.integers(shape.cells[0], shape.cells[1] + 1))))
     if loop is None:
@@ -155,13 +147,9 @@ def build_banks(
     half_width: NDArray[np.float64],
     kinds: tuple[BankKind, ...],
 ) -> tuple[tuple[Wall, ...], tuple[Wall, ...]]:
-    """Walls on the left and on the right of a route, each a closed line.
+    """Walls on the left and on the right of a route, m, (n, 2), at a distance, m, (n,).
 
-    Args:
-        rng: Random generator.
-        route: Middle of the lane, m, (n, 2).
-        half_width: Distance of the banks, m, (n,).
-        kinds: Kinds of bank to draw from.
+    Each side is a closed line of randomly drawn kinds of bank.
     """
     aside = normals(route) * half_width[:, None]
     left = _bank(rng, (route + aside)[::-1], kinds)
@@ -241,16 +229,7 @@ _WORLDS: Final = msgspec.convert(
 
 
 def open_course(name: str, rng: np.random.Generator, seed: int) -> Course | None:
-    """Try to lay out a yard or a harbour.
-
-    Args:
-        name: Kind of course, "yard" or "harbour".
-        rng: Random generator.
-        seed: Seed to record in the course.
-
-    Returns:
-        The course, or None if the random layout does not fit.
-    """
+    """Try to lay out a yard or a harbour; None if the random layout does not fit."""
     world = _WORLDS[name]
     channel = _dig_channel(rng, world.shape, _SPACING_M)
     if channel is None:

@@ -41,13 +41,10 @@ _Point = NDArray[np.float64]
 def panel_walls(
     rng: np.random.Generator, corners: NDArray[np.float64], bends: NDArray[np.int64], height: float
 ) -> tuple[Wall, ...]:
-    """Walls along a closed line of corners, with the lane on their left.
+    """Walls along a closed line of corners, m, (n, 2), with the lane on their left.
 
-    Args:
-        rng: Random generator.
-        corners: Corners, m, (n, 2); legs are at least 1.5 m long and at right angles.
-        bends: 1 for corners that stand out into the lane, -1 for nooks, (n,).
-        height: Height of the walls, m.
+    Legs are at least 1.5 m long and at right angles; `bends` is 1 for corners that stand out into
+    the lane, and -1 for nooks, (n,).
     """
     n = len(corners)
     # Length by which corners are cut off, mostly 0.
@@ -125,15 +122,7 @@ _FURNITURE_SHARES = (0.2, 0.2, 0.18, 0.18, 0.14, 0.1)
 
 
 def corridor(rng: np.random.Generator, seed: int) -> Course | None:
-    """Try to lay out a corridor.
-
-    Args:
-        rng: Random generator.
-        seed: Seed to record in the course.
-
-    Returns:
-        The course, or None if the random layout does not fit.
-    """
+    """Try to lay out a corridor; None if the random layout does not fit."""
     corners = _corners(rng)
     if corners is None:
         return None

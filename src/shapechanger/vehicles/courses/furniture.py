@@ -22,13 +22,9 @@ from shapechanger.vehicles.courses.geometry import (
 
 
 def weighted_choice(rng: np.random.Generator, shares: Sequence[float]) -> int:
-    """Draw an index with a probability proportional to its share.
+    """Draw an index with a probability proportional to its share, >= 0.
 
     `Generator.choice` is thirty times slower, and this is called for every panel of a wall.
-
-    Args:
-        rng: Random generator.
-        shares: Weights, >= 0.
     """
     left = float(rng.random()) * sum(shares)
     for i, share in enumerate(shares):
@@ -55,12 +51,7 @@ class Size:
     height: tuple[float, float]
 
     def draw(self, rng: np.random.Generator, yaw: float) -> Obstacle:
-        """Draw an obstacle at the origin; a round one is as wide as it is long.
-
-        Args:
-            rng: Random generator.
-            yaw: Angle of its length, rad.
-        """
+        """Draw an obstacle at the origin; a round one is as wide as long, and its yaw is 0."""
         length, width, height = (
             float(rng.uniform(*bounds)) for bounds in (self.length, self.width, self.height)
         )
@@ -116,15 +107,7 @@ class LaneObstacles:
         self._passed_left: list[bool] = []
 
     def offer(self, obstacle: Obstacle, s: float) -> bool:
-        """Add an obstacle if it fits.
-
-        Args:
-            obstacle: The obstacle.
-            s: Distance of its middle along the route, m.
-
-        Returns:
-            Whether it was added.
-        """
+        """Add an obstacle `s` m along the route if it fits; return whether it was added."""
         reach = max(obstacle.length, obstacle.width) / 2.0
         s %= self._round_m
         if s - reach < _FREE_AHEAD_M or self._round_m - s - reach < _FREE_BEHIND_M:
@@ -169,13 +152,9 @@ class Scatter(Size):
 def scatter_obstacles(
     rng: np.random.Generator, obstacles: LaneObstacles, kinds: tuple[Scatter, ...], per_m: float
 ) -> None:
-    """Scatter obstacles over a lane.
+    """Scatter obstacles of these kinds over a lane.
 
-    Args:
-        rng: Random generator.
-        obstacles: The lane and its obstacles, which are added to.
-        kinds: Kinds to draw from.
-        per_m: Mean number of attempts per metre; obstacles that do not fit are dropped.
+    Attempts are drawn with a mean of `per_m` for each metre; obstacles that do not fit are dropped.
     """
     route, half_width = obstacles.lane.route, obstacles.half_width
     along, left = arc_lengths(route), normals(route)
@@ -202,13 +181,7 @@ def scatter_obstacles(
 def place_sun_patches(
     rng: np.random.Generator, route: NDArray[np.float64], half_width: NDArray[np.float64]
 ) -> tuple[Lamp, ...]:
-    """Two to eight patches of sun on a lane.
-
-    Args:
-        rng: Random generator.
-        route: Middle of the lane, m, (n, 2).
-        half_width: Half width of the lane, m, (n,).
-    """
+    """Two to eight patches of sun on a lane: its middle, m, (n, 2), and half width, m, (n,)."""
     left = normals(route)
     lamps: list[Lamp] = []
     for _ in range(int(rng.integers(2, 9))):

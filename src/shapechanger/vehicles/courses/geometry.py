@@ -30,16 +30,7 @@ def arc_lengths(line: Points) -> NDArray[np.float64]:
 def interpolate(
     line: NDArray[np.float64], knots: NDArray[np.float64], s: NDArray[np.float64]
 ) -> Points:
-    """Interpolate values linearly along a closed line.
-
-    Args:
-        line: Values at its points, (n, k).
-        knots: Distances from `arc_lengths`, m, (n + 1,).
-        s: Distances to interpolate at, m, (m,); they wrap around.
-
-    Returns:
-        Values at `s`, (m, k).
-    """
+    """Values, (n, k), interpolated at distances along a closed line, m, which wrap: (m, k)."""
     whole = np.concatenate([line, line[:1]])
     s = np.mod(s, knots[-1])
     columns = [np.interp(s, knots, whole[:, k]) for k in range(whole.shape[1])]
@@ -47,14 +38,10 @@ def interpolate(
 
 
 def resample(line: Points, spacing: float) -> Points:
-    """Resample a closed line to points that are equally far apart in a straight line.
+    """Resample a closed line, m, (n, 2), to points that are about `spacing` m apart, equally far.
 
     Equal arc lengths give unequal chords on a curved line; after two corrections they differ by
     less than a thousandth on curves that vehicles can drive.
-
-    Args:
-        line: Points, m, (n, 2).
-        spacing: Approximate distance between the new points, m.
     """
     knots = arc_lengths(line)
     n = max(8, round(float(knots[-1]) / spacing))
@@ -66,22 +53,12 @@ def resample(line: Points, spacing: float) -> Points:
 
 
 def even_distances(length_m: float, n: int) -> NDArray[np.float64]:
-    """Evenly spaced distances from 0 along a closed line, m, (n,).
-
-    Args:
-        length_m: Length of the line, m.
-        n: Number of distances.
-    """
+    """Evenly spaced distances from 0 along a closed line of this length, m, (n,)."""
     return np.arange(n, dtype=np.float64) * (length_m / n)
 
 
 def smooth(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
-    """Smooth values along a closed line with a periodic Gaussian filter.
-
-    Args:
-        values: Values at the points, (n, ...).
-        sigma: Standard deviation of the Gaussian, in points.
-    """
+    """Values along a closed line, (n, ...), after a periodic Gaussian filter of `sigma` points."""
     n = len(values)
     waves = np.exp(-2.0 * (np.pi * sigma * np.fft.rfftfreq(n)) ** 2)
     spectrum = np.fft.rfft(values, axis=0)
@@ -129,13 +106,9 @@ _SIDES = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 def grow_cells(rng: np.random.Generator, size: int) -> frozenset[Cell]:
-    """Grow a random set of cells that are connected by their sides.
+    """Grow a random set of `size` cells that are connected by their sides.
 
     The set may have holes, and cells that touch at a corner only; `trace_outline` rejects those.
-
-    Args:
-        rng: Random generator.
-        size: Number of cells.
     """
     cells: set[Cell] = {(0, 0)}
     while len(cells) < size:
@@ -169,14 +142,7 @@ def trace_outline(cells: frozenset[Cell]) -> NDArray[np.int64] | None:
 def scale_grid(
     rng: np.random.Generator, loop: NDArray[np.int64], shortest_m: float, longest_m: float
 ) -> NDArray[np.float64]:
-    """Scale a loop to metres, with a random width for each row and column of the grid.
-
-    Args:
-        rng: Random generator.
-        loop: Grid points, (n, 2).
-        shortest_m: Smallest width of a row or column, m.
-        longest_m: Largest width, m.
-    """
+    """Scale a loop of grid points, (n, 2), to metres; each row and column has a random width."""
     steps = rng.uniform(shortest_m, longest_m, size=(2, int(np.ptp(loop)) + 2))
     lines = np.cumsum(steps, axis=1)
     shifted = loop - loop.min(axis=0)
@@ -193,12 +159,7 @@ def wall_segments(walls: Iterable[Wall]) -> Segments:
 
 
 def distances_to_segments(points: NDArray[np.float64], pieces: Segments) -> NDArray[np.float64]:
-    """Distance of each point from each segment, m, (n, m).
-
-    Args:
-        points: Points, m, (n, 2).
-        pieces: Segments, m, (m, 4).
-    """
+    """Distance of each point, m, (n, 2), from each segment: m, (n, m)."""
     x, y = points[:, 0:1] - pieces[:, 0], points[:, 1:2] - pieces[:, 1]
     dx, dy = pieces[:, 2] - pieces[:, 0], pieces[:, 3] - pieces[:, 1]
     share = np.clip((x * dx + y * dy) / np.maximum(dx * dx + dy * dy, 1e-12), 0.0, 1.0)
@@ -228,12 +189,7 @@ def box_sides(obstacle: Obstacle) -> Segments:
 
 
 def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.float64]:
-    """Distance of an obstacle from each segment, m, (m,); 0 or less where they overlap.
-
-    Args:
-        obstacle: The obstacle.
-        pieces: Segments, m, (m, 4).
-    """
+    """Distance of an obstacle from each segment, m, (m,); 0 or less where they overlap."""
     if obstacle.is_round:
         return (
             distances_to_segments(np.array([[obstacle.x, obstacle.y]]), pieces)[0]
@@ -248,12 +204,7 @@ def distances_from_obstacle(obstacle: Obstacle, pieces: Segments) -> NDArray[np.
 
 
 def obstacle_gap(one: Obstacle, other: Obstacle) -> float:
-    """Return the distance between two obstacles, m; 0 or less where they overlap.
-
-    Args:
-        one: An obstacle.
-        other: Another one.
-    """
+    """Distance between two obstacles, m; 0 or less where they overlap."""
     if other.is_round:
         return _from_point(one, other.x, other.y) - other.length / 2.0
     if one.is_round:
@@ -329,13 +280,10 @@ class ClearanceField:
         self._obstacles = course.obstacles
 
     def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of each point from the nearest wall or obstacle, m, (N,).
+        """Distance of each point, m, (N, 2), from the nearest wall or obstacle, m, (N,).
 
         It is at most `FAR_M`, and 0 inside an obstacle. It is fast if neighbours in the array are
         close to each other.
-
-        Args:
-            points: Points, m, (N, 2).
         """
         parts = [self._near(points[i : i + _CHUNK]) for i in range(0, len(points), _CHUNK)]
         return np.concatenate([np.empty(0), *parts])

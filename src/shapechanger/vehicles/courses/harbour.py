@@ -36,12 +36,9 @@ _HOUSES: Final = 26
 
 
 def add_banks(course: Course, walls: dict[str, QuadMesh], light: Callable[[Array], Array]) -> None:
-    """Add tops and rear sides of the walls, so that they are quays and moles from above.
+    """Add tops and rear sides to the meshes of walls, so that they are quays and moles from above.
 
-    Args:
-        course: The course.
-        walls: Meshes to extend, keyed by texture; tops of quays are "paving".
-        light: Brightness at points, m, (..., 2), from 0 to 1.
+    `light` returns the brightness at points, m, (..., 2), from 0 to 1; tops of quays are "paving".
     """
     for wall, (start, end) in zip(course.walls, _rears(course.walls), strict=True):
         front = np.array([wall.start, wall.end])
@@ -168,11 +165,7 @@ class MooredBoat(NamedTuple):
 
 
 def moored(course: Course) -> list[MooredBoat]:
-    """Boats along the rear sides of quays, where there is room.
-
-    Args:
-        course: The course.
-    """
+    """Boats along the rear sides of quays, where there is room."""
     rng = np.random.default_rng([course.seed, 80])
     starts = np.array([wall.start for wall in course.walls])
     ways = np.array([wall.end for wall in course.walls]) - starts
@@ -202,13 +195,7 @@ def moored(course: Course) -> list[MooredBoat]:
 
 
 def add_dinghy(mesh: QuadMesh, obstacle: Obstacle, light: float) -> None:
-    """Add a dinghy, blunt at both ends and so nearly as wide as its collision box.
-
-    Args:
-        mesh: Mesh with the texture "things" to extend.
-        obstacle: Its place and size.
-        light: Brightness, 0 to 1.
-    """
+    """Add a dinghy, blunt at both ends and so nearly as wide as its collision box."""
     kind = "cabin dinghy" if round(1000.0 * obstacle.length) % 2 else "dinghy"  # Half of them.
     size = obstacle.length, obstacle.width, obstacle.height
     add_solids(mesh, kind, (obstacle.x, obstacle.y, 0.0), obstacle.yaw, size, light)

@@ -17,13 +17,8 @@ def clouds(
 ) -> Field:
     """Soft random patches with mean 0 and standard deviation 1, which tile seamlessly.
 
-    Args:
-        rng: Random generator.
-        height: Height, pixels.
-        width: Width, pixels.
-        rows: Number of patches from top to bottom.
-        columns: Number of patches from left to right.
-        octaves: Number of layers; each has twice as many patches as the last, half as strong.
+    The picture of height x width pixels has rows x columns patches. Each octave has twice as many
+    patches as the last, half as strong.
     """
     total = np.zeros((height, width), np.float32)
     for octave in range(octaves):
@@ -34,24 +29,12 @@ def clouds(
 
 
 def grain(rng: np.random.Generator, height: int, width: int) -> Field:
-    """White noise, (height, width), with mean 0 and standard deviation 1.
-
-    Args:
-        rng: Random generator.
-        height: Height, pixels.
-        width: Width, pixels.
-    """
+    """White noise, (height, width), with mean 0 and standard deviation 1."""
     return rng.standard_normal((height, width), np.float32)
 
 
 def blend(ground: Field, colour: tuple[float, float, float], share: Field | float) -> Field:
-    """Paint a colour over a picture.
-
-    Args:
-        ground: Picture, (H, W, 3).
-        colour: Red, green and blue, 0 to 1.
-        share: Opacity, 0 to 1, (H, W) or a number.
-    """
+    """Paint a colour over a picture, (H, W, 3), with an opacity from 0 to 1, (H, W) or a number."""
     over = np.asarray(share, np.float32)[..., None]
     return ground + over * (np.asarray(colour, np.float32) - ground)
 
@@ -165,15 +148,10 @@ def _stones(
     high: float,
     joints: Sequence[float],
 ) -> tuple[Field, Field]:
-    """Brightness of stones in courses that are offset by half a stone, and mask of their joints.
+    """Brightness of stones in courses that are offset by half a stone, and mask of joints.
 
-    Args:
-        rng: Random generator.
-        rows: Number of courses.
-        columns: Number of stones in a course.
-        low: Smallest brightness of a stone.
-        high: Largest brightness of a stone.
-        joints: Height and width of a joint over those of a stone.
+    The brightness is drawn from `low` to `high`; `joints` are height and width over those of a
+    stone.
     """
     y = np.arange(_SIZE)[:, None] * rows / _SIZE
     x = np.arange(_SIZE)[None, :] * columns / _SIZE + 0.5 * (y.astype(int) % 2)

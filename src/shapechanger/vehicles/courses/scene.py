@@ -161,19 +161,10 @@ def _add_surface(
     mirrored: bool = False,
     opacity: float = 1.0,
 ) -> None:
-    """Add a visual mesh, without mass and collisions, lit by their own light only.
+    """Add a visual mesh, without mass and collisions, lit by its own light only.
 
     MuJoCo has no brightness per vertex, but a normal. The only light shines straight up, so the
     normals are chosen for the brightness that they give, whatever the orientation of the patch.
-
-    Args:
-        spec: Model to extend.
-        name: Name of the texture, the material, the mesh and the geom.
-        mesh: The mesh.
-        picture: The texture, (H, W, 3).
-        colour: Factors on red, green and blue.
-        mirrored: Whether to add a copy mirrored below the ground.
-        opacity: 0 for invisible to 1 for opaque.
     """
     _add_texture(spec, name, picture, mujoco.mjtTexture.mjTEXTURE_2D)
     material = spec.add_material(

@@ -198,15 +198,7 @@ class Surfaces:
         return np.array([[(a, b), (c, b), (c, d), (a, d)] for a, b, c, d in around])
 
     def _add_wall(self, mesh: QuadMesh, wall: Wall, low: float, high: float, offset: float) -> None:
-        """Add a wall between two heights, in pieces short enough for the light to vary.
-
-        Args:
-            mesh: Mesh to extend.
-            wall: The wall.
-            low: Lower height, m.
-            high: Upper height, m.
-            offset: Start of the texture, 0 to 1.
-        """
+        """Add a wall between two heights, m, in pieces short enough for the light to vary."""
         start, end = np.asarray(wall.start, float), np.asarray(wall.end, float)
         length = float(np.hypot(*(end - start)))
         columns = max(1, int(np.ceil(length / _LONGEST)))

@@ -169,11 +169,8 @@ class QuadMesh:
     ) -> None:
         """Add n quads.
 
-        Args:
-            corners: Corners, m, (n, 4, 3).
-            uvs: Texture coordinates of the corners, (n, 4, 2).
-            lights: Brightness of each corner, 0 to 1, (n, 4); or of all of them.
-            reflected: Whether a glossy ground shows them; False for what is hidden there.
+        Corners are (n, 4, 3), m, texture coordinates (n, 4, 2), and lights, 0 to 1, (n, 4). What is
+        not `reflected` is hidden in a glossy ground.
         """
         self._reflected.append(reflected)
         self._corners.append(corners)
@@ -183,10 +180,7 @@ class QuadMesh:
     def add_grid(self, points: Array, uvs: Array, lights: Array) -> None:
         """Add the cells of a grid whose rows go up and whose columns go right, seen from its front.
 
-        Args:
-            points: Grid points, m, (rows, columns, 3).
-            uvs: Their texture coordinates, (rows, columns, 2).
-            lights: Their brightness, 0 to 1, (rows, columns).
+        Its arrays have the shapes (rows, columns, 3), (rows, columns, 2) and (rows, columns).
         """
         self.add(_grid_cells(points), _grid_cells(uvs), _grid_cells(lights))
 
@@ -196,8 +190,7 @@ class QuadMesh:
     def arrays(self, mirrored: bool) -> tuple[Array, Array, Array, NDArray[np.int64]]:
         """Points, m, (m, 3), texture coordinates, (m, 2), lights, (m,), and triangles, (k, 3).
 
-        Args:
-            mirrored: Whether to add a copy mirrored below the ground, for a glossy ground.
+        `mirrored` adds a copy below the ground, for a glossy ground.
         """
         points = np.concatenate(self._corners).reshape(-1, 3)
         uvs = np.concatenate(self._uvs).reshape(-1, 2)
@@ -236,16 +229,7 @@ _FOOT: Final = 0.75
 def add_box(
     mesh: QuadMesh, middle: Array, half: Array, yaw: float, material: str, light: float
 ) -> None:
-    """Add an upright box.
-
-    Args:
-        mesh: Mesh to extend.
-        middle: Its centre, m, (3,).
-        half: Half sizes, m, (3,).
-        yaw: Rotation about the vertical axis, rad.
-        material: Cell of the texture.
-        light: Brightness, 0 to 1.
-    """
+    """Add an upright box with a centre and half sizes, m, (3,), in a cell of the texture."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     corners = _BOX * half @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + middle
     lights = np.repeat(_BOX_LIGHT[:, None], 4, axis=1) * light
@@ -257,16 +241,7 @@ def add_box(
 def add_turned(
     mesh: QuadMesh, x: float, y: float, profile: Array, material: str, light: float
 ) -> None:
-    """Add a solid of revolution.
-
-    Args:
-        mesh: Mesh to extend.
-        x: Position of its axis, m.
-        y: Position of its axis, m.
-        profile: Radius and height from below, m, (n, 2).
-        material: Cell of the texture.
-        light: Brightness, 0 to 1.
-    """
+    """Add a solid of revolution around (x, y), m; its profile is radius and height, m, (n, 2)."""
     angle = np.linspace(0.0, 2.0 * np.pi, _SIDES + 1)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     points = np.empty((len(profile), _SIDES + 1, 3))

@@ -92,14 +92,7 @@ class Pursuit:
     def steering(
         self, pose: Pose, speed: float, yaw_rate: float, target: tuple[float, float]
     ) -> float:
-        """Steering towards a point, from -1, left, to 1.
-
-        Args:
-            pose: Pose of the vehicle.
-            speed: Speed along its heading, m/s.
-            yaw_rate: Rate of turn, rad/s, counter-clockwise.
-            target: x and y of the point, m.
-        """
+        """Steering towards a point, x and y in m, from -1, left, to 1."""
         dx, dy = target[0] - pose.x, target[1] - pose.y
         distance = max(math.hypot(dx, dy), 0.1)
         angle = _wrap_angle(math.atan2(dy, dx) - pose.heading)
@@ -147,13 +140,9 @@ class Recovery:
     def watch(
         self, action: tuple[float, float], speed: float, yaw_rate: float, *, blocked: bool
     ) -> None:
-        """Update the timers from an action and its effect.
+        """Update the timers from steering and throttle and their effect, m/s and rad/s.
 
-        Args:
-            action: Steering and throttle.
-            speed: Speed, m/s.
-            yaw_rate: Rate of turn, rad/s.
-            blocked: Whether an obstacle ahead prevents a necessary turn.
+        `blocked` says whether an obstacle ahead prevents a necessary turn.
         """
         share = abs(speed) / self._traits.top_speed
         driven = abs(action[1]) > _ASKED
@@ -172,8 +161,7 @@ class Recovery:
     def action(self, angle: float) -> tuple[float, float] | None:
         """Steering and throttle of the manoeuvre; None if the vehicle is not stuck.
 
-        Args:
-            angle: Angle from the heading to the target, rad, counter-clockwise.
+        `angle` is that from the heading to the target, rad, counter-clockwise.
         """
         if self._moves:
             self._left_s -= PERIOD_S

@@ -52,32 +52,18 @@ class ClosedLine:
         self._around = np.column_stack((points, self._steps, self._squared))[around].T.copy()
 
     def index(self, station: float) -> int:
-        """Index of the last point at or before a station.
-
-        Args:
-            station: Station, m; it wraps around.
-        """
+        """Index of the last point at or before a station, m, which wraps around."""
         return int(np.searchsorted(self.stations, station % self.length, side="right")) - 1
 
     def at(self, station: float) -> tuple[float, float]:
-        """Point at a station, m.
-
-        Args:
-            station: Station, m; it wraps around.
-        """
+        """Point, m, at a station, m, which wraps around."""
         i = self.index(station)
         share = (station % self.length - self.stations[i]) / np.sqrt(self._squared[i])
         x, y = self.points[i] + share * self._steps[i]
         return float(x), float(y)
 
     def nearest(self, x: float, y: float, hint: float | None = None) -> Spot:
-        """Nearest spot of the line to a point.
-
-        Args:
-            x: Position, m.
-            y: Position, m.
-            hint: Station to search around, m; None to search everywhere.
-        """
+        """Nearest spot of the line to a point, m; with a hint, near that station only."""
         if hint is None:
             first, count = 0, len(self.points)
         else:
@@ -96,12 +82,7 @@ class ClosedLine:
         return Spot(station, math.copysign(math.hypot(off_x[best], off_y[best]), cross))
 
     def ahead_by(self, start: float, end: float) -> float:
-        """Shorter way along the line from one station to another, m; backward is negative.
-
-        Args:
-            start: First station, m.
-            end: Second station, m.
-        """
+        """Shorter way along the line from one station to another, m; backward is negative."""
         return (end - start + self.length / 2) % self.length - self.length / 2
 
 
@@ -121,22 +102,12 @@ class CourseProgress:
         self._metres = 0.0
 
     def reset(self, x: float, y: float) -> None:
-        """Start at a point.
-
-        Args:
-            x: x coordinate, m.
-            y: y coordinate, m.
-        """
+        """Start at a point, m."""
         self._spot = self._line.nearest(x, y)
         self._metres = 0.0
 
     def update(self, x: float, y: float) -> float:
-        """Move the vehicle to a point, and return the net distance since the last reset, m.
-
-        Args:
-            x: x coordinate, m.
-            y: y coordinate, m.
-        """
+        """Move the vehicle to a point, and return the net distance since the last reset, m."""
         spot = self._line.nearest(x, y, self._spot.station)
         self._metres += self._line.ahead_by(self._spot.station, spot.station)
         self._spot = spot

@@ -62,12 +62,7 @@ class Lattice:
 
 
 def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
-    """Lay a lattice over the lane of a course.
-
-    Args:
-        course: The course.
-        obstacles: Its clearances.
-    """
+    """Lay a lattice over the lane of a course."""
     line = ClosedLine(course.route)
     count = max(round(line.length / _STATION_M), 8)
     middle = np.array([line.at(line.length * i / count) for i in range(count)])
@@ -95,20 +90,11 @@ def lay_lattice(course: Course, obstacles: ClearanceField) -> Lattice:
 
 
 def cheapest_way(lattice: Lattice, least_m: float, comfort_m: float) -> NDArray[np.int64]:
-    """The closed way with the least cost of bends and narrow passages.
+    """Index of the offset at each station, (N,), of the closed way with the least cost.
 
-    It is found by dynamic programming over stations, with offset and slope as the state.
-
-    Args:
-        lattice: The lattice.
-        least_m: Smallest clearance, m.
-        comfort_m: Clearance above which more is worth nothing, m.
-
-    Returns:
-        Index of the offset at each station, (N,).
-
-    Raises:
-        WorldError: If there is no such way.
+    It is found by dynamic programming over stations, with offset and slope as the state. Points
+    below `least_m` are forbidden; a clearance above `comfort_m` is worth nothing more. Raises a
+    `WorldError` if there is no such way.
     """
     missing = np.clip((comfort_m - lattice.clearance) / max(comfort_m - least_m, 1e-9), 0.0, 1.0)
     cost = np.where(lattice.clearance >= least_m, _NARROW_COST * missing**2, np.inf)
@@ -126,16 +112,9 @@ def cheapest_way(lattice: Lattice, least_m: float, comfort_m: float) -> NDArray[
 def _search(
     cost: NDArray[np.float64], stations: NDArray[np.int64], seam: int | None, least_m: float
 ) -> NDArray[np.int64]:
-    """The cheapest way along stations, as indices of offsets, (M,).
+    """The cheapest way along stations, (M,), as indices of offsets, (M,); cost is (N, K).
 
-    Args:
-        cost: Cost of each offset, (N, K).
-        stations: Stations to visit, in order, (M,).
-        seam: Offset to start and end with; None leaves both free.
-        least_m: Smallest clearance, m, for error messages.
-
-    Raises:
-        WorldError: If there is no way.
+    `seam` is the offset to start and end with; None leaves both free.
     """
     width = cost.shape[1]
     bends = _BEND_COST * (_SLOPES[:, None] - _SLOPES[None, :]) ** 2  # (from, to)
