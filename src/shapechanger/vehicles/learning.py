@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import gymnasium as gym
@@ -99,41 +100,21 @@ def train_student(
     return stated(policy, env, demonstrated_steps=steps, teacher=taught)
 
 
+@dataclass
 class _Lessons:
-    """Recorded pictures, labelled with the teacher's actions.
+    """Recorded pictures, labelled with the teacher's actions; see `train_student`."""
 
-    Args:
-        env: The student's env.
-        teacher: The teacher, as its demonstrator.
-        settings: Settings of the cloning.
-        seed: Seed of the starts and of the cloning.
-        on_steps: Called with the number of steps driven.
-    """
-
-    def __init__(
-        self,
-        env: gym.Env[Any, Any],
-        teacher: TaskDemonstrator,
-        settings: CloneSettings,
-        seed: int,
-        on_steps: Callable[[int], None],
-    ) -> None:
-        self._env = env
-        self._teacher = teacher
-        self._settings = settings
-        self._seed = seed
-        self._on_steps = on_steps
-        self._pictures: list[NDArray[np.uint8]] = []
-        self._actions: list[NDArray[np.float32]] = []
-        self._episodes: list[int] = []
+    _env: gym.Env[Any, Any]
+    _teacher: TaskDemonstrator
+    _settings: CloneSettings
+    _seed: int
+    _on_steps: Callable[[int], None]
+    _pictures: list[NDArray[np.uint8]] = field(default_factory=list[NDArray[np.uint8]])
+    _actions: list[NDArray[np.float32]] = field(default_factory=list[NDArray[np.float32]])
+    _episodes: list[int] = field(default_factory=list[int])
 
     def drive(self, steps: int, student: CameraPolicy | None = None) -> None:
-        """Drive and record.
-
-        Args:
-            steps: Number of steps.
-            student: The policy that drives; None for the teacher, with its disturbances.
-        """
+        """Drive and record steps; without a student the teacher drives, with its disturbances."""
         end = len(self._actions) + steps
         while len(self._actions) < end:
             picture = self._env.reset(seed=None if self._episodes else self._seed)[0]
@@ -153,11 +134,7 @@ class _Lessons:
             self._on_steps(len(self._actions))
 
     def learned(self, most_steps: int | None = None) -> CameraPolicy:
-        """Clone the teacher from all that was recorded.
-
-        Args:
-            most_steps: Limit of the cloning's steps below that of the settings; None for none.
-        """
+        """Clone the teacher from all that was recorded, in at most this many steps."""
         settings = self._settings
         most = min(most_steps or settings.most_steps, settings.most_steps)
         fewest = min(settings.fewest_steps, most)

@@ -147,15 +147,7 @@ def _solid(name: str) -> tuple[Array, Array, Array]:
 
 
 class MooredBoat(NamedTuple):
-    """A boat behind a quay.
-
-    Attributes:
-        x: Position of its middle, m.
-        y: Position of its middle, m.
-        yaw: Direction of its bow, rad.
-        length: Length, m.
-        kind: "sail", "motor" or "fishing".
-    """
+    """A boat behind a quay: middle, m, direction of its bow, rad, length, m, and kind."""
 
     x: float
     y: float

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from shapechanger.robot.drivers.duty import Duty
 from shapechanger.robot.guard.limits import MotionReflexes, aimed, clipped, slewed
-from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, SensorPlan, output_values
+from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, output_values
 from shapechanger.vehicles.world import MujocoWorld
 
 _STANDS_AFTER_S: Final = 0.5  # An encoder without an edge for this long stands.
@@ -36,15 +36,8 @@ _BATTERY_NS: Final = 100_000_000
 _V_PER_STEP: Final = 0.004
 
 
-class _Sensor(Protocol):
-    def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Return readings keyed by quantity.
-
-        Args:
-            now_ns: Time, ns.
-            direction: Sign of the propulsion.
-        """
-        ...
+_Read = Callable[[int, float], dict[str, float]]
+"""Readings of a sensor keyed by quantity, at a time, ns, with the sign of the propulsion."""
 
 
 class WheelEncoder:
@@ -53,17 +46,16 @@ class WheelEncoder:
     Args:
         settings: Settings of the driver `encoder`.
         world: The world, whose vehicle rolls.
-        now_ns: Time, ns.
     """
 
-    def __init__(self, settings: dict[str, Any], world: MujocoWorld, now_ns: int) -> None:
+    def __init__(self, settings: dict[str, Any], world: MujocoWorld) -> None:
         count_m: float = settings["wheel_m"] / settings["counts_per_turn"]
         self._two_channels: bool = settings["b"] >= 0
         # Both edges of a single channel are passed, and rising ones counted.
         self._pitch_m = count_m / (_EDGES_PER_COUNT if self._two_channels else 2)
         self._edge_m = self._pitch_m if self._two_channels else count_m
         self._world = world
-        self._travelled_m, self._read_ns = world.travelled_m, now_ns
+        self._travelled_m, self._read_ns = world.travelled_m, 0
         self._position = math.floor(self._travelled_m / self._pitch_m)
         most = _EDGES_PER_COUNT + 1 if self._two_channels else 2
         self._edges: deque[tuple[float, int]] = deque(maxlen=most)
@@ -115,14 +107,6 @@ class WheelEncoder:
             return 0.0
         moved_m = sum(way for _, way in list(edges)[1:]) * self._edge_m
         return moved_m / (edges[-1][0] - edges[0][0])
-
-
-class _Bumper:
-    def __init__(self, world: MujocoWorld) -> None:
-        self._world = world
-
-    def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        return {"bump": float(self._world.bumped)}
 
 
 class _Sonar:
@@ -180,78 +164,17 @@ class _Battery:
         return {"battery": self._volts}
 
 
+_SENSORS: Final[dict[str, Callable[[dict[str, Any], MujocoWorld], _Read]]] = {
+    "encoder": lambda settings, world: WheelEncoder(settings, world).read,
+    "switch": lambda _, world: lambda _ns, _direction: {"bump": float(world.bumped)},
+    "hcsr04": lambda settings, world: _Sonar(settings["max_m"], world.distance_m).read,
+    "mpu6050": lambda _, world: _Inertia(world).read,
+    "ina219": lambda _, world: _Battery(world).read,
+}
+"""Simulations of the sensors by the name of their driver."""
+
 # Quantities whose sensors are read at each tick: reflexes act on them, or they depend on it.
 _AT_EACH_TICK: Final = ("speed", "bump", "distance")
-
-
-class SimulatedSensors:
-    """All sensors of a profile that a world moves.
-
-    Args:
-        plans: The sensors.
-        world: The world.
-        now_ns: Time, ns.
-
-    Attributes:
-        sources: Name of the sensor behind each quantity that was read.
-    """
-
-    def __init__(self, plans: Sequence[SensorPlan], world: MujocoWorld, now_ns: int) -> None:
-        opened = [(plan, _opened(plan, world, now_ns)) for plan in plans]
-        self._fast, self._slow = (
-            [
-                (plan.name, sensor)
-                for plan, sensor in opened
-                if sensor is not None and (plan.measures in _AT_EACH_TICK) == is_fast
-            ]
-            for is_fast in (True, False)
-        )
-        self.sources: dict[str, str] = {}
-
-    def read(self, now_ns: int, direction: float) -> dict[str, float]:
-        """Return readings for the reflexes, keyed by quantity; of two speeds the smaller.
-
-        Args:
-            now_ns: Time, ns; call it at each tick.
-            direction: Sign of the propulsion.
-        """
-        quantities: dict[str, float] = {}
-        if direction == 0.0:
-            self.complete(quantities, now_ns, direction)  # The zero of a gyroscope follows.
-        for name, sensor in self._fast:
-            for quantity, value in sensor.read(now_ns, direction).items():
-                if quantity == "speed" and abs(value) >= abs(quantities.get(quantity, math.inf)):
-                    continue
-                quantities[quantity], self.sources[quantity] = value, name
-        return quantities
-
-    def complete(self, quantities: dict[str, float], now_ns: int, direction: float) -> None:
-        """Add the readings of the other sensors.
-
-        Args:
-            quantities: Readings of the same tick; extended in place.
-            now_ns: Time, ns.
-            direction: Sign of the propulsion.
-        """
-        for name, sensor in self._slow:
-            for quantity, value in sensor.read(now_ns, direction).items():
-                quantities[quantity], self.sources[quantity] = value, name
-
-
-def _opened(plan: SensorPlan, world: MujocoWorld, now_ns: int) -> _Sensor | None:
-    match plan.driver:
-        case "encoder":
-            return WheelEncoder(plan.settings, world, now_ns)
-        case "switch":
-            return _Bumper(world)
-        case "hcsr04":
-            return _Sonar(plan.settings["max_m"], world.distance_m)
-        case "mpu6050":
-            return _Inertia(world)
-        case "ina219":
-            return _Battery(world)
-        case _:
-            return None
 
 
 def _stepped(value: float, step: float) -> float:
@@ -297,7 +220,16 @@ class SensedVehicle:
         self.sources: dict[str, str] = {}
         self._parts = self._outputs()
         self._reflexes = MotionReflexes(self._plan)
-        self._sensors = SimulatedSensors(self._plan.sensors, self._world, self.now_ns)
+        self._measured_by: dict[str, str] = {}
+        opened = [
+            (plan, _SENSORS[plan.driver](plan.settings, self._world))
+            for plan in self._plan.sensors
+            if plan.driver in _SENSORS
+        ]
+        self._fast, self._slow = (
+            [(one.name, read) for one, read in opened if (one.measures in _AT_EACH_TICK) == fast]
+            for fast in (True, False)
+        )
 
     @property
     def bumps(self) -> int:
@@ -324,20 +256,33 @@ class SensedVehicle:
             self._world.advance(tick_ns / 1e9, self._parts)
             push = self._reflexes.propulsion.push(self.applied)
             direction = float((push > 0.0) - (push < 0.0))
-            quantities = self._sensors.read(self.now_ns, direction)
+            quantities: dict[str, float] = {}
+            if direction == 0.0:  # The zero of a gyroscope follows.
+                self._read(self._slow, quantities, direction)
+            self._read(self._fast, quantities, direction)
             self._reflexes.sense(quantities, False, self.applied, self.now_ns)
             if self.now_ns >= end_ns:
                 if direction != 0.0:
-                    self._sensors.complete(quantities, self.now_ns, direction)
+                    self._read(self._slow, quantities, direction)
                 self._conclude(quantities)
             if aims is not None:
                 kept, reason = self._reflexes.hold_back(aims, self.now_ns)
                 self.reason = f"{reason} {clips}".strip()
                 self._follow(kept, tick_ns / 1e9)
 
+    def _read(
+        self, sensors: Sequence[tuple[str, _Read]], quantities: dict[str, float], direction: float
+    ) -> None:
+        """Add readings, keyed by quantity; of two speeds the smaller."""
+        for name, read in sensors:
+            for quantity, value in read(self.now_ns, direction).items():
+                if quantity == "speed" and abs(value) >= abs(quantities.get(quantity, math.inf)):
+                    continue
+                quantities[quantity], self._measured_by[quantity] = value, name
+
     def _conclude(self, quantities: dict[str, float]) -> None:
         """Add what follows from the readings: stalls, an estimated speed, and collisions."""
-        reflexes, sources = self._reflexes, dict(self._sensors.sources)
+        reflexes, sources = self._reflexes, dict(self._measured_by)
         if reflexes.stall.watches:
             quantities["stall"] = float(reflexes.stall.way != 0)
             sources["stall"] = sources["speed"]

@@ -79,7 +79,7 @@ def certify_vehicles(
         changes=tuple(
             f"{what}: {old[what]} -> {new[what]}" for what in old if old[what] != new[what]
         ),
-        answers=_answers(one, two, _commands(source)),
+        answers=_answers(source, one, two),
         is_empty=one.same_as(two),
     )
     if shift.is_empty and not allow_empty:
@@ -90,69 +90,52 @@ def certify_vehicles(
     return shift
 
 
-class _Driven(NamedTuple):
-    """Rollout of one vehicle.
-
-    Attributes:
-        seen: The first and the last observation.
-        path: Pose at the start and after each step, (n, 3): x, y, m, and heading, rad.
-        rewards: Reward of each step.
-        straight_m: Distance driven in the first half.
-        turned_deg: Turn to the left in the second half.
-    """
+class _Rollout(NamedTuple):
+    """First and last observation, poses, x, y and heading, (n, 3), and rewards of a vehicle."""
 
     seen: tuple[NDArray[np.float64], NDArray[np.float64]]
     path: NDArray[np.float64]
     rewards: NDArray[np.float64]
-    straight_m: float
-    turned_deg: float
 
-    def same_as(self, other: _Driven) -> bool:
+    def same_as(self, other: _Rollout) -> bool:
         """Return whether two rollouts are equal."""
-        mine, theirs = (
-            (*self.seen, self.path, self.rewards),
-            (*other.seen, other.path, other.rewards),
-        )
+        mine, theirs = (*self.seen, *self[1:]), (*other.seen, *other[1:])
         return all(np.array_equal(one, two) for one, two in zip(mine, theirs, strict=True))
 
+    def moved(self) -> tuple[float, float]:
+        """Metres in the first half, and degrees of turn to the left in the second."""
+        half = min(_STEPS // 2, len(self.path) - 1)
+        turned = np.unwrap(self.path[half:, 2])
+        straight_m = float(np.linalg.norm(self.path[half, :2] - self.path[0, :2]))
+        return straight_m, math.degrees(float(turned[-1] - turned[0]))
 
-def _drive(env: gym.Env[Any, Any], seed: int) -> _Driven:
+
+def _drive(env: gym.Env[Any, Any], seed: int) -> _Rollout:
+    def flat() -> NDArray[np.float64]:
+        return np.asarray(gym.spaces.flatten(env.observation_space, seen), np.float64)
+
     seen, info = env.reset(seed=seed)
-    first = _flat(env, seen)
-    path, rewards = [info["pose"]], list[float]()
+    first, path, rewards = flat(), [info["pose"]], list[float]()
     for step in range(_STEPS):
         steering = 0.0 if step < _STEPS // 2 else _STEERING
-        seen, reward, terminated, truncated, info = env.step(
-            np.array([steering, _THROTTLE], np.float32)
-        )
+        action = np.array([steering, _THROTTLE], np.float32)
+        seen, reward, terminated, truncated, info = env.step(action)
         path.append(info["pose"])
         rewards.append(float(reward))
         if terminated or truncated:
             break
-    way = np.array(path)
-    half = min(_STEPS // 2, len(way) - 1)
-    turned = np.unwrap(way[half:, 2])
-    return _Driven(
-        (first, _flat(env, seen)),
-        way,
-        np.array(rewards),
-        float(np.linalg.norm(way[half, :2] - way[0, :2])),
-        math.degrees(float(turned[-1] - turned[0])),
-    )
+    return _Rollout((first, flat()), np.array(path), np.array(rewards))
 
 
-def _commands(env: gym.Env[Any, Any]) -> tuple[str, str]:
-    """Return what the two numbers of an action are called: sideways and forward."""
-    return ("bearing", "speed") if hasattr(env.unwrapped, "response") else ("steering", "throttle")
-
-
-def _answers(one: _Driven, two: _Driven, commands: tuple[str, str]) -> tuple[str, ...]:
-    aside, forward = commands
+def _answers(source: gym.Env[Any, Any], one: _Rollout, two: _Rollout) -> tuple[str, ...]:
+    has_waypoints = hasattr(source.unwrapped, "response")
+    aside, forward = ("bearing", "speed") if has_waypoints else ("steering", "throttle")
+    (metres, degrees), (other_metres, other_degrees) = one.moved(), two.moved()
     sentences = [
         f"straight ahead at a {forward} of {_THROTTLE:g} for {_STEPS // 2} steps: "
-        f"{one.straight_m:.2f} m -> {two.straight_m:.2f} m",
-        f"then a {aside} of {_STEERING:g} for as many: turned by {one.turned_deg:.0f} -> "
-        f"{two.turned_deg:.0f} degrees",
+        f"{metres:.2f} m -> {other_metres:.2f} m",
+        f"then a {aside} of {_STEERING:g} for as many: turned by {degrees:.0f} -> "
+        f"{other_degrees:.0f} degrees",
     ]
     if one.seen[0].shape == two.seen[0].shape:
         gaps = [float(np.abs(a - b).mean()) for a, b in zip(one.seen, two.seen, strict=True)]
@@ -170,16 +153,12 @@ def _facts(env: gym.Env[Any, Any]) -> dict[str, str]:
     model, camera = world.vehicle, world.mount
     turning = model.turning_radius_m
     response: SteeringResponse | None = getattr(inner, "response", None)
-    mapped = (
-        {}
-        if response is None
-        else {
-            "turn at full steering, the map of waypoints to this body": (
-                f"{response.per_metre:.2f} rad/m and {response.per_second:.2f} rad/s"
-            )
-        }
-    )
-    return mapped | {
+    facts: dict[str, str] = {}
+    if response is not None:
+        facts["turn at full steering, the map of waypoints to this body"] = (
+            f"{response.per_metre:.2f} rad/m and {response.per_second:.2f} rad/s"
+        )
+    return facts | {
         "vehicle": model.name,
         "moves": "on water" if model.floats else "on land",
         "driven by": " and ".join(sorted(inner.parts)),
@@ -205,8 +184,3 @@ def _name(env: gym.Env[Any, Any]) -> str:
     if not (hasattr(env.unwrapped, "world") and hasattr(env.unwrapped, "parts")):
         raise MorphologyError(f"{name} is not a vehicle, so it cannot be compared with one.")
     return name
-
-
-def _flat(env: gym.Env[Any, Any], seen: Any) -> NDArray[np.float64]:
-    """Return an observation as one vector."""
-    return np.asarray(gym.spaces.flatten(env.observation_space, seen), np.float64)

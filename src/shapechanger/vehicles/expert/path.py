@@ -212,16 +212,10 @@ def _least_bent(
 class CoursePath(ClosedLine):
     """A closed path around a course.
 
-    Args:
-        points: Evenly spaced points, m, (N, 2).
+    Attributes:
         heading: Direction at each point, rad, counter-clockwise from the x axis, (N,).
         curvature: Curvature at each point, 1/m, positive to the left, (N,).
         clearance: Distance of each point from the nearest wall or obstacle, m, (N,).
-
-    Attributes:
-        heading: See above.
-        curvature: See above.
-        clearance: See above.
     """
 
     def __init__(
