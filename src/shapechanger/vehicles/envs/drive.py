@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from shapechanger.contract.drive import DriveReward
 from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError, check_seed
 from shapechanger.layout import Layout
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.vehicles.bodies import require_fit, vehicle_model
 from shapechanger.vehicles.bodies.parts import CameraJitter
@@ -42,7 +41,7 @@ class SimulatedRobot(NamedTuple):
         robot: Name of the profile.
         body: Kind of vehicle.
         path: File of the profile.
-        plan: Actions, outputs, sensors and limits.
+        plan: Actions, outputs, sensors and limits, a `GuardPlan`.
         control_hz: Actions per second.
         reward: Weights of the task.
         action_layout: Layout of its actions.
@@ -55,7 +54,7 @@ class SimulatedRobot(NamedTuple):
     robot: str
     body: str
     path: Path
-    plan: GuardPlan
+    plan: Any
     control_hz: float
     reward: Mapping[str, float]
     action_layout: Layout
