@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -14,22 +13,11 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.world import Pose
 from shapechanger.errors import UnknownName, WorldError
-from shapechanger.vehicles.courses.channel import open_course
 from shapechanger.vehicles.courses.corridor import corridor
 from shapechanger.vehicles.courses.course import FLOODED, Course
 from shapechanger.vehicles.courses.geometry import distances_from_obstacle, turn_angles
 
-_MAKERS: Final[Mapping[str, Callable[[np.random.Generator, int], Course | None]]] = (
-    MappingProxyType(
-        {
-            "corridor": corridor,
-            "yard": partial(open_course, "yard"),
-            "harbour": partial(open_course, "harbour"),
-        }
-    )
-)
-
-WORLDS: Final = (*_MAKERS, FLOODED)
+WORLDS: Final = ("corridor", "yard", "harbour", FLOODED)
 """Kinds of course."""
 
 _ATTEMPTS: Final = 500
@@ -48,13 +36,18 @@ def lay_out(world: str, seed: int) -> Course:
     """
     if world == FLOODED:
         return dataclasses.replace(lay_out("corridor", seed), world=world)
-    if world not in _MAKERS:
+    if world not in WORLDS:
         raise UnknownName("world", world, WORLDS)
     if seed < 0:
         raise WorldError(f"Seeds of courses count from 0, got {seed}.")
     rng = np.random.default_rng([zlib.crc32(world.encode()), seed])
+    make: Callable[[np.random.Generator, int], Course | None] = corridor
+    if world != "corridor":
+        from shapechanger.vehicles.courses.channel import open_course
+
+        make = partial(open_course, world)
     for _ in range(_ATTEMPTS):
-        course = _MAKERS[world](rng, seed)
+        course = make(rng, seed)
         if course is not None:
             return course
     raise WorldError(
