@@ -9,7 +9,7 @@ import mujoco
 from gymnasium.envs.mujoco.mujoco_env import expand_model_path
 
 from benchmarks.row import Row
-from shapechanger.bodies.ant import ANT
+from shapechanger.envs.ant import ANT
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.effective import fingerprint
 

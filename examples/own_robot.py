@@ -15,7 +15,7 @@ from stable_baselines3 import PPO
 
 import shapechanger
 from shapechanger import Mass, Stretch
-from shapechanger.tasks.own import RobotState
+from shapechanger.envs.own_tasks import RobotState
 
 DOG = """
 <mujoco model="dog">

@@ -13,8 +13,8 @@ import tyro
 from stable_baselines3 import PPO
 
 from shapechanger import AddLimb, BodyMap, Cut
-from shapechanger.bodies.families import BodyLike, Family, length_axes, strength_axes
 from shapechanger.envs.ant import AntEnv
+from shapechanger.morphology.families import BodyLike, Family, length_axes, strength_axes
 
 # The legs of the ant point to 45, 135, 225 and 315 degrees: two more, to 0 and 180.
 SIX_LEGS = (

@@ -89,7 +89,7 @@ def _odrl_page() -> SitePage:
     """Return the page of the bodies of ODRL, with what each changes."""
     rows: list[tuple[str, ...]] = []
     for env_id, entry in ODRL_ENVS.items():
-        edits = _loaded(entry.entry_point).family.published[entry.body]
+        edits = _loaded(entry.entry_point).family.body(entry.body)
         rows.append((f"`{env_id}`", ", ".join(f"`{edit}`" for edit in edits) or "none: a source"))
     parts = [
         "# ODRL",

@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.bodies.ant import ANT
-from shapechanger.bodies.families import PENDULUM
+from shapechanger.envs.ant import ANT
+from shapechanger.envs.pendulum import PENDULUM
 from shapechanger.morphology import compile_body
 from tests.morphology.models import differing
 from tests.morphology.scenes import ASSETS

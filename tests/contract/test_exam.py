@@ -24,7 +24,7 @@ from shapechanger.envs.catalogue import (
     VEHICLE_ENVS,
     WAYPOINT_ENVS,
 )
-from shapechanger.tasks.own import RobotState
+from shapechanger.envs.own_tasks import RobotState
 
 # Bodies without an id, and arguments that change a space.
 _VARIANTS: dict[str, MakeEnv] = {

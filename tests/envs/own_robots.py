@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shapechanger.contract.measure import Measure
-from shapechanger.tasks.own import RobotState
+from shapechanger.envs.own_tasks import RobotState
 
 # A dog in a plane: two legs with a hinge each, of which one is a servo.
 DOG = """

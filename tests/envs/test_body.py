@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from shapechanger.bodies.families import BodyLike
 from shapechanger.envs import CATALOGUE
 from shapechanger.errors import (
     BrokenModel,
@@ -42,6 +41,7 @@ from shapechanger.morphology import (
     to_json,
 )
 from shapechanger.morphology.effective import fingerprint
+from shapechanger.morphology.families import BodyLike
 
 _BIG = (Stretch("shank_*", 2.0),)
 _OTHER = (Stretch("shank_*", 1.5), Cut("shank_4", 0.25), Gear("hip_1", to=40.0))

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.bodies.ant import ANT
-from shapechanger.bodies.families import PENDULUM
+from shapechanger.envs.ant import ANT
+from shapechanger.envs.pendulum import PENDULUM
 from shapechanger.morphology import Edit, compile_body
 from tests.morphology.scenes import ASSETS
 

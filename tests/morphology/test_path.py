@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.bodies.ant import ANT
-from shapechanger.bodies.families import PENDULUM
+from shapechanger.envs.ant import ANT
+from shapechanger.envs.pendulum import PENDULUM
 from shapechanger.errors import MorphologyError
 from shapechanger.morphology import (
     EDITS,

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.bodies.ant import ANT
+from shapechanger.envs.ant import ANT
 from shapechanger.morphology import JointRange, StartHeight, Stretch
 from shapechanger.morphology.pose import (
     Lift,

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.bodies.ant import ANT
+from shapechanger.envs.ant import ANT
 from shapechanger.morphology import Body, Cut, Gear, Mass, Stretch, compile_body
 from shapechanger.morphology.pose import start_pose
 from shapechanger.morphology.tree import LIMB_NUMBERS, TRUNK_NUMBERS, Tree, tree_of

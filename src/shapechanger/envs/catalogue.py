@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -10,6 +10,7 @@ import gymnasium as gym
 import msgspec
 
 from shapechanger.contract.vector import register_make_vec
+from shapechanger.envs.odrl import odrl_bodies
 from shapechanger.errors import UnknownName
 
 NAMESPACE: Final = "shapechanger"
@@ -166,36 +167,25 @@ CATALOGUE: Final[dict[str, CatalogueEntry]] = {
     entry.id: entry for entry in (_entry(*row) for row in _BODIES)
 }
 
-# Robots of ODRL with their families and their two shifts of joints and of shapes each.
-_ODRL: Final = (
-    ("ant", "Ant", ("anklejnt", "hipjnt"), ("alllegs", "halflegs")),
-    ("halfcheetah", "HalfCheetah", ("footjnt", "thighjnt"), ("thigh", "torso")),
-    ("hopper", "Hopper", ("footjnt", "legjnt"), ("foot", "torso")),
-    ("walker2d", "Walker2d", ("footjnt", "thighjnt"), ("leg", "torso")),
-)
+# Families of ODRL's robots.
+_ODRL: Final = {
+    "ant": "Ant",
+    "halfcheetah": "HalfCheetah",
+    "hopper": "Hopper",
+    "walker2d": "Walker2d",
+}
 
 
-def _odrl_entries() -> Iterator[CatalogueEntry]:
-    """Yield the source and the 20 targets of each robot of ODRL."""
-    for robot, family, joints, shapes in _ODRL:
-        entry_point, learner, threshold = _FAMILIES[family]
-        tasks = [
-            "",
-            *(f"-{kind}-{f}" for kind in ("friction", "gravity") for f in (0.1, 0.5, 2.0, 5.0)),
-        ]
-        shifts = [f"kinematic-{name}" for name in joints] + [f"morph-{name}" for name in shapes]
-        tasks += [f"-{shift}-{level}" for shift in shifts for level in ("easy", "medium", "hard")]
-        for task in tasks:
-            name = f"odrl-{robot}{task}"
-            where = f"shapechanger.envs.{entry_point}"
-            summary = f"body of ODRL: {robot}{task}"
-            yield CatalogueEntry(name, family, summary, where, learner, name, threshold)
+def _odrl_entry(name: str) -> CatalogueEntry:
+    """Return the entry of a body such as `odrl-ant-friction-0.1`."""
+    task = name.removeprefix("odrl-")
+    return _entry(name, _ODRL[task.partition("-")[0]], f"body of ODRL: {task}")
 
 
 ODRL_ENVS: Final[Mapping[str, CatalogueEntry]] = MappingProxyType(
-    {entry.id: entry for entry in _odrl_entries()}
+    {entry.id: entry for entry in map(_odrl_entry, odrl_bodies())}
 )
-"""Envs with the bodies of ODRL by id: 4 sources and 80 targets; see `shapechanger.bodies.odrl`."""
+"""Envs with the bodies of ODRL by id: 4 sources and 80 targets; see `shapechanger.envs.odrl`."""
 
 # Envs whose bodies form no family, except the vehicle on the network.
 _TASK_IDS: Final = (

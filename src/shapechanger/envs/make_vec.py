@@ -22,8 +22,8 @@ from shapechanger.envs.vector.env import ThreadVectorEnv
 from shapechanger.errors import UnknownName, VectorEnvError
 
 if TYPE_CHECKING:
-    from shapechanger.bodies.families import BodyLike
     from shapechanger.envs.warp.env import WarpVectorEnv
+    from shapechanger.morphology.families import BodyLike
 
 _BACKENDS: Final = ("threads", "warp")
 

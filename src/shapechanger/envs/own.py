@@ -21,14 +21,22 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.bodies.families import BodyLike
-from shapechanger.bodies.own import own_family, require_robot
 from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.envs.layouts import contact_features, position_features, velocity_features
+from shapechanger.envs.own_models import own_family, require_robot
+from shapechanger.envs.own_tasks import (
+    RobotState,
+    as_task,
+    has_ended,
+    observed,
+    reference,
+    reward_terms,
+)
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
 from shapechanger.morphology import as_body, reason_of, to_json
+from shapechanger.morphology.families import BodyLike
 from shapechanger.morphology.pose import (
     StartRules,
     floor_height,
@@ -38,7 +46,6 @@ from shapechanger.morphology.pose import (
     trunk_lift,
 )
 from shapechanger.morphology.robot import robot_bodies
-from shapechanger.tasks.own import RobotState, as_task, has_ended, observed, reference, reward_terms
 
 _Floats = NDArray[np.float64]
 
@@ -114,7 +121,7 @@ class OwnRobotEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     Args:
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`.
         task: `walk`, or a task of your own: `module:Name`, a class, a function or an object; see
-            `shapechanger.tasks.own`.
+            `shapechanger.envs.own_tasks`.
         task_options: Arguments of the task's class.
         body: Edits of `shapechanger.morphology`, or their JSON; the file's own robot by default.
         rig: Edits that come before those of any body, such as `AddMotor("*")` and `AddFloor()`, or
@@ -367,7 +374,7 @@ def from_mjcf(
         path: An MJCF or URDF file, or a name of the package `robot_descriptions`, such as
             `go2_mj_description`, which downloads it.
         task: `walk`, or a task of your own: `module:Name`, a class, a function or an object; see
-            `shapechanger.tasks.own`. Worker processes need one that they can import.
+            `shapechanger.envs.own_tasks`. Worker processes need one that they can import.
         body: Edits of `shapechanger.morphology`, or their JSON.
         rig: Edits that come before those of any body, such as `AddMotor("*")` and `AddFloor()`.
         task_options: Arguments of the task's class.

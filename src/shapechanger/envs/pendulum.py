@@ -22,14 +22,26 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.bodies.families import DOUBLE_PENDULUM, PENDULUM, BodyLike
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import position_features, velocity_features
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.envs.stepping.tuned import NO_WARNINGS, Binding, StepResult, TunedStep
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.layout import Element, Feature
-from shapechanger.morphology import compile_body
+from shapechanger.morphology import Stretch, compile_body
+from shapechanger.morphology.families import BodyLike, Family
+
+PENDULUM: Final = Family(
+    name="InvertedPendulum",
+    bodies={
+        "InvertedPendulum": (),
+        # Those of the 2017 release end at (0.001, 0, h) m with h = 0.3 and 1.2: stretching along z
+        # keeps the lean of 1 mm.
+        "SmallInvertedPendulum": (Stretch("pole", 0.5, axis="z"),),
+        "BigInvertedPendulum": (Stretch("pole", 2.0, axis="z"),),
+    },
+)
+DOUBLE_PENDULUM: Final = Family("InvertedDoublePendulum", {"InvertedDoublePendulum": ()})
 
 _CART_AND_POLE: Final = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 _CART_AND_POLES: Final = (*_CART_AND_POLE, int(mujoco.mjtJoint.mjJNT_HINGE))

@@ -27,7 +27,6 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.bodies.families import BodyLike, Family, Split
 from shapechanger.envs.actions import check_action
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
 from shapechanger.envs.renderer import (
@@ -40,6 +39,7 @@ from shapechanger.envs.renderer import (
 from shapechanger.layout import Feature, Layout
 from shapechanger.morphology import Body, compile_body, interpolate, reshape, to_json
 from shapechanger.morphology.certificate import Certificate, Wrapped, certify
+from shapechanger.morphology.families import BodyLike, Family, Split
 from shapechanger.morphology.pose import (
     StartRules,
     standing_height,

@@ -1,9 +1,13 @@
-"""Half cheetah, hopper, walker, swimmer and humanoid with editable bodies."""
+"""Half cheetah, hopper, walker, swimmer and humanoid: their families of bodies, and their envs.
+
+All models are those of Gymnasium (MIT).
+"""
 
 from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
 from typing import Any, ClassVar, Final, cast
 
 import gymnasium as gym
@@ -22,7 +26,6 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.bodies.families import HALF_CHEETAH, HOPPER, HUMANOID, SWIMMER, WALKER2D, BodyLike
 from shapechanger.contract.measure import FORWARD_SPEED, RETURN, Measure
 from shapechanger.envs.layouts import (
     contact_features,
@@ -32,10 +35,45 @@ from shapechanger.envs.layouts import (
     twist_features,
     velocity_features,
 )
+from shapechanger.envs.odrl import published
 from shapechanger.envs.reshapable import Reshapable
 from shapechanger.layout import Feature
-from shapechanger.morphology import compile_body
+from shapechanger.morphology import Cut, compile_body
+from shapechanger.morphology.families import BodyLike, Family, length_axes, strength_axes
 from shapechanger.morphology.pose import Lift, standing_height, start_pose, trunk_lift
+
+
+def _runner(name: str, legs: Mapping[str, tuple[str, str, str]]) -> Family:
+    """Family of runners in a plane, whose parts are feet cut short.
+
+    Args:
+        name: Its name.
+        legs: Thigh, shank and foot of each leg.
+    """
+    limbs = [limb for leg in legs.values() for limb in leg]
+    return Family(
+        name,
+        {name: ()},
+        axes=length_axes(limbs, 0.7, 1.4) + strength_axes("torso"),
+        parts={leg: {"stump": (Cut(limbs[-1], 0.4),)} for leg, limbs in legs.items()},
+        published=published(name.lower()),
+    )
+
+
+HALF_CHEETAH: Final = _runner(
+    "HalfCheetah",
+    {"back leg": ("bthigh", "bshin", "bfoot"), "front leg": ("fthigh", "fshin", "ffoot")},
+)
+HOPPER: Final = _runner("Hopper", {"leg": ("thigh", "leg", "foot")})
+WALKER2D: Final = _runner(
+    "Walker2d",
+    {
+        "right leg": ("thigh", "leg", "foot"),
+        "left leg": ("thigh_left", "leg_left", "foot_left"),
+    },
+)
+SWIMMER: Final = Family("Swimmer", {"Swimmer": ()})
+HUMANOID: Final = Family("Humanoid", {"Humanoid": ()})
 
 # Where Gymnasium clips the velocities that Hopper and Walker2d observe, m/s and rad/s.
 _CLIPPED_AT: Final = 10.0

@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from shapechanger.bodies.ant import LEGS
+from shapechanger.envs.ant import LEGS
 from shapechanger.morphology import (
     Body,
     Cut,

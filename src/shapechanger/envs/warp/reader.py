@@ -8,7 +8,6 @@ from typing import Any, Final, Protocol, cast
 
 import gymnasium as gym
 
-from shapechanger.bodies.families import BodyLike
 from shapechanger.envs.catalogue import FINGER_ENVS
 from shapechanger.envs.checks import describe_body
 from shapechanger.envs.warp.batch import BatchKind
@@ -16,6 +15,7 @@ from shapechanger.envs.warp.bodies import DeviceBody, device_body
 from shapechanger.envs.warp.tasks import DeviceTask, find_device_task
 from shapechanger.errors import SpaceMismatch
 from shapechanger.morphology import Body
+from shapechanger.morphology.families import BodyLike
 
 
 class Reader(Protocol):

@@ -9,9 +9,8 @@ from typing import Any, cast
 import gymnasium as gym
 import pytest
 
-from shapechanger.bodies import Family
-from shapechanger.bodies.ant import ANT
-from shapechanger.bodies.families import HOPPER, Axis
+from shapechanger.envs.ant import ANT
+from shapechanger.envs.runners import HOPPER
 from shapechanger.errors import MorphologyError, UnknownName
 from shapechanger.morphology import (
     AddLimb,
@@ -25,6 +24,7 @@ from shapechanger.morphology import (
     to_json,
 )
 from shapechanger.morphology.certificate import certify
+from shapechanger.morphology.families import Axis, Family
 from tests.morphology.models import LEG
 
 FAMILY = Family("Leg", {"Leg": (), "LongLeg": (Stretch("thigh", 2.0),)}, {"knee": "calf"})

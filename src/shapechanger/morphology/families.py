@@ -1,9 +1,4 @@
-"""Families of bodies: one model each, and the named bodies that edits make from it.
-
-All models are those of Gymnasium (MIT). `InvertedPendulum`, `SmallInvertedPendulum` and
-`BigInvertedPendulum` are bodies of the 2017 Shapechanger release, whose poles end at (0.001, 0, h)
-m with h = 0.6, 0.3 and 1.2: stretching along z keeps the lean of 1 mm.
-"""
+"""Families of bodies: one model each, the named bodies that edits make from it, and its splits."""
 
 from __future__ import annotations
 
@@ -12,16 +7,14 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import mujoco
 import numpy as np
 
-from shapechanger.bodies import odrl
 from shapechanger.errors import MorphologyError, UnknownName
 from shapechanger.morphology import (
     Body,
-    Cut,
     Edit,
     Friction,
     Gear,
@@ -76,7 +69,7 @@ class Family:
         axes: The numbers by which its bodies differ; none for a family that cannot be sampled.
         parts: Parts that a place, such as a leg, can have instead of the model's own, by the name
             of the place and of the part.
-        published: Edits of bodies that others have published, by name.
+        published: Edits of bodies that others have published, or their JSON, by name.
         rig: Edits that come before those of any body, such as two more legs.
     """
 
@@ -85,7 +78,7 @@ class Family:
     bodies_by_joint: Mapping[str, str] = field(default_factory=dict[str, str])
     axes: tuple[Axis, ...] = ()
     parts: Mapping[str, Mapping[str, Body]] = field(default_factory=dict[str, Mapping[str, Body]])
-    published: Mapping[str, Body] = field(default_factory=dict[str, Body])
+    published: Mapping[str, Any] = field(default_factory=dict[str, Any])
     rig: Body = ()
 
     def load(self, path: str | Path) -> mujoco.MjSpec:
@@ -112,7 +105,7 @@ class Family:
             named = {**self.bodies, **self.published}
             if value not in named:
                 raise UnknownName(f"body of the family {self.name}", value, named)
-            return named[value]
+            return as_body(named[value])
         return as_body(value)
 
     def body_at(self, values: Mapping[str, float], parts: Mapping[str, str] | None = None) -> Body:
@@ -234,57 +227,3 @@ def strength_axes(trunk: str, actuators: str = "*") -> tuple[Axis, ...]:
         Axis("strength of the motors", partial(Gear, actuators), 0.8, 1.25, 0.6, 1.6),
         Axis("friction", partial(Friction, "*"), 0.7, 1.4, 0.45, 2.0),
     )
-
-
-PENDULUM: Final = Family(
-    name="InvertedPendulum",
-    bodies={
-        "InvertedPendulum": (),
-        "SmallInvertedPendulum": (Stretch("pole", 0.5, axis="z"),),
-        "BigInvertedPendulum": (Stretch("pole", 2.0, axis="z"),),
-    },
-)
-
-
-def _plain(name: str) -> Family:
-    """Family whose only named body is the unedited model."""
-    return Family(name, {name: ()})
-
-
-def _runner(
-    name: str, legs: Mapping[str, tuple[str, str, str]], bodies_of_odrl: Mapping[str, Body]
-) -> Family:
-    """Family of runners in a plane, whose parts are feet cut short.
-
-    Args:
-        name: Its name.
-        legs: Thigh, shank and foot of each leg.
-        bodies_of_odrl: Bodies of ODRL.
-    """
-    limbs = [limb for leg in legs.values() for limb in leg]
-    return Family(
-        name,
-        {name: ()},
-        axes=length_axes(limbs, 0.7, 1.4) + strength_axes("torso"),
-        parts={leg: {"stump": (Cut(limbs[-1], 0.4),)} for leg, limbs in legs.items()},
-        published=odrl.published(name.lower(), bodies_of_odrl),
-    )
-
-
-HALF_CHEETAH: Final = _runner(
-    "HalfCheetah",
-    {"back leg": ("bthigh", "bshin", "bfoot"), "front leg": ("fthigh", "fshin", "ffoot")},
-    odrl.HALF_CHEETAH,
-)
-HOPPER: Final = _runner("Hopper", {"leg": ("thigh", "leg", "foot")}, odrl.HOPPER)
-WALKER2D: Final = _runner(
-    "Walker2d",
-    {
-        "right leg": ("thigh", "leg", "foot"),
-        "left leg": ("thigh_left", "leg_left", "foot_left"),
-    },
-    odrl.WALKER2D,
-)
-SWIMMER: Final = _plain("Swimmer")
-HUMANOID: Final = _plain("Humanoid")
-DOUBLE_PENDULUM: Final = _plain("InvertedDoublePendulum")

@@ -1,6 +1,6 @@
 """The bodies of ODRL have the published numbers.
 
-The numbers are those of ODRL's files; `shapechanger.bodies.odrl` names where they were read. All
+The numbers are those of ODRL's files; `shapechanger.envs.odrl` names where they were read. All
 places are in the world's frame at the start pose, as ODRL writes the hopper and the walker.
 """
 
@@ -16,11 +16,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from shapechanger.bodies.ant import ANT
-from shapechanger.bodies.families import HALF_CHEETAH, HOPPER, WALKER2D, Family
+from shapechanger.envs.ant import ANT
 from shapechanger.envs.catalogue import ODRL_ENVS
+from shapechanger.envs.runners import HALF_CHEETAH, HOPPER, WALKER2D
 from shapechanger.morphology import compile_body
 from shapechanger.morphology.effective import fingerprint
+from shapechanger.morphology.families import Family
 from tests.morphology.models import capsule_inertia, capsule_mass
 
 _ASSETS = Path(gymnasium_mujoco.__file__).parent / "assets"
@@ -38,7 +39,7 @@ Point = tuple[float, float, float]
 
 def _model(name: str) -> mujoco.MjModel:
     family, file = _ROBOTS[name.split("-")[1]]
-    return compile_body(family.load(_ASSETS / file), family.published[name])
+    return compile_body(family.load(_ASSETS / file), family.body(name))
 
 
 def _source(name: str) -> mujoco.MjModel:

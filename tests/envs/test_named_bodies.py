@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from shapechanger.bodies import Family
-from shapechanger.bodies.ant import ANT, LEGS
-from shapechanger.bodies.families import PENDULUM
+from shapechanger.envs.ant import ANT, LEGS
+from shapechanger.envs.pendulum import PENDULUM
 from shapechanger.morphology import from_json, to_json
+from shapechanger.morphology.families import Family
 from tests.morphology.models import ant, built, pendulum, posed
 
 _BODIES = [(family, name) for family in (ANT, PENDULUM) for name in family.bodies]

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from shapechanger.contract.measure import FORWARD_SPEED
-from shapechanger.errors import TaskError, UnknownName
-from shapechanger.tasks.own import (
+from shapechanger.envs.own_tasks import (
     RobotState,
     Walk,
     as_task,
@@ -19,6 +18,7 @@ from shapechanger.tasks.own import (
     reference,
     reward_terms,
 )
+from shapechanger.errors import TaskError, UnknownName
 
 
 class Still:

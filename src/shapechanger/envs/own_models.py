@@ -11,9 +11,9 @@ from typing import Any, Final
 
 import mujoco
 
-from shapechanger.bodies.families import Family
 from shapechanger.errors import BrokenModel, MorphologyError, ShapechangerError, UnknownName
 from shapechanger.morphology import Body, name_elements, reason_of, reshape, to_json
+from shapechanger.morphology.families import Family
 
 # Names of the package are those of its modules.
 _DESCRIPTION: Final = re.compile(r"[A-Za-z0-9_]+_description")

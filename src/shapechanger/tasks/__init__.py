@@ -1,1 +1,0 @@
-"""Tasks of a user's own, without bodies."""
