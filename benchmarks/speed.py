@@ -12,13 +12,11 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import gymnasium as gym
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.row import Row
 from shapechanger.envs.stepping import fast_model
-from shapechanger.envs.stepping.tuned import paused_timer
 
 ROUNDS: Final = 41
 # Env steps per round: about 30 ms for either env.
@@ -29,7 +27,6 @@ WARM_UP: Final = 600
 FRAMES: Final = 60
 SLOW_FRAMES: Final = 8
 SIZE: Final[dict[str, Any]] = {"width": 128, "height": 128}
-_ANT_FRAME_SKIP: Final = 5
 # Scale of actions small enough for the pole to stay up for a while.
 _GENTLE: Final = 0.05
 
@@ -47,7 +44,6 @@ def single() -> list[Row]:
         _ratio_row("the same with fast_model=False", plain_pole, None),
         _ratio_row("one Ant-v1 reset against Ant-v5, CPU time", ant_reset, None),
         _ratio_row("one InvertedPendulum-v1 reset, likewise", pole_reset, None),
-        _stopwatch_row(),
         _search_row(),
         *_frame_rows(),
     ]
@@ -121,51 +117,6 @@ def _ratio_row(name: str, ratios: list[float], target: float | None) -> Row:
         "none" if target is None else f">= {target:g}x",
         target is None or median >= target,
     )
-
-
-def _stopwatch_row() -> Row:
-    """Return the cost of MuJoCo's timers in physics steps alone."""
-    ant: Any = gym.make("Ant-v5").unwrapped
-    model = ant.model
-    rng = np.random.default_rng(0)
-    actions = rng.uniform(-1.0, 1.0, (ANT_STEPS, model.nu))
-
-    def step_all() -> None:
-        data = mujoco.MjData(model)
-        for action in actions:
-            data.ctrl[:] = action
-            mujoco.mj_step(model, data, _ANT_FRAME_SKIP)
-
-    def rested() -> None:
-        with paused_timer():
-            step_all()
-
-    ratios: list[float] = []
-    for number in range(ROUNDS):
-        pair = (step_all, rested) if number % 2 else (rested, step_all)
-        spent = {work: _cpu_s(work) for work in pair}
-        ratios.append(spent[step_all] / spent[rested])
-    name = f"physics of Ant-v5 with MuJoCo's stopwatch, read {_readings(model)} times a step, over"
-    return _ratio_row(f"{name} without, CPU time", sorted(ratios), None)
-
-
-def _readings(model: Any) -> int:
-    """Return how often a step reads the timer."""
-    readings = 0
-
-    def clock() -> float:
-        nonlocal readings
-        readings += 1
-        return float(readings)
-
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, ANT_STEPS)  # Let the body fall to the floor.
-    mujoco.set_mjcb_time(clock)
-    try:
-        mujoco.mj_step(model, data, _ANT_FRAME_SKIP)
-    finally:
-        mujoco.set_mjcb_time(None)
-    return readings
 
 
 def _search_row() -> Row:

@@ -214,8 +214,7 @@ class AntEnv(TunedStep, GymnasiumAntEnv):  # pyright: ignore[reportIncompatibleV
             check_action(self, action)
         x_before, y_before = bound.main_xy.tolist()
         bound.ctrl[:] = action
-        with bound.timer:
-            bound.move()
+        bound.move()
         x_after, y_after = bound.main_xy.tolist()
         x_velocity = np.float64((x_after - x_before) / bound.dt)
         y_velocity = np.float64((y_after - y_before) / bound.dt)

@@ -96,8 +96,7 @@ class InvertedPendulumEnv(  # pyright: ignore[reportIncompatibleVariableOverride
         if not math.isfinite(sum(action.tolist())):
             check_action(self, action)
         bound.ctrl[:] = action
-        with bound.timer:
-            bound.move()
+        bound.move()
         observation = np.concatenate(bound.observed, out=out)
         numbers = observation.tolist()
         # A sum is finite only if every number is; one that is not may have overflowed.

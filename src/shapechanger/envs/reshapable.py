@@ -84,9 +84,9 @@ class Reshapable(MujocoEnv):
     - `shadows`: whether frames have shadows, reflections and smoothed edges. By default, frames of
       more than 256 x 256 pixels have them, and smaller ones, which render twenty times faster
       without them, do not.
-    - `fast_model`: whether a cheaper model that moves equally to the last bit may step the physics,
-      while MuJoCo's profiling timer (`data.timer`) is paused. Ants and pendulums have such a model;
-      other envs accept the argument and always step their own.
+    - `fast_model`: whether a cheaper model that moves equally to the last bit may step the physics.
+      Ants and pendulums have such a model; other envs accept the argument and always step their
+      own.
     - `towards`: another body of the family with the same spaces. Each reset then draws the body
       uniformly on the way from `body` to it, unless the reset names one.
 

@@ -151,6 +151,8 @@ class FingerParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         )
         for name, value in numbers.items():
             given, shape = as_numbers(value), sizes.get(name, ())
+            if not given.size:
+                raise FingerError(f"{name} must hold numbers, got {value!r}.")
             if given.shape != shape:
                 raise FingerError(f"{name}: the shape must be {shape}, got {given.shape}.")
             if not np.isfinite(given).all():

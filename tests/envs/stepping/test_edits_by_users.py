@@ -225,7 +225,6 @@ def test_an_unedited_model_is_unedited() -> None:
     watch = ModelWatch(env.model)
     env.reset(seed=0)
     env.step(np.ones(8))
-    assert watch.sees
     assert watch.unedited()
     assert watch.digest == ModelWatch(AntEnv().model).digest
     assert watch.digest != ModelWatch(AntEnv("BigAnt").model).digest

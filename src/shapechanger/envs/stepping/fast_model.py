@@ -63,8 +63,6 @@ def find_fast_model(
     Returns:
         The fast model; None if none is known to move equally.
     """
-    if not watch.sees:
-        return None  # pragma: no cover  # Another MuJoCo build.
     name = watch.digest
     with _lock:  # Of several threads with the same body, one searches.
         if name not in _fast_models:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
-import threading
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
-from functools import cache
 from typing import Any, ClassVar, Final, Literal, NamedTuple, cast
 
 import mujoco
@@ -17,50 +13,6 @@ from shapechanger.envs.reshapable import BAD_STATE, Reshapable
 from shapechanger.envs.stepping.fast_model import find_fast_model, known_fast_model
 from shapechanger.envs.stepping.watch import ModelWatch
 from shapechanger.morphology.pose import StartRules
-
-
-class PausedTimer:
-    """Context in which MuJoCo's profiling timer is paused, for all threads at once.
-
-    In C nothing is measured unless a clock is installed. Python's MuJoCo installs one, and an ant's
-    step reads it hundreds of times to fill `data.timer`; `python -m benchmarks.run speed` measures
-    the cost. No other number depends on it. A clock installed with `mujoco.set_mjcb_time` is kept.
-
-    Args:
-        clock: The pointer to the clock function.
-    """
-
-    def __init__(self, clock: ctypes.c_void_p) -> None:
-        self._clock = clock
-        self._usual = clock.value
-        self._inside = 0
-        self._lock = threading.Lock()
-
-    def __enter__(self) -> None:
-        with self._lock:
-            self._inside += 1
-            if self._clock.value == self._usual:
-                self._clock.value = None
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._inside -= 1
-            if not self._inside and self._clock.value is None:
-                self._clock.value = self._usual
-
-
-@cache
-def paused_timer() -> AbstractContextManager[None]:
-    """Return the context that pauses the timer; it does nothing if the timer cannot be reached."""
-    if mujoco.get_mjcb_time() is not None:
-        return nullcontext()  # A user's clock; MuJoCo's own is unknown then.
-    try:
-        # The bindings are linked to the library, wherever it is installed.
-        bindings = ctypes.CDLL(cast("Any", mujoco)._callbacks.__file__)
-        return PausedTimer(ctypes.c_void_p.in_dll(bindings, "mjcb_time"))
-    except (AttributeError, OSError, ValueError):  # pragma: no cover  # Another MuJoCo build.
-        return nullcontext()
-
 
 # Result of `step`; Gymnasium's own steps promise that they never truncate.
 StepResult = tuple[NDArray[np.float64], Any, bool, Literal[False], dict[str, Any]]
@@ -103,7 +55,6 @@ class Binding:
         model: The public model.
         stepping: The model that steps the data: the public model or its fast model.
         has_fast_model: Whether `stepping` is a fast model; None until one has been looked for.
-        timer: Context in which to step: MuJoCo's profiling timer may pause there.
         shape: Shape of an action.
         dt: Duration of a step while the model is unedited, s.
         warnings: View of MuJoCo's counts of bad positions, velocities and accelerations, (3,).
@@ -121,7 +72,6 @@ class Binding:
         self.data = data
         self.stepping = model
         self.has_fast_model: bool | None = None
-        self.timer: AbstractContextManager[None] = nullcontext()
         self.shape = (int(model.nu),)
         self.frame_skip = frame_skip
         self.dt = watch.timestep * frame_skip
@@ -138,7 +88,7 @@ class Binding:
         self.stepping = self.model if fast is None else fast
 
     def move(self) -> None:
-        """Step the physics; call it inside `timer`."""
+        """Step the physics."""
         mujoco.mj_step(self.stepping, self.data, self.frame_skip)
         mujoco.mj_rnePostConstraint(self.stepping, self.data)
 
@@ -203,11 +153,6 @@ class TunedStep(Reshapable):
         if self._bound is not None:
             self._bound.kind = None
             self._bound.valid = False
-
-    @property
-    def timer(self) -> AbstractContextManager[None]:
-        """The context in which the physics of this env step."""
-        return paused_timer() if self.fast_model else nullcontext()
 
     def render(self) -> Any:
         """Return a frame, or None where a window shows it.
@@ -317,7 +262,6 @@ class TunedStep(Reshapable):
         if watch is None or watch.model is not self.model or not self._is_as_written():
             return None
         bound = self._bound = self._bind(watch)
-        bound.timer = self.timer
         if self.fast_model and (fast := known_fast_model(watch)) is not None:
             bound.step_with(fast)
         return bound

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
@@ -136,9 +135,6 @@ class BatchStep:
     ) -> None:
         self._subs = subs
         self._observations = observations
-        # MuJoCo's timer pauses only if all envs allow it.
-        timers = {None if sub.tuned is None else sub.tuned.timer for sub in subs}
-        self._timer = (timers.pop() if len(timers) == 1 else None) or nullcontext()
         self._bounds: list[Any] = [None] * len(subs)
         # Threads rarely take equally long, so each takes its own tasks from the front and then
         # those of others from the back. A deque hands out each task once.
@@ -195,10 +191,9 @@ class BatchStep:
         tasks[place:place] = [(number, reset) for number in resets]
         own = self._tasks[thread]
         own.extend(tasks)
-        with self._timer:
-            _work_off(own, own.popleft, failures)
-            for others in self._tasks:
-                _work_off(others, others.pop, failures)
+        _work_off(own, own.popleft, failures)
+        for others in self._tasks:
+            _work_off(others, others.pop, failures)
 
     def _bind(self, number: int) -> None:
         """Look up how an env steps its physics; where it does not, take its whole step."""

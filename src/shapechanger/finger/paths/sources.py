@@ -202,7 +202,7 @@ def _rows(name: str) -> tuple[list[str], list[list[float]]]:
             raise PathError(f"{where} has {len(cells)} cells, and there are four columns.")
         row = dict(zip(header, cells, strict=True))
         for column, cell in row.items():
-            if not np.isfinite(as_numbers(cell or None)).all():
+            if not (found := as_numbers(cell)).size or not np.isfinite(found):
                 raise PathError(f"{where}: {column} is {cell!r}, which is not a finite number.")
         rows.append([float(row[column]) for column in _COLUMNS])
     return [where for where, _ in body], rows
