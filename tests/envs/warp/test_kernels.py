@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from benchmarks import gpu_kernels
-from shapechanger.envs.warp import noise, tendon_arms
+from shapechanger.envs.warp import noise, patches
 from shapechanger.envs.warp.devices import wp
 
 
-@pytest.mark.parametrize("module", [noise, tendon_arms], ids=["noise", "tendon_arms"])
+@pytest.mark.parametrize("module", [noise, patches], ids=["noise", "patches"])
 def test_our_kernels_compile_for_an_h100(module: object, tmp_path: Path) -> None:
     """CUDA's compiler accepts them, which is stricter than the one for CPUs."""
     files = wp.compile_aot_module(module, arch=90, module_dir=tmp_path, use_ptx=False)

@@ -92,7 +92,9 @@ class ModelWatch:
 
 def _regions(model: mujoco.MjModel) -> list[tuple[int, int]]:
     """Return address and length in bytes of the memory of all arrays, neighbours as one region."""
-    inside = [_span(getattr(part, name)) for part in _parts(model) for name in _arrays(type(part))]
+    inside = [
+        _span(getattr(part, name)) for part in _parts(model) for name in _arrays(part.__class__)
+    ]
     # Options and statistics are parts of the model, so that what lies between is of it, too.
     spans = [(min(start for start, _ in inside), max(end for _, end in inside))]
     for name in _arrays(mujoco.MjModel):
@@ -120,7 +122,7 @@ def _parts(model: mujoco.MjModel) -> tuple[Any, Any]:
 
 
 @cache
-def _arrays(kind: type) -> list[str]:
+def _arrays(kind: type[Any]) -> list[str]:
     """Return the names of the arrays of a kind of object of MuJoCo."""
     made: Any = _blank if kind is mujoco.MjModel else kind
     blank = made()

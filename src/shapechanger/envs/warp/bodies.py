@@ -27,7 +27,7 @@ _SHARED_OPTIONS: Final = (
     *("noslip_iterations", "ccd_iterations", "disableflags", "enableflags"),
 )
 ARMS: Final = "wrap_prm"
-"""Moment arms of tendons over joints, which worlds have their own of; see `tendon_arms`."""
+"""Moment arms of tendons over joints, which worlds have their own of; see `patches`."""
 # Read by sleeping bodies and by sensors alone, which our tasks do not have.
 _UNREAD: Final = ("dof_length", "site_size")
 

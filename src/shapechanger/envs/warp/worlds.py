@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from shapechanger.envs.warp.bodies import ARMS, DeviceBody, static_geoms
-from shapechanger.envs.warp.contact_frames import follow_capsules
 from shapechanger.envs.warp.devices import as_torch, mjw, on, wp
-from shapechanger.envs.warp.tendon_arms import follow_arms
+from shapechanger.envs.warp.patches import follow_mujoco
 
 _G: Final = mujoco.mjtGeom
 
@@ -107,8 +106,7 @@ class Worlds:
         self._graphs: dict[str, Any] = {}
         self._warm: set[str] = set()
         self._static = torch.as_tensor(static_geoms(model), device=device)
-        follow_capsules()
-        follow_arms()
+        follow_mujoco()
         if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
             # mujoco-warp has no PGS. Newton's method solves the same problem, to its end.
             model = copy.copy(model)
