@@ -1,13 +1,16 @@
-"""Check actions before anything steps."""
+"""Check the arguments of envs, and actions before anything steps."""
 
 from __future__ import annotations
 
-from typing import Any, Final, Protocol
+import inspect
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any, Final, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.errors import BadAction
+from shapechanger.errors import BadAction, EnvArgumentError, UnknownName
 from shapechanger.layout import Layout
 
 # Kinds of NumPy dtypes: booleans, integers and floats; a batch refuses booleans, as Gymnasium.
@@ -103,3 +106,54 @@ def _wrong_shape(actions: Any, num_envs: int, shape: tuple[int, ...]) -> str:
         if np.shape(action) != shape:
             return f"The action of env {number} has shape {np.shape(action)}, not {shape}."
     return f"Actions have the shape {(num_envs, *shape)}."
+
+
+# Arguments of Gymnasium's base class that its envs set themselves.
+_FIXED: Final = ("self", "arguments", "kwargs", "model_path", "observation_space")
+
+
+def check_arguments(
+    env: type[Any], family: str, own: Mapping[str, Any], arguments: Mapping[str, Any]
+) -> None:
+    """Refuse arguments of an env that do not exist or have the wrong type.
+
+    Args:
+        env: Class of the env; its Gymnasium base class defines the arguments.
+        family: Name of the family, for messages.
+        own: Arguments of every env that Gymnasium's constructors lack, with their defaults.
+        arguments: Arguments by name.
+
+    Raises:
+        UnknownName: If there is no such argument.
+        EnvArgumentError: If one has the wrong type.
+    """
+    # `main_body` is a number or a name; MuJoCo refuses an unknown one.
+    known: dict[str, Any] = dict(own)
+    for base in reversed(env.__mro__):
+        if not base.__module__.startswith("gymnasium.envs.mujoco"):
+            continue
+        parameters = inspect.signature(cast("Any", base).__init__).parameters.values()
+        known.update({each.name: each.default for each in parameters if each.name not in _FIXED})
+    for name, value in arguments.items():
+        if name not in known:
+            own = [
+                each for each in inspect.signature(env.__init__).parameters if each not in _FIXED
+            ]
+            names = dict.fromkeys([*own, *known])
+            raise UnknownName(f"argument of {family}", name, names)
+        if name != "main_body" and (expected := _mismatch(known[name], value)):
+            raise EnvArgumentError(f"{family}: {name} must be {expected}, got {value!r}.")
+
+
+def _mismatch(default: Any, value: Any) -> str:
+    """Return what a value must be, judged by the argument's default; empty if it fits."""
+    if isinstance(default, bool):
+        return "" if isinstance(value, (bool, np.bool_)) else "True or False"
+    if isinstance(default, (int, float)):
+        is_number = isinstance(value, Real) and value is not True and value is not False
+        return "" if is_number else "a number"
+    if isinstance(default, tuple):
+        pair: list[Any] = [*value] if isinstance(value, (tuple, list, np.ndarray)) else []
+        fits = len(pair) == 2 and all(isinstance(each, Real) for each in pair)
+        return "" if fits else "two numbers"
+    return ""

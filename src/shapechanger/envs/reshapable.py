@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import copy
-import inspect
-from collections.abc import Mapping
-from numbers import Real
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import gymnasium as gym
@@ -27,7 +24,7 @@ try:
 except (ImportError, gym.error.DependencyNotInstalled) as error:
     raise MissingExtra("mujoco", "sim") from error
 
-from shapechanger.envs.actions import check_action
+from shapechanger.envs.actions import check_action, check_arguments
 from shapechanger.envs.layouts import action_layout, position_features, velocity_features
 from shapechanger.envs.renderer import (
     Renderer,
@@ -127,7 +124,7 @@ class Reshapable(MujocoEnv):
             UnknownName: If an argument or the body does not exist.
             EnvArgumentError: If an argument has the wrong type.
         """
-        _check_arguments(type(self), self.family.name, arguments)
+        check_arguments(type(self), self.family.name, _OWN_ARGUMENTS, arguments)
         own = {name: arguments.pop(name, default) for name, default in _OWN_ARGUMENTS.items()}
         self._own_arguments: dict[str, Any] = own
         self.fast_model = own["fast_model"]
@@ -478,53 +475,3 @@ class Reshapable(MujocoEnv):
         """
         pose = standing_pose(self.model, self.init_qpos)
         return draw(self.model, pose, width, height, reach or self.reach)
-
-
-def _check_arguments(env: type[Any], family: str, arguments: Mapping[str, Any]) -> None:
-    """Refuse arguments that do not exist or have the wrong type.
-
-    Args:
-        env: Class of the env; its Gymnasium base class defines the arguments.
-        family: Name of the family, for messages.
-        arguments: Arguments by name.
-
-    Raises:
-        UnknownName: If there is no such argument.
-        EnvArgumentError: If one has the wrong type.
-    """
-    # `main_body` is a number or a name; MuJoCo refuses an unknown one.
-    base: Any = next(each for each in env.__mro__ if each.__module__.startswith("gymnasium."))
-    known: dict[str, Any] = dict(_OWN_ARGUMENTS)
-    for constructor in (cast("Any", MujocoEnv).__init__, base.__init__):
-        parameters = inspect.signature(constructor).parameters.values()
-        known.update({each.name: each.default for each in parameters if each.name not in _FIXED})
-    for name, value in arguments.items():
-        if name not in known:
-            own = [
-                each for each in inspect.signature(env.__init__).parameters if each not in _FIXED
-            ]
-            names = dict.fromkeys([*own, *known])
-            raise UnknownName(f"argument of {family}", name, names)
-        if name != "main_body" and (expected := _mismatch(known[name], value)):
-            raise EnvArgumentError(f"{family}: {name} must be {expected}, got {value!r}.")
-
-
-# Arguments of Gymnasium's base class that its envs set themselves.
-_FIXED: Final = ("self", "arguments", "kwargs", "model_path", "observation_space")
-
-
-def _mismatch(default: Any, value: Any) -> str:
-    """Return what a value must be, judged by the argument's default; empty if it fits."""
-    if isinstance(default, bool):
-        return "" if isinstance(value, (bool, np.bool_)) else "True or False"
-    if isinstance(default, (int, float)):
-        return (
-            ""
-            if isinstance(value, Real) and value is not True and value is not False
-            else "a number"
-        )
-    if isinstance(default, tuple):
-        pair: list[Any] = [*value] if isinstance(value, (tuple, list, np.ndarray)) else []
-        fits = len(pair) == 2 and all(isinstance(each, Real) for each in pair)
-        return "" if fits else "two numbers"
-    return ""
