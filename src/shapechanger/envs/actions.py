@@ -136,11 +136,8 @@ def check_arguments(
         known.update({each.name: each.default for each in parameters if each.name not in _FIXED})
     for name, value in arguments.items():
         if name not in known:
-            own = [
-                each for each in inspect.signature(env.__init__).parameters if each not in _FIXED
-            ]
-            names = dict.fromkeys([*own, *known])
-            raise UnknownName(f"argument of {family}", name, names)
+            first = [n for n in inspect.signature(env.__init__).parameters if n not in _FIXED]
+            raise UnknownName(f"argument of {family}", name, dict.fromkeys([*first, *known]))
         if name != "main_body" and (expected := _mismatch(known[name], value)):
             raise EnvArgumentError(f"{family}: {name} must be {expected}, got {value!r}.")
 

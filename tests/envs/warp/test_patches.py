@@ -1,6 +1,7 @@
 """Functions of mujoco-warp that ours replace, for as long as that is needed."""
 
-from __future__ import annotations
+# Warp reads the annotations, so they must not become strings.
+# pyright: basic, reportInvalidTypeForm=false
 
 import dataclasses
 from typing import Any
@@ -48,7 +49,8 @@ def test_a_steep_capsule_still_needs_our_contacts() -> None:
 
 def test_moment_arms_are_still_kept_once() -> None:
     """If each world has its own, the tendons of `patches` can go."""
-    arms = next(f for f in dataclasses.fields(mjw.Model) if f.name == "wrap_prm")
+    fields: Any = dataclasses.fields(mjw.Model)
+    arms = next(field for field in fields if field.name == "wrap_prm")
     assert arms.type.shape[0] != "*"
 
 

@@ -99,7 +99,8 @@ def _regions(model: mujoco.MjModel) -> list[tuple[int, int]]:
     spans = [(min(start for start, _ in inside), max(end for _, end in inside))]
     for name in _arrays(mujoco.MjModel):
         array: Any = getattr(model, name)
-        if array.size and name != "tex_data":
+        # An array that owns its memory is a copy, which is gone at once.
+        if array.size and not array.flags.owndata and name != "tex_data":
             spans.append(_span(array))
     regions: list[tuple[int, int]] = []
     for start, end in sorted(spans):
