@@ -1,0 +1,74 @@
+"""A task on a body of the catalogue, by a user: one file, and the preset of a learner."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import gymnasium as gym
+import pytest
+
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.transfer.learners.presets import resolve_learner
+from shapechanger.transfer.runs import learner_of
+
+_TASK = '''
+"""A hopper that is rewarded for its height."""
+
+import gymnasium as gym
+
+from shapechanger.envs.runners import HopperEnv
+
+
+class HighHopper(HopperEnv):
+    """The hopper of any body, whose reward is the height of its torso over where it stands."""
+
+    def _get_rew(self, x_velocity, action):
+        height = float(self.data.qpos[1]) / self.standing_height
+        return height, {"reward_height": height}
+
+
+gym.register("outside/HighHopper-v0", HighHopper, max_episode_steps=30)
+'''
+_PRESET = """
+preset = "ppo-planar"
+n_envs = 1
+n_steps = 64
+batch_size = 32
+n_epochs = 1
+eval_every = 64
+eval_episodes = 1
+"""
+
+
+@pytest.fixture
+def task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """Return the id of the task, whose module is in a folder of the path."""
+    (tmp_path / "high_hopper.py").write_text(_TASK)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield "high_hopper:outside/HighHopper-v0"
+    gym.registry.pop("outside/HighHopper-v0", None)
+    sys.modules.pop("high_hopper", None)
+
+
+def test_a_task_keeps_bodies_layouts_and_certificates(task: str) -> None:
+    """It names its numbers, takes edits of the body, and certifies a shift."""
+    source, target = EnvRef(task).make(), EnvRef(task, {"body": "odrl-hopper-morph-torso-easy"})
+    shifted = target.make()
+    with source, shifted:
+        assert source.unwrapped.observation_layout.names[0] == "rootz/position"
+        assert source.unwrapped.certify_shift(source, shifted).changes
+        source.reset(seed=0)
+        _, reward, _, _, info = source.step(source.action_space.sample())
+        assert info["reward_height"] == reward > 0.5
+
+
+def test_a_preset_trains_it(task: str, tmp_path: Path) -> None:
+    """A TOML file of settings serves as for a task of the catalogue."""
+    file = tmp_path / "high.toml"
+    file.write_text(_PRESET)
+    learner = learner_of(*resolve_learner(str(file), {}))
+    curve = []
+    learner.train(EnvRef(task), 64, 0, on_evaluation=curve.append)
+    assert [evaluation.steps for evaluation in curve] == [0, 64]
