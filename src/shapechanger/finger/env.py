@@ -168,7 +168,14 @@ class FingerEnv(gym.Env[Any, NDArray[np.float32]], EzPickle):
         if self._is_drawn_anew and self._gap is not None:
             self._use(self._gap.draw(self.np_random))
         given = (options or {}).get("posture")
-        angles = draw_start(self.np_random) if given is None else check_posture(given)
+        angles, (low, high) = as_numbers(given), JOINT_RANGE.T
+        if given is None:
+            angles = draw_start(self.np_random)
+        elif angles.shape != (len(JOINTS),) or not ((angles >= low) & (angles <= high)).all():
+            raise FingerError(
+                f"A posture must be four angles in rad, {', '.join(JOINTS)}, within "
+                f"{low.round(3).tolist()} and {high.round(3).tolist()}; got {given}."
+            )
         self._senses = self._start_at(angles)
         return self._senses
 
@@ -371,19 +378,3 @@ def as_finger(value: FingerLike | None) -> FingerParameters:
     if given not in PARAMETER_SETS.values():
         require_balance(given)
     return given
-
-
-def check_posture(value: Any) -> NDArray[np.float64]:
-    """Return a posture as an array, rad, (4,).
-
-    Raises:
-        FingerError: If it is not four angles within the ranges of the joints.
-    """
-    angles = as_numbers(value)
-    low, high = JOINT_RANGE.T
-    if angles.shape != (len(JOINTS),) or not ((angles >= low) & (angles <= high)).all():
-        raise FingerError(
-            f"A posture must be four angles in rad, {', '.join(JOINTS)}, within "
-            f"{low.round(3).tolist()} and {high.round(3).tolist()}; got {value}."
-        )
-    return angles

@@ -109,7 +109,14 @@ class FingerReachEnv(FingerEnv):
         super().reset(seed=seed)
         given = (options or {}).get("target")
         target = fingertip(draw_posture(self.np_random))
-        self._target = target if given is None else _target(given)
+        if given is not None:
+            target = as_numbers(given)
+            target = fingertip(target) if target.shape == (4,) else target
+            if target.shape != (3,) or not np.isfinite(target).all():
+                raise FingerError(
+                    f"A target must be three finite numbers, m, or four angles; got {given}."
+                )
+        self._target = target
         senses = self._place(options)
         self.plant.mark(self._target)
         self._steps_near = 0
@@ -155,12 +162,3 @@ class FingerReachEnv(FingerEnv):
 
 def _unbounded(size: int) -> gym.spaces.Box:
     return gym.spaces.Box(-np.inf, np.inf, (size,), np.float64)
-
-
-def _target(value: Any) -> NDArray[np.float64]:
-    given = as_numbers(value)
-    if given.shape == (4,):
-        given = fingertip(given)
-    if given.shape != (3,) or not np.isfinite(given).all():
-        raise FingerError(f"A target must be three finite numbers, m, or four angles; got {value}.")
-    return given
