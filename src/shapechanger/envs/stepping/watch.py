@@ -95,8 +95,7 @@ def _regions(model: mujoco.MjModel) -> list[tuple[int, int]]:
     inside = [
         _span(getattr(part, name)) for part in _parts(model) for name in _arrays(part.__class__)
     ]
-    # Options and statistics are parts of the model, so that what lies between is of it, too.
-    spans = [(min(start for start, _ in inside), max(end for _, end in inside))]
+    spans: list[tuple[int, int]] = []
     for name in _arrays(mujoco.MjModel):
         array: Any = getattr(model, name)
         # An array that owns its memory is a copy, which is gone at once.
@@ -109,7 +108,10 @@ def _regions(model: mujoco.MjModel) -> list[tuple[int, int]]:
             regions[-1] = first, max(sum(regions[-1]), end) - first
         else:
             regions.append((start, end - start))
-    return regions
+    # Options and statistics are parts of the model, so that what lies between is of it, too. They
+    # come first, wherever in memory, so that equal models have equal digests.
+    first, last = min(start for start, _ in inside), max(end for _, end in inside)
+    return [(first, last - first), *regions]
 
 
 def _span(array: Any) -> tuple[int, int]:
