@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.robot.fetch import fetch_episode
 from shapechanger.demos.episodes import (
     EpisodeHeader,
     EpisodeWriter,
@@ -25,6 +24,7 @@ from shapechanger.demos.episodes import (
 from shapechanger.errors import DemosError
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.known_robots import KnownRobot, remember
+from shapechanger.robot.client.recordings import fetch_episode
 from tests.robot.client.test_real_daemon import Served
 from tests.robot.daemon.plans import ACTIONS, picture
 

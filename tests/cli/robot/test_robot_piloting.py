@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.robot.fetch import recorded
+from shapechanger.cli.robot.drive import recorded_to
 from shapechanger.demos.episodes import episodes_of, read_episode
 from shapechanger.robot.client.known_robots import KnownRobot, remember
 from shapechanger.robot.link.messages import Observation
@@ -65,14 +65,14 @@ def test_recordings_are_kept_after_a_failure(
         robot.client(role="person") as person,
     ):
         person.take()
-        with pytest.raises(KeyboardInterrupt), recorded(person, "car", tmp_path / "lost"):
+        with pytest.raises(KeyboardInterrupt), recorded_to(tmp_path / "lost", person, "car"):
             raise KeyboardInterrupt
         message = " ".join(capsys.readouterr().err.split())
         assert f"`shapechanger robot fetch car --out {tmp_path / 'lost'}` downloads it" in message
         assert not (tmp_path / "lost").exists()
         person.record(on=False)
 
-        with recorded(person, "car", tmp_path / "kept"):
+        with recorded_to(tmp_path / "kept", person, "car"):
             person.arm()
             for _ in range(20):
                 person.exchange((0.0, 0.3), person.ask())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -14,7 +15,6 @@ from rich.live import Live
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console, say
-from shapechanger.cli.robot.fetch import recorded
 from shapechanger.cli.robot.key import can_open, open_console
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.layout import Layout
@@ -73,7 +73,8 @@ class Drive:
                 )
                 if pilot is None and self.record is None:
                     return
-            stack.enter_context(recorded(robot, known.name, self.record))
+            if self.record is not None:
+                stack.enter_context(recorded_to(self.record, robot, known.name))
             if pilot is not None:
                 stack.enter_context(pilot)
             if driving is not None:
@@ -81,6 +82,32 @@ class Drive:
             else:
                 say("Ctrl-C ends this.")
                 _stay(robot, pilot)
+
+
+@contextlib.contextmanager
+def recorded_to(data: Path, robot: RobotClient, name: str) -> Generator[None]:
+    """Record on the robot for the duration of a block; if it fails, tell where the recording is.
+
+    Args:
+        data: Folder to download to at the end.
+        robot: The robot, connected to as a person.
+        name: Its local name.
+    """
+    from shapechanger.robot.client.recordings import begin_recording, end_recording, fetch_episode
+
+    before = begin_recording(robot)
+    try:
+        yield
+        for episode in end_recording(robot, before):
+            fetch_episode(robot, episode.id, data)
+            say(f"recorded {episode.kept} steps in {data / episode.id}")
+    except BaseException:
+        say(
+            f"The recording is on the robot: `shapechanger robot fetch {name} --out {data}` "
+            "downloads it.",
+            stderr=True,
+        )
+        raise
 
 
 def _stay(robot: RobotClient, pilot: PolicyDriver | None) -> None:

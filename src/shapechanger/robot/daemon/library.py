@@ -10,13 +10,20 @@ import threading
 from array import array
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, Final, Literal
+from typing import Annotated, Any, BinaryIO, Final
 
 import msgspec
 from msgspec import Meta
 
 from shapechanger.demos.episodes import drop, keep
-from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode
+from shapechanger.demos.episodes.files import (
+    FRAMES,
+    HEADER,
+    MAX_PICTURE_BYTES,
+    STEPS,
+    is_episode,
+    read_file,
+)
 from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import durations_s
 from shapechanger.errors import DemosError, ShapechangerError
@@ -38,32 +45,25 @@ Question = Browse | Fetch | Judge
 Answer = Recordings | Piece | Refused
 
 _EPISODE_ID: Final = re.compile(r"[0-9A-Za-z][0-9A-Za-z._-]{0,127}")
-# The start of `Step.to_json`. Steps are matched without parsing the JSON: there are 1200 a minute.
-_STEP: Final = re.compile(rb'\{"kind":"step","step":(\d{1,15}),')
-# The first of both is that of `Step.clock_ns`; a text in the line would have its quotes escaped.
-_TIMES: Final = re.compile(rb'"(?:captured|decided)_ns":(-?\d{1,19})')
 _MAX_TEXT: Final = 200
 _CHUNK: Final = 1 << 16
 _JOIN_S: Final = 2.0
 
 
-class _FrameOfLine(msgspec.Struct):
-    """The frame that a line of `steps.jsonl` names: file, size and checksum; None for none."""
+class _Line(msgspec.Struct, frozen=True):
+    """What the library needs of a line of `steps.jsonl`; an hour of steps has 72 000."""
 
-    # Such a name never leads to another folder.
+    kind: str
+    step: int = -1
+    first: int = 0
+    last: int = -1
+    captured_ns: int | None = None
+    decided_ns: int | None = None
+    # File, size and checksum. Such a name never leads to another folder.
     frame: tuple[Annotated[str, Meta(pattern=r"^[0-9]{6,}\.jpg\Z")], Any, Any] | None = None
 
 
-class _EditLine(msgspec.Struct):
-    """A line of `steps.jsonl` that drops or keeps steps."""
-
-    kind: Literal["drop", "keep"]
-    first: int
-    last: int
-
-
-_FRAME_DECODER: Final = msgspec.json.Decoder(_FrameOfLine)
-_EDIT_DECODER: Final = msgspec.json.Decoder(_EditLine)
+_LINES: Final = msgspec.json.Decoder(_Line)
 
 
 class RecordingLibrary:
@@ -197,8 +197,14 @@ class RecordingFolder:
             size, frame_before = len(header), ""
             for number in range(question.first, last):
                 line = index.read(file, number)[:-1].decode()
-                name = _frame_name(line, steps, number)
-                frame = _frame(path, name) if name and name != frame_before else None
+                try:
+                    named = _LINES.decode(line).frame
+                except msgspec.MsgspecError as error:
+                    raise DemosError(f"Line {number + 1} of {steps} is damaged: {error}.") from None
+                name = "" if named is None else named[0]
+                frame = None
+                if name and name != frame_before:
+                    frame = read_file(path / FRAMES / name, MAX_PICTURE_BYTES)
                 size += len(line.encode()) + len(frame or b"")
                 if lines and size > MAX_PIECE:
                     break
@@ -274,33 +280,6 @@ def _is_listed(path: Path) -> bool:
     return bool(_EPISODE_ID.fullmatch(path.name)) and not path.is_symlink() and is_episode(path)
 
 
-def _frame(path: Path, name: str) -> bytes:
-    """Read a frame of an episode.
-
-    Raises:
-        DemosError: If it cannot be read.
-    """
-    try:
-        return (path / FRAMES / name).read_bytes()
-    except OSError as error:
-        raise DemosError(
-            f"Cannot read the frame {name} of {path.name}: {error.strerror or error}."
-        ) from error
-
-
-def _frame_name(line: str, steps: Path, number: int) -> str:
-    """Return the file name of a line's frame, or "" if it has none.
-
-    Raises:
-        DemosError: If the line is damaged.
-    """
-    try:
-        frame = _FRAME_DECODER.decode(line).frame
-    except msgspec.MsgspecError as error:
-        raise DemosError(f"Line {number + 1} of {steps} is damaged: {error}.") from error
-    return "" if frame is None else frame[0]
-
-
 def _stamp(path: Path) -> tuple[int, ...]:
     """Return numbers that change when an episode does."""
     numbers: list[int] = []
@@ -311,49 +290,39 @@ def _stamp(path: Path) -> tuple[int, ...]:
 
 
 def _summary(path: Path) -> EpisodeSummary:
+    """Summarise an episode; an incomplete or damaged line is left out.
+
+    Raises:
+        DemosError: If the header cannot be read.
+        OSError: If the steps cannot be read.
+    """
     header, closed = read_header(path)
-    steps, dropped = _steps(path / STEPS)
-    kept = len(steps) - len(dropped)
-    lasted = zip(steps, durations_s(list(steps.values()), header.control_hz), strict=True)
+    steps: dict[int, int | None] = {}
+    edits: list[_Line] = []
+    with (path / STEPS).open("rb") as lines:
+        for raw in lines:
+            try:
+                line = _LINES.decode(raw)
+            except (msgspec.MsgspecError, UnicodeDecodeError):
+                continue
+            if line.kind == "step" and raw.endswith(b"\n"):
+                at_ns = line.decided_ns if line.captured_ns is None else line.captured_ns
+                steps[line.step] = at_ns
+            elif line.kind in {"drop", "keep"}:
+                edits.append(line)
+    dropped: set[int] = set()
+    for edit in edits:
+        # Only existing steps, whatever range the line names.
+        reach = {index for index in steps if edit.first <= index <= edit.last}
+        (dropped.difference_update if edit.kind == "keep" else dropped.update)(reach)
+    lasted = zip(steps, durations_s([*steps.values()], header.control_hz), strict=True)
     return EpisodeSummary(
         id=path.name,
         steps=len(steps),
-        kept=kept,
+        kept=len(steps) - len(dropped),
         seconds=math.fsum(seconds for index, seconds in lasted if index not in dropped),
         closed=closed is not None,
         created=header.created[:_MAX_TEXT],
         driver=header.driver[:_MAX_TEXT],
         outcome="" if closed is None else str(closed.get("outcome", ""))[:_MAX_TEXT],
     )
-
-
-def _steps(file: Path) -> tuple[dict[int, int | None], set[int]]:
-    """Return the time of each step by its index, ns, and the indices of the dropped ones.
-
-    Raises:
-        OSError: If the file cannot be read.
-    """
-    steps: dict[int, int | None] = {}
-    dropped: set[int] = set()
-    edits: list[_EditLine] = []
-    with file.open("rb") as lines:
-        for line in lines:
-            step = _STEP.match(line)
-            if step is not None and line.endswith(b"\n"):
-                at = _TIMES.search(line)
-                steps[int(step[1])] = None if at is None else int(at[1])
-            elif step is None and (edit := _edit(line)) is not None:
-                edits.append(edit)
-    for edit in edits:
-        # Only existing steps, whatever range the line names.
-        reach = {index for index in steps if edit.first <= index <= edit.last}
-        (dropped.difference_update if edit.kind == "keep" else dropped.update)(reach)
-    return steps, dropped
-
-
-def _edit(line: bytes) -> _EditLine | None:
-    """Return a line that drops or keeps steps, or None for any other or incomplete line."""
-    try:
-        return _EDIT_DECODER.decode(line)
-    except (msgspec.MsgspecError, UnicodeDecodeError):
-        return None

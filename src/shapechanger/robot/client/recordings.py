@@ -1,0 +1,204 @@
+"""Recordings on a robot: their list, their download, and recording for the time of a block."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS, is_episode, lock, write_all
+from shapechanger.demos.episodes.reader import read_header
+from shapechanger.demos.episodes.records import Step, decode_line, split_lines
+from shapechanger.errors import DemosError, OutputError, UnknownName
+from shapechanger.files import cannot_write, write_atomic
+from shapechanger.robot.client.client import RobotClient
+from shapechanger.robot.link.messages import EpisodeSummary, Piece
+
+_PART: Final = ".fetching"
+_STEP: Final = b'{"kind":"step",'
+_LINES: Final = 1_000
+_CLOSED_WITHIN_S: Final = 10.0  # Time that a memory card may need for the last steps.
+_LOOK_EVERY_S: Final = 0.1
+
+
+def episodes_there(robot: RobotClient, wanted: Sequence[str] = ()) -> list[EpisodeSummary]:
+    """Return the episodes on a robot, oldest first.
+
+    Args:
+        robot: The robot.
+        wanted: Ids of the episodes; empty for all.
+
+    Raises:
+        UnknownName: If one is not there.
+    """
+    found: list[EpisodeSummary] = []
+    more = True
+    while more:
+        page = robot.browse(found[-1].id if found else "")
+        found += page.episodes
+        more = page.more and bool(page.episodes)
+    found.reverse()
+    ids = [episode.id for episode in found]
+    for name in wanted:
+        if name not in ids:
+            raise UnknownName("episode", name, ids)
+    return [episode for episode in found if not wanted or episode.id in wanted]
+
+
+class Fetched(NamedTuple):
+    """Result of a download.
+
+    Attributes:
+        came: Number of new lines of the robot.
+        own: Number of marks and edits that were made here, and are kept.
+    """
+
+    came: int
+    own: int
+
+
+def fetch_episode(robot: RobotClient, name: str, data: Path) -> Fetched:
+    """Download one episode, or the new part of it.
+
+    An incomplete episode is kept in a folder that readers ignore. Marks and edits that were made
+    here are kept after those of the robot, so that they override these.
+
+    Args:
+        robot: The robot.
+        name: Id of the episode.
+        data: Folder of the recording.
+
+    Raises:
+        DemosError: If the data is damaged, or the local steps are not those of the robot.
+        OutputError: If it cannot be written; the part before that is kept.
+        LinkError: If the robot does not respond or refuses.
+    """
+    here, part = data / name, data / f".{name}{_PART}"
+    folder = here if is_episode(here) else part
+    try:
+        (folder / FRAMES).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    fd = lock(folder / STEPS, f"Somebody else fetches or changes {folder} at this moment.")
+    try:
+        have = _complete_lines(folder, fd)
+        # Lines up to the last step are the robot's; marks and edits of both sides follow.
+        begin = 1 + max((n for n, line in enumerate(have) if line.startswith(_STEP)), default=-1)
+        edits, theirs = have[begin:], list[bytes]()
+        piece = robot.fetch(name, max(begin - 1, 0), _LINES)
+        if begin and [line.encode() + b"\n" for line in piece.lines[:1]] != have[begin - 1 : begin]:
+            raise DemosError(
+                f"{folder} has other steps than {name} on the robot, so it stays as it is: "
+                "`--out` with another folder fetches that of the robot."
+            )
+        while piece.lines:
+            lines = _kept(piece, folder / FRAMES)
+            new = lines[max(begin - piece.first, 0) :]
+            theirs += new
+            if not edits:
+                write_all(fd, b"".join(new))
+            piece = robot.fetch(name, piece.first + len(lines), _LINES)
+        own = _without(edits, theirs)
+        if edits and (merged := have[:begin] + theirs + own) != have:
+            write_atomic(folder / STEPS, b"".join(merged))
+        os.fsync(fd)
+        # A header that was closed here, by a repair, and only here, stays.
+        if not (folder / HEADER).is_file() or read_header(folder)[1] is None:
+            write_atomic(folder / HEADER, piece.header.encode())
+            read_header(folder)
+        if folder is part:
+            part.rename(here)
+    except OSError as error:
+        if isinstance(error, ConnectionError | OutputError):  # Of the link, or worded already.
+            raise
+        raise cannot_write(folder, error) from error
+    finally:
+        os.close(fd)
+    return Fetched(len(_without(theirs, edits)), len(own))
+
+
+def _without(lines: Sequence[bytes], others: Sequence[bytes]) -> list[bytes]:
+    """Return the lines that are not among others; of equal ones, the last ones remain."""
+    left = Counter(others)
+    found: list[bytes] = []
+    for line in lines:
+        if left[line]:
+            left[line] -= 1
+        else:
+            found.append(line)
+    return found
+
+
+def _complete_lines(folder: Path, fd: int) -> list[bytes]:
+    """Return the local lines, after removing a truncated last one."""
+    lines = split_lines((folder / STEPS).read_bytes())
+    if lines and not lines[-1].endswith(b"\n"):
+        if (folder / HEADER).is_file():
+            raise DemosError(f"{folder} is not whole: `shapechanger demos repair {folder}` first.")
+        os.ftruncate(fd, sum(map(len, lines[:-1])))
+        lines.pop()
+    return lines
+
+
+def _kept(piece: Piece, frames: Path) -> list[bytes]:
+    """Check the lines of a piece, write their frames, and return them."""
+    lines = [line.encode() + b"\n" for line in piece.lines]
+    if len(piece.frames) != len(lines):
+        raise DemosError(f"The robot sent {len(piece.frames)} pictures for {len(lines)} lines.")
+    for number, (line, jpeg) in enumerate(zip(lines, piece.frames, strict=True), piece.first + 1):
+        try:
+            fields = decode_line(line)
+            step = Step.from_json(fields) if fields.get("kind") == "step" else None
+        except ValueError as error:
+            raise DemosError(
+                f"Line {number} of {piece.episode} is damaged on the robot, because {error}; "
+                "repair it there."
+            ) from error
+        if step is None or (picture := step.picture) is None:
+            continue
+        # A robot's data must not escape the folder.
+        if not (step.frame.endswith(".jpg") and step.frame[:-4].isdecimal()):
+            raise DemosError(f"A step names the picture {step.frame!r}.")
+        file = frames / step.frame
+        if jpeg is None:
+            is_good = file.is_file() and file.stat().st_size == picture.size
+        else:
+            is_good = picture.fits(jpeg)
+        if not is_good:
+            words = f"The picture {step.frame} of step {step.index} is damaged on the robot."
+            raise DemosError(words)
+        if jpeg is not None and not (file.is_file() and file.read_bytes() == jpeg):
+            file.write_bytes(jpeg)
+    return lines
+
+
+def begin_recording(robot: RobotClient) -> set[str]:
+    """Begin to record on a robot, as a person, and return the ids of the episodes before.
+
+    Raises:
+        RobotRefused: If the robot refuses to record.
+    """
+    before = {episode.id for episode in episodes_there(robot)}
+    robot.record(on=True)
+    return before
+
+
+def end_recording(robot: RobotClient, before: set[str]) -> list[EpisodeSummary]:
+    """End a recording, if it has not ended by itself, and return its episodes.
+
+    Args:
+        robot: The robot.
+        before: What `begin_recording` returned.
+    """
+    state = robot.recorder
+    if state is not None and state.recording:
+        robot.record(on=False)
+    until_s = time.monotonic() + _CLOSED_WITHIN_S
+    while True:
+        new = [episode for episode in episodes_there(robot) if episode.id not in before]
+        if all(episode.closed for episode in new) or time.monotonic() > until_s:
+            return new
+        time.sleep(_LOOK_EVERY_S)
