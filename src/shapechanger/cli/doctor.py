@@ -52,23 +52,6 @@ class ExamineMachine:
             sys.exit(1)
 
 
-@dataclass(frozen=True)
-class _Machine:
-    """What is installed on this machine; see `Subject`."""
-
-    requirements: Sequence[str]
-    version_of: Callable[[str], str]
-    dev: Path
-
-    def lacks(self, need: str) -> str | None:
-        """Leave out the check of a package that is not installed; an extra says that it is not."""
-        try:
-            self.version_of(need)
-        except importlib.metadata.PackageNotFoundError:
-            return ""
-        return None
-
-
 def examine_machine(
     requirements: Sequence[str] | None = None,
     version_of: Callable[[str], str] = importlib.metadata.version,
@@ -90,23 +73,28 @@ def examine_machine(
         raise MissingExtra("packaging", "cli") from None
     parsed = [Requirement(text) for text in requirements]
     extras = sorted({extra for one in parsed for extra in _extras_of(one)} - {*_NOT_LISTED})
+
+    def is_here(package: str) -> bool:
+        try:
+            version_of(package)
+        except importlib.metadata.PackageNotFoundError:
+            return False
+        return True
+
     checks = [
         Check("machine", _machine),
         *(
-            Check(f"extra {extra}" if extra else "core", partial(_extra, parsed, extra))
+            Check(f"extra {extra}" if extra else "core", partial(_extra, parsed, extra, version_of))
             for extra in ("", *extras)
         ),
-        Check("pictures", _drawing, ("mujoco",)),
-        Check("films", _films, ("imageio-ffmpeg",)),
-        Check("torch", _torch, ("torch",)),
-        Check("warp", _warp, ("warp-lang",)),
-        Check("ray", _ray, ("ray",)),
-        Check("pins", _gpio),
+        # An extra says that a package is not installed.
+        *(Check(name, run) for name, package, run in _PACKAGES if is_here(package)),
+        Check("pins", partial(_gpio, dev)),
     ]
-    return run_checks(checks, _Machine(requirements, version_of, dev))
+    return run_checks(checks)
 
 
-def _machine(_: _Machine) -> Results:
+def _machine() -> Results:
     """Yield the versions and the size of the machine."""
     free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
     yield (
@@ -116,7 +104,7 @@ def _machine(_: _Machine) -> Results:
     )
 
 
-def _extra(parsed: Sequence[Requirement], extra: str, machine: _Machine) -> Results:
+def _extra(parsed: Sequence[Requirement], extra: str, version_of: Callable[[str], str]) -> Results:
     """Yield whether the core or an extra is installed, in the versions that it needs."""
     absent: list[str] = []
     wrong: list[str] = []
@@ -126,7 +114,7 @@ def _extra(parsed: Sequence[Requirement], extra: str, machine: _Machine) -> Resu
         if bool(extra) != ("extra" in str(one.marker)):
             continue
         try:
-            version = machine.version_of(one.name)
+            version = version_of(one.name)
         except importlib.metadata.PackageNotFoundError:
             absent.append(one.name)
             continue
@@ -148,7 +136,7 @@ def _extras_of(requirement: Requirement) -> list[str]:
     return [part.partition('"')[0] for part in quoted[1:]]
 
 
-def _drawing(_: _Machine) -> Results:
+def _drawing() -> Results:
     """Yield whether MuJoCo draws a picture, and with which library."""
     done = subprocess.run(
         [sys.executable, "-c", _DRAW],
@@ -164,7 +152,7 @@ def _drawing(_: _Machine) -> Results:
     yield "bad", last.partition("RenderError: ")[2] or last
 
 
-def _films(_: _Machine) -> Results:
+def _films() -> Results:
     """Yield whether films can be encoded."""
     ffmpeg: Any = importlib.import_module("imageio_ffmpeg")
     try:
@@ -173,7 +161,7 @@ def _films(_: _Machine) -> Results:
         yield "bad", "No ffmpeg: run `pip install --force-reinstall imageio-ffmpeg`."
 
 
-def _torch(_: _Machine) -> Results:
+def _torch() -> Results:
     """Yield on what PyTorch computes."""
     import torch
 
@@ -183,7 +171,7 @@ def _torch(_: _Machine) -> Results:
     yield "good", f"{torch.__version__} on {where}."
 
 
-def _warp(_: _Machine) -> Results:
+def _warp() -> Results:
     """Yield on what `make_vec(..., backend="warp")` steps."""
     warp: Any = importlib.import_module("shapechanger.envs.warp.devices").wp
     if devices := [device.name for device in warp.get_cuda_devices()]:
@@ -192,7 +180,7 @@ def _warp(_: _Machine) -> Results:
         yield "unknown", "Steps on the CPU, slowly: CUDA finds no GPU here."
 
 
-def _ray(_: _Machine) -> Results:
+def _ray() -> Results:
     """Yield whether Ray can be imported."""
     try:
         ray: Any = importlib.import_module("ray")
@@ -202,9 +190,9 @@ def _ray(_: _Machine) -> Results:
         yield "good", f"{ray.__version__}; `--executor ray` runs studies on it."
 
 
-def _gpio(machine: _Machine) -> Results:
+def _gpio(dev: Path) -> Results:
     """Yield whether this machine has pins that a robot could use."""
-    chips = sorted(machine.dev.glob("gpiochip*"))
+    chips = sorted(dev.glob("gpiochip*"))
     if not chips:
         yield "unknown", "None here: robots run as twins, on simulated pins."
     elif any(os.access(chip, os.R_OK | os.W_OK) for chip in chips):
@@ -212,3 +200,13 @@ def _gpio(machine: _Machine) -> Results:
     else:
         remedy = "run `sudo usermod -aG gpio $USER` and log in again"
         yield "bad", f"{chips[0]} may not be opened: {remedy}."
+
+
+_PACKAGES: Final = (
+    ("pictures", "mujoco", _drawing),
+    ("films", "imageio-ffmpeg", _films),
+    ("torch", "torch", _torch),
+    ("warp", "warp-lang", _warp),
+    ("ray", "ray", _ray),
+)
+"""Checks of packages that are installed: name, package, function."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from queue import Empty, SimpleQueue
 from threading import Thread
 from time import monotonic
-from typing import Final, Generic, Literal, NamedTuple, Protocol, TypeVar
+from typing import Final, Literal, NamedTuple
 
 from shapechanger.errors import ShapechangerError
 
@@ -34,53 +34,23 @@ class Finding(NamedTuple):
     sentence: str
 
 
-class Subject(Protocol):
-    """A robot as a list of checks sees it."""
-
-    def lacks(self, need: str) -> str | None:
-        """Return why a check that needs something is not made; None if it is there.
-
-        An empty reason leaves the check out without a finding.
-        """
-        ...
-
-
-SubjectT = TypeVar("SubjectT", bound=Subject)
-
-
-class Check(NamedTuple, Generic[SubjectT]):
-    """A check.
-
-    Attributes:
-        name: Its name.
-        run: Yields its results.
-        needs: What the robot must have for it, as `Subject.lacks` knows it, the first first.
-    """
+class Check(NamedTuple):
+    """A check: its name, and a function that yields its results."""
 
     name: str
-    run: Callable[[SubjectT], Results]
-    needs: tuple[str, ...] = ()
+    run: Callable[[], Results]
 
 
-def run_checks(
-    checks: Iterable[Check[SubjectT]], subject: SubjectT, limit_s: float | None = None
-) -> Iterator[Finding]:
+def run_checks(checks: Iterable[Check], limit_s: float | None = None) -> Iterator[Finding]:
     """Yield the findings of a list of checks.
 
     Args:
         checks: The checks.
-        subject: The robot.
         limit_s: Time for each, s, after which the next begins, as after an error of any kind; None
             for checks that depend on those before.
     """
     for check in checks:
-        lacks = (subject.lacks(need) for need in check.needs)
-        why = next((reason for reason in lacks if reason is not None), None)
-        if why:
-            yield Finding(check.name, "unknown", why)
-        if why is not None:
-            continue
-        results = check.run(subject)
+        results = check.run()
         if limit_s is not None:
             late = f"No answer within {limit_s:g} s: its device or driver hangs. Look at its wires "
             late += "and supply, restart the computer, and check again."

@@ -6,6 +6,8 @@ import importlib.util
 import os
 import re
 from collections.abc import Iterator
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +25,7 @@ from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.check.wiring import wiring_checks
 from shapechanger.robot.daemon.credentials import credentials_folder, load_credentials
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
+from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.computer import (
     FAST_HZ,
     boot_config,
@@ -36,9 +39,8 @@ from shapechanger.robot.setup.systemd import unit_name, unit_word
 _CAMERA_S: Final = 5.0
 
 
-def _profile(robot: StandingRobot) -> Results:
-    if robot.profile is not None:
-        yield "good", f"{robot.profile.path} is valid."
+def _profile(profile: Profile) -> Results:
+    yield "good", f"{profile.path} is valid."
 
 
 def _credentials(robot: StandingRobot) -> Results:
@@ -46,9 +48,9 @@ def _credentials(robot: StandingRobot) -> Results:
     yield "good", f"Key and certificate: {folder.key_file.parent}."
 
 
-def _calibration(robot: StandingRobot) -> Results:
-    if robot.profile is not None and robot.profile.calibrated is None:
-        yield "unknown", f"Never calibrated: shapechanger robot calibrate {robot.profile.path}"
+def _calibration(profile: Profile) -> Results:
+    if profile.calibrated is None:
+        yield "unknown", f"Never calibrated: shapechanger robot calibrate {profile.path}"
 
 
 def _computer(robot: StandingRobot) -> Results:
@@ -189,33 +191,24 @@ def _packages(robot: StandingRobot) -> Results:
         yield judged(there, f"{name} is {'installed' if there else f'not installed: {remedy}'}.")
 
 
-def _camera(robot: StandingRobot) -> Results:
-    if (plan := robot.camera) is None:
-        return
+def _camera(robot: StandingRobot, plan: CameraPlan) -> Results:
     late = f"{plan.driver} sent no frame within {_CAMERA_S:g} s."
     try:
-        camera = robot.look(plan)
-        try:
+        with closing(robot.look(plan)) as camera:  # Also ends a `read` that still waits.
             yield from finish_in_time(_frame(plan, camera), _CAMERA_S, late)
-        finally:
-            camera.close()  # Also ends a `read` that still waits.
     except ShapechangerError as error:
         yield "bad", f"{plan.driver}: {error}"
 
 
 def _frame(plan: CameraPlan, camera: Camera) -> Results:
     try:
-        frame = camera.read()
+        yield "good", f"{plan.driver} sent a frame of {len(camera.read().jpeg)} bytes."
     except ShapechangerError as error:
         yield "bad", f"{plan.driver}: {error}"
-    else:
-        yield "good", f"{plan.driver} sent a frame of {len(frame.jpeg)} bytes."
 
 
-def _geometry(robot: StandingRobot) -> Results:
+def _geometry(plan: CameraPlan) -> Results:
     """Check that policies that drive by waypoints can use the camera."""
-    if (plan := robot.camera) is None:
-        return
     if plan.pitch_deg is None or plan.fovy_deg is None:
         words = "pitch_deg and fovy_deg are not stated, which policies with waypoints need: "
         yield "unknown", words + "`shapechanger robot camera` measures them."
@@ -242,12 +235,6 @@ def _bus_speed(robot: StandingRobot) -> Results:
         )
 
 
-def _served(robot: StandingRobot) -> Results:
-    if robot.port_error:
-        words = "The robot may be served now, so its pins and buses were left alone."
-        yield "unknown", words
-
-
 def _port(robot: StandingRobot) -> Results:
     if robot.port_error:
         reason = f"Port {robot.port} cannot be used ({robot.port_error})."
@@ -258,32 +245,33 @@ def _port(robot: StandingRobot) -> Results:
 
 def _close(robot: StandingRobot) -> Results:
     """Close what was opened, which may hang."""
+    if robot.port_error:
+        words = "The robot may be served now, so its pins and buses were left alone."
+        yield "unknown", words
     if "pins" in vars(robot):
         robot.pins.close()
-    yield from ()
 
 
-_COMPUTER: Final = (
-    Check("profile", _profile, ("profile",)),
-    Check("credentials", _credentials, ("profile",)),
-    Check("calibration", _calibration, ("profile",)),
-    Check("computer", _computer),
-    Check("strict_gpiod", _strict_gpiod),
-    Check("systemd", _unit, ("installation",)),
-    Check("enable line", _one_shot),
-    Check("output enable", _output_enable),
-    Check("latency timer", _latency_timers),
-    Check("devices", _devices),
-    Check("packages", _packages),
-    Check("camera", _camera, ("camera",)),
-    Check("camera's geometry", _geometry, ("camera",)),
-    Check("I2C speed", _bus_speed, ("encoders",)),
-)
-_LAST: Final = (
-    Check("wiring", _served),
-    Check("wiring", _close),
-    Check("port", _port, ("installation",)),
-)
+def _own_checks(robot: StandingRobot) -> Iterator[Check]:
+    """Yield the checks of a robot's profile, computer, installation and camera."""
+    if (profile := robot.profile) is not None:
+        yield Check("profile", partial(_profile, profile))
+        yield Check("credentials", partial(_credentials, robot))
+        yield Check("calibration", partial(_calibration, profile))
+    yield Check("computer", partial(_computer, robot))
+    yield Check("strict_gpiod", partial(_strict_gpiod, robot))
+    if robot.installed:
+        yield Check("systemd", partial(_unit, robot))
+    yield Check("enable line", partial(_one_shot, robot))
+    yield Check("output enable", partial(_output_enable, robot))
+    yield Check("latency timer", partial(_latency_timers, robot))
+    yield Check("devices", partial(_devices, robot))
+    yield Check("packages", partial(_packages, robot))
+    if (camera := robot.camera) is not None:
+        yield Check("camera", partial(_camera, robot, camera))
+        yield Check("camera's geometry", partial(_geometry, camera))
+    if any(sensor.driver == "as5600" for sensor in robot.guard.sensors):
+        yield Check("I2C speed", partial(_bus_speed, robot))
 
 
 def examine(robot: StandingRobot) -> Iterator[Finding]:
@@ -294,6 +282,8 @@ def examine(robot: StandingRobot) -> Iterator[Finding]:
     Args:
         robot: The robot.
     """
-    own = () if robot.on_twin else _COMPUTER
-    checks = (*own, *wiring_checks(robot), *_LAST)
-    return run_checks(checks, robot, robot.limit_s)
+    checks = [] if robot.on_twin else [*_own_checks(robot)]
+    checks += [*wiring_checks(robot), Check("wiring", partial(_close, robot))]
+    if robot.installed and not robot.on_twin:
+        checks.append(Check("port", partial(_port, robot)))
+    return run_checks(checks, robot.limit_s)

@@ -12,14 +12,14 @@ from pathlib import Path
 
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
 from shapechanger.robot.check.check import CHECK_S
-from shapechanger.robot.guard.plan import GuardPlan, SensorPlan, driven_pins
+from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.profile.profile import Profile
 
 
 @dataclass(frozen=True)
 class StandingRobot:
-    """A robot that is not driven; see `Subject`.
+    """A robot that is not driven.
 
     Attributes:
         guard: Outputs, sensors and limits of the robot.
@@ -82,26 +82,10 @@ class StandingRobot:
             return self.has_bus(sensor.settings["bus"])
         return self.has_pins or sensor.driver == "cpu_temperature"
 
-    def lacks(self, need: str) -> str | None:
-        """Return why a check is not made: a sentence, "" to leave it out, None if it is made."""
-        has_encoders = any(sensor.driver == "as5600" for sensor in self.guard.sensors)
-        there = {
-            "profile": self.profile is not None,
-            "installation": self.installed and not self.on_twin,
-            "camera": self.camera is not None,
-            "encoders": has_encoders,
-            "pins": self.has_pins,
-            "resistors": bool(driven_pins(self.guard) or servo_enables(self.guard)),
-            # Where the robot is served, its guard has the hardware to itself.
-            "hardware": not self.port_error and importlib.util.find_spec("gpiozero") is not None,
-        }
-        match need:
-            case "motors off" if not self.has_pins:
-                return "Not tested: this computer has no pins."
-            case "motors off" if not self.motors_off:
-                return "Not tested: take the motors' supply off, and add --motors-off."
-            case _:
-                return None if there.get(need, True) else ""
+    @property
+    def is_free(self) -> bool:
+        """Whether its pins and buses can be opened; where it is served, its guard has them."""
+        return not self.port_error and importlib.util.find_spec("gpiozero") is not None
 
 
 def servo_enables(guard: GuardPlan) -> list[int]:

@@ -5,6 +5,8 @@ They need the pins and buses for themselves, so the robot must not be served mea
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
@@ -35,6 +37,10 @@ def _resistors(robot: StandingRobot) -> Results:
     which 10 kOhm outside overrule. A motor could start where they are missing, so its supply must
     be off.
     """
+    if not (robot.has_pins and robot.motors_off):
+        lacks = "take the motors' supply off, and add --motors-off"
+        yield "unknown", f"Not tested: {lacks if robot.has_pins else 'this computer has no pins'}."
+        return
     for pin, use in driven_pins(robot.guard).items():
         level = _outside_level(pin, robot.pins)
         if level == 0:
@@ -102,16 +108,13 @@ def _read_sensor(robot: StandingRobot, plan: SensorPlan) -> Results:
         words = "turn the wheel a little by hand and check again: each must change now and then"
         yield "unknown", f"{plan.name}: {', '.join(levels)}; {words}."
         return
-    sensor = open_sensor(plan, hardware)
-    try:
+    with closing(open_sensor(plan, hardware)) as sensor:
         reading = sensor.read(hardware.clock.now_ns(), 0.0)
         for _ in range(_DISTANCE_READS if plan.measures == "distance" else 0):
             if reading:
                 break
             hardware.clock.wait([], hardware.clock.now_ns() + _PING_NS, _PING_NS / 1e9)
             reading = sensor.read(hardware.clock.now_ns(), 0.0)
-    finally:
-        sensor.close()
     yield _judged(plan, reading, robot.guard.limits.low_battery_v)
 
 
@@ -140,12 +143,8 @@ def _servo_boards(robot: StandingRobot) -> Results:
     for bus, address in sorted(boards):
         name = f"The PCA9685 at 0x{address:02x} on I2C bus {bus}"
         try:
-            with device_errors(name):
-                opened = robot.pins.i2c(bus)
-                try:
-                    opened.read_byte_data(address, _MODE1)
-                finally:
-                    opened.close()
+            with device_errors(name), closing(robot.pins.i2c(bus)) as opened:
+                opened.read_byte_data(address, _MODE1)
         except RobotError as error:
             words = f"look at SDA, SCL, 3.3 V and ground, and at `i2cdetect -y {bus}`"
             yield "bad", f"{str(error).rstrip('.')}: {words}."
@@ -177,15 +176,11 @@ def _encoders(robot: StandingRobot) -> Results:
         if plan.driver != "as5600" or not robot.can_read(plan):
             continue
         try:
-            sensor = connect_encoders(plan, robot.pins)
+            with closing(connect_encoders(plan, robot.pins)) as sensor:
+                for encoder in sensor.encoders:
+                    yield _encoder(sensor, encoder)
         except RobotError as error:
             yield "bad", str(error)
-            continue
-        try:
-            for encoder in sensor.encoders:
-                yield _encoder(sensor, encoder)
-        finally:
-            sensor.close()
 
 
 def _encoder(sensor: As5600, encoder: JointEncoder) -> tuple[Level, str]:
@@ -202,22 +197,22 @@ def _encoder(sensor: As5600, encoder: JointEncoder) -> tuple[Level, str]:
     return "good", f"The encoder of {joint} detects its magnet."
 
 
-def wiring_checks(robot: StandingRobot) -> list[Check[StandingRobot]]:
-    """Return the checks of a robot's wiring, one for each sensor that can be read.
+def wiring_checks(robot: StandingRobot) -> Iterator[Check]:
+    """Yield the checks of a robot's wiring, one for each sensor that can be read.
 
     Args:
         robot: The robot.
     """
-    return [
-        Check("resistors", _resistors, ("hardware", "resistors", "motors off")),
-        Check("emergency button", _button, ("hardware", "pins")),
-        Check("servo board", _servo_boards, ("hardware",)),
-        *(
-            Check("sensor", partial(_read_sensor, plan=plan), ("hardware",))
-            for plan in robot.guard.sensors
-            # Those have checks of their own.
-            if plan.driver not in {"as5600", DRIVER} and robot.can_read(plan)
-        ),
-        Check("servo bus", _servo_bus, ("hardware",)),
-        Check("encoders", _encoders, ("encoders", "hardware")),
-    ]
+    if not robot.is_free:
+        return
+    if driven_pins(robot.guard) or servo_enables(robot.guard):
+        yield Check("resistors", partial(_resistors, robot))
+    if robot.has_pins:
+        yield Check("emergency button", partial(_button, robot))
+    yield Check("servo board", partial(_servo_boards, robot))
+    for plan in robot.guard.sensors:
+        # Those have checks of their own.
+        if plan.driver not in {"as5600", DRIVER} and robot.can_read(plan):
+            yield Check("sensor", partial(_read_sensor, robot, plan))
+    yield Check("servo bus", partial(_servo_bus, robot))
+    yield Check("encoders", partial(_encoders, robot))

@@ -81,11 +81,11 @@ def test_trials_of_one_fault_are_one_finding() -> None:
 def test_faults_need_parts_of_a_robot() -> None:
     """A bench lets those happen that need no board of a twin."""
     trial = Trial(shipped("car"))
-    assert trial.lacks("") is None
+    assert not trial.lacks("")
     assert trial.lacks("bumper") == "This robot has no bumper."
     assert Trial(shipped("finger")).lacks("throttle") == "This robot has no throttle."
-    assert [check.name for check in fault_checks(all_faults=True)] == list(FAULTS)
-    needs = {FAULTS[check.name].needs for check in fault_checks(all_faults=False)}
+    assert [check.name for check in fault_checks(trial, all_faults=True)] == list(FAULTS)
+    needs = {FAULTS[check.name].needs for check in fault_checks(trial, all_faults=False)}
     assert needs == {"", "one-shot"}
 
 

@@ -7,6 +7,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Final
 
 from shapechanger.layout import Layout
@@ -25,7 +26,7 @@ _STANDS_MPS: Final = 0.02
 
 
 class DrivenRobot:
-    """A robot with its wheels off the ground, driven by a person; see `Subject`.
+    """A robot with its wheels off the ground, driven by a person.
 
     Args:
         robot: The running robot.
@@ -52,13 +53,10 @@ class DrivenRobot:
         self._state = Layout.from_json(self.client.welcome.state_layout)
         self.client.take()
 
-    def lacks(self, need: str) -> str | None:
-        """Return why a check is not made."""
-        if need == "motion" and not any(self._forward):
-            return "Nothing of this robot propels."
-        if need == "encoder" and self.speed(self.look()) is None:
-            return "No encoder measures the wheels."
-        return None
+    @property
+    def is_motive(self) -> bool:
+        """Whether an action propels it."""
+        return any(self._forward)
 
     def look(self) -> Observation:
         """Return the newest observation."""
@@ -95,6 +93,10 @@ class DrivenRobot:
         return dict(zip(self._state.names, seen.state, strict=True)).get("speed")
 
 
+def _stands(_: DrivenRobot) -> Results:
+    yield "unknown", "Nothing of this robot propels."
+
+
 def _boots_disarmed(robot: DrivenRobot) -> Results:
     seen = robot.push()
     good = not seen.armed and robot.at_rest(seen)
@@ -128,6 +130,9 @@ def _silence(robot: DrivenRobot) -> Results:
 
 def _coasts(robot: DrivenRobot) -> Results:
     """Measure how long the wheels coast."""
+    if robot.speed(robot.look()) is None:
+        yield "unknown", "No encoder measures the wheels."
+        return
     begin_s = time.monotonic()
     seen = robot.watch(lambda o: abs(robot.speed(o) or 0.0) < _STANDS_MPS, _COASTS_S)
     took_s = time.monotonic() - begin_s if seen else math.inf
@@ -164,16 +169,21 @@ def _crash(robot: DrivenRobot) -> Results:
     yield judged(not seen.armed and robot.at_rest(seen), words)
 
 
-# Each begins with the state that the one before left.
-_DRIVING: Final = (
-    Check("boots disarmed", _boots_disarmed),
-    Check("drives", _drives, ("motion",)),
-    Check("stops by silence", _silence, ("motion",)),
-    Check("wheels stand", _coasts, ("motion", "encoder")),
-    Check("emergency stop", _emergency, ("motion",)),
-    Check("disarms", _disarms, ("motion",)),
-    Check("disarmed after a crash", _crash, ("motion",)),
-)
+_OF_MOTION: Final = {
+    "drives": _drives,
+    "stops by silence": _silence,
+    "wheels stand": _coasts,
+    "emergency stop": _emergency,
+    "disarms": _disarms,
+    "disarmed after a crash": _crash,
+}
+
+
+def _driving_checks(robot: DrivenRobot) -> Iterator[Check]:
+    """Yield the checks, each of which begins with the state that the one before left."""
+    yield Check("boots disarmed", partial(_boots_disarmed, robot))
+    for name, run in _OF_MOTION.items():
+        yield Check(name, partial(run if robot.is_motive else _stands, robot))
 
 
 def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator[Finding]:
@@ -189,6 +199,6 @@ def check_driving(robot: RunningRobot, profile: Profile, cap: float) -> Iterator
     """
     driven = DrivenRobot(robot, profile, cap)
     try:
-        yield from run_checks(_DRIVING, driven)
+        yield from run_checks(_driving_checks(driven))
     finally:
         driven.client.close()

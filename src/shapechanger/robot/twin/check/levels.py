@@ -81,7 +81,7 @@ def _findings(
                 with bench.robot() as served:
                     yield from check_driving(served, bench.profile, cap)
             case "faults":
-                yield from run_checks(fault_checks(all_faults=level == "faults"), trial)
+                yield from run_checks(fault_checks(trial, all_faults=level == "faults"))
     finally:
         failures = bench.close()
     if failures:

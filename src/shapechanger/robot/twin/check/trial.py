@@ -78,7 +78,7 @@ class TrialResult:
 
 
 class Trial:
-    """A robot for successive trials; see `Subject`.
+    """A robot for successive trials.
 
     Args:
         bench: Where it is; a profile for its twin.
@@ -120,8 +120,8 @@ class Trial:
         if failures := self.bench.close():
             raise RobotError(f"Not everything is at rest: {' '.join(failures)}")
 
-    def lacks(self, need: str) -> str | None:
-        """Return why a fault is not tried; None if the robot has what it needs."""
+    def lacks(self, need: str) -> str:
+        """Return why a fault is not tried; "" if the robot has what it needs."""
         profile = self.bench.profile
         has = {
             "camera": profile.camera is not None,
@@ -131,7 +131,7 @@ class Trial:
             "one-shot": profile.enable_pin is not None or not self.bench.twin,
             "throttle": any(one.name == "throttle" and one.propels for one in profile.actions),
         }
-        return None if has.get(need, True) else f"This robot has no {need}."
+        return "" if has.get(need, True) else f"This robot has no {need}."
 
     def results(self, fault: Fault) -> Results:
         """Try a fault as often as asked, and yield one result.
@@ -139,6 +139,9 @@ class Trial:
         Args:
             fault: The fault.
         """
+        if why := self.lacks("throttle") or self.lacks(fault.needs):
+            yield "unknown", why
+            return
         try:
             results = [self._moving(fault) for _ in range(self._trials)]
         except ShapechangerError as error:
@@ -362,14 +365,15 @@ def _calm(robot: RunningRobot) -> None:
         person.ping()
 
 
-def fault_checks(*, all_faults: bool) -> list[Check[Trial]]:
+def fault_checks(trial: Trial, *, all_faults: bool) -> list[Check]:
     """Return the faults as checks.
 
     Args:
+        trial: The robot.
         all_faults: Whether to try all, and not only those that a bench with LEDs can have.
     """
     return [
-        Check(fault.name, partial(Trial.results, fault=fault), ("throttle", fault.needs))
+        Check(fault.name, partial(trial.results, fault))
         for fault in FAULTS.values()
         if all_faults or fault.on_pins
     ]
