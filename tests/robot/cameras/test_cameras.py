@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import fcntl
 import mmap
 import os
-import struct
 import sys
 import threading
 import time
@@ -228,32 +228,37 @@ class _Kernel:
         """Handle one call."""
         self.calls.append(call)
         if call == api.SET_FORMAT:
-            struct.pack_into("=II", data, 8, *self._size)
+            data.width, data.height = self._size
         elif call == api.QUERY_BUFFER:
-            index = api.Buffer.unpack(data).index
-            data[:] = api.Buffer(index, 0, 0, 0, index * mmap.PAGESIZE, mmap.PAGESIZE).pack()
+            data.offset, data.length = data.index * mmap.PAGESIZE, mmap.PAGESIZE
         elif call == api.QUEUE:
-            self._queued.append(api.Buffer.unpack(data).index)
+            self._queued.append(data.index)
         elif call == api.DEQUEUE:
             if not self.pictures:
                 raise BlockingIOError
             jpeg, at_ns, flags = self.pictures.pop(0)
-            index = self._queued.pop(0)
+            data.index, data.used, data.flags = self._queued.pop(0), len(jpeg), flags
+            data.seconds, data.microseconds = 0, at_ns // 1000
             with self._path.open("r+b") as file:
-                file.seek(index * mmap.PAGESIZE)
+                file.seek(data.index * mmap.PAGESIZE)
                 file.write(jpeg)
-            data[:] = api.Buffer(index, len(jpeg), flags, at_ns).pack()
         return 0
 
 
 def test_structures_have_the_kernels_sizes() -> None:
     """The sizes of structures are part of the ioctl numbers."""
-    assert len(api.Buffer(0).pack()) == (api.QUEUE >> 16) & 0x3FFF == 88
-    assert len(api.pixel_format(1, 1)) == (api.SET_FORMAT >> 16) & 0x3FFF == 208
-    assert len(api.frame_rate(1.0)) == (api.SET_PARAMETERS >> 16) & 0x3FFF == 204
-    assert len(api.request(1)) == (api.REQUEST_BUFFERS >> 16) & 0x3FFF == 20
-    buffer = api.Buffer(2, 100, 0x2000, 5_000_001_000, 8192, 4096)
-    assert api.Buffer.unpack(buffer.pack()) == buffer
+    for structure, call, size in (
+        (api.Buffer, api.QUEUE, 88),
+        (api.PixelFormat, api.SET_FORMAT, 208),
+        (api.Parameters, api.SET_PARAMETERS, 204),
+        (api.BufferRequest, api.REQUEST_BUFFERS, 20),
+    ):
+        assert ctypes.sizeof(structure) == (call >> 16) & 0x3FFF == size
+    # As on a 64-bit kernel.
+    assert (api.Buffer.seconds.offset, api.Buffer.memory.offset) == (24, 60)
+    assert (api.Buffer.offset.offset, api.Buffer.length.offset) == (64, 72)
+    assert api.PixelFormat.width.offset == 8
+    assert api.Parameters.numerator.offset == 12
 
 
 def test_a_webcam_returns_the_newest_frame_and_the_kernels_time(tmp_path: Path) -> None:

@@ -1,17 +1,17 @@
 """Camera driver for a JPEG webcam over Video4Linux2.
 
-Tested against a fake of the kernel's calls only, not on a camera.
+Tested against a fake of the kernel's calls only, not on a camera. Structures and numbers are those
+of linux/videodev2.h on a 64-bit system.
 """
 
 from __future__ import annotations
 
+import ctypes
 import fcntl
 import mmap
 import os
-import struct
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 from shapechanger.errors import RobotError
@@ -25,103 +25,60 @@ QUERY_BUFFER: Final = 0xC0585609  # VIDIOC_QUERYBUF
 QUEUE: Final = 0xC058560F  # VIDIOC_QBUF
 DEQUEUE: Final = 0xC0585611  # VIDIOC_DQBUF
 STREAM_ON: Final = 0x40045612  # VIDIOC_STREAMON
-STREAM_OFF: Final = 0x40045613  # VIDIOC_STREAMOFF
 
-CAPTURE: Final = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
 MJPEG: Final = 0x47504A4D  # V4L2_PIX_FMT_MJPEG
 BUFFER_FLAG_ERROR: Final = 0x40
 BUFFER_FLAG_TIMESTAMP_MASK: Final = 0xE000
 BUFFER_FLAG_MONOTONIC: Final = 0x2000
 
+_CAPTURE: Final = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
 _MEMORY_MMAP: Final = 1
 _FIELD_NONE: Final = 1
-_BUFFER: Final = struct.Struct("=IIIII4xqq16xIIQIIi4x")  # struct v4l2_buffer, 88 bytes.
-_FORMAT: Final = struct.Struct("=I4xIIII184x")  # struct v4l2_format, 208 bytes.
-_PARAMETERS: Final = struct.Struct("=I8xII184x")  # struct v4l2_streamparm, 204 bytes.
-_REQUEST: Final = struct.Struct("=III8x")  # struct v4l2_requestbuffers, 20 bytes.
-
-
-@dataclass(frozen=True, slots=True)
-class Buffer:
-    """State of a kernel buffer (struct v4l2_buffer).
-
-    Attributes:
-        index: Number of the buffer.
-        used: Size of its frame, bytes.
-        flags: Kind of its timestamp, and errors.
-        at_ns: Time of capture, ns.
-        offset: Offset for mmap.
-        length: Size of the buffer, bytes.
-    """
-
-    index: int
-    used: int = 0
-    flags: int = 0
-    at_ns: int = 0
-    offset: int = 0
-    length: int = 0
-
-    def pack(self) -> bytearray:
-        """Encode for the kernel."""
-        seconds, rest_ns = divmod(self.at_ns, 1_000_000_000)
-        return bytearray(
-            _BUFFER.pack(
-                self.index,
-                CAPTURE,
-                self.used,
-                self.flags,
-                _FIELD_NONE,
-                seconds,
-                rest_ns // 1000,
-                0,
-                _MEMORY_MMAP,
-                self.offset,
-                self.length,
-                0,
-                0,
-            )
-        )
-
-    @classmethod
-    def unpack(cls, data: bytes | bytearray) -> Buffer:
-        """Decode from the kernel."""
-        index, _, used, flags, _, seconds, microseconds, _, _, offset, length, _, _ = (
-            _BUFFER.unpack(data)
-        )
-        at_ns = seconds * 1_000_000_000 + microseconds * 1000
-        return cls(index, used, flags, at_ns, offset & 0xFFFFFFFF, length)
-
-
-def pixel_format(width: int, height: int) -> bytearray:
-    """Return a request for JPEG frames of a size.
-
-    Args:
-        width: Width, pixels.
-        height: Height, pixels.
-    """
-    return bytearray(_FORMAT.pack(CAPTURE, width, height, MJPEG, _FIELD_NONE))
-
-
-def image_size(data: bytes | bytearray) -> tuple[int, int, int]:
-    """Return width, height and pixel format as accepted by the camera."""
-    _, width, height, kind, _ = _FORMAT.unpack(data)
-    return width, height, kind
-
-
-def frame_rate(fps: float) -> bytearray:
-    """Return a request for a number of frames a second."""
-    return bytearray(_PARAMETERS.pack(CAPTURE, 1000, round(fps * 1000)))
-
-
-def request(buffers: int) -> bytearray:
-    """Return a request for a number of buffers."""
-    return bytearray(_REQUEST.pack(buffers, CAPTURE, _MEMORY_MMAP))
-
-
+_U32: Final = ctypes.c_uint32
 _BUFFERS: Final = 3
 _SILENT_S: Final = 5.0  # Time after which a silent camera counts as hung.
 
-Ioctl = Callable[[int, int, Any], int]
+
+def _words(*names: str) -> tuple[tuple[str, type[ctypes.c_uint32]], ...]:
+    return tuple((name, _U32) for name in names)
+
+
+class Buffer(ctypes.Structure):
+    """Struct v4l2_buffer: a buffer of the kernel and its frame."""
+
+    _fields_ = (
+        *_words("index", "type", "used", "flags", "field"),
+        ("seconds", ctypes.c_int64),
+        ("microseconds", ctypes.c_int64),
+        ("timecode", _U32 * 4),
+        *_words("sequence", "memory"),
+        ("offset", ctypes.c_uint64),
+        *_words("length", "reserved", "request"),
+    )
+
+
+class PixelFormat(ctypes.Structure):
+    """Struct v4l2_format."""
+
+    _fields_ = (
+        *_words("type", "padding", "width", "height", "kind", "field"),
+        ("rest", _U32 * 46),
+    )
+
+
+class Parameters(ctypes.Structure):
+    """Struct v4l2_streamparm, with the time of a frame as a fraction of a second."""
+
+    _fields_ = (
+        *_words("type", "capability", "mode", "numerator", "denominator"),
+        ("rest", _U32 * 46),
+    )
+
+
+class BufferRequest(ctypes.Structure):
+    """Struct v4l2_requestbuffers."""
+
+    _fields_ = _words("count", "type", "memory", "caps", "rest")
 
 
 class V4l2:
@@ -132,8 +89,10 @@ class V4l2:
         ioctl: Calls the kernel.
     """
 
-    def __init__(self, plan: CameraPlan, ioctl: Ioctl = fcntl.ioctl) -> None:
-        if struct.calcsize("P") != 8:
+    def __init__(
+        self, plan: CameraPlan, ioctl: Callable[[int, int, Any], int] = fcntl.ioctl
+    ) -> None:
+        if ctypes.sizeof(ctypes.c_void_p) != 8:
             raise RobotError("The v4l2 camera needs a 64-bit system; take `pipe` with ffmpeg.")
         self._plan = plan
         self._ioctl = ioctl
@@ -169,45 +128,41 @@ class V4l2:
             os.close(self._fd)  # This stops the camera.
 
     def _start(self) -> None:
-        wanted = pixel_format(*self._plan.size)
+        width, height = self._plan.size
+        wanted = PixelFormat(
+            type=_CAPTURE, width=width, height=height, kind=MJPEG, field=_FIELD_NONE
+        )
         self._ioctl(self._fd, SET_FORMAT, wanted)
-        width, height, kind = image_size(wanted)
-        if (width, height, kind) != (*self._plan.size, MJPEG):
+        if (wanted.width, wanted.height, wanted.kind) != (width, height, MJPEG):
             raise RobotError(
-                f"The camera {self._device} offers no JPEG frames of {self._plan.size[0]} by "
-                f"{self._plan.size[1]} pixels; `v4l2-ctl --list-formats-ext` lists what it offers."
+                f"The camera {self._device} offers no JPEG frames of {width} by {height} pixels; "
+                "`v4l2-ctl --list-formats-ext` lists what it offers."
             )
-        self._ioctl(self._fd, SET_PARAMETERS, frame_rate(self._plan.fps))
-        self._ioctl(self._fd, REQUEST_BUFFERS, request(_BUFFERS))
+        rate = Parameters(type=_CAPTURE, numerator=1000, denominator=round(1000 * self._plan.fps))
+        self._ioctl(self._fd, SET_PARAMETERS, rate)
+        asked = BufferRequest(count=_BUFFERS, type=_CAPTURE, memory=_MEMORY_MMAP)
+        self._ioctl(self._fd, REQUEST_BUFFERS, asked)
         for index in range(_BUFFERS):
-            data = Buffer(index).pack()
-            self._ioctl(self._fd, QUERY_BUFFER, data)
-            buffer = Buffer.unpack(data)
-            self._buffers.append(
-                mmap.mmap(
-                    self._fd,
-                    buffer.length,
-                    flags=mmap.MAP_SHARED,
-                    prot=mmap.PROT_READ | mmap.PROT_WRITE,
-                    offset=buffer.offset,
-                )
-            )
-            self._ioctl(self._fd, QUEUE, data)
-        self._ioctl(self._fd, STREAM_ON, struct.pack("=i", CAPTURE))
+            buffer = Buffer(index=index, type=_CAPTURE, memory=_MEMORY_MMAP)
+            self._ioctl(self._fd, QUERY_BUFFER, buffer)
+            offset = buffer.offset & 0xFFFFFFFF  # A union, of which the kernel sets 32 bits.
+            self._buffers.append(mmap.mmap(self._fd, buffer.length, offset=offset))
+            self._ioctl(self._fd, QUEUE, buffer)
+        self._ioctl(self._fd, STREAM_ON, ctypes.c_int(_CAPTURE))
 
     def _newest(self) -> tuple[bytes, int]:
         newest: tuple[bytes, int] | None = None
         while True:
-            data = Buffer(0).pack()
+            buffer = Buffer(type=_CAPTURE, memory=_MEMORY_MMAP)
             try:
-                self._ioctl(self._fd, DEQUEUE, data)
+                self._ioctl(self._fd, DEQUEUE, buffer)
             except BlockingIOError:
                 if newest is None:
                     raise
                 return newest
-            buffer = Buffer.unpack(data)
             if not buffer.flags & BUFFER_FLAG_ERROR:
-                monotonic = buffer.flags & BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC
-                jpeg = self._buffers[buffer.index][: buffer.used]
-                newest = jpeg, buffer.at_ns if monotonic else time.monotonic_ns()
-            self._ioctl(self._fd, QUEUE, data)
+                at_ns: int = time.monotonic_ns()
+                if buffer.flags & BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC:
+                    at_ns = buffer.seconds * 1_000_000_000 + buffer.microseconds * 1000
+                newest = bytes(self._buffers[buffer.index][: buffer.used]), at_ns
+            self._ioctl(self._fd, QUEUE, buffer)
