@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.serve import make_known
 from shapechanger.robot.client.known_robots import KnownRobot, known_folder, recall, remember
 from shapechanger.robot.link.authentication import new_key
+from shapechanger.robot.serve import make_known
 
 _MINE = KnownRobot("rover", "127.0.0.1", new_key(), "ab" * 32)
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.robot import key as opening
-from shapechanger.cli.robot.key import can_open, open_console
 from shapechanger.errors import LinkError
+from shapechanger.robot.client import browser as opening
+from shapechanger.robot.client.browser import can_open, open_console
 from shapechanger.robot.client.known_robots import KnownRobot, remember
 from shapechanger.robot.link.authentication import new_key
 from shapechanger.robot.twin.robot import run_robot

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli.robot.serve import recordings_folder
 from shapechanger.errors import RobotError
+from shapechanger.robot.serve import recordings_folder
 
 
 def test_it_follows_the_xdg_specification(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,11 +13,11 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.calibrate import ask_for_wheels_up
-from shapechanger.cli.robot.setup import require_pins, require_port
+from shapechanger.cli.robot.setup import require_port
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.check import MARKS
 from shapechanger.robot.check.lamps import lamps_of
-from shapechanger.robot.check.pins import check_jumper, plan_of_pins
+from shapechanger.robot.check.pins import check_jumper, plan_of_pins, require_pins
 from shapechanger.robot.check.report import facts, write_report
 from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.guard.plan import GuardPlan

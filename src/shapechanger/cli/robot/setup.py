@@ -14,8 +14,9 @@ from typing import Annotated, Any, Final, Literal
 import tyro
 
 from shapechanger.cli.console import say
-from shapechanger.cli.robot.key import how_to_remember, robot_at, shown_credentials
+from shapechanger.cli.robot.key import how_to_remember, shown_credentials
 from shapechanger.errors import RobotError, ShapechangerError, UnknownName
+from shapechanger.robot.check.pins import require_pins
 from shapechanger.robot.client.known_robots import check_name, remember
 from shapechanger.robot.daemon.credentials import (
     credentials_folder,
@@ -23,7 +24,6 @@ from shapechanger.robot.daemon.credentials import (
     make_credentials,
 )
 from shapechanger.robot.guard.outputs import make_safe
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import REAL, connect
 from shapechanger.robot.profile.load import (
     find_profile,
@@ -34,7 +34,7 @@ from shapechanger.robot.profile.load import (
     write_text,
 )
 from shapechanger.robot.profile.profile import Profile
-from shapechanger.robot.setup.computer import needs_pins
+from shapechanger.robot.serve import robot_at
 from shapechanger.robot.setup.install import (
     Machine,
     Outcome,
@@ -411,20 +411,3 @@ class SafePins:
                 "Not everything is at rest: take the battery off. " + " ".join(failures)
             )
         say(f"All {len(plan.outputs)} outputs of {plan.name} are at rest.")
-
-
-def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
-    """Refuse a machine without GPIO pins.
-
-    Args:
-        plan: The robot.
-        root: Root of the file system, for tests.
-
-    Raises:
-        RobotError: If an output needs a pin and the machine has none.
-    """
-    if needs_pins(plan) and not any((root / "dev").glob("gpiochip*")):
-        raise RobotError(
-            f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
-            "`shapechanger robot serve --twin` runs it on simulated ones."
-        )

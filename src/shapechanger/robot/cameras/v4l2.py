@@ -164,5 +164,7 @@ class V4l2:
                 at_ns: int = time.monotonic_ns()
                 if buffer.flags & BUFFER_FLAG_TIMESTAMP_MASK == BUFFER_FLAG_MONOTONIC:
                     at_ns = buffer.seconds * 1_000_000_000 + buffer.microseconds * 1000
-                newest = bytes(self._buffers[buffer.index][: buffer.used]), at_ns
+                index: int = buffer.index
+                used: int = buffer.used
+                newest = self._buffers[index][:used], at_ns
             self._ioctl(self._fd, QUEUE, buffer)

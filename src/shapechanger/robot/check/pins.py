@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from contextlib import closing
+from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.plan import GuardPlan, driven_pins
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.profile.pins import BCM_OF_BOARD, HIGHEST_BCM
+from shapechanger.robot.setup.computer import needs_pins
 
 _TOGGLES: Final = 50
 _SETTLES_S: Final = 0.002
@@ -117,3 +119,20 @@ def check_jumper(
                         f"Pin {sensed} does not follow pin {output}: is the wire between them?"
                     )
     return f"pin {sensed} followed pin {output} {_TOGGLES} times."
+
+
+def require_pins(plan: GuardPlan, root: Path = Path("/")) -> None:
+    """Refuse a machine without GPIO pins.
+
+    Args:
+        plan: The robot.
+        root: Root of the file system, for tests.
+
+    Raises:
+        RobotError: If an output needs a pin and the machine has none.
+    """
+    if needs_pins(plan) and not any((root / "dev").glob("gpiochip*")):
+        raise RobotError(
+            f"{plan.name} is on pins, and this machine has none (no /dev/gpiochip0): "
+            "`shapechanger robot serve --twin` runs it on simulated ones."
+        )

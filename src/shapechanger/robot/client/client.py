@@ -22,7 +22,7 @@ from typing import Final, Self, TypeVar
 
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.robot.client.connection import Access, RobotConnection, open_connection
-from shapechanger.robot.client.inbox import Inbox, Received, Request
+from shapechanger.robot.client.inbox import Inbox, Received
 from shapechanger.robot.client.known_robots import KnownRobot, parse_trust, untrusted
 from shapechanger.robot.link import messages
 from shapechanger.robot.link.address import parse_address
@@ -71,14 +71,13 @@ class RobotClient:
         self._thread = threading.Thread(
             target=self._run, name=f"robot {access.address}", daemon=True
         )
-        welcome = Request(Welcome)
-        with self._inbox.expecting(welcome):
-            self._thread.start()
-            try:
-                self.welcome = self._inbox.answer(welcome)
-            except BaseException:  # Ctrl-C too: leave no thread behind.
-                self.close()
-                raise
+        welcome = self._inbox.expect(Welcome)
+        self._thread.start()
+        try:
+            self.welcome = welcome.result()
+        except BaseException:  # Ctrl-C too: leave no thread behind.
+            self.close()
+            raise
 
     @classmethod
     def connect(
@@ -168,16 +167,18 @@ class RobotClient:
         seen = self.newest or self.ask()
         # Answer a new observation, but end only an emergency stop that was seen before the call.
         newest = self.ask()
-        request = Request(messages.Refused)
-        with self._inbox.expecting(request):
+        refused = self._inbox.expect(messages.Refused)
+        try:
             self._post(messages.Arm(answers=newest.message.seq, emergency=seen.message.emergencies))
             until = time.monotonic() + self._access.timeout_s
             while time.monotonic() < until:
                 newest = self.ask()
-                if request.refusal is not None:
-                    raise RobotRefused(request.refusal)
+                if refused.done():
+                    refused.result()
                 if newest.message.armed:
                     return
+        finally:
+            refused.cancel()
         reason = newest.message.stop_reason
         raise RobotRefused(f"The robot did not arm{f': {reason}' if reason else ''}.")
 
@@ -486,14 +487,15 @@ class RobotClient:
         timeout_s: float | None = None,
         accepts: Callable[[_Answer], bool] = lambda _: True,
     ) -> _Answer:
-        request = Request(kind, accepts)
-        with self._inbox.expecting(request):
+        answer = self._inbox.expect(kind, accepts)
+        try:
             self._post(message)
-            try:
-                return self._inbox.answer(request, self._limit(timeout_s))
-            except TimeoutError:
-                asked = type(message).__name__
-                raise LinkError(f"The robot did not answer {asked!r} in time.") from None
+            return answer.result(self._limit(timeout_s))
+        except TimeoutError:
+            asked = type(message).__name__
+            raise LinkError(f"The robot did not answer {asked!r} in time.") from None
+        finally:
+            answer.cancel()
 
     # In the connection's thread.
 

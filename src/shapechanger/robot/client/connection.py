@@ -119,7 +119,11 @@ class RobotConnection:
             await asyncio.gather(*tasks, return_exceptions=True)
         for task in done:
             task.result()
-        await self._close()
+        # Should this fail, the robot notices the end of the connection anyway.
+        with contextlib.suppress(LinkError, TimeoutError):
+            async with asyncio.timeout(_CLOSE_S):
+                await self._send_pending()
+                await self._websocket.close()
 
     async def _receive(self, handle: _Handler) -> None:
         loop = asyncio.get_running_loop()
@@ -152,14 +156,6 @@ class RobotConnection:
                 raise _lost(f"no message for {silent_s:.1f} s")
             if silent_s > _PING_AFTER * limit_s:
                 self.post(Ping())
-
-    async def _close(self) -> None:
-        try:
-            async with asyncio.timeout(_CLOSE_S):
-                await self._send_pending()
-                await self._websocket.close()
-        except (LinkError, TimeoutError):
-            return  # The robot notices the end of the connection anyway.
 
 
 @asynccontextmanager
@@ -225,15 +221,11 @@ async def open_connection(access: Access) -> AsyncGenerator[RobotConnection]:
             await websocket.close()
         await session.close()
         await connector.close(abort_ssl=True)
-        await _wait_until_closed(sockets)
-
-
-async def _wait_until_closed(sockets: list[socket.socket]) -> None:
-    """Wait until the loop has noticed the end of the sockets, which would stay open otherwise."""
-    with contextlib.suppress(TimeoutError):
-        async with asyncio.timeout(_CLOSE_S):
-            while any(each.fileno() != -1 for each in sockets):
-                await asyncio.sleep(0)
+        # Wait until the loop has noticed the end of the sockets, which would stay open otherwise.
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_CLOSE_S):
+                while any(each.fileno() != -1 for each in sockets):
+                    await asyncio.sleep(0)
 
 
 async def _welcomed(websocket: aiohttp.ClientWebSocketResponse, access: Access) -> Welcome:

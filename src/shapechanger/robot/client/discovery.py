@@ -10,7 +10,7 @@ from shapechanger.errors import MissingExtra
 from shapechanger.robot.link.address import SERVICE, Address
 
 try:
-    from zeroconf import ServiceBrowser, ServiceListener, Zeroconf
+    from zeroconf import ServiceBrowser, ServiceStateChange, Zeroconf
 except ImportError as error:
     raise MissingExtra("zeroconf", "remote") from error
 
@@ -34,40 +34,6 @@ class FoundRobot:
     version: str
 
 
-class _Collector(ServiceListener):
-    """Listener that resolves each service, in the one thread of its browser."""
-
-    def __init__(self, timeout_s: float) -> None:
-        self._timeout_ms = int(timeout_s * 1e3)
-        self.found: dict[str, FoundRobot] = {}
-
-    def add_service(self, zc: Zeroconf, type_: str, name: str) -> None:
-        """Add a robot."""
-        info = zc.get_service_info(type_, name, self._timeout_ms)
-        addresses = info.parsed_scoped_addresses() if info else []
-        if info is None or info.port is None or not addresses:
-            return
-        properties = {
-            key.decode("utf-8", "replace"): (value or b"").decode("utf-8", "replace")
-            for key, value in info.properties.items()
-        }
-        self.found[name] = FoundRobot(
-            name=properties.get("id") or name.removesuffix(f".{SERVICE}"),
-            body=properties.get("body", ""),
-            address=Address(addresses[0], info.port),
-            fingerprint=properties.get("fp", ""),
-            version=properties.get("v", ""),
-        )
-
-    def update_service(self, zc: Zeroconf, type_: str, name: str) -> None:
-        """Update a robot."""
-        self.add_service(zc, type_, name)
-
-    def remove_service(self, zc: Zeroconf, type_: str, name: str) -> None:
-        """Remove a robot."""
-        self.found.pop(name, None)
-
-
 def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
     """Find the robots on the local network, sorted by name.
 
@@ -77,13 +43,37 @@ def find(timeout_s: float = 2.0, zeroconf: Any = None) -> list[FoundRobot]:
         timeout_s: Time to listen, s.
         zeroconf: A `zeroconf.Zeroconf` to use; None for a new one.
     """
-    listener = _Collector(timeout_s)
+    names: set[str] = set()
+
+    def changed(name: str, state_change: ServiceStateChange, **_: Any) -> None:
+        (names.discard if state_change is ServiceStateChange.Removed else names.add)(name)
+
     own = zeroconf or Zeroconf()
     try:
-        browser = ServiceBrowser(own, SERVICE, listener)
+        browser = ServiceBrowser(own, SERVICE, handlers=[changed])
         threading.Event().wait(timeout_s)
         browser.cancel()  # It waits for the browser's thread.
-        return sorted(listener.found.values(), key=lambda found: (found.name, str(found.address)))
+        found = [_resolved(own, name, timeout_s) for name in names]
     finally:
         if zeroconf is None:
             own.close()
+    robots = [robot for robot in found if robot is not None]
+    return sorted(robots, key=lambda robot: (robot.name, str(robot.address)))
+
+
+def _resolved(zeroconf: Zeroconf, name: str, timeout_s: float) -> FoundRobot | None:
+    info = zeroconf.get_service_info(SERVICE, name, int(timeout_s * 1e3))
+    addresses = info.parsed_scoped_addresses() if info else []
+    if info is None or info.port is None or not addresses:
+        return None
+    properties = {
+        key.decode("utf-8", "replace"): (value or b"").decode("utf-8", "replace")
+        for key, value in info.properties.items()
+    }
+    return FoundRobot(
+        name=properties.get("id") or name.removesuffix(f".{SERVICE}"),
+        body=properties.get("body", ""),
+        address=Address(addresses[0], info.port),
+        fingerprint=properties.get("fp", ""),
+        version=properties.get("v", ""),
+    )

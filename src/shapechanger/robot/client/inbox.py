@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, TypeVar
 
 from shapechanger.errors import LinkError, RobotRefused, StaleObservation
 from shapechanger.robot.link.messages import (
@@ -39,38 +39,6 @@ class Received:
     jpeg: bytes | None
 
 
-@dataclass(eq=False)
-class Request(Generic[_Answer]):
-    """A call that waits for an answer.
-
-    Attributes:
-        kind: Type of the answer.
-        accepts: Returns True if a message of that type is the answer.
-        answer: The answer; None until it arrives.
-        refusal: Reason of a refusal in place of the answer; None without one.
-    """
-
-    kind: type[_Answer]
-    accepts: Callable[[_Answer], bool] = lambda _: True
-    answer: _Answer | None = None
-    refusal: str | None = None
-
-    @property
-    def is_open(self) -> bool:
-        """True until the robot has answered or refused."""
-        return self.answer is None and self.refusal is None
-
-    def offer(self, message: RobotMessage) -> bool:
-        """Take a message if it is the answer; a refusal answers any open request."""
-        if not self.is_open:
-            return False
-        if isinstance(message, Refused):
-            self.refusal = message.reason
-        elif isinstance(message, self.kind) and self.accepts(message):
-            self.answer = message
-        return not self.is_open
-
-
 class Inbox:
     """Messages of a robot, for any number of calling threads.
 
@@ -96,7 +64,7 @@ class Inbox:
         self._changed = threading.Condition()
         self._events: deque[Event] = deque(maxlen=_MAX_EVENTS)
         self._refusals: dict[int, str] = {}
-        self._requests: list[Request[Any]] = []
+        self._expected: list[tuple[type[Any], Callable[[Any], bool], Future[Any]]] = []
 
     def put(self, message: RobotMessage) -> None:
         """Store a message that has just arrived.
@@ -120,13 +88,17 @@ class Inbox:
                         self.recorder = message
                     elif isinstance(message, PolicyState):
                         self.policies = message
-                    any(request.offer(message) for request in self._requests)  # The oldest one.
+                    self._answer(message)
             self._changed.notify_all()
 
     def fail(self, failure: LinkError) -> None:
         """End all waits with an error; the first one counts."""
         with self._changed:
             self.failure = self.failure or failure
+            for *_, future in self._expected:
+                if future.set_running_or_notify_cancel():
+                    future.set_exception(type(self.failure)(*self.failure.args))
+            self._expected.clear()
             self._changed.notify_all()
 
     def check(self) -> None:
@@ -178,37 +150,23 @@ class Inbox:
             f"The robot sent no new observation within {timeout_s:.2f} s ({age})."
         )
 
-    @contextmanager
-    def expecting(self, request: Request[_Answer]) -> Generator[None]:
-        """Offer the messages that arrive within the block to a request, after older requests."""
-        with self._changed:
-            self._requests.append(request)
-        try:
-            yield
-        finally:
-            with self._changed:
-                self._requests.remove(request)
+    def expect(
+        self, kind: type[_Answer], accepts: Callable[[_Answer], bool] = lambda _: True
+    ) -> Future[_Answer]:
+        """Return the future answer to a request that is sent next; cancel one that is given up.
 
-    def answer(self, request: Request[_Answer], timeout_s: float | None = None) -> _Answer:
-        """Wait for the answer to a request.
+        A refusal answers the oldest request, and a lost link all of them, with its error.
 
         Args:
-            request: The request, which must be expected.
-            timeout_s: Time limit, s; None for that of the link.
-
-        Raises:
-            RobotRefused: If the robot refuses.
-            TimeoutError: If there is no answer in time.
-            LinkError: If the link is lost.
+            kind: Type of the answer.
+            accepts: Returns True if a message of that type is the answer.
         """
+        future: Future[_Answer] = Future()
         with self._changed:
-            self._changed.wait_for(lambda: self.failure or not request.is_open, timeout_s)
-        if request.refusal is not None:
-            raise RobotRefused(request.refusal)
-        if request.answer is None:
             self.check()
-            raise TimeoutError
-        return request.answer
+            self._expected = [one for one in self._expected if not one[2].done()]
+            self._expected.append((kind, accepts, future))
+        return future
 
     def events(self) -> list[Event]:
         """Return the events since the last call, oldest first, at most 256."""
@@ -220,6 +178,21 @@ class Inbox:
     def refusal(self, seq: int) -> str:
         """Return the reason why the robot refused a command, or "" if it has not."""
         return self._refusals.get(seq, "")
+
+    def _answer(self, message: RobotMessage) -> None:
+        """Give a message to the oldest request that it answers."""
+        for one in list(self._expected):
+            kind, accepts, future = one
+            is_refusal = isinstance(message, Refused)
+            if not is_refusal and not (isinstance(message, kind) and accepts(message)):
+                continue
+            self._expected.remove(one)
+            if future.set_running_or_notify_cancel():  # False for one that was given up.
+                if is_refusal:
+                    future.set_exception(RobotRefused(message.reason))
+                else:
+                    future.set_result(message)
+                return
 
     def _observe(self, message: Observation) -> None:
         last = self.newest

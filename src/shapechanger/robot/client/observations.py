@@ -137,8 +137,20 @@ class RobotSpaces:
         self.action_space = gym.spaces.Box(
             self._low.astype(np.float32), self._high.astype(np.float32)
         )
-        self.observation_layout = self._layout()
-        self.observation_space = self._space()
+        low, high = (
+            bound.astype(np.float32) for bound in (self._state_layout.low, self._state_layout.high)
+        )
+        space: gym.Space[Any] = gym.spaces.Box(low, high)
+        features = self._state_layout.features if self._has_state else ()
+        if self.has_image:
+            shape = (size[1], size[0], 3)
+            camera = Element("camera", "camera")
+            features = (Feature(IMAGE, "1", 0.0, _BRIGHTEST, camera, shape), *features)
+            image_space = gym.spaces.Box(0, _BRIGHTEST, shape, np.uint8)
+            both: dict[str, gym.Space[Any]] = {"image": image_space, "state": space}
+            space = gym.spaces.Dict(both) if self._has_state else image_space
+        self.observation_layout = Layout(features)
+        self.observation_space = space
         self.picture: NDArray[np.uint8] | None = None
         self._tried_seq = 0
         self._picture_seq = 0
@@ -243,26 +255,6 @@ class RobotSpaces:
             block = state[places[feature.name]]
             block[np.isnan(block)] = feature.middle
         return state, tuple(feature.name for feature in absent)
-
-    def _layout(self) -> Layout:
-        features: list[Feature] = []
-        if self.has_image:
-            shape = (self._size[1], self._size[0], 3)
-            camera = Element("camera", "camera")
-            features.append(Feature(IMAGE, "1", 0.0, _BRIGHTEST, camera, shape))
-        if self._has_state:
-            features += self._state_layout.features
-        return Layout(tuple(features))
-
-    def _space(self) -> gym.Space[Any]:
-        low, high = (
-            bound.astype(np.float32) for bound in (self._state_layout.low, self._state_layout.high)
-        )
-        state = gym.spaces.Box(low, high)
-        if not self.has_image:
-            return state
-        image = gym.spaces.Box(0, _BRIGHTEST, (self._size[1], self._size[0], 3), np.uint8)
-        return gym.spaces.Dict({"image": image, "state": state}) if self._has_state else image
 
 
 class StepMeasures(NamedTuple):

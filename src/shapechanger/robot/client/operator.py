@@ -103,7 +103,11 @@ class Preparation:
         """
         name = robot.welcome.robot
         because = "It waits for a person"
-        how = self._how_to_arm(name)
+        first = "" if self._known_as else f"`shapechanger robot remember {name} …` once, then "
+        how = (
+            f"{first}`shapechanger robot drive {self._known_as or name}` in another terminal, and "
+            "there P, which arms it for the program"
+        )
         waits_for = f"{name} waits for its operator: put it at the start and arm it: {how}."
         while True:
             seen = robot.ask().message
@@ -127,14 +131,6 @@ class Preparation:
                     f"{name} was not armed within {self._timeout_s:.0f} s. {because}{stopped}. "
                     f"To arm it, {how}; `reset_timeout_s` says how long to wait for that."
                 )
-
-    def _how_to_arm(self, name: str) -> str:
-        """Return instructions to arm the robot for a program."""
-        first = "" if self._known_as else f"`shapechanger robot remember {name} …` once, then "
-        return (
-            f"{first}`shapechanger robot drive {self._known_as or name}` in another terminal, and "
-            "there P, which arms it for the program"
-        )
 
     def require_routine(self, robot: RobotClient) -> None:
         """Check that the robot has a reset routine, before it moves.

@@ -114,24 +114,20 @@ class ObservationPacer:
 
     async def next(self) -> Observation:
         """Return the next observation, once it is due and the client has credit for it."""
-        session = self._session
+        session, lease = self._session, self._hub.lease
         while not session.credit:
             session.updated.clear()
             await session.updated.wait()
         if session.pace == "lockstep" and not self._time.in_steps:
             await self._time.step(self._period_s)
-        elif self._time.in_steps and self._moves_time():
+        # The lease holder advances time, or any client if there is none.
+        elif self._time.in_steps and (lease.holder is None or lease.holds(session.client.session)):
             await self._time.step(self._period_s)
             if session.pace == "realtime":
                 await self._wait_until_due()
         else:
             await self._wait_until_due()
         return session.observe()
-
-    def _moves_time(self) -> bool:
-        """Return True if this client advances time: the lease holder, or any if there is none."""
-        lease = self._hub.lease
-        return lease.holder is None or lease.holds(self._session.client.session)
 
     async def _wait_until_due(self) -> None:
         """Wait until one period after the last observation was due, or for its frame."""

@@ -241,10 +241,22 @@ class SessionHub:
     def on_state(self, state: GuardState) -> None:
         """Handle a new state of the guard."""
         before, self.state = self.state, state
-        for name, text in _state_events(before, state):
-            self.event(name, text)
+        if state.emergencies > (0 if before is None else before.emergencies):
+            self.event("emergency", state.stop_reason or "Emergency stop.")
+        if state.armed and not (before is not None and before.armed):
+            self.event("armed", "Armed.")
+        if before is not None and before.armed and not state.armed:
+            self.event("disarmed", state.stop_reason or "Disarmed.")
+        if before is not None and state.bumps > before.bumps:
+            self.event("bump", "The robot bumped into something.")
         if state.refused:
-            self._post_refused(state)
+            # A refused command is the business of the lease holder alone.
+            refused = Refused(reason=state.refused, seq=state.refused_seq)
+            held = self.lease.holder
+            if state.refused_seq is None:
+                self._broadcast(refused)
+            elif held is not None and held.session in self._clients:
+                self._clients[held.session].post(refused)
         self._notify()
 
     def on_frame(self, frame: Frame) -> None:
@@ -277,29 +289,6 @@ class SessionHub:
         if self._suggestion is not None and self._suggestion.client.session == session:
             self._suggestion = None
 
-    def _post_refused(self, state: GuardState) -> None:
-        """Report a refused command to the lease holder, and any other refused order to all."""
-        refused = Refused(reason=state.refused, seq=state.refused_seq)
-        held = self.lease.holder
-        if state.refused_seq is None:
-            self._broadcast(refused)
-        elif held is not None and held.session in self._clients:
-            self._clients[held.session].post(refused)
-
     def _notify(self) -> None:
         for member in self._clients.values():
             member.updated.set()
-
-
-def _state_events(before: GuardState | None, now: GuardState) -> list[tuple[str, str]]:
-    """Return the events between two states, as names and sentences."""
-    events: list[tuple[str, str]] = []
-    if now.emergencies > (0 if before is None else before.emergencies):
-        events.append(("emergency", now.stop_reason or "Emergency stop."))
-    if now.armed and not (before is not None and before.armed):
-        events.append(("armed", "Armed."))
-    if before is not None and before.armed and not now.armed:
-        events.append(("disarmed", now.stop_reason or "Disarmed."))
-    if before is not None and now.bumps > before.bumps:
-        events.append(("bump", "The robot bumped into something."))
-    return events

@@ -161,20 +161,15 @@ class PolicyRunner:
             pass  # It is gone, and its exit code says more.
         except ValueError:
             failure = failure or f"its process wrote a line of more than {_LONGEST} characters."
-        code = process.returncode if process.returncode is not None else await _exit(process)
+        with contextlib.suppress(TimeoutError):  # It has closed its output, but may live on.
+            await asyncio.wait_for(process.wait(), _END_S)
+        code = process.returncode
         return failure or f"its process ended with code {code}."
 
     def _report(self, running: str, text: str) -> None:
         if (running, text) != (self._running, self._text):
             self._running, self._text = running, text
             self._post(self.state())
-
-
-async def _exit(process: Process) -> int | None:
-    """Return the exit code of a process that has closed its output; None if it lives on."""
-    with contextlib.suppress(TimeoutError):
-        return await asyncio.wait_for(process.wait(), _END_S)
-    return None
 
 
 async def _finish(process: Process) -> None:

@@ -212,21 +212,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         source, argument = serve_plan.hardware
         clock = connect(source, argument).clock
         run_early()
-        why = asyncio.run(_run(plan, clock, options))
+
+        async def run() -> str:
+            daemon = Daemon(plan, clock, options.guard_fd, options.heartbeat_fd, options.ready_fd)
+            for number in (signal.SIGTERM, signal.SIGINT):
+                asyncio.get_running_loop().add_signal_handler(number, daemon.end)
+            return await daemon.run()
+
+        why = asyncio.run(run())
     except ShapechangerError as error:
         why = str(error)
     if why:
         _log.error("%s", why)
     log.stop()
     return 1 if why else 0
-
-
-async def _run(plan: DaemonPlan, clock: Clock, options: argparse.Namespace) -> str:
-    daemon = Daemon(plan, clock, options.guard_fd, options.heartbeat_fd, options.ready_fd)
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, daemon.end)
-    return await daemon.run()
 
 
 def _start_log() -> QueueListener:

@@ -13,43 +13,11 @@ from typing import Final
 from shapechanger.errors import LinkError, RobotRefused
 from shapechanger.robot.daemon.control import ClientIdentity
 from shapechanger.robot.daemon.hub import SessionHub
-from shapechanger.robot.daemon.library import Answer
+from shapechanger.robot.daemon.library import Answer, Question
 from shapechanger.robot.daemon.observation import build_observation
 from shapechanger.robot.guard.messages import Order
+from shapechanger.robot.link import messages
 from shapechanger.robot.link.authentication import is_proof, new_nonce
-from shapechanger.robot.link.messages import (
-    VERSION,
-    Acknowledge,
-    Arm,
-    Browse,
-    Challenge,
-    Command,
-    Disarm,
-    EmergencyStop,
-    Event,
-    Fetch,
-    Hello,
-    Judge,
-    Lease,
-    Mark,
-    Observation,
-    Pace,
-    Piece,
-    Ping,
-    Pong,
-    Record,
-    RecorderState,
-    Recordings,
-    Refused,
-    Release,
-    RobotMessage,
-    RunPolicy,
-    Suggest,
-    Take,
-    Undo,
-    Welcome,
-    decode_client_message,
-)
 
 MESSAGES_PER_S: Final = 500.0
 """Messages per second that a connection may send; a driver sends 50."""
@@ -86,7 +54,7 @@ class Authenticator:
         """True if the robot has no key and accepts every client."""
         return not self.key
 
-    def accepts(self, hello: Hello, nonce: bytes) -> bool:
+    def accepts(self, hello: messages.Hello, nonce: bytes) -> bool:
         """Return True if the proof in `hello` answers `nonce` with the right key.
 
         Args:
@@ -141,32 +109,32 @@ class Outbox:
 
     def __init__(self) -> None:
         self.is_full = False
-        self._messages: deque[RobotMessage] = deque()
+        self._messages: deque[messages.RobotMessage] = deque()
 
     def __len__(self) -> int:
         """Return the number of queued messages."""
         return len(self._messages)
 
-    def put(self, message: RobotMessage) -> None:
+    def put(self, message: messages.RobotMessage) -> None:
         """Add a message; one that does not fit is lost, and sets `is_full`."""
-        if isinstance(message, Lease | RecorderState):
+        if isinstance(message, messages.Lease | messages.RecorderState):
             self._trim(type(message), keep=0)
-        elif isinstance(message, Event):
-            self._trim(Event, keep=_MAX_EVENTS - 1)
+        elif isinstance(message, messages.Event):
+            self._trim(messages.Event, keep=_MAX_EVENTS - 1)
         elif len(self._messages) >= _MAX_MESSAGES:
             self.is_full = True
             return
         self._messages.append(message)
 
-    def take(self) -> RobotMessage | None:
+    def take(self) -> messages.RobotMessage | None:
         """Remove and return the oldest message, or None if the queue is empty."""
         return self._messages.popleft() if self._messages else None
 
-    def holds(self, *kinds: type[RobotMessage]) -> bool:
+    def holds(self, *kinds: type[messages.RobotMessage]) -> bool:
         """Return True if a message of one of these types is queued."""
         return any(isinstance(message, kinds) for message in self._messages)
 
-    def _trim(self, kind: type[RobotMessage], keep: int) -> None:
+    def _trim(self, kind: type[messages.RobotMessage], keep: int) -> None:
         """Remove the oldest messages of a type until `keep` are left."""
         queued = [message for message in self._messages if isinstance(message, kind)]
         for message in queued[: max(0, len(queued) - keep)]:
@@ -249,7 +217,7 @@ class Session:
         self.updated = asyncio.Event()
         self.credit = False
         self.client = ClientIdentity(number, "", "program")
-        self.pace: Pace = "realtime"
+        self.pace: messages.Pace = "realtime"
         self.expelled = ""
         self._hub = hub
         self._authenticator = authenticator
@@ -270,11 +238,13 @@ class Session:
         newest = self._hub.newest
         return self._wants_frames and newest is not None and newest.seq != self._frame_seq
 
-    def challenge(self) -> Challenge:
+    def challenge(self) -> messages.Challenge:
         """Return the first message to the client."""
-        return Challenge(version=VERSION, nonce=self._nonce, robot=self._hub.plan.card.robot)
+        return messages.Challenge(
+            version=messages.VERSION, nonce=self._nonce, robot=self._hub.plan.card.robot
+        )
 
-    def introduce(self, data: bytes) -> Welcome:
+    def introduce(self, data: bytes) -> messages.Welcome:
         """Authenticate the client by its first message.
 
         Raises:
@@ -282,13 +252,13 @@ class Session:
             RobotRefused: If its version differs, or too many clients are connected.
             LinkError: If the message is not a hello.
         """
-        hello = decode_client_message(data)
-        if not isinstance(hello, Hello) or self._is_known:
+        hello = messages.decode_client_message(data)
+        if not isinstance(hello, messages.Hello) or self._is_known:
             raise LinkError("The first message must be a hello.")
-        if hello.version != VERSION:
+        if hello.version != messages.VERSION:
             raise RobotRefused(
-                f"The robot uses version {VERSION} of the link, and this client {hello.version}: "
-                "install the same version of shapechanger on both."
+                f"The robot uses version {messages.VERSION} of the link, and this client "
+                f"{hello.version}: install the same version of shapechanger on both."
             )
         if not self._authenticator.accepts(hello, self._nonce):
             raise WrongKey(
@@ -303,7 +273,7 @@ class Session:
         if self._hub.plan.policies:
             self.post(self._hub.policies.state())
         can_record = bool(self._hub.plan.recordings)
-        return Welcome.of(self._hub.plan.card, self.client.session, can_record=can_record)
+        return messages.Welcome.of(self._hub.plan.card, self.client.session, can_record=can_record)
 
     def receive(self, data: bytes) -> None:
         """Handle a message of the client.
@@ -316,32 +286,36 @@ class Session:
         if self.expelled:
             raise LinkError(self.expelled)
         self.count()
-        message = decode_client_message(data)
+        message = messages.decode_client_message(data)
         match message:
-            case Command():
+            case messages.Command():
                 self._command(message)
-            case Acknowledge():
+            case messages.Acknowledge():
                 self._give_credit()
-            case Take():
+            case messages.Take():
                 self._hub.take(self.client)
-            case Release():
+            case messages.Release():
                 self._hub.release(self.client, f"{self.client.name} released it")
-            case Arm():
+            case messages.Arm():
                 self._arm(message)
-            case Disarm():
+            case messages.Disarm():
                 self._disarm()
-            case EmergencyStop():
-                self._emergency(message)
-            case Ping():
-                self.post(Pong(token=message.token, now_ns=self._hub.now_ns()))
-            case Suggest():
+            case messages.EmergencyStop():
+                reason = f"{self.client.name}: {printable(message.reason) or 'stop'}"
+                self._hub.give_order(Order(kind="emergency", reason=reason))
+            case messages.Ping():
+                self.post(messages.Pong(token=message.token, now_ns=self._hub.now_ns()))
+            case messages.Suggest():
                 self._suggest(message)
-            case RunPolicy():
-                self._refuse(self._run_policy(message.policy))
-            case Record() | Mark() | Undo() | Browse() | Fetch() | Judge():
-                self._refuse(self._recording(message))
-            case Hello():
+            case messages.RunPolicy():
+                if self.client.role == "person":
+                    self._refuse(self._hub.policies.run(message.policy))
+                else:
+                    self._refuse("Only a person can start a policy on this robot, or end it.")
+            case messages.Hello():
                 raise LinkError("The hello was sent already.")
+            case _:
+                self._refuse(self._recording(message))
         if self.outbox.is_full:
             raise LinkError(NOT_READING)
 
@@ -363,12 +337,12 @@ class Session:
         """End the session."""
         self._hub.leave(self.client.session)
 
-    def post(self, message: RobotMessage) -> None:
+    def post(self, message: messages.RobotMessage) -> None:
         """Queue a message; if the queue is full, the connection ends."""
         self.outbox.put(message)
         self.posted.set()
 
-    def observe(self) -> Observation:
+    def observe(self) -> messages.Observation:
         """Build the observation to send now, which uses up the credit."""
         hub, now_ns = self._hub, self._hub.now_ns()
         self._observation_seq += 1
@@ -399,13 +373,13 @@ class Session:
     def _refuse(self, reason: str, seq: int | None = None) -> None:
         """Report a refusal, unless `reason` is empty."""
         if reason:
-            self.post(Refused(reason=reason, seq=seq))
+            self.post(messages.Refused(reason=reason, seq=seq))
 
     def _give_credit(self) -> None:
         self.credit = True
         self.updated.set()
 
-    def _command(self, command: Command) -> None:
+    def _command(self, command: messages.Command) -> None:
         now_ns = self._hub.now_ns()
         refusal = ""
         if not self._hub.lease.holds(self.client.session):
@@ -424,7 +398,7 @@ class Session:
             self._hub.command(self.client, command, now_ns)
         self._give_credit()
 
-    def _suggest(self, suggestion: Suggest) -> None:
+    def _suggest(self, suggestion: messages.Suggest) -> None:
         if self._hub.lease.holds(self.client.session):
             refusal = "You have control: send a command in place of a suggestion."
         elif suggestion.seq <= self._suggestion_seq:
@@ -447,31 +421,23 @@ class Session:
             return f"The values of a command must be finite and at most {_LARGEST_VALUE:g}."
         return ""
 
-    def _arm(self, arm: Arm) -> None:
-        refusal = self._arm_refusal()
-        if not refusal and (late := self._sent.refusal(arm.answers, self._hub.now_ns())):
+    def _arm(self, arm: messages.Arm) -> None:
+        hub, person = self._hub, self.client.role == "person"
+        refusal = ""
+        if hub.lease.holder is None:
+            refusal = "No client has control; take control first."
+        elif not person and hub.plan.card.arming != "anyone":
+            refusal = "Only a person can arm this robot."
+        elif not person and hub.state is not None and hub.state.emergency:
+            refusal = "Only a person can end an emergency stop."
+        elif not person and not hub.lease.holds(self.client.session):
+            refusal = "Only the client in control, or a person, can arm this robot."
+        elif late := self._sent.refusal(arm.answers, hub.now_ns()):
             refusal = f"Not armed. {late}"
-        if refusal:
-            self._refuse(refusal)
-            return
-        # The guard knows every emergency stop; this process only those that were reported to it.
-        person = self.client.role == "person"
-        self._hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
-
-    def _arm_refusal(self) -> str:
-        """Return the reason why this client must not arm, or ""."""
-        state = self._hub.state
-        if self._hub.lease.holder is None:
-            return "No client has control; take control first."
-        if self.client.role == "person":
-            return ""
-        if self._hub.plan.card.arming != "anyone":
-            return "Only a person can arm this robot."
-        if state is not None and state.emergency:
-            return "Only a person can end an emergency stop."
-        if not self._hub.lease.holds(self.client.session):
-            return "Only the client in control, or a person, can arm this robot."
-        return ""
+        self._refuse(refusal)
+        if not refusal:
+            # The guard knows every emergency stop; this process only those reported to it.
+            hub.give_order(Order(kind="arm", emergency=arm.emergency, person=person))
 
     def _disarm(self) -> None:
         if self.client.role != "person" and not self._hub.lease.holds(self.client.session):
@@ -482,34 +448,29 @@ class Session:
             return
         self._hub.give_order(Order(kind="disarm", reason=f"{self.client.name} disarmed"))
 
-    def _emergency(self, stop: EmergencyStop) -> None:
-        reason = f"{self.client.name}: {printable(stop.reason) or 'stop'}"
-        self._hub.give_order(Order(kind="emergency", reason=reason))
-
-    def _run_policy(self, name: str) -> str:
-        """Start or end a policy on board. Return the reason for a refusal, or ""."""
-        if self.client.role != "person":
-            return "Only a person can start a policy on this robot, or end it."
-        return self._hub.policies.run(name)
-
-    def _recording(self, message: Record | Mark | Undo | Browse | Fetch | Judge) -> str:
+    def _recording(
+        self, message: messages.Record | messages.Mark | messages.Undo | Question
+    ) -> str:
         """Handle a request about recordings. Return the reason for a refusal, or ""."""
-        if not isinstance(message, Browse | Fetch) and self.client.role != "person":
+        if (
+            not isinstance(message, messages.Browse | messages.Fetch)
+            and self.client.role != "person"
+        ):
             return "Only a person can record on this robot, and judge recordings."
         recorder = self._hub.recorder
         match message:
-            case Record(on=False):
+            case messages.Record(on=False):
                 return recorder.end()
-            case Record():
+            case messages.Record():
                 driver = self._hub.lease.holder_name
                 return recorder.begin(self.client, printable(message.name), driver, self.post)
-            case Mark():
-                return recorder.edit(Mark(text=printable(message.text)), self.post)
-            case Undo():
+            case messages.Mark():
+                return recorder.edit(messages.Mark(text=printable(message.text)), self.post)
+            case messages.Undo():
                 return recorder.edit(message, self.post)
-            case Browse() | Fetch() | Judge():
+            case _:
                 # An answer may be large, so the next question waits until it has left.
-                if self._awaits_library or self.outbox.holds(Recordings, Piece):
+                if self._awaits_library or self.outbox.holds(messages.Recordings, messages.Piece):
                     return "Ask one question about recordings at a time."
                 self._awaits_library = True
                 self._hub.library.ask(message, self._library_answered)
