@@ -29,10 +29,11 @@ from shapechanger.robot.daemon.credentials import (
     load_credentials,
     make_credentials,
 )
-from shapechanger.robot.daemon.plan import DaemonPlan, card_of
+from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard.serve_plan import ServePlan
 from shapechanger.robot.link.address import Address, is_loopback, parse_address
 from shapechanger.robot.link.authentication import fingerprint_hex
+from shapechanger.robot.link.card import card_of
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.start import BoardAt, find_board, start_board

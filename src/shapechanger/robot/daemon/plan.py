@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
@@ -12,9 +11,6 @@ from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.link.address import DEFAULT_PORT
 from shapechanger.robot.link.card import RobotCard
-
-if TYPE_CHECKING:  # The daemon needs no profile.
-    from shapechanger.robot.profile.profile import Profile
 
 
 class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -67,46 +63,3 @@ class DaemonPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             return msgspec.convert(fields, cls)
         except msgspec.ValidationError as error:
             raise ProfileError(f"Invalid daemon plan: {error}.") from error
-
-
-def card_of(
-    profile: Profile,
-    *,
-    arming: Literal["", "anyone"] = "",
-    clock: Literal["real", "twin"] = "real",
-    pictures: bool = True,
-) -> RobotCard:
-    """Return the card of a robot.
-
-    Args:
-        profile: The robot.
-        arming: Who may arm it, in place of the profile's; "" for the profile's.
-        clock: Source of its time.
-        pictures: Whether its camera is used.
-    """
-    camera = profile.camera if pictures else None
-    return RobotCard(
-        robot=profile.name,
-        body=profile.body,
-        action_layout=profile.action_layout().to_json(),
-        state_layout=profile.state_layout().to_json(),
-        image_size=None if camera is None else camera.size,
-        camera_pitch_deg=None if camera is None else camera.pitch_deg,
-        camera_fovy_deg=None if camera is None else camera.fovy_deg,
-        control_hz=profile.control_hz,
-        tick_hz=profile.tick_hz,
-        slew_per_s=tuple(_limit(action.slew_per_s) for action in profile.actions),
-        slew_down_per_s=tuple(_limit(action.slew_down_per_s) for action in profile.actions),
-        deadline_ms=profile.limits.deadline_ms,
-        max_observation_age_ms=profile.max_observation_age_ms,
-        reward=profile.reward,
-        reset=profile.reset,
-        arming=arming or profile.arming,
-        clock=clock,
-        turning=profile.turning,
-    )
-
-
-def _limit(slew_per_s: float) -> float:
-    """Return a slew as JSON can hold it: 0 for no limit."""
-    return slew_per_s if math.isfinite(slew_per_s) else 0.0

@@ -19,10 +19,10 @@ from shapechanger.contract.world import World
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
-from shapechanger.robot.daemon.plan import card_of
 from shapechanger.robot.guard.messages import GuardState, Order
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
+from shapechanger.robot.link.card import card_of
 from shapechanger.robot.link.messages import Observation, Welcome
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.hardware import TwinHardware
