@@ -17,7 +17,6 @@ from shapechanger.demos.jpeg import MAX_PIXELS, decode_picture
 from shapechanger.errors import DemosError, OutputError, RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, open_camera
 from shapechanger.robot.profile.load import find_profile, load_profile
-from shapechanger.robot.profile.profile import Profile
 
 if TYPE_CHECKING:
     from shapechanger.vehicles.cameras.rectify import CameraGeometry
@@ -55,6 +54,10 @@ class CameraView:
         Raises:
             RobotError: If the options contradict each other, or something is missing.
         """
+        import simplejpeg
+
+        from shapechanger.vehicles.cameras.rectify import CameraGeometry
+
         if self.board and self.horizon is not None:
             raise RobotError("Give --board or --horizon, not both.")
         if self.fovy is not None and not _LEAST_FOVY_DEG <= self.fovy <= _MOST_FOVY_DEG:
@@ -62,7 +65,15 @@ class CameraView:
                 f"--fovy is in degrees, {_LEAST_FOVY_DEG:g} to {_MOST_FOVY_DEG:g}, got "
                 f"{self.fovy:g}."
             )
-        corners = _corners(self.board) if self.board else None
+        corners = None
+        if self.board:
+            sides = re.fullmatch(r"(\d+)x(\d+)", self.board)
+            if not sides:
+                raise RobotError(
+                    "--board is the number of inner corners along both sides, such as 9x6, got "
+                    f"{self.board!r}."
+                )
+            corners = int(sides[1]), int(sides[2])
         measures = corners is not None or self.horizon is not None or self.fovy is not None
         path = own_profile(self.profile) if measures else find_profile(self.profile)
         profile = load_profile(path)
@@ -77,8 +88,17 @@ class CameraView:
             }
             change_profile(path, changes)
             profile = load_profile(path)
-        geometry = _stated(profile)
-        _write(_drawing(picture, geometry), self.out)
+        camera = profile.camera
+        if camera is None or camera.pitch_deg is None or camera.fovy_deg is None:
+            raise RobotError(
+                f"{profile.path} does not say pitch_deg and fovy_deg of its camera: measure them "
+                "with --board or --horizon."
+            )
+        drawing = _drawing(picture, CameraGeometry(camera.pitch_deg, camera.fovy_deg))
+        try:
+            self.out.write_bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(drawing), 92))
+        except OSError as error:
+            raise OutputError(f"Cannot write {self.out}: {error.strerror or error}.") from error
         say(f"wrote {self.out}")
 
     def _measured(
@@ -108,29 +128,6 @@ class CameraView:
         if stated.pitch_deg is None:
             raise RobotError("The pitch is unknown: give --board or --horizon as well.")
         return CameraGeometry(stated.pitch_deg, fovy)
-
-
-def _corners(board: str) -> tuple[int, int]:
-    """Parse the corners of a board, such as "9x6"."""
-    match = re.fullmatch(r"(\d+)x(\d+)", board)
-    if not match:
-        raise RobotError(
-            f"--board is the number of inner corners along both sides, such as 9x6, got {board!r}."
-        )
-    return int(match[1]), int(match[2])
-
-
-def _stated(profile: Profile) -> CameraGeometry:
-    """Return the geometry that a profile states."""
-    from shapechanger.vehicles.cameras.rectify import CameraGeometry
-
-    camera = profile.camera
-    if camera is None or camera.pitch_deg is None or camera.fovy_deg is None:
-        raise RobotError(
-            f"{profile.path} does not say pitch_deg and fovy_deg of its camera: measure them with "
-            "--board or --horizon."
-        )
-    return CameraGeometry(camera.pitch_deg, camera.fovy_deg)
 
 
 def _picture(plan: CameraPlan, path: Path | None) -> NDArray[np.uint8]:
@@ -178,12 +175,3 @@ def _drawing(picture: NDArray[np.uint8], geometry: CameraGeometry) -> NDArray[np
     rows = np.arange(height) * down // height
     columns = np.arange(height * across // down) * down // height
     return np.hstack((drawn, seen[rows][:, columns]))
-
-
-def _write(picture: NDArray[np.uint8], path: Path) -> None:
-    import simplejpeg
-
-    try:
-        path.write_bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(picture), 92))
-    except OSError as error:
-        raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error

@@ -33,7 +33,12 @@ class Find:
 
         if not 0.0 < self.seconds <= 60.0:
             raise LinkError(f"Listening takes more than 0 s and at most 60 s, got {self.seconds}.")
-        known = _known_here()
+        known: dict[str, str] = {}
+        for name in known_names():
+            try:
+                known[recall(name).fingerprint] = name
+            except (ShapechangerError, OSError) as error:
+                say(f"{name} is skipped: {error}", stderr=True)
         found = find(self.seconds)
         if not found:
             say(
@@ -77,17 +82,6 @@ class Forget:
     def run(self) -> None:
         """Remove its file."""
         forget(self.name)
-
-
-def _known_here() -> dict[str, str]:
-    """Return the local names of known robots by fingerprint, skipping broken files."""
-    known: dict[str, str] = {}
-    for name in known_names():
-        try:
-            known[recall(name).fingerprint] = name
-        except (ShapechangerError, OSError) as error:
-            say(f"{name} is skipped: {error}", stderr=True)
-    return known
 
 
 def _asked_key(name: str) -> str:

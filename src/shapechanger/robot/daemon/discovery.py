@@ -57,27 +57,24 @@ async def withdraw(zeroconf: AsyncZeroconf) -> None:
 
 
 def _service(plan: DaemonPlan, port: int, fingerprint: bytes) -> ServiceInfo:
-    name = plan.card.robot.replace(".", " ")  # A dot would start another label.
+    card = plan.card
+    name = card.robot.replace(".", " ")  # A dot would start another label.
     label = name.encode()[:63].decode(errors="ignore")  # RFC 6763: 63 bytes.
+    # The addresses at which other machines reach it.
+    addresses = [ipaddress.ip_address(plan.host)]
+    if addresses[0].is_unspecified:
+        every = map(ipaddress.ip_address, get_all_addresses())
+        addresses = [address for address in every if not address.is_loopback]
     return ServiceInfo(
         SERVICE,
         f"{label}.{SERVICE}",
         port=port,
-        addresses=_addresses(plan.host),
+        addresses=[address.packed for address in addresses],
         properties={
-            "id": plan.card.robot,
-            "body": plan.card.body,
+            "id": card.robot,
+            "body": card.body,
             "v": str(VERSION),
             "fp": fingerprint_hex(fingerprint),
         },
         server=f"{socket.gethostname().partition('.')[0]}.local.",
     )
-
-
-def _addresses(host: str) -> list[bytes]:
-    """Return the addresses at which other machines reach a robot that listens at `host`."""
-    listening = ipaddress.ip_address(host)
-    if not listening.is_unspecified:
-        return [listening.packed]
-    every = [ipaddress.ip_address(text) for text in get_all_addresses()]
-    return [address.packed for address in every if not address.is_loopback]

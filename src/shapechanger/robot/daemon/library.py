@@ -27,22 +27,10 @@ from shapechanger.demos.episodes.files import (
 from shapechanger.demos.episodes.reader import read_header
 from shapechanger.demos.episodes.records import durations_s
 from shapechanger.errors import DemosError, ShapechangerError
-from shapechanger.robot.link.messages import (
-    MAX_EPISODES,
-    MAX_PIECE,
-    MAX_ROBOT_MESSAGE,
-    Browse,
-    EpisodeSummary,
-    Fetch,
-    Judge,
-    Piece,
-    Recordings,
-    Refused,
-    encode,
-)
+from shapechanger.robot.link import messages
 
-Question = Browse | Fetch | Judge
-Answer = Recordings | Piece | Refused
+Question = messages.Browse | messages.Fetch | messages.Judge
+Answer = messages.Recordings | messages.Piece | messages.Refused
 
 _EPISODE_ID: Final = re.compile(r"[0-9A-Za-z][0-9A-Za-z._-]{0,127}")
 _MAX_TEXT: Final = 200
@@ -89,7 +77,7 @@ class RecordingLibrary:
         """
         recordings = self._recordings
         if recordings is None:
-            then(Refused(reason="This robot was served without a folder for recordings."))
+            then(messages.Refused(reason="This robot was served without a folder for recordings."))
             return
 
         def work() -> None:
@@ -121,49 +109,51 @@ class RecordingFolder:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._known: dict[str, tuple[tuple[int, ...], EpisodeSummary]] = {}
+        self._known: dict[str, tuple[object, messages.EpisodeSummary]] = {}
         self._index: LineIndex | None = None
 
     def answer(self, question: Question) -> Answer:
         """Answer a question; errors of the disk are refusals."""
         try:
             match question:
-                case Browse():
+                case messages.Browse():
                     return self._newest(question.before)
-                case Fetch():
+                case messages.Fetch():
                     return self._piece(self._path(question.episode), question)
-                case Judge():
+                case messages.Judge():
                     path = self._path(question.episode)
                     if question.keep:
                         keep(path, question.first, question.last)
                     else:
                         drop(path, question.first, question.last, "bad")
-                    return Recordings(episodes=(self.summary(question.episode),))
+                    return messages.Recordings(episodes=(self.summary(question.episode),))
         except (ShapechangerError, OSError, ValueError) as error:
-            return Refused(reason=str(error))
+            return messages.Refused(reason=str(error))
 
-    def summary(self, name: str) -> EpisodeSummary:
+    def summary(self, name: str) -> messages.EpisodeSummary:
         """Summarise one episode; the outcome of an unreadable one is the error."""
         path = self._folder / name
         try:
-            stamp = _stamp(path)
+            # Numbers that change when the episode does.
+            found = ((path / STEPS).stat(), (path / HEADER).stat())
+            stamp = tuple((one.st_mtime_ns, one.st_size, one.st_ino) for one in found)
             known = self._known.get(name)
             if known is not None and known[0] == stamp:
                 return known[1]
             summary = _summary(path)
         except (DemosError, OSError) as error:
-            return EpisodeSummary(id=name, outcome=str(error)[:_MAX_TEXT])
+            return messages.EpisodeSummary(id=name, outcome=str(error)[:_MAX_TEXT])
         self._known[name] = stamp, summary
         return summary
 
-    def _newest(self, before: str) -> Recordings:
+    def _newest(self, before: str) -> messages.Recordings:
         """List the newest episodes with ids before `before`, or all for ""; newest first."""
         paths = list(self._folder.iterdir()) if self._folder.exists() else []
         found = sorted((path.name for path in paths if _is_listed(path)), reverse=True)
         self._known = {name: self._known[name] for name in found if name in self._known}
         found = [name for name in found if not before or name < before]
-        listed = tuple(self.summary(name) for name in found[:MAX_EPISODES])
-        return Recordings(episodes=listed, more=len(found) > MAX_EPISODES)
+        listed = tuple(self.summary(name) for name in found[: messages.MAX_EPISODES])
+        return messages.Recordings(episodes=listed, more=len(found) > messages.MAX_EPISODES)
 
     def _path(self, name: str) -> Path:
         """Return the folder of an episode, directly inside that of the recordings.
@@ -176,7 +166,7 @@ class RecordingFolder:
             raise DemosError(f"There is no episode {name!r} on this robot.")
         return path
 
-    def _piece(self, path: Path, question: Fetch) -> Piece:
+    def _piece(self, path: Path, question: messages.Fetch) -> messages.Piece:
         """Read a part of an episode.
 
         Raises:
@@ -206,12 +196,12 @@ class RecordingFolder:
                 if name and name != frame_before:
                     frame = read_file(path / FRAMES / name, MAX_PICTURE_BYTES)
                 size += len(line.encode()) + len(frame or b"")
-                if lines and size > MAX_PIECE:
+                if lines and size > messages.MAX_PIECE:
                     break
                 lines.append(line)
                 frames.append(frame)
                 frame_before = name
-        piece = Piece(
+        piece = messages.Piece(
             episode=question.episode,
             first=question.first,
             total=len(index),
@@ -219,7 +209,7 @@ class RecordingFolder:
             frames=tuple(frames),
             header=header,
         )
-        if size > MAX_PIECE and len(encode(piece)) > MAX_ROBOT_MESSAGE:
+        if size > messages.MAX_PIECE and len(messages.encode(piece)) > messages.MAX_ROBOT_MESSAGE:
             raise DemosError(f"Line {question.first + 1} of {steps} is too large to send.")
         return piece
 
@@ -280,16 +270,7 @@ def _is_listed(path: Path) -> bool:
     return bool(_EPISODE_ID.fullmatch(path.name)) and not path.is_symlink() and is_episode(path)
 
 
-def _stamp(path: Path) -> tuple[int, ...]:
-    """Return numbers that change when an episode does."""
-    numbers: list[int] = []
-    for file in (path / STEPS, path / HEADER):
-        found = file.stat()
-        numbers += [found.st_mtime_ns, found.st_size, found.st_ino]
-    return tuple(numbers)
-
-
-def _summary(path: Path) -> EpisodeSummary:
+def _summary(path: Path) -> messages.EpisodeSummary:
     """Summarise an episode; an incomplete or damaged line is left out.
 
     Raises:
@@ -316,7 +297,7 @@ def _summary(path: Path) -> EpisodeSummary:
         reach = {index for index in steps if edit.first <= index <= edit.last}
         (dropped.difference_update if edit.kind == "keep" else dropped.update)(reach)
     lasted = zip(steps, durations_s([*steps.values()], header.control_hz), strict=True)
-    return EpisodeSummary(
+    return messages.EpisodeSummary(
         id=path.name,
         steps=len(steps),
         kept=len(steps) - len(dropped),

@@ -8,7 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
@@ -109,7 +109,7 @@ class StepBuilder:
         if decided is None or decided.session != session:
             return
         if observation.mine:
-            step = replace(
+            step = msgspec.structs.replace(
                 decided.step,
                 applied=observation.action_applied or None,
                 stop_reason=observation.stop_reason,
@@ -276,16 +276,6 @@ class EpisodeThread:
             self._changed.notify()
             return fits
 
-    def _next(self) -> _Job | None:
-        """Return the next job, or None at the end."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._jobs or self._ending)
-            if not self._jobs:
-                return None
-            job, size = self._jobs.popleft()
-            self._bytes -= size
-            return job
-
     def _run(self) -> None:
         if self._after is not None:
             self._after.join()
@@ -308,7 +298,13 @@ class EpisodeThread:
         try:
             self._note(writer)
             self._report("begun", "")
-            while (job := self._next()) is not None:
+            while True:
+                with self._changed:
+                    self._changed.wait_for(lambda: self._jobs or self._ending)
+                    if not self._jobs:
+                        break
+                    job, size = self._jobs.popleft()
+                    self._bytes -= size
                 writer = job(writer)
         except BaseException as error:
             # On a full disk this may fail too. All steps are there all the same, and
