@@ -1,0 +1,60 @@
+"""The card of a robot, which its processes, clients and recordings share."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import msgspec
+import pytest
+
+from shapechanger.demos.episodes import EpisodeHeader
+from shapechanger.errors import LinkError
+from shapechanger.layout import Layout
+from shapechanger.robot.link.card import RobotCard, card_of
+from shapechanger.robot.link.messages import Welcome, decode_robot_message, encode
+from shapechanger.robot.profile.load import find_profile, load_profile, shipped_profiles
+
+
+@pytest.mark.parametrize("kind", list(shipped_profiles()))
+def test_every_shipped_robot_has_a_card_that_a_client_reads(kind: str) -> None:
+    """Its numbers survive JSON and msgpack, and its layouts are those of the profile."""
+    profile = load_profile(find_profile(kind))
+    card = card_of(profile)
+    assert msgspec.json.decode(json.dumps(msgspec.to_builtins(card)), type=RobotCard) == card
+    welcome = decode_robot_message(encode(Welcome.of(card, 7, can_record=True)))
+    assert isinstance(welcome, Welcome)
+    assert (welcome.session, welcome.can_record) == (7, True)
+    assert all(
+        getattr(welcome, name) == getattr(card, name) for name in RobotCard.__struct_fields__
+    )
+    assert Layout.from_json(card.action_layout) == profile.action_layout()
+    assert len(card.slew_per_s) == len(card.slew_down_per_s) == len(profile.actions)
+
+
+def test_a_twin_may_be_armed_by_anyone_and_needs_no_pictures() -> None:
+    """What a service changes is said when the card is made."""
+    profile = load_profile(find_profile("lab-car"))
+    card = card_of(profile, arming="anyone", clock="twin", pictures=False)
+    assert (card.arming, card.clock, card.image_size) == ("anyone", "twin", None)
+    assert not card.has_geometry
+
+
+@pytest.mark.parametrize(
+    "missing", ["deadline_ms", "control_hz", "arming", "max_observation_age_ms"]
+)
+def test_a_welcome_without_a_limit_is_refused(missing: str) -> None:
+    """No limit of a robot is guessed by its clients."""
+    fields = msgspec.to_builtins(Welcome.of(card_of(load_profile(find_profile("car"))), 1))
+    del fields[missing]
+    with pytest.raises(LinkError, match=missing):
+        decode_robot_message(msgspec.msgpack.encode(fields))
+
+
+def test_headers_of_episodes_share_its_names() -> None:
+    """A recorder copies them by name."""
+    shared = {f.name for f in dataclasses.fields(EpisodeHeader)} & {*RobotCard.__struct_fields__}
+    assert shared == {
+        *("robot", "body", "action_layout", "state_layout", "image_size", "control_hz", "clock"),
+        *("camera_pitch_deg", "camera_fovy_deg"),
+    }
