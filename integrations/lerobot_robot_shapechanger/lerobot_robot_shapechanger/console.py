@@ -7,7 +7,7 @@ from typing import Any
 from lerobot.teleoperators import Teleoperator
 
 from lerobot_robot_shapechanger.config import ShapechangerConsoleConfig
-from lerobot_robot_shapechanger.robot.link import Link, named
+from lerobot_robot_shapechanger.link import Link, named
 from shapechanger.robot.client.operator import Takeover
 
 

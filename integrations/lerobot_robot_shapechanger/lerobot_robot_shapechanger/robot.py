@@ -10,7 +10,7 @@ from typing import Any, Final
 from lerobot.robots import Robot
 
 from lerobot_robot_shapechanger.config import ShapechangerConfig
-from lerobot_robot_shapechanger.robot.link import Link, named
+from lerobot_robot_shapechanger.link import Link, named
 from shapechanger.errors import RobotRefused, SpaceMismatch, UnknownName
 from shapechanger.robot.client.client import RobotClient
 from shapechanger.robot.client.inbox import Received
