@@ -6,7 +6,7 @@ the key that was held, from the start of a drive of 2017.
 **Trained on them.** Five splits train on the earlier frames and test on the next segment, with five
 seeds each (SEEDS overrides the number): our clone and a plain network. Both train on the same
 frames; our clone takes its held-out steps for early stopping from them. Its settings
-(`shapechanger.demos.cloning.learn.DEMOS`) were chosen on these splits, so the rows are slightly
+(`shapechanger.demos.cloning.settings.DEMOS`) were chosen on these splits, so the rows are slightly
 optimistic. They were chosen by accuracy, with one to three seeds each:
 
 - Inputs, with kernel ridge regression in place of a network: pixels (grey or coloured, 8 to 32
@@ -50,10 +50,10 @@ from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.card import class_numbers
 from shapechanger.demos.cloning.judge import macro_f1, output_fields
-from shapechanger.demos.cloning.learn import DEMOS, clone, learn
+from shapechanger.demos.cloning.learn import clone, learn
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
+from shapechanger.demos.cloning.settings import DEMOS, Augmentation, CloneSettings
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.transfer.learners.cloning import record_demonstrations
 from shapechanger.vehicles.envs.demonstrators import CLONES

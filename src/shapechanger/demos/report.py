@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import accumulate, groupby
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -89,7 +90,7 @@ def recording_html(name: str, episodes: Sequence[Episode], broken: Sequence[str]
         steps.update(one.drivers)
     total = sum(steps.values())
     return render(
-        "recording.html",
+        Path(__file__).with_name("recording.html"),
         title=name,
         cards=_cards(statistics),
         broken=broken,

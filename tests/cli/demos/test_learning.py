@@ -21,7 +21,7 @@ from tests.demos.cloning.data import KEYS, QUICK, STEERS, stripes
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Settings that train in seconds."""
-    monkeypatch.setattr("shapechanger.demos.cloning.learn.DEMOS", QUICK)
+    monkeypatch.setattr("shapechanger.demos.cloning.settings.DEMOS", QUICK)
 
 
 def _record(folder: Path, n: int, seed: int, layout: object = KEYS) -> Path:

@@ -7,9 +7,8 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from shapechanger.demos.cloning.learn import DEMOS
 from shapechanger.demos.cloning.pictures import Framing
-from shapechanger.demos.cloning.settings import Augmentation
+from shapechanger.demos.cloning.settings import DEMOS, Augmentation
 from shapechanger.demos.dataset import Dataset
 from shapechanger.layout import Feature, Layout
 

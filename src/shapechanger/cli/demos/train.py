@@ -68,8 +68,9 @@ class TrainClone:
         import_module("shapechanger.demos.cloning.report")
         from shapechanger.demos.cloning.examples import judged_steps
         from shapechanger.demos.cloning.judge import duration_s, judge, outlook
-        from shapechanger.demos.cloning.learn import learn, settings_for
+        from shapechanger.demos.cloning.learn import learn
         from shapechanger.demos.cloning.report import clone_html, write_numbers
+        from shapechanger.demos.cloning.settings import settings_for
         from shapechanger.transfer.learners.presets import LEARNERS
         from shapechanger.transfer.learners.sb3 import use_one_thread
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Generator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, cast
 
@@ -24,9 +24,9 @@ from shapechanger.demos.cloning.examples import (
     stretch,
 )
 from shapechanger.demos.cloning.judge import AskedHead, output_fields
-from shapechanger.demos.cloning.pictures import CloningError, Framing, prepare
+from shapechanger.demos.cloning.pictures import CloningError, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.demos.cloning.settings import Augmentation, CloneSettings
+from shapechanger.demos.cloning.settings import CloneSettings, settings_for
 from shapechanger.errors import MissingExtra, check_seed
 
 try:
@@ -45,33 +45,6 @@ if TYPE_CHECKING:
 Inputs = Literal["auto", "picture", "state", "both"]
 """Inputs of a policy; "auto" takes pictures if there are any, and states otherwise."""
 
-# Chosen on the first 430 frames of a real drive by the accuracy on five later stretches;
-# benchmarks/cloning_real.py lists the alternatives.
-DEMOS: Final = CloneSettings(
-    framing=Framing(height=48, width=64, top=0.0),
-    channels=(24, 48),
-    features=64,
-    batch=32,
-    passes=25.0,
-    fewest_steps=300,
-    most_steps=3000,
-    learning_rate=2e-3,
-    weight_decay=0.1,
-    held_out=0.15,
-    checks=12,
-    patience=12,
-    augmentation=Augmentation(shift=3),
-    eyes="edges",
-    members=4,
-    dropout=0.5,
-    smoothing=0.1,
-    averaging=0.98,
-)
-"""Settings for few demonstrations."""
-
-# Steps, two and a half minutes at 20 Hz, from which demonstrations are many. One network on colours
-# and finer pictures learns from them; with fewer it would learn irrelevant details.
-_MANY: Final = 3000
 # Error at which the loss changes from quadratic to linear. An error of a tenth of the steering's
 # range is a mistake, and one mistake of the driver should not outweigh ten small errors.
 _HUBER_BETA: Final = 0.1
@@ -86,16 +59,6 @@ _MIN_SPREAD: Final = 1e-6
 # From twice as confident to a fifth as confident.
 _TEMPERATURES: Final = torch.logspace(-0.3, 0.7, 101)
 _MIN_CALIBRATION_STEPS: Final = 20
-
-
-def settings_for(steps: int) -> CloneSettings:
-    """Return the settings for this many steps.
-
-    With many steps nothing is held out, and the last network is kept. When a tenth of twenty
-    minutes was held out, the network after 140 of 1,400 steps was best by 0.3 %, and drove badly;
-    see docs/cloning.md.
-    """
-    return DEMOS if steps < _MANY else CloneSettings(held_out=0.0)
 
 
 class MemberCheck(msgspec.Struct, frozen=True):
@@ -171,45 +134,35 @@ def clone(
         CloningError: If there are no examples, or an array is invalid.
     """
     began = time.monotonic()
-    settings = CloneSettings() if settings is None else settings
+    given = CloneSettings() if settings is None else settings
+    settings = msgspec.structs.replace(given, members=1, dropout=0.0, smoothing=0.0)
     framing = settings.framing if start is None else start.card.framing
     shown = steering_examples(pictures, actions, framing)
     kept_back = held_out(len(shown), episodes, settings.held_out)
-    again = None if rehearsal is None else steering_examples(*rehearsal, framing)
     policy = CameraPolicy.fresh(settings, seed) if start is None else start.copy()
+    lesson = _Lesson(
+        shown,
+        settings,
+        settings.learning_rate if start is None else settings.further_rate,
+        torch.tensor([1.0, settings.throttle_weight]),
+        None if rehearsal is None else steering_examples(*rehearsal, framing),
+        on_check,
+    )
     if start is None:
-        _begin_with_mean(policy.network, shown.targets[~kept_back])
-    validation = shown.part(kept_back)
-    weights = torch.tensor([1.0, settings.throttle_weight])
+        lesson.begin(policy, ~kept_back)
 
-    def loss(out: Tensor, wanted: Tensor) -> Tensor:
-        return (_huber(out, wanted, reduction="none") * weights).mean()
-
-    def error(network: CameraNetwork) -> float:
+    def error(network: CameraNetwork, validation: Examples) -> float:
         done = CameraPolicy(network, policy.card).predict_many(validation.pictures)
         return sum(np.abs(done - validation.targets).mean(axis=0).tolist())
 
-    checks, best = _fit(
-        policy.network,
-        Batches(shown, ~kept_back, again, settings, seed),
-        loss,
-        error if len(validation) else None,
-        msgspec.structs.replace(settings, dropout=0.0),
-        settings.learning_rate if start is None else settings.further_rate,
-        0,
-        on_check,
-    )
+    with _seeded(seed):
+        checks, best = lesson.fit(policy, kept_back, seed, 0, error)
     card = msgspec.structs.replace(
-        policy.card, seeds=(*policy.card.seeds, seed), steps=best, settings=settings
+        policy.card, seeds=(*policy.card.seeds, seed), steps=best, settings=given
     )
-    training = Training(
-        checks=tuple(checks),
-        best_steps=(best,),
-        learned=int((~kept_back).sum()),
-        mirrored=settings.augmentation.mirror,
-        mirror_note="",
-        seconds=time.monotonic() - began,
-    )
+    learned, seconds = int((~kept_back).sum()), time.monotonic() - began
+    mirrored = settings.augmentation.mirror
+    training = Training(tuple(checks), (best,), learned, mirrored, "", seconds)
     return CameraPolicy(policy.network, card), training
 
 
@@ -287,9 +240,10 @@ def learn(
         states if states is None or state_mirror is None else state_mirror(states),
         card.targets(actions if mirrored is None else mirrored),
     )
+    lesson = _Lesson(shown, settings, settings.learning_rate, None, None, on_check)
     members = [
-        _train_member(shown, card, settings, seed, member, on_check)
-        for member in range(settings.members)
+        lesson.member(card, stretch(len(shown), n, settings.members, settings.held_out), seed, n)
+        for n in range(settings.members)
     ]
     networks, checks, steps, logits, wanted = (list(each) for each in zip(*members, strict=True))
     card = msgspec.structs.replace(
@@ -303,12 +257,12 @@ def learn(
             whole.hands.weight.div_(temperature)
             whole.hands.bias.div_(temperature)
     training = Training(
-        checks=tuple(check for own in checks for check in own),
-        best_steps=tuple(steps),
-        learned=len(actions),
-        mirrored=share,
-        mirror_note=note,
-        seconds=time.monotonic() - began,
+        tuple(check for own in checks for check in own),
+        tuple(steps),
+        len(actions),
+        share,
+        note,
+        time.monotonic() - began,
     )
     return CameraPolicy(whole, card), training
 
@@ -356,76 +310,156 @@ def _unseen(data: Dataset) -> tuple[str, ...]:
     return unseen
 
 
-def _train_member(
-    shown: Examples,
-    card: CloneCard,
-    settings: CloneSettings,
-    seed: int,
-    member: int,
-    on_check: Callable[[MemberCheck], None],
-) -> tuple[CameraNetwork, list[MemberCheck], int, Tensor, Tensor]:
-    """Train one member.
+@dataclass(frozen=True, slots=True)
+class _Lesson:
+    """Training of networks on examples.
 
-    Returns:
-        The network, its validations, the step at which it was best, and its outputs and targets on
-        the stretch that it did not learn from.
+    Attributes:
+        shown: The examples.
+        settings: Number of steps, validations, and patience.
+        rate: Maximum learning rate.
+        weights: Weight of each value's error, shape (m,); None for equal ones, or classes.
+        rehearsal: Examples to mix in; None for none.
+        on_check: Called after each validation.
     """
-    seed = seed * settings.members + member
-    kept_back = stretch(len(shown), member, settings.members, settings.held_out)
-    policy = CameraPolicy.blank(card, seed)
-    learned = shown.part(~kept_back)
-    if card.classes:
-        counts = np.bincount(learned.targets, minlength=len(card.classes)) + 1.0
-        with torch.no_grad():
-            policy.network.hands.weight.zero_()
-            policy.network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
-    else:
-        _begin_with_mean(policy.network, learned.targets)
-    if learned.states is not None:
-        _normalise(policy.network, learned.states)
-    validation = shown.part(kept_back)
-    wanted = torch.as_tensor(validation.targets)
 
-    def loss(out: Tensor, wanted: Tensor, smoothing: float = settings.smoothing) -> Tensor:
+    shown: Examples
+    settings: CloneSettings
+    rate: float
+    weights: Tensor | None
+    rehearsal: Examples | None
+    on_check: Callable[[MemberCheck], None]
+
+    def member(
+        self, card: CloneCard, kept_back: NDArray[np.bool_], seed: int, member: int
+    ) -> tuple[CameraNetwork, list[MemberCheck], int, Tensor, Tensor]:
+        """Train one member of several.
+
+        Returns:
+            The network, its validations, the step at which it was best, and its outputs and targets
+            on the stretch that it did not learn from.
+        """
+        seed = seed * self.settings.members + member
+        policy = CameraPolicy.blank(card, seed)
+        self.begin(policy, ~kept_back)
+        wanted = torch.as_tensor(self.shown.targets[kept_back])
+
+        def logits(network: CameraNetwork, validation: Examples) -> Tensor:
+            return CameraPolicy(network, card).logits(validation.pictures, validation.states)
+
+        def error(network: CameraNetwork, validation: Examples) -> float:
+            return float(self.loss(card, logits(network, validation), wanted, smoothing=0.0))
+
+        with _seeded(seed):
+            checks, best = self.fit(policy, kept_back, seed, member, error)
+        outputs = logits(policy.network, self.shown.part(kept_back))
+        return policy.network, checks, best, outputs, wanted
+
+    def begin(self, policy: CameraPolicy, learned: NDArray[np.bool_]) -> None:
+        """Initialise the output to the mean action or the frequencies, and normalise the states."""
+        shown, network = self.shown.part(learned), policy.network
+        with torch.no_grad():
+            if policy.card.classes:
+                counts = np.bincount(shown.targets, minlength=len(policy.card.classes)) + 1.0
+                network.hands.weight.zero_()
+                network.hands.bias.copy_(torch.as_tensor(np.log(counts / counts.sum())))
+            else:
+                mean = torch.as_tensor(shown.targets.mean(axis=0))
+                network.hands.bias.copy_(torch.atanh(mean.clamp(-_MAX_INITIAL, _MAX_INITIAL)))
+        if shown.states is not None:
+            _normalise(network, shown.states)
+
+    def loss(self, card: CloneCard, out: Tensor, wanted: Tensor, smoothing: float) -> Tensor:
+        """Return the mean loss of outputs."""
         if card.classes:
             return functional.cross_entropy(out, wanted, label_smoothing=smoothing)
-        return _huber(out, wanted)
+        out = torch.tanh(out)
+        if self.weights is None:
+            return functional.smooth_l1_loss(out, wanted, beta=_HUBER_BETA)
+        each = functional.smooth_l1_loss(out, wanted, reduction="none", beta=_HUBER_BETA)
+        return (each * self.weights).mean()
 
-    def logits(network: CameraNetwork) -> Tensor:
-        return CameraPolicy(network, card).logits(validation.pictures, validation.states)
+    def fit(
+        self,
+        policy: CameraPolicy,
+        kept_back: NDArray[np.bool_],
+        seed: int,
+        member: int,
+        error: Callable[[CameraNetwork, Examples], float],
+    ) -> tuple[list[MemberCheck], int]:
+        """Train the network of a policy in place, and restore its best weights at the end.
 
-    def error(network: CameraNetwork) -> float:
-        return float(loss(logits(network), wanted, smoothing=0.0))
+        Args:
+            policy: The policy.
+            kept_back: Mask of the examples that validate it.
+            seed: Seed of everything random.
+            member: Index of the network.
+            error: Validates a network on examples.
 
-    # Dropout draws from the global generator; earlier draws must not matter.
+        Returns:
+            The validations in order, and the step of the best one.
+        """
+        network, settings = policy.network, self.settings
+        batches = Batches(self.shown, ~kept_back, self.rehearsal, settings, seed)
+        validation = self.shown.part(kept_back)
+        optimizer = torch.optim.AdamW(
+            network.parameters(), lr=self.rate, weight_decay=settings.weight_decay
+        )
+        total = settings.steps(batches.size)
+        every = max(total // settings.checks, 1)
+        # Validated and kept: the network itself, or the average of its weights.
+        kept = copy.deepcopy(network) if settings.averaging else network
+        checks: list[MemberCheck] = []
+        losses: list[float] = []
+        best, best_weights = -1, dict[str, Tensor]()
+        step = worse = 0
+        while True:
+            if step % every == 0 or step == total:
+                mean_loss = sum(losses) / len(losses) if losses else math.nan
+                now = error(kept.eval(), validation) if len(validation) else math.nan
+                checks.append(MemberCheck(member, step, mean_loss, now))
+                self.on_check(checks[-1])
+                losses.clear()
+                worse += 1
+                # NaN without held-out data: keep the last.
+                if best < 0 or not now >= checks[best].error:
+                    best, worse = len(checks) - 1, 0
+                    best_weights = {name: w.clone() for name, w in kept.state_dict().items()}
+                if step == total or worse >= settings.patience:
+                    break
+            for group in optimizer.param_groups:
+                group["lr"] = self.rate * _share_of_rate(step, total, settings.warm_up)
+            network.train()
+            batch = batches.draw()
+            found = network.perceive(batch.pictures, batch.states)
+            out = network.hands(functional.dropout(found, settings.dropout))
+            batch_loss = self.loss(policy.card, out, batch.targets, settings.smoothing)
+            optimizer.zero_grad()
+            batch_loss.backward()  # pyright: ignore[reportUnknownMemberType]
+            torch.nn.utils.clip_grad_norm_(network.parameters(), _MAX_GRADIENT)
+            optimizer.step()  # pyright: ignore[reportUnknownMemberType]
+            losses.append(batch_loss.item())
+            step += 1
+            if settings.averaging:
+                share = min(settings.averaging, step / (step + _AVERAGE_FROM))
+                with torch.no_grad():
+                    for old, new in zip(kept.parameters(), network.parameters(), strict=True):
+                        old.lerp_(new, 1.0 - share)
+        network.load_state_dict(best_weights)
+        network.eval()
+        return checks, checks[best].step
+
+
+@contextmanager
+def _seeded(seed: int) -> Generator[None]:
+    """Seed the global generator, which dropout draws from; earlier draws must not matter."""
     fork = cast(
         "AbstractContextManager[None]",
         torch.random.fork_rng(devices=[]),  # pyright: ignore[reportUnknownMemberType]
     )
     with fork:
         torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
-        checks, best = _fit(
-            policy.network,
-            Batches(shown, ~kept_back, None, settings, seed),
-            loss,
-            error if len(validation) else None,
-            settings,
-            settings.learning_rate,
-            member,
-            on_check,
-        )
-    return policy.network, checks, best, logits(policy.network), wanted
-
-
-def _huber(out: Tensor, wanted: Tensor, reduction: str = "mean") -> Tensor:
-    return functional.smooth_l1_loss(torch.tanh(out), wanted, reduction=reduction, beta=_HUBER_BETA)
-
-
-def _begin_with_mean(network: CameraNetwork, wanted: NDArray[np.float32]) -> None:
-    """Initialise the output to the mean action."""
-    mean = torch.as_tensor(wanted.mean(axis=0)).clamp(-_MAX_INITIAL, _MAX_INITIAL)
-    with torch.no_grad():
-        network.hands.bias.copy_(torch.atanh(mean))
+        yield
 
 
 def _normalise(network: CameraNetwork, states: NDArray[np.float32]) -> None:
@@ -439,76 +473,6 @@ def _normalise(network: CameraNetwork, states: NDArray[np.float32]) -> None:
     with torch.no_grad():
         for name, values in (("middle", middle), ("spread", spread)):
             getattr(network.nerves, name).copy_(torch.as_tensor(values))
-
-
-def _fit(
-    network: CameraNetwork,
-    batches: Batches,
-    loss: Callable[[Tensor, Tensor], Tensor],
-    error: Callable[[CameraNetwork], float] | None,
-    settings: CloneSettings,
-    rate: float,
-    member: int,
-    on_check: Callable[[MemberCheck], None],
-) -> tuple[list[MemberCheck], int]:
-    """Train a network in place, and restore its best weights at the end.
-
-    Args:
-        network: The network.
-        batches: The training data.
-        loss: Returns the loss of outputs, given the targets.
-        error: Validates a network; None without held-out data.
-        settings: Number of steps, validations, and patience.
-        rate: Maximum learning rate.
-        member: Index of the network.
-        on_check: Called after each validation.
-
-    Returns:
-        The validations in order, and the step of the best one.
-    """
-    optimizer = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=settings.weight_decay)
-    total = settings.steps(batches.size)
-    every = max(total // settings.checks, 1)
-    # Validated and kept: the network itself, or the average of its weights.
-    kept = copy.deepcopy(network) if settings.averaging else network
-    checks: list[MemberCheck] = []
-    losses: list[float] = []
-    best, best_weights = -1, dict[str, Tensor]()
-    step = worse = 0
-    while True:
-        if step % every == 0 or step == total:
-            mean_loss = sum(losses) / len(losses) if losses else math.nan
-            now = error(kept.eval()) if error else math.nan
-            checks.append(MemberCheck(member, step, mean_loss, now))
-            on_check(checks[-1])
-            losses.clear()
-            worse += 1
-            # NaN without held-out data: keep the last.
-            if best < 0 or not now >= checks[best].error:
-                best, worse = len(checks) - 1, 0
-                best_weights = {name: w.clone() for name, w in kept.state_dict().items()}
-            if step == total or worse >= settings.patience:
-                break
-        for group in optimizer.param_groups:
-            group["lr"] = rate * _share_of_rate(step, total, settings.warm_up)
-        network.train()
-        batch = batches.draw()
-        found = network.perceive(batch.pictures, batch.states)
-        batch_loss = loss(network.hands(functional.dropout(found, settings.dropout)), batch.targets)
-        optimizer.zero_grad()
-        batch_loss.backward()  # pyright: ignore[reportUnknownMemberType]
-        torch.nn.utils.clip_grad_norm_(network.parameters(), _MAX_GRADIENT)
-        optimizer.step()  # pyright: ignore[reportUnknownMemberType]
-        losses.append(batch_loss.item())
-        step += 1
-        if settings.averaging:
-            share = min(settings.averaging, step / (step + _AVERAGE_FROM))
-            with torch.no_grad():
-                for old, new in zip(kept.parameters(), network.parameters(), strict=True):
-                    old.lerp_(new, 1.0 - share)
-    network.load_state_dict(best_weights)
-    network.eval()
-    return checks, checks[best].step
 
 
 def _share_of_rate(step: int, total: int, warm_up: int) -> float:

@@ -74,7 +74,7 @@ def clone_html(
     card = policy.card
     by_class = judgement.head == "class"
     return render(
-        "clone.html",
+        Path(__file__).with_name("clone.html"),
         title=name,
         verdict=_verdict(judgement, data_note),
         cards=_cards(judgement),

@@ -132,9 +132,6 @@ def require_alike(episodes: Sequence[ExchangeEpisode], dataset: str) -> None:
     Args:
         episodes: The episodes.
         dataset: How to name the dataset in errors, such as "a Minari dataset".
-
-    Raises:
-        DemosError: If their actions, states, picture sizes or rates differ.
     """
     first = episodes[0]
     for episode in episodes[1:]:

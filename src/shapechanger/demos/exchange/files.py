@@ -1,7 +1,8 @@
 """The loader: sources are never changed, targets appear atomically, strangers have one budget.
 
 The budget is `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of a picture,
-`MAX_UNPACKED` of anything compressed, and regular files inside the folder only.
+`MAX_UNPACKED` of anything compressed, and regular files inside the folder only. All functions raise
+`DemosError` for what they refuse, and `MissingExtra` for a package that is not installed.
 """
 
 from __future__ import annotations
@@ -53,11 +54,7 @@ class UnpacksToTooMuch(DemosError):
 
 
 def library(name: str, extra: str = "data") -> Any:
-    """Import a module of a package that an extra installs.
-
-    Raises:
-        MissingExtra: If it is not installed.
-    """
+    """Import a module of a package that an extra installs."""
     try:
         return import_module(name)
     except ImportError as error:
@@ -74,10 +71,6 @@ def new_folder(out: Path, source: Path | None = None) -> Generator[Path]:
 
     Yields:
         A hidden folder beside `out` to write to.
-
-    Raises:
-        DemosError: If `out` exists, or lies in `source`.
-        OutputError: If it cannot be written.
     """
     if os.path.lexists(out):
         raise DemosError(f"{out} exists already: choose another name, or move it away.")
@@ -121,9 +114,6 @@ def inside(folder: Path, name: str, named_by: object) -> Path:
         folder: The folder.
         name: Its name according to the data set.
         named_by: Where the name stands, such as "steps.csv, line 3".
-
-    Raises:
-        DemosError: If there is no such file, or the name leads out of the folder.
     """
     if not name or not is_inside(folder, name):
         problem = "leaves the folder" if name else "is empty"
@@ -137,11 +127,7 @@ def inside(folder: Path, name: str, named_by: object) -> Path:
 
 
 def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
-    """Return the content of a regular file.
-
-    Raises:
-        DemosError: If it cannot be read, or is too large.
-    """
+    """Return the content of a regular file."""
     try:
         return read_file(path, most)
     except OSError as error:
@@ -149,11 +135,7 @@ def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file without a byte order mark; line ends are kept.
-
-    Raises:
-        DemosError: If the file cannot be read, is too large, or is not UTF-8.
-    """
+    """Return the text of a UTF-8 file without a byte order mark; line ends are kept."""
     data = read_bytes(path)
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise DemosError(f"{path} is not text in UTF-8 but in UTF-16: save it as UTF-8.")
@@ -174,9 +156,6 @@ def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[
 
     Returns:
         What separates the cells, and the number and the cells of each line that is not blank.
-
-    Raises:
-        DemosError: If the file cannot be read, or is not CSV.
     """
     text = read_text(path)
     first = next((line for line in text.splitlines() if line.strip()), "")
@@ -196,11 +175,7 @@ def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[
 
 
 def parse_json(text: str, where: str) -> Any:
-    """Parse JSON.
-
-    Raises:
-        DemosError: If it is not valid; `where` names it.
-    """
+    """Parse JSON."""
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -208,11 +183,7 @@ def parse_json(text: str, where: str) -> Any:
 
 
 def read_json_object(path: Path) -> dict[str, Any]:
-    """Read a file that holds a JSON object.
-
-    Raises:
-        DemosError: If it cannot be read, is not valid, or holds something else.
-    """
+    """Read a file that holds a JSON object."""
     value = parse_json(read_text(path), str(path))
     if not isinstance(value, dict):
         raise DemosError(f"{path} is not a JSON object.")
@@ -225,9 +196,6 @@ def own_headers(section: object, where: object) -> list[dict[str, Any]]:
     Args:
         section: Shapechanger's part of the metadata.
         where: The file that it is in.
-
-    Raises:
-        DemosError: If another version wrote them.
     """
     fields = cast("dict[str, Any]", section) if isinstance(section, dict) else {}
     headers = fields.get("episodes")
@@ -278,9 +246,6 @@ def column(file: Any, name: str, length: int = 0) -> Any:
         file: An open `h5py.File`.
         name: Path of the dataset in the file.
         length: Minimum number of entries.
-
-    Raises:
-        DemosError: If it is missing, elsewhere, too short, or unpacks to too much.
     """
     h5py = library("h5py")
     where, found = file.filename, file
@@ -364,9 +329,6 @@ def all_rows(path: Path, columns: set[str] | None) -> list[dict[str, Any]]:
     Args:
         path: The file.
         columns: Names of the columns to read, if they are there; None for all.
-
-    Raises:
-        DemosError: If it is damaged, or has a very long text.
     """
     found: list[dict[str, Any]] = []
     with _open_parquet(path) as file:
@@ -424,9 +386,6 @@ def rows_at(
         rows: Positions of the rows, in ascending order.
         sizes: Number of values of each column of numbers.
         stored: Names of other columns.
-
-    Raises:
-        DemosError: If a column is missing, or has other values.
     """
     with _open_parquet(path) as file:
         wanted = [*sizes, *stored]

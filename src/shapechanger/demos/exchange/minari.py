@@ -158,18 +158,14 @@ def _require_stored(main: Path, count: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Parts:
-    """Where the parts of a step are in the group of an episode.
-
-    `action` and `state` are columns, each with its number of values; `picture` is "" without one,
-    and has JPEGs or pixels. `infos` are columns of our own; () in a dataset of others.
-    """
+    """Columns of an episode, some with their number of values; "" without pictures."""
 
     header: EpisodeHeader
     action: Sequence[tuple[str, int]]
     state: Sequence[tuple[str, int]]
     picture: str
     is_jpeg: bool
-    infos: Sequence[str] = ()
+    infos: Sequence[str] = ()  # Of our own; () in a dataset of others.
 
     def columns(self, file: Any, number: int) -> dict[str, Any]:
         """Return the columns by name; those of rewards may be missing."""

@@ -55,9 +55,6 @@ class Pictures:
             jpeg: Its bytes.
             name: How to name it in errors.
             decode: Whether to decode it, because others encoded it.
-
-        Raises:
-            DemosError: If it is.
         """
         size = picture_size(jpeg, name)
         self.size = self.size or size
@@ -71,12 +68,7 @@ class Pictures:
 
 
 def as_jpeg(data: bytes, name: object) -> bytes:
-    """Return a picture as JPEG; PNG and BMP are encoded with quality 100.
-
-    Raises:
-        PictureError: If it is empty, of another format, transparent, damaged or too large.
-        MissingExtra: If a package that is needed is not installed.
-    """
+    """Return a picture as JPEG; PNG and BMP are encoded with quality 100."""
     if data.startswith(_JPEG):
         return data  # Its users decode it.
     if not data.strip(b"\0"):
@@ -112,9 +104,6 @@ def read_picture(path: Path) -> tuple[bytes, bool]:
 
     Returns:
         The JPEG, and whether it was encoded now. It is not decoded otherwise.
-
-    Raises:
-        PictureError: If it cannot be imported.
     """
     try:
         data = read_file(path, MAX_PICTURE_BYTES)

@@ -4,15 +4,11 @@
 Shapechanger. In the `user/mode` "user" a person drives, and `pilot/...` is what a policy wanted. In
 the other modes `pilot/...` drives, except that in "local_angle" the throttle is the person's.
 
-Version 2 is a folder with `manifest.json`, catalogs and `images/`. The manifest has five lines of
-JSON: inputs, types, metadata, more metadata, and an object with `paths` (the catalogs in order),
-`current_index`, `max_len` and `deleted_indexes`, which are values of the records' `_index`. A
-catalog has one JSON object per line; `_timestamp_ms` is Unix time, `_session_id` names the start of
-the car that it belongs to, and `cam/image_array` names a file in `images/`. Beside a catalog,
-`NAME.catalog_manifest` has its `start_index` and the lengths of its lines. Version 1 has a file
-`record_N.json` per record, its picture beside it, optionally `milliseconds` since the start,
-`meta.json` with inputs, types and optionally the Unix time of the start, and `exclude.json` with
-the numbers of deleted records.
+Version 2 is a folder with `manifest.json` (five lines of JSON: inputs, types, metadata, more
+metadata, and an object with the catalogs), catalogs with a record per line, and `images/`. Deleted
+indexes are values of the records' `_index`; `_timestamp_ms` is Unix time, and `_session_id` names
+the start of the car. Version 1 has a file `record_N.json` per record, its picture beside it,
+optionally `milliseconds` since the start, `meta.json`, and the deleted numbers in `exclude.json`.
 
 Source: github.com/autorope/donkeycar, donkeycar/parts/datastore_v2.py and tub_v2.py for version 2,
 parts/datastore.py for version 1, at the commits 1e831b81, 38a1c2db and b253cef6.
@@ -24,10 +20,11 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from itertools import groupby, pairwise
 from pathlib import Path, PurePath
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, TypeVar, cast
 
 import msgspec
 
@@ -82,10 +79,10 @@ _CATALOG_NAME: Final = re.compile(r"catalog_([0-9]{1,9})\.catalog")
 _DAMAGED: Final = "that is not valid JSON"
 
 _Fields = dict[str, Any]
+_T = TypeVar("_T", int, str)
 
 
-@dataclass(frozen=True, slots=True)
-class _Record:
+class _Record(NamedTuple):
     """A record with its `_index` or the number of its file; its time and picture if known."""
 
     fields: _Fields
@@ -96,19 +93,15 @@ class _Record:
     path: Path | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class _Tub:
-    """The records of a tub that were not deleted, and its declarations.
-
-    Times are Unix times if `is_unix`, or begin at 0 with each start of the car.
-    """
+class _Tub(NamedTuple):
+    """The records of a tub that were not deleted, and its declarations."""
 
     inputs: dict[str, str]
     records: list[_Record]
     deleted: int
     images: Path
     start_ns: int | None
-    is_unix: bool
+    is_unix: bool  # Otherwise times begin at 0 with each start of the car.
     stated_hz: float | None
 
 
@@ -147,15 +140,15 @@ def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
         return
     parts = list(_drives(records, restarts=not tub.is_unix))
     times = [_times_ns(part, context) for part in parts]
+    numbers = [[record.number for record in part] for part in parts]
     drives = [
-        TimedDrive(known, [record.number for record in part], f"record {part[0].number}")
-        for part, known in zip(parts, times, strict=True)
+        TimedDrive(known, part, f"record {part[0]}")
+        for known, part in zip(times, numbers, strict=True)
     ]
     rates, believed = choose_rates(drives, context, tub.stated_hz)
     if not believed:
         drives = [replace(drive, times_ns=()) for drive in drives]
-    names = [[str(record.number) for record in part] for part in parts]
-    places = split_at_jumps(drives, names, rates, context)
+    places = split_at_jumps(drives, [list(map(str, part)) for part in numbers], rates, context)
     for part, known, hz, split in zip(parts, times, rates, places, strict=True):
         timed = bool(known) and believed
         for place in split:
@@ -189,15 +182,10 @@ def _steps(records: Sequence[_Record], *, timed: bool, is_unix: bool) -> Iterato
 
 
 def _kind_of(value: Any) -> str:
-    match value:
-        case bool():
-            return "boolean"
-        case int() | float():
-            return "float"
-        case str():
-            return _PICTURES[0] if value.lower().endswith(_ENDINGS) else "str"
-        case _:
-            return "list"
+    if isinstance(value, str):
+        return _PICTURES[0] if value.lower().endswith(_ENDINGS) else "str"
+    kinds: dict[type, str] = {bool: "boolean", int: "float", float: "float"}
+    return kinds.get(type(value), "list")
 
 
 def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) -> str:
@@ -248,16 +236,15 @@ def _driven(record: _Record, sensed: Sequence[str], context: ImportContext) -> _
             context.leave_out("suggestion", reason, record.number)
     state = tuple(_sensed(record.fields.get(name)) for name in sensed)
     driver = "person" if by_person else "policy"
-    return replace(record, step=Step(action=action, driver=driver, wanted=wanted, state=state))
+    return record._replace(step=Step(action=action, driver=driver, wanted=wanted, state=state))
 
 
 def _pair(record: _Record, names: Sequence[str]) -> tuple[float, float] | None:
     """Return two numbers from -1 to 1; None for anything else."""
-    values = [record.fields.get(name) for name in names]
-    for value in values:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1.0:
-            return None
-    return float(cast("float", values[0])), float(cast("float", values[1]))
+    values: list[Any] = [record.fields.get(name) for name in names]
+    if all(type(value) in {int, float} and abs(value) <= 1.0 for value in values):
+        return float(values[0]), float(values[1])
+    return None
 
 
 def _sensed(value: Any) -> float:
@@ -287,7 +274,7 @@ def _with_pictures(
         elif shown[name] > 1 and (images / place).is_file():
             context.leave_out("record", "with the picture of another record", number)
         else:
-            found.append(replace(record, path=images / place))
+            found.append(record._replace(path=images / place))
             if (match := _PICTURE_NUMBER.match(name)) and int(match[1]) != number:
                 offsets[number] = int(match[1]) - number
     if offsets:
@@ -343,8 +330,9 @@ def _read_v2(folder: Path, context: ImportContext) -> _Tub:
         inputs = types = []
     known = _object(catalogs) or {}
     if known:
-        names = [str(name) for name in _list(known.get("paths"), f"paths in {path}")]
-        deleted = _numbers(known.get("deleted_indexes", []), f"deleted_indexes in {path}")
+        names = _list(known.get("paths"), str, f"paths in {path}")
+        gone = known.get("deleted_indexes", [])
+        deleted = set(_list(gone, int, f"deleted_indexes in {path}"))
     else:
         deleted, names = set[int](), [*_numbered(folder, _CATALOG_NAME).values()]
         context.warn(
@@ -379,7 +367,7 @@ def _read_catalog(path: Path, rows: list[tuple[int, _Fields]], context: ImportCo
     beside = path.with_suffix(".catalog_manifest")
     about = _object(_parsed(read_bytes(beside))) if beside.is_file() else None
     start = (about or {}).get("start_index")
-    if not isinstance(start, int) or isinstance(start, bool):
+    if type(start) is not int:
         start = rows[-1][0] + 1 if rows else 0
     try:
         lines = read_bytes(path).split(b"\n")
@@ -401,7 +389,7 @@ def _with_numbers(rows: Sequence[tuple[int, _Fields]], context: ImportContext) -
     records: list[_Record] = []
     for position, fields in rows:
         number = fields.get("_index") if has_index else position
-        if isinstance(number, bool) or not isinstance(number, int):
+        if type(number) is not int:
             context.leave_out("record", "without a valid _index", f"the one at position {position}")
             continue
         session = fields.get("_session_id")
@@ -435,7 +423,7 @@ def _report_missing(
     """Report numbers that the manifest has and no record."""
     numbers = {record.number for record in records}
     last = max(numbers, default=-1)
-    if isinstance(count, int) and not isinstance(count, bool):
+    if type(count) is int:
         last = max(last, min(count, last + 1_000_000) - 1)
         if last >= count:
             context.warn(
@@ -458,7 +446,8 @@ def _read_v1(folder: Path, context: ImportContext) -> _Tub:
     meta = read_json_object(path) if path.is_file() else {}
     deleted = set[int]()
     if exclude.is_file():
-        deleted = _numbers(parse_json(read_text(exclude), str(exclude)), f"numbers in {exclude}")
+        gone = parse_json(read_text(exclude), str(exclude))
+        deleted = set(_list(gone, int, f"numbers in {exclude}"))
     start_ns = _in_ns(meta.get("start"), NS_PER_S)
     names = _numbered(folder, _RECORD_NAME)
     records: list[_Record] = []
@@ -485,10 +474,9 @@ def _read_v1(folder: Path, context: ImportContext) -> _Tub:
 
 def _parsed(line: bytes) -> Any:
     """Return the value of a line of JSON; None if it is damaged."""
-    try:
+    with suppress(DemosError, UnicodeDecodeError):
         return parse_json(line.decode("utf-8-sig"), "a line")
-    except (DemosError, UnicodeDecodeError):
-        return None
+    return None
 
 
 def _object(value: Any) -> _Fields | None:
@@ -496,37 +484,30 @@ def _object(value: Any) -> _Fields | None:
 
 
 def _typed(inputs: Any, types: Any, path: Path) -> dict[str, str]:
-    names, kinds = _list(inputs, f"inputs in {path}"), _list(types, f"types in {path}")
+    names, kinds = _list(inputs, str, f"inputs in {path}"), _list(types, str, f"types in {path}")
     if len(names) != len(kinds):
         raise DemosError(f"{path} has {len(names)} inputs, but {len(kinds)} types.")
-    return {str(name): str(kind) for name, kind in zip(names, kinds, strict=True)}
+    return dict(zip(names, kinds, strict=True))
 
 
-def _list(value: Any, what: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise DemosError(f"The {what} must be a list.")
-    return cast("list[Any]", value)
-
-
-def _numbers(value: Any, what: str) -> set[int]:
-    for number in _list(value, what):
-        if isinstance(number, bool) or not isinstance(number, int):
-            raise DemosError(f"The {what} must be integers, got {number!r}.")
-    return set(value)
+def _list(value: Any, kind: type[_T], what: str) -> list[_T]:
+    try:
+        return msgspec.convert(value, list[kind])
+    except msgspec.ValidationError as error:
+        raise DemosError(f"The {what} must be a list of {kind.__name__}: {error}.") from error
 
 
 def _stated_hz(metadata: Any) -> float | None:
     """Return the rate in the metadata of a tub; None if they do not state it."""
-    try:
+    with suppress(LookupError, TypeError, ValueError, OverflowError):
         hz = float(metadata[LOOP_HZ])
-    except (LookupError, TypeError, ValueError, OverflowError):
-        return None
-    return hz if 0.0 < hz < math.inf else None
+        return hz if 0.0 < hz < math.inf else None
+    return None
 
 
 def _in_ns(value: Any, unit_ns: int) -> int | None:
     """Return a time as ns; None for anything that cannot be a time."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if type(value) not in {int, float}:
         return None
     in_ns = round(value * unit_ns) if abs(value) < _MAX_TIME else _MAX_NS
     return in_ns if abs(in_ns) < _MAX_NS else None

@@ -52,10 +52,6 @@ class VideoWriter:
 
     Attributes:
         frames: Number of pictures written.
-
-    Raises:
-        DemosError: If the width or the height is odd.
-        MissingExtra: If there is no FFmpeg.
     """
 
     CODEC: Final = "h264"
@@ -91,11 +87,7 @@ class VideoWriter:
         return self._path.stat().st_size if self._path.exists() else 0
 
     def add(self, pixels: NDArray[np.uint8]) -> None:
-        """Append a picture, shape (height, width, 3).
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Append a picture, shape (height, width, 3)."""
         try:
             if not self.frames:
                 self._pictures.send(None)  # It starts FFmpeg.
@@ -105,11 +97,7 @@ class VideoWriter:
         self.frames += 1
 
     def close(self) -> None:
-        """Finish the file, and check that it is whole.
-
-        Raises:
-            OutputError: If it is not.
-        """
+        """Finish the file, and check that it is whole."""
         self._pictures.close()
         written = 0
         with contextlib.suppress(DemosError, OSError):
@@ -143,12 +131,7 @@ class VideoTimes:
 
 
 def read_times(path: Path) -> VideoTimes:
-    """Read the times of the pictures of an MP4 video, without decoding them.
-
-    Raises:
-        DemosError: If the video is damaged, or is of depth.
-        MissingExtra: If there is no FFmpeg.
-    """
+    """Read the times of the pictures of an MP4 video, without decoding them."""
     taken = ["-map", "0:v:0", "-c", "copy", "-copyinkf", "-f", "framecrc", "pipe:1"]
     command = _ffmpeg([*_reading(path), *taken], log="info")
     ticks: list[int] = []
@@ -202,10 +185,6 @@ def read_pictures(
         wanted: The times to read, of those, ascending, in ticks.
         size: Width and height that the pictures must have, pixels.
         from_start: Whether to decode the video from its start, not from the key frame before.
-
-    Raises:
-        DemosError: If the video is damaged, or has pictures of another size.
-        MissingExtra: If there is no FFmpeg.
     """
     width, height = size
     seek: list[str] = []
