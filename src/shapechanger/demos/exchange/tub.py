@@ -184,8 +184,9 @@ def _steps(records: Sequence[_Record], *, timed: bool, is_unix: bool) -> Iterato
 def _kind_of(value: Any) -> str:
     if isinstance(value, str):
         return _PICTURES[0] if value.lower().endswith(_ENDINGS) else "str"
-    kinds: dict[type, str] = {bool: "boolean", int: "float", float: "float"}
-    return kinds.get(type(value), "list")
+    if isinstance(value, bool):
+        return "boolean"
+    return "float" if isinstance(value, int | float) else "list"
 
 
 def _camera(columns: Mapping[str, str], folder: Path, context: ImportContext) -> str:
