@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from shapechanger.demos.dataset import decode_picture, load_dataset
+from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.episodes import EpisodeWriter, drop
+from shapechanger.demos.jpeg import decode_picture
 from shapechanger.errors import BrokenEpisode, DemosError, UnknownName
 from tests.demos.episodes.making import ACTIONS, STATES, header, step
 

@@ -15,7 +15,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import TimeLimit
 
-from shapechanger.demos.dataset import decode_picture, load_dataset
+from shapechanger.demos.dataset import load_dataset
 from shapechanger.demos.episodes import (
     Episode,
     EpisodeWriter,
@@ -24,6 +24,7 @@ from shapechanger.demos.episodes import (
     repair,
     writer,
 )
+from shapechanger.demos.jpeg import decode_picture
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.errors import DemosError, OutputError
 from tests.demos.corridor_env import SIZE, CorridorEnv, Shows

@@ -100,6 +100,11 @@ def load_dataset(
     pictures = [picture for part in parts for picture in part.pictures]
     steps = [step for part in parts for step in part.steps]
     layout = first.header.state_layout
+    periods_s: list[float] = []
+    for part in parts:
+        if all(step.captured_ns is not None for step in part.steps):
+            follows = np.diff([step.index for step in part.steps]) == 1
+            periods_s += np.diff(part.times_s())[follows].tolist()
     return Dataset(
         pictures=np.stack(pictures) if pictures else None,
         states=np.array([step.state for step in steps], np.float32) if layout else None,
@@ -111,7 +116,7 @@ def load_dataset(
         state_layout=Layout.from_json(layout) if layout else None,
         control_hz=first.header.control_hz,
         body=first.header.body,
-        rate_jitter=_jitter(parts),
+        rate_jitter=rate_jitter(periods_s, first.header.control_hz),
     )
 
 
@@ -147,16 +152,6 @@ class _Part(NamedTuple):
                 "with `shapechanger demos bad`."
             )
         return times_s
-
-
-def _jitter(parts: list[_Part]) -> float:
-    """Return how far the rate of all parts varied, as a share of it."""
-    periods: list[float] = []
-    for part in parts:
-        if all(step.captured_ns is not None for step in part.steps):
-            indices = [step.index for step in part.steps]
-            periods += np.diff(part.times_s())[np.diff(indices) == 1].tolist()
-    return rate_jitter(periods, parts[0].header.control_hz)
 
 
 def _parts(data: Path, drivers: Collection[str], shrink: Shrink | None) -> Iterator[_Part]:

@@ -59,8 +59,11 @@ def merge(sources: Sequence[Path], out: Path) -> Merged:
         if identity in known:
             raise DemosError(f"{episode.path} and {known[identity]} are the same episode.")
         known[identity] = episode.path
-        _require_no_links(episode.path)
-    layouts = {_layouts(episode) for episode in [*there, *episodes]}
+        # A link would copy a file or a folder of another place into the recording.
+        if link := next((path for path in episode.path.rglob("*") if path.is_symlink()), None):
+            raise DemosError(f"{link} is a link, but an episode has only files: remove it.")
+    headers = [episode.header for episode in [*there, *episodes]]
+    layouts = {(header.action_layout, header.state_layout) for header in headers}
     pairs: list[tuple[Path, Path]] = []
     copied = 0
     for episode in episodes:
@@ -85,18 +88,6 @@ def _identity(episode: Episode) -> tuple[object, ...]:
     first = episode.steps[0] if episode.steps else None
     seen = (first.wall_ns, first.captured_ns, first.picture, first.action) if first else ()
     return (episode.header.created, len(episode.steps), *seen)
-
-
-def _require_no_links(folder: Path) -> None:
-    """Refuse links, which would copy a file or a folder of another place into the recording."""
-    for parent, folders, files in os.walk(folder):
-        for path in (Path(parent, name) for name in (*folders, *files)):
-            if path.is_symlink():
-                raise DemosError(f"{path} is a link, but an episode has only files: remove it.")
-
-
-def _layouts(episode: Episode) -> tuple[str, str]:
-    return episode.header.action_layout, episode.header.state_layout
 
 
 def _copied(source: Path, out: Path) -> Path:

@@ -274,9 +274,9 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         if seen is None:
             raise gym.error.ResetNeeded("Call reset() before the first step of an episode.")
         # Before the step, so that an unwritable folder is found before anything moves.
-        writer = self._writer or self._begin(seen)
-        if writer.is_full:
-            writer = self._go_on(writer)
+        writer = self._writer
+        if writer is None or writer.is_full:
+            writer = self._begin(seen, writer)
         try:
             observation, reward, terminated, truncated, info = super().step(action)
         except BaseException as error:
@@ -343,21 +343,19 @@ class RecordEpisodes(gym.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float
         finally:
             self.end()
 
-    def _begin(self, seen: EncodedObservation) -> EpisodeWriter:
-        self._writer = EpisodeWriter.create(
-            self._recording, self._header(seen), spare_bytes=self._spare_bytes
-        )
-        self.path = self._writer.path
-        self.episodes += 1
-        return self._writer
-
-    def _go_on(self, full: EpisodeWriter) -> EpisodeWriter:
-        self.seconds += full.seconds + 1.0 / self.control_hz
+    def _begin(self, seen: EncodedObservation, full: EpisodeWriter | None) -> EpisodeWriter:
+        """Begin an episode, which continues one that is full."""
         self._writer = None  # In case that the next one cannot be created.
-        self._writer = full.continued()
-        self.path = self._writer.path
+        if full is None:
+            writer = EpisodeWriter.create(
+                self._recording, self._header(seen), spare_bytes=self._spare_bytes
+            )
+        else:
+            self.seconds += full.seconds + 1.0 / self.control_hz
+            writer = full.continued()
+        self._writer, self.path = writer, writer.path
         self.episodes += 1
-        return self._writer
+        return writer
 
     def _header(self, seen: EncodedObservation) -> EpisodeHeader:
         spec, inner = self.env.spec, self.env.unwrapped

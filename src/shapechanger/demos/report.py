@@ -251,7 +251,9 @@ def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
         seconds = since_start_s[step.index]
         caption = [f"step {step.index}", f"{seconds:.1f} s"]
         if step.index not in kept:
-            caption.append(_drop_reason(episode, step))
+            drops = [drop for drop in episode.drops if drop.first <= step.index <= drop.last]
+            whys = (drop.why for drop in reversed(drops) if not drop.keep and drop.why)
+            caption.append(next(whys, "dropped"))
         frames.append(
             {
                 "step": step.index,
@@ -263,12 +265,6 @@ def _frames(episode: Episode, most: int) -> list[dict[str, Any]]:
             }
         )
     return frames
-
-
-def _drop_reason(episode: Episode, step: Step) -> str:
-    """The reason given last for dropping a step."""
-    drops = [drop for drop in episode.drops if drop.first <= step.index <= drop.last]
-    return next((drop.why for drop in reversed(drops) if not drop.keep and drop.why), "dropped")
 
 
 def _thumbnail(episode: Episode, step: Step) -> str:

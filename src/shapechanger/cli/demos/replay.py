@@ -25,7 +25,6 @@ from shapechanger.robot.client.teleop import Terminal
 from shapechanger.robot.link.messages import Welcome
 
 if TYPE_CHECKING:
-    from shapechanger.demos.episodes import Step
     from shapechanger.demos.recording import EncodedObservation
     from shapechanger.robot.client.client import RobotClient
 
@@ -71,7 +70,9 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
     header = episode.header
     kept = episode.kept
     apart = _Apart()
-    with opened(_ref(episode, env_id), max_episode_steps=-1) as env:
+    ref = env_ref(env_id)  # With the recorded arguments if it is the recorded env.
+    kwargs = header.env_kwargs if ref.id == header.env else {}
+    with opened(EnvRef(ref.id, {**kwargs, **ref.kwargs}), max_episode_steps=-1) as env:
         encoder = ObservationEncoder(env, 95)
         recorded = Layout.from_json(header.action_layout)
         if [(f.name, f.unit, f.shape) for f in encoder.action_layout] != [
@@ -103,13 +104,6 @@ def _play_in_env(episode: Episode, env_id: str) -> None:
         say(line)
     for line in apart.lines(states if compares else None):
         say(line)
-
-
-def _ref(episode: Episode, env_id: str) -> EnvRef:
-    """Return the env, with the recorded arguments if it is the recorded one."""
-    ref, header = env_ref(env_id), episode.header
-    kwargs = header.env_kwargs if ref.id == header.env else {}
-    return EnvRef(ref.id, {**kwargs, **ref.kwargs})
 
 
 def _caveats(episode: Episode) -> list[str]:

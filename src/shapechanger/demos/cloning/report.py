@@ -76,7 +76,11 @@ def clone_html(
     return render(
         Path(__file__).with_name("clone.html"),
         title=name,
-        verdict=_verdict(judgement, data_note),
+        verdict=(
+            f"The policy chose the driver's action on {judgement.accuracy:.1%} of the steps; "
+            "always choosing the driver's most frequent action is right on "
+            f"{judgement.always:.1%}. {data_note}"
+        ),
         cards=_cards(judgement),
         outlook=outlook(policy.card),
         judgement=judgement,
@@ -100,14 +104,6 @@ def clone_html(
             card.class_names or (card.action_layout.names if card.action_layout else ())
         ),
         weights=sum(p.numel() for p in policy.network.parameters()),
-    )
-
-
-def _verdict(judgement: Judgement, data_note: str) -> str:
-    return (
-        f"The policy chose the driver's action on {judgement.accuracy:.1%} of the steps; always "
-        f"choosing the driver's most frequent action is right on {judgement.always:.1%}. "
-        f"{data_note}"
     )
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from itertools import chain
 from pathlib import Path
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, NamedTuple, TypeVar, cast
 
 from msgspec import structs
 
@@ -89,22 +89,21 @@ def _columns(header: EpisodeHeader) -> dict[str, list[str]]:
     }
 
 
-def _write_all(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
+def _write(episodes: Sequence[ExchangeEpisode], folder: Path, _: ExportContext) -> int:
     """Write episodes; several episodes get a subfolder each."""
     steps = 0
     for number, episode in enumerate(episodes, 1):
         place = folder if len(episodes) == 1 else folder / f"episode-{number:04d}"
-        place.mkdir(exist_ok=True)
-        steps += _write(episode, place)
+        (place / _FRAMES).mkdir(parents=True)
+        steps += _write_episode(episode, place)
     return steps
 
 
-def _write(episode: ExchangeEpisode, folder: Path) -> int:
+def _write_episode(episode: ExchangeEpisode, folder: Path) -> int:
     columns = _columns(episode.header)
     header = episode.header.to_json() | {"outcome": episode.outcome}
     text = json.dumps(header, indent=1, ensure_ascii=False)
     (folder / _HEADER).write_text(text + "\n", encoding="utf-8", errors="replace")
-    (folder / _FRAMES).mkdir()
     frame, number = "", 0
     with (folder / _TABLE).open("w", encoding="utf-8", errors="replace", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -143,7 +142,7 @@ def _cell(value: Any) -> str:
     return json.dumps(value) if value else ""
 
 
-def _read_all(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
+def _read(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]:
     """Yield the episodes of a folder."""
     for place in _tables_of(folder):
         path = place / _HEADER
@@ -158,10 +157,11 @@ def _read_all(folder: Path, context: ImportContext) -> Iterator[ExchangeEpisode]
             columns = _columns(header)
         except (DemosError, LayoutError) as error:
             raise DemosError(f"{path}: {error}") from error
-        table = _Table(place, columns, list(chain.from_iterable(columns.values())))
+        names = list(chain.from_iterable(columns.values()))
+        lines = _lines(place, columns, names, None, context)
         yield ExchangeEpisode(
             header=header,
-            rows=_with_pictures(table.lines(context), place / _FRAMES, header, context),
+            rows=_with_pictures(lines, place / _FRAMES, header, context),
             name=str(place),
             outcome=str(fields.get("outcome", "")),
         )
@@ -188,7 +188,7 @@ def _read_others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpiso
         context.note(f"Columns that are not imported: {', '.join(others)}.")
     if len(set(found)) < len(found):
         raise DemosError(f"{path} has two columns of one name: rename one of them.")
-    parsed = list(_Table(folder, columns, found, dict(named)).lines(context))
+    parsed = list(_lines(folder, columns, found, dict(named), context))
     if not parsed:
         return
     times = [line.step.captured_ns for line in parsed if line.step.captured_ns is not None]
@@ -197,9 +197,7 @@ def _read_others(folder: Path, context: ImportContext) -> Iterator[ExchangeEpiso
     (hz,), believed = choose_rates([drive], context)
     if not (timed and believed):
         drive = replace(drive, times_ns=())
-        parsed = [
-            replace(line, step=structs.replace(line.step, captured_ns=None)) for line in parsed
-        ]
+        parsed = [one._replace(step=structs.replace(one.step, captured_ns=None)) for one in parsed]
     size = None
     if shown := next((line.frame for line in parsed if line.frame), ""):
         size = picture_size(read_bytes(inside(folder, shown, path), MAX_PICTURE_BYTES), shown)
@@ -236,8 +234,7 @@ def _known_name(name: str) -> tuple[str, float]:
     return name.strip(), 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
+class _Line(NamedTuple):
     """A line of a table, its number among them, and how to name it in errors."""
 
     number: int
@@ -282,61 +279,47 @@ def _leave_out(context: ImportContext, error: DemosError, where: str) -> None:
     context.leave_out("line", f"of {table}", str(error).removeprefix(f"{table}, ")[:-1])
 
 
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """A `steps.csv`.
+def _lines(
+    folder: Path,
+    columns: dict[str, list[str]],
+    names: Sequence[str],
+    factors: Mapping[str, float] | None,
+    context: ImportContext,
+) -> Iterator[_Line]:
+    """Yield the lines of a table that can be read; the others are left out.
 
-    Attributes:
-        folder: Its folder.
-        columns: Names of the columns of each field of a step.
-        names: Names of the columns in the table, in order.
-        factors: Factors of the columns of others; None for a table of Shapechanger.
+    `columns` are those of each field of a step, `names` those of the table, in order, and `factors`
+    those of the columns of others; None for a table of Shapechanger.
     """
-
-    folder: Path
-    columns: dict[str, list[str]]
-    names: Sequence[str]
-    factors: Mapping[str, float] | None = None
-
-    def lines(self, context: ImportContext) -> Iterator[_Line]:
-        """Yield the lines that can be read; the others are left out."""
-        path = self.folder / _TABLE
-        separator, table = read_table(path, len(self.names))
-        if self.factors is None:
-            _require_columns(table[0][1] if table else [], self.names, str(path))
-        before = -1
-        for position, (line, cells) in enumerate(table[1:]):
-            where = f"{path}, line {line}"
-            try:
-                if len(cells) != len(self.names):
-                    hint = " (decimal commas need another separator)" if separator == "," else ""
-                    raise DemosError(
-                        f"{where} has {len(cells)} cells instead of {len(self.names)}{hint}."
-                    )
-                row = _Row(dict(zip(self.names, cells, strict=True)), where, separator)
-                number = row.number("step", int) if self.factors is None else position
-                if number is None:
-                    raise DemosError(f"{where}: step is empty.")
-                if number <= before:
-                    raise DemosError(f"{where}: step {number} comes after step {before}.")
-                found = row.line(number, self.columns, self.factors or {})
-            except DemosError as error:
-                _leave_out(context, error, where)
-                continue
-            before = number
-            yield found
-
-
-def _require_columns(found: Sequence[str], names: Sequence[str], where: str) -> None:
-    """Refuse a table with other columns."""
-    if list(found) == list(names):
-        return
-    missing = [name for name in names if name not in found]
-    surplus = [repr(name) for name in found if name not in names]
-    problems = [f"lacks {', '.join(missing[:_MAX_NAMED])}"] if missing else []
-    problems += [f"has the unknown {', '.join(surplus[:_MAX_NAMED])}"] if surplus else []
-    what = " and ".join(problems) or "has its columns in another order"
-    raise DemosError(f"{where} {what}: the columns must be those of {_HEADER}.")
+    path = folder / _TABLE
+    separator, table = read_table(path, len(names))
+    found = table[0][1] if table else []
+    if factors is None and found != list(names):
+        missing = [name for name in names if name not in found]
+        surplus = [repr(name) for name in found if name not in names]
+        problems = [f"lacks {', '.join(missing[:_MAX_NAMED])}"] if missing else []
+        problems += [f"has the unknown {', '.join(surplus[:_MAX_NAMED])}"] if surplus else []
+        what = " and ".join(problems) or "has its columns in another order"
+        raise DemosError(f"{path} {what}: the columns must be those of {_HEADER}.")
+    before = -1
+    for position, (line, cells) in enumerate(table[1:]):
+        where = f"{path}, line {line}"
+        try:
+            if len(cells) != len(names):
+                hint = " (decimal commas need another separator)" if separator == "," else ""
+                raise DemosError(f"{where} has {len(cells)} cells instead of {len(names)}{hint}.")
+            row = _Row(dict(zip(names, cells, strict=True)), where, separator)
+            number = row.number("step", int) if factors is None else position
+            if number is None:
+                raise DemosError(f"{where}: step is empty.")
+            if number <= before:
+                raise DemosError(f"{where}: step {number} comes after step {before}.")
+            parsed = row.line(number, columns, factors or {})
+        except DemosError as error:
+            _leave_out(context, error, where)
+            continue
+        before = number
+        yield parsed
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,10 +344,9 @@ class _Row:
         for column in COLUMNS:
             name = column.names["csv"]
             match column.kind:
-                case "action":
-                    fields[column.field] = self._vector(column.field, columns[column.field]) or None
-                case "state":
-                    fields[column.field] = self._vector(column.field, columns[column.field])
+                case "action" | "state":
+                    values = self._vector(column.field, columns[column.field])
+                    fields[column.field] = values if column.kind == "state" else values or None
                 case "time":
                     fields[column.field] = self._time(name, factors)
                 case "number":
@@ -445,7 +427,7 @@ FORMAT: Final = Format(
     title="CSV",
     sign=_TABLE,
     detect=lambda folder: bool(_tables_of(folder)),
-    read=_read_all,
-    write=_write_all,
+    read=_read,
+    write=_write,
     options=frozenset({"dropped", "hz"}),
 )

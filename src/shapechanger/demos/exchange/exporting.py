@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
 from itertools import pairwise
@@ -133,29 +133,28 @@ def require_alike(episodes: Sequence[ExchangeEpisode], dataset: str) -> None:
         episodes: The episodes.
         dataset: How to name the dataset in errors, such as "a Minari dataset".
     """
-    first = episodes[0]
-    for episode in episodes[1:]:
-        for what, described in _DESCRIPTIONS.items():
-            ours, theirs = described(first.header), described(episode.header)
-            if ours != theirs:
+    first, *others = episodes
+    for episode in others:
+        theirs = _kind(episode.header)
+        for what, ours in _kind(first.header).items():
+            if ours != theirs[what]:
                 raise DemosError(
-                    f"{first.name} has {what} {ours}, and {episode.name} {theirs}: {dataset} "
+                    f"{first.name} has {what} {ours}, and {episode.name} {theirs[what]}: {dataset} "
                     "has one kind of episode, so export each kind to a dataset of its own."
                 )
 
 
-def _described_layout(layout: str) -> str:
-    return ", ".join(map(str, Layout.from_json(layout))) if layout else "none"
-
-
-_DESCRIPTIONS: Final[dict[str, Callable[[EpisodeHeader], str]]] = {
-    "the actions": lambda header: _described_layout(header.action_layout),
-    "the state": lambda header: _described_layout(header.state_layout),
-    "pictures of": lambda header: (
-        "no size" if header.image_size is None else "{} x {}".format(*header.image_size)
-    ),
-    "steps a second:": lambda header: f"{header.control_hz:g}",
-}
+def _kind(header: EpisodeHeader) -> dict[str, str]:
+    """Describe what all episodes of a dataset have in common."""
+    action, state = (
+        ", ".join(map(str, Layout.from_json(layout))) if layout else "none"
+        for layout in (header.action_layout, header.state_layout)
+    )
+    size = "no size" if header.image_size is None else "{} x {}".format(*header.image_size)
+    rate = f"{header.control_hz:g}"
+    return {
+        "the actions": action, "the state": state, "pictures of": size, "steps a second:": rate
+    }  # fmt: skip
 
 
 def _rows(episode: Episode, *, dropped: bool, part: range | None) -> Iterator[ExchangeStep]:

@@ -41,7 +41,7 @@ from shapechanger.demos.exchange.format import (
     name_in,
 )
 from shapechanger.demos.exchange.lerobot_export import DONE, EPISODES, INFO, OURS, TASKS, write
-from shapechanger.demos.exchange.lerobot_index import LocatedEpisode, Place, locate, read_places
+from shapechanger.demos.exchange.lerobot_index import LocatedEpisode, locate, read_places
 from shapechanger.demos.exchange.pictures import PictureError, Pictures, as_jpeg
 from shapechanger.demos.exchange.video import read_pictures
 from shapechanger.demos.jpeg import MAX_PIXELS, encode_picture
@@ -247,10 +247,15 @@ def read_lerobot(folder: Path, context: ImportContext) -> Iterator[ExchangeEpiso
         notes={"dataset": folder.resolve().name}
         | ({} if camera is None else {"camera": camera.key}),
     )
-    tasks = _tasks(folder)
+    rows = all_rows(inside(folder, TASKS, path), None) if (folder / TASKS).is_file() else []
+    texts = [[value for value in row.values() if isinstance(value, str)] for row in rows]
+    tasks = [text[0] for text in texts if text]
     video = camera.key if camera is not None and camera.kind == "video" else ""
     places, twice = read_places(folder, video, context)
-    _compare_counts(info, places, context)
+    total = sum(place["length"] for place in places)
+    for key, count in (("total_episodes", len(places)), ("total_frames", total)):
+        if info.get(key, count) != count:
+            context.warn(f"{INFO} has {key} {info[key]}, and {EPISODES} {count}.")
     ours = _own_headers(folder, places[-1]["episode_index"] + 1 if places else 0)
     unpacked: dict[Path, int] = {}
     for located in locate(folder, info, places, twice, video, header.image_size, context):
@@ -268,25 +273,6 @@ def read_lerobot(folder: Path, context: ImportContext) -> Iterator[ExchangeEpiso
             name=f"{folder}, episode {number}",
             outcome=outcome,
         )
-
-
-def _compare_counts(
-    info: Mapping[str, Any], places: Sequence[Place], context: ImportContext
-) -> None:
-    """Report totals in `info.json` that differ from `meta/episodes`."""
-    steps = sum(place["length"] for place in places)
-    for key, count in (("total_episodes", len(places)), ("total_frames", steps)):
-        if key in info and info[key] != count:
-            context.warn(f"{INFO} has {key} {info[key]}, and {EPISODES} {count}.")
-
-
-def _tasks(folder: Path) -> list[str]:
-    """Return the texts of the tasks, in order; [] if there is no such file."""
-    if not (folder / TASKS).is_file():
-        return []
-    rows = all_rows(inside(folder, TASKS, folder / TASKS), None)
-    texts = [[value for value in row.values() if isinstance(value, str)] for row in rows]
-    return [text[0] for text in texts if text]
 
 
 def _own_headers(folder: Path, count: int) -> list[dict[str, Any]]:
@@ -428,18 +414,14 @@ def _in_order(located: LocatedEpisode, kept: _Kept) -> Iterator[dict[str, Any]]:
     for path, places, rows in located.rows_by_file():
         for place, row in zip(places.tolist(), rows_at(path, rows, sizes, stored), strict=True):
             waiting[place] = row
-            held += _bytes_of(row, stored)
+            held += sum(len(_stored(row[key])) for key in stored)
             while due in waiting:
-                held -= _bytes_of(waiting[due], stored)
-                yield waiting.pop(due)
+                row = waiting.pop(due)
+                held -= sum(len(_stored(row[key])) for key in stored)
+                yield row
                 due += 1
             if held > MAX_UNPACKED:  # Many rows may share one large value.
                 raise DemosError(f"{path} has pictures too far out of order: sort its rows.")
-
-
-def _bytes_of(row: dict[str, Any], stored: Sequence[str]) -> int:
-    """Return the size of the pictures of a row, bytes."""
-    return sum(len(_stored(row[key])) for key in stored)
 
 
 def _stored(value: Any) -> bytes:

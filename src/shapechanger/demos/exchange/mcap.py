@@ -21,7 +21,7 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -34,19 +34,19 @@ _TEXT: Final = {"type": "string"}
 _WHOLE: Final = {"type": "integer"}
 _NUMBER: Final = {"type": "number"}
 # Foxglove's own, by which its panels know a picture: github.com/foxglove/foxglove-sdk.
-_IMAGE: Final = {
+_IMAGE: Final[dict[str, Any]] = {
     "timestamp": {"type": "object", "properties": {"sec": _WHOLE, "nsec": _WHOLE}},
     "frame_id": _TEXT,
     "data": {"type": "string", "contentEncoding": "base64"},
     "format": _TEXT,
 }
-_STEP: Final = {
+_STEP: Final[dict[str, Any]] = {
     **{name: _WHOLE for name in ("step", "wall_ns")},
     **{name: _TEXT for name in ("driver", "stop_reason", "dropped")},
     **{name: {"type": "boolean"} for name in ("terminated", "truncated")},
     "marks": {"type": "array", "items": _TEXT},
 }
-_REWARD: Final = {
+_REWARD: Final[dict[str, Any]] = {
     "reward": _NUMBER,
     "terms": {"type": "object", "additionalProperties": _NUMBER},
 }
@@ -72,28 +72,30 @@ def _write_episode(episode: ExchangeEpisode, writer: Any) -> int:
     header = episode.header
     actions = Layout.from_json(header.action_layout)
     states = Layout.from_json(header.state_layout) if header.state_layout else None
-    schemas: dict[str, tuple[str, Mapping[str, Any]]] = {
-        topic: ("Action", _properties(actions)) for topic in ("action", "applied", "wanted")
-    }
+    schemas = {topic: ("Action", _properties(actions)) for topic in ("action", "applied", "wanted")}
     schemas |= {"step": ("Step", _STEP), "reward": ("Reward", _REWARD)}
     if states is not None:
         schemas["state"] = ("State", _properties(states))
-    channels = {
-        topic: _channel(writer, topic, f"shapechanger.{name}", properties)
-        for topic, (name, properties) in schemas.items()
-    }
+    schemas = {topic: (f"shapechanger.{name}", parts) for topic, (name, parts) in schemas.items()}
     if header.image_size is not None:
-        channels["camera"] = _channel(writer, "camera", "foxglove.CompressedImage", _IMAGE)
+        schemas["camera"] = ("foxglove.CompressedImage", _IMAGE)
+    channels: dict[str, int] = {}
+    for topic, (name, properties) in schemas.items():
+        schema = {"title": name, "type": "object", "properties": properties}
+        number = writer.register_schema(
+            name=name, encoding="jsonschema", data=json.dumps(schema).encode()
+        )
+        channels[topic] = writer.register_channel(
+            topic=f"/{topic}", message_encoding="json", schema_id=number
+        )
     steps = 0
     for row, seen_ns in _timed(episode):
         steps += 1
-        for topic, (message, at_ns) in _messages(row, seen_ns, actions, states).items():
-            writer.add_message(
-                channel_id=channels[topic],
-                log_time=at_ns,
-                publish_time=at_ns,
-                data=json.dumps(message, allow_nan=False).encode(),
-            )
+        acted_ns = max(seen_ns, row.step.decided_ns or 0)
+        for topic, message in _messages(row, seen_ns, actions, states).items():
+            at_ns = seen_ns if topic in {"camera", "state"} else acted_ns
+            data = json.dumps(message, allow_nan=False).encode()
+            writer.add_message(channels[topic], log_time=at_ns, publish_time=at_ns, data=data)
     return steps
 
 
@@ -119,43 +121,32 @@ def _timed(episode: ExchangeEpisode) -> Iterator[tuple[ExchangeStep, int]]:
 
 def _messages(
     row: ExchangeStep, seen_ns: int, actions: Layout, states: Layout | None
-) -> dict[str, tuple[Mapping[str, Any], int]]:
-    """Return the messages of a step by topic, each with its time, ns."""
+) -> dict[str, dict[str, Any]]:
+    """Return the messages of a step by topic."""
     step = row.step
-    acted_ns = max(seen_ns, step.decided_ns or 0)
-    found: dict[str, tuple[Mapping[str, Any], int]] = {}
+    found: dict[str, dict[str, Any]] = {}
     if row.jpeg is not None:
         sec, nsec = divmod(seen_ns, _NS_PER_S)
-        picture = {"timestamp": {"sec": sec, "nsec": nsec}, "frame_id": "camera"}
-        picture |= {"data": base64.b64encode(row.jpeg).decode(), "format": "jpeg"}
-        found["camera"] = picture, seen_ns
+        found["camera"] = {
+            "timestamp": {"sec": sec, "nsec": nsec},
+            "frame_id": "camera",
+            "data": base64.b64encode(row.jpeg).decode(),
+            "format": "jpeg",
+        }
     if states is not None:
-        found["state"] = _by_name(states, step.state), seen_ns
+        found["state"] = _by_name(states, step.state)
     for name in ("action", "applied", "wanted"):
-        values = getattr(step, name)
-        if values is not None:
-            found[name] = _by_name(actions, values), acted_ns
+        if (values := getattr(step, name)) is not None:
+            found[name] = _by_name(actions, values)
     if step.reward is not None:
         terms = {name: _known(value) for name, value in step.terms.items()}
-        found["reward"] = {"reward": _known(step.reward), "terms": terms}, acted_ns
-    about: dict[str, Any] = {"step": step.index, "driver": step.driver}
+        found["reward"] = {"reward": _known(step.reward), "terms": terms}
+    about = {"step": step.index, "driver": step.driver}
     about |= {"terminated": step.terminated, "truncated": step.truncated}
     more = {"stop_reason": step.stop_reason or None, "wall_ns": step.wall_ns}
     more |= {"marks": list(row.marks) or None, "dropped": row.dropped}
-    about |= {name: value for name, value in more.items() if value is not None}
-    found["step"] = about, acted_ns
+    found["step"] = about | {name: value for name, value in more.items() if value is not None}
     return found
-
-
-def _channel(writer: Any, topic: str, name: str, properties: Mapping[str, Any]) -> int:
-    schema = {"title": name, "type": "object", "properties": properties}
-    return writer.register_channel(
-        topic=f"/{topic}",
-        message_encoding="json",
-        schema_id=writer.register_schema(
-            name=name, encoding="jsonschema", data=json.dumps(schema).encode()
-        ),
-    )
 
 
 def _properties(layout: Layout) -> dict[str, Any]:

@@ -95,7 +95,11 @@ def choose_rates(
         rates = [nominal_hz(measured.get(drive.name, pooled)) for drive in drives]
     else:
         rates = [nominal_hz(pooled)] * len(drives)
-        _report_rate(pooled, rates[0], context)
+        if abs(pooled / rates[0] - 1.0) > _WHOLE[0][1]:
+            context.note(
+                f"The records are {_described(pooled)}, which is taken to be {rates[0]:g} Hz; --hz "
+                "states another rate."
+            )
     for hz in sorted({rate for rate in rates if not _SLOWEST_HZ <= rate <= _FASTEST_HZ}):
         context.warn(
             f"The records are {_described(hz)}, which no robot has ({_SLOWEST_HZ:g} to "
@@ -185,14 +189,6 @@ def iso_time(unix_ns: int) -> str:
     except (OverflowError, ValueError, OSError):
         return ""
     return at.isoformat(timespec="milliseconds")
-
-
-def _report_rate(measured: float, nominal: float, context: ImportContext) -> None:
-    if abs(measured / nominal - 1.0) > _WHOLE[0][1]:
-        context.note(
-            f"The records are {_described(measured)}, which is taken to be {nominal:g} Hz; --hz "
-            "states another rate."
-        )
 
 
 def _report_irregular(periods_ns: Sequence[float], context: ImportContext) -> None:
