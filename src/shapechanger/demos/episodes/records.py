@@ -251,7 +251,8 @@ class Step(
 
     def to_json(self) -> dict[str, Any]:
         """Return the step as JSON can hold it; empty fields are left out."""
-        return {name: _as_json(value) for name, value in msgspec.to_builtins(self).items()}
+        plain = msgspec.to_builtins(self, enc_hook=float).items()  # Of NumPy, too.
+        return {name: value if name == "frame" else _as_json(value) for name, value in plain}
 
     @classmethod
     def from_json(cls, plain: dict[str, Any]) -> Step:
@@ -273,10 +274,11 @@ def _as_json(value: Any) -> Any:
         case float():
             return value if math.isfinite(value) else None if math.isnan(value) else str(value)
         case dict():
-            items = cast("dict[str, Any]", value).items()
+            items = cast("dict[str, float]", value).items()
             return {name: _as_json(number) for name, number in items}
         case list() | tuple():
-            return [_as_json(number) for number in cast("Sequence[Any]", value)]
+            numbers = cast("Sequence[float]", value)
+            return [n if math.isfinite(n) else _as_json(n) for n in numbers]
         case _:
             return value
 
