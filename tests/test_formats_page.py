@@ -10,7 +10,7 @@ from typing import Any, Final
 import pytest
 
 from shapechanger.demos.episodes import EpisodeHeader, Step
-from shapechanger.demos.episodes.records import Frame
+from shapechanger.demos.episodes.records import StepPicture
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.policy_file import PolicyCard
@@ -64,7 +64,7 @@ def test_the_page_names_every_key_of_a_step() -> None:
         truncated=True,
         stop_reason="It is late.",
         index=0,
-        picture=Frame("000000.jpg", 1, "00000000"),
+        picture=StepPicture("000000.jpg", 1, "00000000"),
     )
     table = PAGE.partition("| key of a step | meaning |\n|---|---|\n")[2].partition("\n\n")[0]
     first = [row.split("|")[1] for row in table.splitlines()]

@@ -30,8 +30,8 @@ from shapechanger.demos.episodes.files import (
 )
 from shapechanger.demos.episodes.records import (
     EpisodeHeader,
-    Frame,
     Step,
+    StepPicture,
     decode_line,
     durations_s,
     encode_line,
@@ -74,7 +74,7 @@ def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine
         raise DemosError(f"{path / STEPS} cannot be read: {error.strerror or error}.") from error
     sizes = header.action_size, header.state_size
     lines: list[StepLine] = []
-    seen: dict[Frame, str] = {}
+    seen: dict[StepPicture, str] = {}
     newest = -1
     for raw in split_lines(content):
         try:
@@ -97,7 +97,7 @@ def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine
     return lines
 
 
-def _wrong_with(frames: Path, picture: Frame, *, thorough: bool) -> str:
+def _wrong_with(frames: Path, picture: StepPicture, *, thorough: bool) -> str:
     """Return what is wrong with the picture of a step, as part of a sentence; "" for nothing."""
     name, size = picture.name, picture.size
     if not _FRAME_NAME.fullmatch(name):

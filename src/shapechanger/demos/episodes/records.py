@@ -157,7 +157,7 @@ DRIVERS: Final[tuple[Driver, ...]] = ("person", "policy", "expert", "program")
 _NS: Final = ("captured_ns", "decided_ns", "wall_ns")
 
 
-class Frame(msgspec.Struct, frozen=True, array_like=True):
+class StepPicture(msgspec.Struct, frozen=True, array_like=True):
     """The picture of a step: file name, size in bytes, and CRC-32 as eight hexadecimal digits."""
 
     name: str
@@ -165,13 +165,13 @@ class Frame(msgspec.Struct, frozen=True, array_like=True):
     crc: str
 
     @classmethod
-    def of(cls, name: str, jpeg: bytes) -> Frame:
+    def of(cls, name: str, jpeg: bytes) -> StepPicture:
         """Return the record of a picture."""
         return cls(name, len(jpeg), f"{binascii.crc32(jpeg):08x}")
 
     def fits(self, jpeg: bytes) -> bool:
         """Return whether a picture is the recorded one."""
-        return self == Frame.of(self.name, jpeg)
+        return self == StepPicture.of(self.name, jpeg)
 
 
 class Step(
@@ -212,7 +212,7 @@ class Step(
     terminated: bool = False
     truncated: bool = False
     stop_reason: str = ""
-    picture: Frame | None = msgspec.field(default=None, name="frame")
+    picture: StepPicture | None = msgspec.field(default=None, name="frame")
 
     @property
     def frame(self) -> str:

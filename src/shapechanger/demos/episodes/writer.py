@@ -26,7 +26,7 @@ from shapechanger.demos.episodes.files import (
     write_all,
     write_header,
 )
-from shapechanger.demos.episodes.records import EpisodeHeader, Frame, Step, encode_line
+from shapechanger.demos.episodes.records import EpisodeHeader, Step, StepPicture, encode_line
 from shapechanger.errors import DemosError, OutputError
 from shapechanger.files import cannot_write
 
@@ -312,14 +312,14 @@ class EpisodeWriter:
             raise cannot_write(self.path / STEPS, error) from error
         self._bytes += len(line)
 
-    def _frame(self, jpeg: bytes | None) -> Frame | None:
+    def _frame(self, jpeg: bytes | None) -> StepPicture | None:
         """Write a picture, and return its record; without a new one, keep that before."""
         before = self._before
         jpeg = self._jpeg if jpeg is None and before is None else jpeg
         if jpeg is None:
             return None if before is None else before.picture
         self._jpeg = jpeg
-        frame = Frame.of(f"{self.steps:06d}.jpg", jpeg)
+        frame = StepPicture.of(f"{self.steps:06d}.jpg", jpeg)
         path = self.path / FRAMES / frame.name
         try:
             with path.open("wb", buffering=0) as file:
