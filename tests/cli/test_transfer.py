@@ -89,6 +89,7 @@ def _until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> Non
             pytest.fail(f"ended too early: {process.communicate()}")
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_resumes_to_the_same_numbers(
     quick: tuple[Path, subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:
@@ -114,6 +115,7 @@ def test_an_interrupted_study_resumes_to_the_same_numbers(
     assert curves(out) == curves(quick[0])
 
 
+@pytest.mark.slow
 def test_a_full_disk_gives_one_sentence(tmp_path: Path) -> None:
     """With files limited to 20 kB, the error says what is kept."""
     done = run(
@@ -353,6 +355,7 @@ def test_a_missing_extra_is_named_with_its_command(
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_robot_and_a_task_of_ones_own_are_studied(tmp_path: Path) -> None:
     """Files and a module of the current folder, in worker processes, in two bodies."""
     (tmp_path / "dog.xml").write_text(DOG)

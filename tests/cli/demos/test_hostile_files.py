@@ -6,6 +6,7 @@ Each command runs with 384 MiB of memory, ten seconds of processor time and 64 M
 from __future__ import annotations
 
 import binascii
+import itertools
 import json
 import os
 import subprocess
@@ -152,20 +153,23 @@ EPISODES: dict[str, Callable[[Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("name", EPISODES)
-def test_a_hostile_episode_is_refused(tmp_path: Path, jail: Jail, name: str) -> None:
-    """By each command that reads episodes; `list` goes on with the next one."""
+READERS = {
+    "merge": ("--out", "out"),
+    "export": ("--out", "out", "--to", "csv"),
+    "train": ("--out", "policy.safetensors"),
+}
+"""Commands that read episodes, all by one reader, with their options."""
+
+
+@pytest.mark.parametrize(("name", "command"), [*zip(EPISODES, itertools.cycle(READERS))])
+def test_a_hostile_episode_is_refused(tmp_path: Path, jail: Jail, name: str, command: str) -> None:
+    """By one of the commands that read episodes in turn; `list` goes on with the next one."""
     (tmp_path / "secret.jpg").write_text("secret")
     episode = drive(tmp_path / "data")
     EPISODES[name](episode)
-    out = tmp_path / "out"
-    for command in (
-        ("merge", tmp_path / "data", "--out", out),
-        ("export", tmp_path / "data", "--out", out, "--to", "csv"),
-        ("train", tmp_path / "data", "--out", tmp_path / "policy.safetensors"),
-    ):
-        refuse(jail(*command))
-        assert not out.exists()
+    out, *more = READERS[command][1:]
+    refuse(jail(command, tmp_path / "data", "--out", tmp_path / out, *more))
+    assert not (tmp_path / out).exists()
     code, text = jail("list", tmp_path / "data")
     assert code in {0, 2}, text
     assert "Traceback" not in text
@@ -221,8 +225,23 @@ def test_a_hostile_picture_is_refused(tmp_path: Path, jail: Jail, name: str) -> 
         refuse(jail(*command))
 
 
+@pytest.fixture(scope="module")
+def bomb(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """300 MB of zeros in about a megabyte."""
+    path = tmp_path_factory.mktemp("bomb") / "bomb.zip"
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open("t.npy", "w", force_zip64=True) as file,
+    ):
+        for _ in range(300):
+            file.write(bytes(1 << 20))
+    return path
+
+
 @pytest.mark.parametrize("command", ["list", "merge", "import", "export", "train", "repair"])
-def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path, jail: Jail, command: str) -> None:
+def test_a_file_in_place_of_a_folder_is_refused(
+    tmp_path: Path, jail: Jail, bomb: Path, command: str
+) -> None:
     """An archive is not unpacked, and a pickle, an HDF5 file or a pipe not opened."""
     options = {
         "merge": ("--out", tmp_path / "out"),
@@ -230,13 +249,8 @@ def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path, jail: Jail, comm
         "export": ("--out", tmp_path / "out", "--to", "csv"),
         "train": ("--out", tmp_path / "policy.safetensors"),
     }
-    with (
-        zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive,
-        archive.open("t.npy", "w", force_zip64=True) as file,
-    ):
-        for _ in range(300):  # 300 MB in 300 kB.
-            file.write(bytes(1 << 20))
-    (tmp_path / "evil.npz").hardlink_to(tmp_path / "bomb.zip")
+    (tmp_path / "bomb.zip").hardlink_to(bomb)
+    (tmp_path / "evil.npz").hardlink_to(bomb)
     (tmp_path / "evil.pkl").write_bytes(b"cos\nsystem\n(S'touch pwned'\ntR.")
     sparse(tmp_path / "evil.hdf5", 8 * GIB)
     os.mkfifo(tmp_path / "pipe")
