@@ -55,7 +55,7 @@ def _controller(env: str, mode: str, **arguments: Any) -> FingerController:
 @pytest.mark.parametrize("mode", DRIVES)
 def test_the_controller_reaches_every_target(mode: str) -> None:
     """In each action mode, the median error is below 0.1 mm."""
-    infos = _ends(_controller(FINGER, mode), FINGER, 20, actions=mode)
+    infos = _ends(_controller(FINGER, mode), FINGER, 6, actions=mode)
     assert all(info["is_success"] for info in infos)
     assert np.median([info["distance"] for info in infos]) < 1e-4
 
@@ -71,7 +71,7 @@ def test_the_shipped_policy_reaches() -> None:
     """It reaches nine of ten targets, and its card names the env."""
     policy = load_policy(POLICIES["reach"])
     assert policy.card.env.id == FINGER
-    infos = _ends(_Policy(policy), FINGER, 30)
+    infos = _ends(_Policy(policy), FINGER, 10)
     assert np.mean([info["is_success"] for info in infos]) >= 0.9
 
 
@@ -79,8 +79,8 @@ def test_the_shipped_policy_follows() -> None:
     """Its RMS error on a circle at 0.5 Hz is at most twice that of the controller."""
     policy = load_policy(POLICIES["track"])
     assert policy.card.env.id == TRACK
-    infos = _ends(_Policy(policy), TRACK, 3, path=_CIRCLE)
-    knows = _ends(_controller(TRACK, "impedance"), TRACK, 3, path=_CIRCLE)
+    infos = _ends(_Policy(policy), TRACK, 1, path=_CIRCLE)
+    knows = _ends(_controller(TRACK, "impedance"), TRACK, 1, path=_CIRCLE)
     errors = [np.mean([info["rms"] for info in some]) for some in (infos, knows)]
     assert errors[0] <= 2.0 * errors[1]
 
@@ -90,5 +90,5 @@ def test_the_gap_halves_the_success() -> None:
     act = _Policy(load_policy(POLICIES["reach"]))
     infos: list[dict[str, Any]] = []
     for finger in range(3):
-        infos += _ends(act, FINGER, 8, gap="real-like", finger_seed=finger)
+        infos += _ends(act, FINGER, 3, gap="real-like", finger_seed=finger)
     assert np.mean([info["is_success"] for info in infos]) < 0.5

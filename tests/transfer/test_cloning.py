@@ -212,13 +212,6 @@ def test_arms_learn_from_the_same_demonstrations(finished: tuple[Study, Path]) -
     assert names == ["scratch-0.npz", "scratch-1.npz", "source-0.npz", "source-1.npz"]
 
 
-def test_a_study_again_gives_the_same_numbers(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """Equal plans give equal numbers."""
-    again = run_study(_plan(), tmp_path / "again", executor=Serial())
-    assert _curves(again) == _curves(finished[0])
-    assert again.summaries == finished[0].summaries
-
-
 def test_a_study_that_was_killed_ends_with_the_same_numbers(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:

@@ -23,7 +23,7 @@ from shapechanger.transfer.runs import load_result, perform_run
 from shapechanger.transfer.study import Study, default_arms, inspect_task, run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan
 
-FINGER = EnvRef("shapechanger/Finger-v1")
+FINGER = EnvRef("shapechanger/Finger-v1", {"max_episode_steps": 50})
 REAL_LIKE = FINGER.having({"gap": "real-like"})
 _EVERY = (*ARMS, "randomised", "identified")
 FOLLOWS = EnvRef("shapechanger/FingerTrack-v1")
@@ -81,7 +81,7 @@ def test_adapted_sources_are_saved(study: tuple[Study, Path, list[Any]]) -> None
     }
     assert sources["randomised"] == {
         "id": FINGER.id,
-        "kwargs": {"gap": "wide", "reward": {"change": 5.0}},
+        "kwargs": {"max_episode_steps": 50, "gap": "wide", "reward": {"change": 5.0}},
     }
     assert sources["identified"]["kwargs"]["parameters"]["tendon_friction"] == 0.25
     assert all(Run(kind, 1).policy_file(out).exists() for kind in sources)

@@ -21,6 +21,7 @@ from shapechanger.transfer.learners.settings import LimbSettings
 from shapechanger.transfer.limbs.envs import fitted, limb_envs
 from shapechanger.transfer.limbs.export import export_limbs
 from shapechanger.transfer.limbs.policy import LimbPolicy
+from shapechanger.transfer.methods import generalist
 from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan, run_study
@@ -203,13 +204,14 @@ def test_a_padded_network_fits_its_room_only(tmp_path: Path) -> None:
 
 def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is evaluated before the first target step, and then learns there."""
+    monkeypatch.setattr(generalist, "BODIES", 4)
     short = {"max_episode_steps": 20}
     task = TransferTask(ANT.having(short), EXTENDED.having(short))
     plan = make_plan(
         task,
         "limbs",
         msgspec.structs.replace(
-            TINY, n_envs=32, n_steps=2, eval_every=64, steps=64, source_steps=64
+            TINY, n_envs=4, n_steps=16, eval_every=64, steps=64, source_steps=64
         ),
         seeds=2,
         arms=("scratch", "generalist"),
@@ -223,7 +225,7 @@ def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr(Sb3Learner, "train", recorded)
     study = run_study(plan, tmp_path / "study", executor=Serial())
-    many = task.source.having({"bodies": {"split": "train", "count": 32, "seed": 0}})
+    many = task.source.having({"bodies": {"split": "train", "count": 4, "seed": 0}})
     assert [trained.count(env) for env in (many, task.target)] == [2, 4]
     curve = study.of("generalist")[0].curve
     assert [evaluation.steps for evaluation in curve] == [0, 64]
