@@ -23,8 +23,14 @@ from tests.transfer.studies import tiny_plan
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 
 
+@pytest.fixture(autouse=True)
+def short_films(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Films of half a second."""
+    monkeypatch.setattr("shapechanger.cli.films._FILM_S", 0.5)
+
+
 def test_every_policy_is_filmed(tmp_path: Path) -> None:
-    """The source in its own body, each arm in the target, and scratch last."""
+    """The source in its own body, each arm in the target, and scratch last; edges are smooth."""
     plan = tiny_plan(steps=32, source_steps=32)
     study = run_study(plan, tmp_path / "study", executor=Serial())
     film = tmp_path / "film.mp4"
@@ -38,6 +44,8 @@ def test_every_policy_is_filmed(tmp_path: Path) -> None:
         assert picture.std() > 1.0
         assert "return" in strip.caption
     assert film.stat().st_size > 1000
+    frame = np.asarray(iio.imread(io.BytesIO(strips[0].jpeg)))[:90, :240, 0].astype(int)
+    assert ((frame > 60) & (frame < 180)).sum() > 20
 
 
 def test_a_given_source_policy_is_filmed(tmp_path: Path) -> None:
@@ -54,16 +62,7 @@ def test_a_given_source_policy_is_filmed(tmp_path: Path) -> None:
     assert names == ["source, in the source", "zero-shot", "fine-tune", "scratch"]
 
 
-def test_films_have_smooth_edges(tmp_path: Path) -> None:
-    """Edges have pixels between the pole's colour and the background's."""
-    plan = tiny_plan(steps=32, source_steps=32)
-    study = run_study(plan, tmp_path, executor=Serial())
-    strip = film_study(study, tmp_path)[0]
-    frame = np.asarray(iio.imread(io.BytesIO(strip.jpeg)))[:90, :240, 0].astype(int)
-    assert ((frame > 60) & (frame < 180)).sum() > 20
-
-
-def test_vehicles_are_filmed_from_outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_vehicles_are_filmed_from_outside(tmp_path: Path) -> None:
     """Their envs render what the robot sees, not the robot."""
     source, target = driven(env_ref("CarWaypoint")), driven(env_ref("TankWaypoint"))
     whole = cast("Any", learner_settings("waypoint")).clone
@@ -74,7 +73,6 @@ def test_vehicles_are_filmed_from_outside(tmp_path: Path, monkeypatch: pytest.Mo
         TransferTask(source, target), "waypoint", settings, seeds=2, steps=20, source_steps=20
     )
     study = run_study(plan, tmp_path / "study", executor=Serial())
-    monkeypatch.setattr("shapechanger.cli.films._FILM_S", 0.5)
     strips = film_study(study, tmp_path / "study")
     assert [strip.caption.partition(":")[0] for strip in strips] == [
         *("source, in the source", "zero-shot", "fine-tune", "scratch")
