@@ -3,10 +3,6 @@
 `python scripts/draw_pictures.py --only vehicles` draws one of them, and `--out FOLDER` writes
 elsewhere than to docs/pictures. The clip from one ant to another trains for some minutes first, in
 results/gallery; where that study has ended, it is only filmed.
-
-`--sheets results/sheets` draws contact sheets instead, one of each world: a row for each vehicle
-and course, with the camera's picture, the same through each lens, and two views from outside. The
-last course of each vehicle is held out and has a random look.
 """
 
 from __future__ import annotations
@@ -35,8 +31,7 @@ from shapechanger.finger.policies import POLICIES
 from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import STUDY_FILE, Study
-from shapechanger.vehicles.cameras.corruptions import CORRUPTIONS
-from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT, HOME, LOOKS, Look
+from shapechanger.vehicles.courses.course import FLOODED
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from shapechanger.vehicles.world import MujocoWorld
 
@@ -67,13 +62,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--only", choices=sorted({*STILLS, *CLIPS}))
     parser.add_argument("--out", type=Path, default=PICTURES, help="folder for the pictures")
-    parser.add_argument("--sheets", type=Path, help="folder for contact sheets of the worlds")
     asked = parser.parse_args()
-    if asked.sheets is not None:
-        asked.sheets.mkdir(parents=True, exist_ok=True)
-        for world in LOOKS:
-            iio.imwrite(asked.sheets / f"{world}.png", _sheet(world))
-        return
     asked.out.mkdir(parents=True, exist_ok=True)
     for name, draw in STILLS.items():
         if asked.only in (None, name):
@@ -93,32 +82,6 @@ def _vehicles() -> Picture:
     pairs = [_seen(name) for name in VEHICLES]
     rows = [np.concatenate(row, axis=1) for row in zip(*pairs, strict=True)]
     return np.concatenate(rows)
-
-
-_SEEDS: Final = (0, 1, 2, HELD_OUT[0])
-
-
-def _sheet(world: str) -> Picture:
-    """Vehicles of a world on four courses; see the docstring of this script."""
-    vehicles = ["boat"] if world == FLOODED else [name for name in HOME if HOME[name] == world]
-    rows: list[Picture] = []
-    for name in vehicles:
-        for seed in _SEEDS:
-            drawn = Look.random(world, np.random.default_rng(seed))
-            look = drawn if seed == _SEEDS[-1] else None
-            here = MujocoWorld(name, world, seed, size=_SIZE, look=look)
-            seen = here.picture()
-            through = [lens(seen, seed) for lens in CORRUPTIONS.values()]
-            outside = [
-                here.outside(*_SIZE),
-                here.outside(*_SIZE, 2.0 * here.reach, azimuth_rad=_BEHIND),
-            ]
-            here.close()
-            rows.append(np.concatenate([seen, *through, *outside], axis=1))
-    return np.concatenate(rows)
-
-
-_BEHIND: Final = math.radians(15.0)
 
 
 def _finger() -> Picture:

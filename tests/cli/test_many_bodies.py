@@ -35,6 +35,7 @@ def test_it_is_trained_in_drawn_bodies(policy: Path) -> None:
     assert card.learner == "limbs"
 
 
+@pytest.mark.slow
 def test_it_is_trained_on_a_device(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In many bodies `rsl-ppo` has the network of limbs; the policy acts in a body it never had."""
     out = tmp_path / "ants.safetensors"
