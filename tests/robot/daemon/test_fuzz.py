@@ -33,7 +33,7 @@ def test_mutated_messages_over_a_socket(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
     async def play() -> None:
         async with running(car_plan(recordings=str(tmp_path / "kept")), monkeypatch) as robot:
-            for _ in range(150):
+            for _ in range(40):
                 async with robot.client() as client:
                     try:
                         for _ in range(20):
