@@ -69,7 +69,6 @@ def environment(served: FakeHub, tmp_path_factory: pytest.TempPathFactory) -> di
         # The fake stores large files as Git LFS does.
         "HF_HUB_DISABLE_XET": "1",
         "NO_PROXY": "127.0.0.1",
-        "OMP_NUM_THREADS": "1",
     }
 
 

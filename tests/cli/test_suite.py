@@ -13,7 +13,6 @@ from pathlib import Path
 
 import msgspec
 import pytest
-import torch
 
 from shapechanger.cli import env_arguments, main
 from shapechanger.cli import suite as suite_command
@@ -57,14 +56,11 @@ class _Counting(Serial):
 @pytest.fixture(scope="module", autouse=True)
 def lanes() -> Iterator[None]:
     """Three lane envs in place of four vehicles, and fast clones."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
     with pytest.MonkeyPatch.context() as patch:
         suite = SuiteFile(envs=(DRY.id, WET.id, ICY.id), learner="cloning")
         patch.setattr(suite_command, "load_suite", lambda name: suite)
         patch.setitem(LEARNERS, "cloning", QUICK_CLONING)
         yield
-    torch.set_num_threads(threads)
 
 
 def _run(

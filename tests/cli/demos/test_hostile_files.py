@@ -38,7 +38,7 @@ Jail = Callable[..., tuple[int, str]]
 @pytest.fixture(scope="module")
 def jail() -> Iterator[Jail]:
     """Run `shapechanger demos` with limits; returns the exit code and the output."""
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "COLUMNS": "400"}
+    environment = os.environ | {"COLUMNS": "400"}
     command = [sys.executable, "-m", "tests.cli.demos.jail"]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
