@@ -12,9 +12,9 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
+from shapechanger.robot.drivers.pins import BCM_OF_BOARD, I2C_PINS
 from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
 from shapechanger.robot.profile import Profile, find_profile, load_profile
-from shapechanger.robot.profile.pins import BCM_OF_BOARD, I2C_PINS
 
 _NO_PIN: Final = -1
 _POSITIONS: Final = {pin: position for position, pin in BCM_OF_BOARD.items()}

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import LinkError
+from shapechanger.robot.drivers.simulation import WiredOutput
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
-from shapechanger.robot.twin.wiring import TwinWiring, WiredOutput
+from shapechanger.robot.twin.wiring import TwinWiring
 from shapechanger.vehicles.remote.discrete_driving import FOUR_WAYS, DiscreteDriving
 from tests.robot.profile.texts import HOVERCRAFT
 from tests.robot.twin.robots import until

@@ -13,6 +13,8 @@ from gpiozero.pins.mock import MockFactory, MockPin
 
 from shapechanger.robot.check.computer import examine
 from shapechanger.robot.check.standing import StandingRobot
+from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
+from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
@@ -81,7 +83,8 @@ def test_pressed_switches(car: GuardPlan) -> None:
     """A switch that is pressed now, or whose wire touches ground, is reported."""
     board = _board(car)
     board.pins.sensors.press_stop(down=True)
-    board.pins.sensors.hold_bumpers(down=True)
+    for bumper in board.pins.sensors.of_kind(SimulatedSwitch):
+        bumper.held = True
     board.advance(board.now_ns() + 100_000_000)
     found = _found(car, board)
     level, sentence = found["emergency button"][0]
@@ -121,7 +124,8 @@ def test_dead_sensors_do_not_hide_others(car: GuardPlan) -> None:
     """Each is reported by its own driver's error."""
     board = _board(car)
     board.pins.dead_chips.add((1, 0x40))
-    board.pins.sensors.override_distance(None, dead=True)
+    for sensor in board.pins.sensors.of_kind(SimulatedHcsr04):
+        sensor.dead = True
     found = _found(car, board)["sensor"]
     assert [level for level, _ in found] == ["unknown", "good", "bad", "bad"]
     assert "receives no echo" in found[2][1]

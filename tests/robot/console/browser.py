@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page, TimeoutError
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.twin.judge import propelled
 from shapechanger.robot.twin.robot import RunningRobot
-from shapechanger.robot.twin.signals import Transition
+from shapechanger.robot.twin.signals import Transition, apply
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.robots import until
 
@@ -224,7 +224,7 @@ class Pins:
                 continue  # The edges of the encoder are many, and no output.
             known = {key: fields[key] for key in fields if key in Transition.__slots__}
             self._lines.append(Transition(**known))
-            self._levels.apply(self._lines[-1])
+            apply(self._levels, self._lines[-1])
             push = self._push()
             if push:
                 self._pushes.append(push)

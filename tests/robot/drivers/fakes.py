@@ -9,8 +9,7 @@ from typing import Any
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.output import OutputDriver, open_output
-from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
+from shapechanger.robot.drivers.chip import OutputDriver, SensorDriver, open_output, open_sensor
 from shapechanger.robot.drivers.servos.registers import ServoPort
 from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.guard.plan import OutputPlan, SensorPlan

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.output import OUTPUT_DRIVERS, OutputDriver
+from shapechanger.robot.drivers.chip import OUTPUTS, OutputDriver
 from shapechanger.robot.drivers.pulse import SysfsPwm
 from tests.robot.drivers.fakes import FakeHardware
 
@@ -115,7 +115,7 @@ _ON_A_BUS = {"bus_servo"}
 
 def test_every_driver_is_covered() -> None:
     """Each registered output driver takes part in these tests."""
-    assert {driver for driver, _ in _OUTPUTS.values()} == set(OUTPUT_DRIVERS) - _ON_A_BUS
+    assert {driver for driver, _ in _OUTPUTS.values()} == set(OUTPUTS) - _ON_A_BUS
 
 
 @pytest.mark.parametrize("takes_effect", [False, True])

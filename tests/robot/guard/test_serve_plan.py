@@ -144,11 +144,9 @@ start._put_package_in_place()
 import importlib
 for module in ("process", "supervisor"):
     importlib.import_module(f"shapechanger.robot.guard.{module}")
-from shapechanger.robot.drivers.output import OUTPUT_DRIVERS
-from shapechanger.robot.drivers.sensor import SENSOR_DRIVERS
-from shapechanger.robot.hardware import load
-for place in (*OUTPUT_DRIVERS.values(), *SENSOR_DRIVERS.values()):
-    load(place)
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
+for chips in (OUTPUTS, PULSES, SENSORS):
+    list(chips.values())
 print(*sys.modules)
 """
 
@@ -159,9 +157,9 @@ def test_guard_and_supervisor_import_only_their_drivers() -> None:
     before = "import sys; print(*sys.modules)"
     bare = subprocess.check_output([sys.executable, "-I", "-c", before], text=True).split()
     loaded = subprocess.check_output(command, text=True).split()
-    # gpiozero prefers the backport of importlib.metadata where another package has brought it.
-    backport = {"importlib_metadata", "lazy_importer", "zipp"}
-    theirs = {"gpiozero", "colorzero", "lgpio", "_lgpio", "smbus2", "start"} | backport
+    # gpiozero and msgspec prefer backports where another package has brought them.
+    backport = {"importlib_metadata", "lazy_importer", "typing_extensions", "zipp"}
+    theirs = {"gpiozero", "colorzero", "lgpio", "_lgpio", "smbus2", "msgspec", "start"} | backport
     for module in set(loaded) - set(bare):
         top = module.partition(".")[0]
         if top == "shapechanger":

@@ -64,7 +64,10 @@ def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
     ("text", "words"),
     [
         (_TEXT.replace(_SENSOR, _HEAD), r"needs a table for each joint, such as \[sensor.joints."),
-        (changed("channel = 3\n", "channel = 2\n", _TEXT), "channel 2 of .*PIP_flexion, too"),
+        (
+            changed("channel = 3\n", "channel = 2\n", _TEXT),
+            r"DIP_flexion of .* has the channel 2, .* PIP_flexion, too",
+        ),
         (changed("channel = 3\n", "channel = 8\n", _TEXT), "channel of .* from 0 to 7"),
         (changed("channel = 3\n", "chanel = 3\n", _TEXT), "did you mean 'channel'"),
         (changed("channel = 3\n", "", _TEXT), "lacks the key 'channel'"),
@@ -78,7 +81,7 @@ def test_a_zero_can_be_rewritten(tmp_path: Path) -> None:
         ),
         (
             "direction = 0".join(_TEXT.rsplit("direction = 1", 1)),
-            r"direction of \[sensor.joints.DIP_flexion\] must be 1 or -1, not 0",
+            r"direction of \[sensor.joints.DIP_flexion\] must be one of -1, 1, not 0",
         ),
     ],
 )

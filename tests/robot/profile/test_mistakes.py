@@ -229,7 +229,7 @@ MISTAKES = [
     ("enable = 26", 'enable = "GPIO28"', 'enable = "GPIO28"', "a BCM pin from 0 to 27"),
     ("enable = 26", 'enable = "P1"', 'enable = "P1"', "a BCM pin from 0 to 27"),
     ("a = 16", "a = -1", "a = -1", "a of [sensor.wheel] must be a BCM pin from 0 to 27"),
-    ("12,  # Left.", "99,", "pins = [", 'or "BOARD15", and 99 is none'),
+    ("12,  # Left.", "99,", "pins = [", 'or "BOARD15", not 99'),
     ('pins = [\n    12,  # Left.\n    "GPIO13",\n]', "pins = []", "pins = []", "not an empty list"),
     (
         "enable = 26",
@@ -450,7 +450,7 @@ MISTAKES = [
         "[action.wave]",
         "[action.wave] moves nothing: no mix of",
     ),
-    ('part = "wheels"', 'part = "wheel"', 'part = "wheel"', "one of 'wheels', 'left track'"),
+    ('part = "wheels"', 'part = "wheel"', 'part = "wheel"', "not 'wheel' (did you mean 'wheels'?)"),
     (
         "mix = { throttle = 1 }",
         "mix = { arm = 1 }",

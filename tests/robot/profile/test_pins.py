@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gpiozero.pins.data import PLUS_J8
 
-from shapechanger.robot.profile.pins import BCM_OF_BOARD, bcm
+from shapechanger.robot.drivers.pins import BCM_OF_BOARD, bcm
 
 
 def test_the_header_matches_gpiozero() -> None:

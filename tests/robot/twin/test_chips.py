@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
-from shapechanger.contract.world import Pose, Readings
-from shapechanger.robot.twin.chips import SimulatedMpu6050
+from shapechanger.contract.world import Pose, Readings, World
+from shapechanger.robot.drivers.mpu6050 import SimulatedMpu6050
 
 _READINGS = Readings(
     Pose(0.0, 0.0, 0.0),
@@ -28,7 +30,7 @@ def _words(chip: SimulatedMpu6050) -> tuple[int, ...]:
 )
 def test_the_mpu6050_measures_in_each_range(select: int, per_g: int, per_deg_per_s: float) -> None:
     """Accelerometer and gyroscope scale with their ranges, register map sections 4.17 and 4.19."""
-    chip = SimulatedMpu6050(lambda: _READINGS)
+    chip = SimulatedMpu6050(cast("World", SimpleNamespace(inputs=lambda: _READINGS)))
     chip.write(0x6B, [0])  # Wake up.
     chip.write(0x1C, [select << 3])
     x, y, z, _, _, _, yaw = _words(chip)
@@ -42,7 +44,7 @@ def test_the_mpu6050_measures_in_each_range(select: int, per_g: int, per_deg_per
 
 def test_the_mpu6050_sleeps_at_power_on() -> None:
     """The chip reads 0 while asleep, at power-on and after a reset."""
-    chip = SimulatedMpu6050(lambda: _READINGS)
+    chip = SimulatedMpu6050(cast("World", SimpleNamespace(inputs=lambda: _READINGS)))
     assert _words(chip) == (0,) * 7
     chip.write(0x6B, [0])
     assert any(_words(chip))

@@ -12,9 +12,14 @@ from shapechanger.errors import RobotError, UnknownName
 from shapechanger.finger.anatomy import JOINTS
 from shapechanger.finger.parameters import NOMINAL
 from shapechanger.finger.twin import FingerWorld
-from shapechanger.robot.drivers.as5600 import connect_encoders, open_driver
+from shapechanger.robot.drivers.as5600 import (
+    ChannelsBehind,
+    SimulatedAs5600,
+    Tca9548a,
+    connect_encoders,
+    open_driver,
+)
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
-from shapechanger.robot.twin.chips import ChannelsBehind, SimulatedAs5600, Tca9548a
 from shapechanger.robot.twin.in_process import LocalBoard
 from shapechanger.robot.twin.wiring import TwinWiring
 from shapechanger.robot.twin.world.vehicle import DrivingWorld

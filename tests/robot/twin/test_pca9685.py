@@ -9,12 +9,13 @@ import pytest
 from gpiozero import DigitalOutputDevice
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.output import open_output
+from shapechanger.robot.drivers.chip import open_output
+from shapechanger.robot.drivers.pca9685 import SimulatedPca9685
+from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.guard.plan import GuardPlan
-from shapechanger.robot.twin.chips import SimulatedPca9685
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.signals import PwmChannel, read_ledger
+from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.robots import ACTIONS, esc, process, servo
@@ -47,11 +48,11 @@ def _awake(chip: SimulatedPca9685) -> None:
 def test_pulses_are_decoded_from_the_registers() -> None:
     """A prescale of 121 gives 50 Hz, and 307 of 4096 counts about 1.5 ms."""
     chip = SimulatedPca9685()
-    assert all(pulse.us == 0.0 for pulse in chip.channels)
+    assert all(pulse.us == 0.0 for pulse in chip.pulses)
     _awake(chip)
     chip.write(0x06, [0, 0, 307 & 0xFF, 307 >> 8])
-    assert chip.channels[0].us == pytest.approx(307 * 122 / 25.0)
-    assert chip.channels[0].hz == pytest.approx(50.03, abs=0.01)
+    assert chip.pulses[0].us == pytest.approx(307 * 122 / 25.0)
+    assert chip.pulses[0].hz == pytest.approx(50.03, abs=0.01)
     assert chip.read(0x06, 4) == [0, 0, 51, 1]
 
 
@@ -60,9 +61,9 @@ def test_the_full_on_and_full_off_bits() -> None:
     chip = SimulatedPca9685()
     _awake(chip)
     chip.write(0xFA, [0, 0x10, 0, 0])
-    assert all(pulse.us == pytest.approx(1e6 / pulse.hz) for pulse in chip.channels)
+    assert all(pulse.us == pytest.approx(1e6 / pulse.hz) for pulse in chip.pulses)
     chip.write(0xFD, [0x10])
-    assert all(pulse.us == 0.0 for pulse in chip.channels)
+    assert all(pulse.us == 0.0 for pulse in chip.pulses)
 
 
 def test_the_prescale_is_read_only_while_awake() -> None:
@@ -79,12 +80,12 @@ def test_a_sleep_ends_the_pulses_until_a_restart() -> None:
     _awake(chip)
     chip.write(0x06, [0, 0, 51, 1])
     chip.write(0x00, [0x31])
-    assert chip.channels[0].us == 0.0
+    assert chip.pulses[0].us == 0.0
     chip.write(0x00, [0x21])
-    assert chip.channels[0].us == 0.0
+    assert chip.pulses[0].us == 0.0
     assert chip.read(0x00, 1) == [0xA1]
     chip.write(0x00, [0xA1])
-    assert chip.channels[0].us > 0.0
+    assert chip.pulses[0].us > 0.0
     assert chip.read(0x00, 1) == [0x21]
 
 
@@ -94,7 +95,7 @@ def test_without_auto_increment_a_block_lands_in_one_register() -> None:
     chip.write(0x00, [0x01])
     chip.write(0x06, [0, 0, 51, 1])
     assert chip.read(0x06, 4) == [1, 1, 1, 1]
-    assert chip.channels[0].us == 0.0
+    assert chip.pulses[0].us == 0.0
 
 
 def test_a_failed_transfer_keeps_outputs_off_until_all_channels_are_written(

@@ -11,7 +11,7 @@ import pytest
 from gpiozero import Motor
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
+from shapechanger.robot.drivers.chip import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
 from shapechanger.robot.twin.board_client import BoardClient
 from shapechanger.robot.twin.hardware import TwinHardware, connect

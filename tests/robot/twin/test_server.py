@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from shapechanger.robot.drivers.simulation import Edge
 from shapechanger.robot.twin.messages import (
     MAX_MESSAGE,
     BoardEvent,
     BoardReply,
-    Edge,
     GrantTime,
     InputEdges,
     decode_event,

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.output import open_output
+from shapechanger.robot.drivers.chip import open_output
+from shapechanger.robot.drivers.simulation import Levels, Pulse
 from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
-from shapechanger.robot.twin.signals import Levels, Pulse
 from shapechanger.robot.twin.start import start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 from tests.robot.twin.robots import ACTIONS, CAR, DRIVE, STEER, esc, hbridge, servo

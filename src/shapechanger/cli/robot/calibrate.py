@@ -22,7 +22,7 @@ from shapechanger.cli.robot.setup import change_profile, own_profile
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.client.teleop import STOPS, Terminal
-from shapechanger.robot.drivers.pulse import PULSE_KEYS
+from shapechanger.robot.drivers.chip import OUTPUTS
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
@@ -146,7 +146,7 @@ class Calibration:
         )
         try:
             for output in self._profile.outputs:
-                if output.mix and output.driver in PULSE_KEYS:
+                if output.mix and OUTPUTS[output.driver].pulses:
                     self.found |= self._pulses(output)
                 elif output.mix and output.driver in _MOTORS:
                     self.found |= self._motor(output)
@@ -231,7 +231,7 @@ class Calibration:
 
     def _pulses(self, output: OutputPlan) -> dict[str, Any]:
         wide = with_widest_pulses(output)
-        low_key, _, high_key = PULSE_KEYS[output.driver]
+        low_key, _, high_key = OUTPUTS[output.driver].pulses
         settings = {
             f"output.{output.name}.{key}": wide.settings[key] for key in (low_key, high_key)
         }

@@ -7,7 +7,9 @@ import select
 import threading
 import time
 from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from typing import Annotated, Any, Final, Protocol
+
+from msgspec import Meta
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.hardware import load
@@ -40,6 +42,9 @@ class Frame:
     skipped: int = 0
 
 
+_Side = Annotated[int, Meta(ge=16, le=1920, multiple_of=2)]
+
+
 @dataclass(frozen=True, slots=True)
 class CameraPlan:
     """A camera of a profile.
@@ -56,12 +61,12 @@ class CameraPlan:
     """
 
     driver: str
-    size: tuple[int, int] = (160, 120)
-    fps: float = 20.0
-    jpeg_quality: int = 80
+    size: tuple[_Side, _Side] = (160, 120)
+    fps: Annotated[float, Meta(ge=1, le=120)] = 20.0
+    jpeg_quality: Annotated[int, Meta(ge=1, le=100)] = 80
     flip: bool = False
-    pitch_deg: float | None = None
-    fovy_deg: float | None = None
+    pitch_deg: Annotated[float, Meta(ge=-45, le=45)] | None = None
+    fovy_deg: Annotated[float, Meta(ge=10, le=170)] | None = None
     settings: dict[str, Any] = field(default_factory=dict[str, Any])
 
 

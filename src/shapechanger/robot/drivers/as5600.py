@@ -7,14 +7,26 @@ sheet SCPS207F, section 8.5.4.
 
 from __future__ import annotations
 
+import errno
 import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Protocol, runtime_checkable
 
-from shapechanger.errors import RobotError
+from msgspec import Meta
+
+from shapechanger.errors import RobotError, UnknownName
+from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import BusNumber, Claim, KeyMistake, Keys, i2c_claims
+from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
+
+if TYPE_CHECKING:  # The guard loads neither.
+    from shapechanger.contract.world import World
+    from shapechanger.layout import Feature
 
 ADDRESS: Final = 0x36
 """Of every AS5600."""
@@ -29,6 +41,60 @@ _TOO_STRONG: Final = 0x08
 # Consecutive missed readings of a joint before the sensor fails, as for a servo on the servo bus:
 # 50 ms of a guard's ticks. Chosen so that one disturbed transfer does not release a finger.
 _MOST_MISSED: Final = 5
+
+
+class JointKeys(Keys, frozen=True, kw_only=True):
+    """Keys of one joint, which has a table of its own.
+
+    Attributes:
+        channel: Channel of the multiplexer.
+        zero: Counts of 1/4096 turn with a straight joint.
+        direction: 1 if the counts rise with the angle, -1 if they fall.
+    """
+
+    channel: Annotated[int, Meta(ge=0, le=7)]
+    zero: Annotated[int, Meta(ge=0, le=4095)] = 0
+    direction: Literal[1, -1] = 1
+
+
+class As5600Keys(Keys, frozen=True, kw_only=True):
+    """Keys of the encoders at joints.
+
+    Attributes:
+        bus: I2C bus.
+        mux: Address of the multiplexer.
+        rows: Joints by name.
+    """
+
+    bus: BusNumber = 1
+    mux: Annotated[int, Meta(ge=0x70, le=0x77)] = 0x70
+    rows: dict[str, JointKeys]
+
+    def __post_init__(self) -> None:
+        """Refuse two joints on one channel."""
+        users: dict[int, str] = {}
+        for name, joint in self.rows.items():
+            other = users.setdefault(joint.channel, name)
+            if other != name:
+                words = f"has the channel {joint.channel}, which is that of {other}, too"
+                raise KeyMistake(name, words)
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings, with a list for each column of the joints."""
+        joints = self.rows.values()
+        return {
+            "bus": self.bus,
+            "mux": self.mux,
+            "joints": list(self.rows),
+            "channels": [one.channel for one in joints],
+            "zeros": [one.zero for one in joints],
+            "directions": [one.direction for one in joints],
+        }
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claims of the addresses; all encoders of a bus answer at the same one."""
+        yield from i2c_claims(self.bus, "mux", self.mux)
+        yield Claim("driver", f"address {ADDRESS:#x} of I2C bus {self.bus}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +218,11 @@ class As5600:
         self._bus.close()
 
 
+def _encoders(plan: SensorPlan) -> tuple[JointEncoder, ...]:
+    columns = (plan.settings[key] for key in ("joints", "channels", "zeros", "directions"))
+    return tuple(JointEncoder(*row) for row in zip(*columns, strict=True))
+
+
 def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
     """Return the encoders without reading them.
 
@@ -164,12 +235,9 @@ def connect_encoders(plan: SensorPlan, hardware: Hardware) -> As5600:
         RobotError: If there is no such bus.
     """
     bus, mux = plan.settings["bus"], plan.settings["mux"]
-    columns = (plan.settings[key] for key in ("joints", "channels", "zeros", "directions"))
-    rows = zip(*columns, strict=True)
-    encoders = tuple(JointEncoder(*row) for row in rows)
     words = f"The multiplexer of sensor {plan.name!r} at 0x{mux:02x} on I2C bus {bus}"
     with device_errors(words):
-        return As5600(hardware.i2c(bus), mux, encoders, words)
+        return As5600(hardware.i2c(bus), mux, _encoders(plan), words)
 
 
 def open_driver(plan: SensorPlan, hardware: Hardware) -> As5600:
@@ -187,3 +255,189 @@ def open_driver(plan: SensorPlan, hardware: Hardware) -> As5600:
         sensor.close()
         raise
     return sensor
+
+
+@runtime_checkable
+class JointWorld(Protocol):
+    """A world with joints that encoders measure."""
+
+    def measured_angle(self, joint: str) -> float:
+        """Return one reading of a joint's angle, rad, with the noise of its encoder.
+
+        Raises:
+            RobotError: If there is no such joint.
+        """
+        ...
+
+
+Magnet = Literal["", "gone", "weak", "strong"]
+"""State of the magnet: in order (""), missing, too weak or too strong."""
+
+_RAW_ANGLE: Final = 0x0C
+_STATUS_OF: Final = {
+    "": _MAGNET_DETECTED,
+    "gone": _TOO_WEAK,
+    "weak": _MAGNET_DETECTED | _TOO_WEAK,
+    "strong": _MAGNET_DETECTED | _TOO_STRONG,
+}
+
+
+class SimulatedAs5600(SimulatedChip):
+    """AS5600: magnetic encoder of a joint.
+
+    Args:
+        joint: Name of the joint on which the magnet sits.
+        angle: Reads the measured angle, rad.
+        zero: Counts at the angle 0.
+        direction: 1 if the counts rise with the angle, -1 if they fall.
+
+    Attributes:
+        joint: Name of the joint.
+    """
+
+    def __init__(self, joint: str, angle: Callable[[], float], zero: int, direction: int) -> None:
+        self.joint = joint
+        self._angle = angle
+        self._zero = zero
+        self._direction = direction
+        self._magnet = ""
+
+    def set_magnet(self, state: Magnet | str) -> None:
+        """Set the state of the magnet.
+
+        Raises:
+            UnknownName: If there is no such state.
+        """
+        if state not in _STATUS_OF:
+            raise UnknownName("fault of a magnet", state, _STATUS_OF)
+        self._magnet = state
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Read bytes, starting at a register; those that no driver reads are 0."""
+        high, low = divmod(self._counts(), 256)
+        known = {_STATUS: _STATUS_OF[self._magnet], _RAW_ANGLE: high, _RAW_ANGLE + 1: low}
+        return [known.get(register + i, 0) for i in range(length)]
+
+    def _counts(self) -> int:
+        if self._magnet == "gone":
+            return 0
+        turned = self._direction * self._angle() / (2.0 * math.pi)
+        return (self._zero + round(turned * COUNTS_PER_TURN)) % COUNTS_PER_TURN
+
+
+class Tca9548a(SimulatedChip):
+    """TCA9548A: multiplexer of one I2C bus to eight; all are closed at power-on.
+
+    Args:
+        channels: Chip behind each channel, 0 to 7; all chips have the same address.
+    """
+
+    is_logged = False  # It moves nothing, and hundreds of writes a second would fill the ledger.
+
+    def __init__(self, channels: Mapping[int, SimulatedChip]) -> None:
+        self.channels = dict(channels)
+        self._control = 0
+
+    @property
+    def open(self) -> list[SimulatedChip]:
+        """Chips behind the open channels."""
+        return [chip for channel, chip in self.channels.items() if self._control >> channel & 1]
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Read the control register; sending the register byte writes it first."""
+        self._control = register
+        return [self._control] * length
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write the control register; of all bytes, the register byte included, the last counts."""
+        self._control = (register, *data)[-1]
+
+
+class ChannelsBehind(SimulatedChip):
+    """The chips behind a multiplexer, at their common address.
+
+    Args:
+        mux: The multiplexer.
+    """
+
+    def __init__(self, mux: Tca9548a) -> None:
+        self._mux = mux
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Read all chips behind open channels: a bit that one of them pulls low is low.
+
+        Raises:
+            OSError: If no channel is open, with the `errno` of the kernel's driver.
+        """
+        data = [0xFF] * length
+        for chip in self._open_chips():
+            data = [a & b for a, b in zip(data, chip.read(register, length), strict=True)]
+        return data
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write to all chips behind open channels.
+
+        Raises:
+            OSError: If no channel is open.
+        """
+        for chip in self._open_chips():
+            chip.write(register, data)
+
+    def _open_chips(self) -> list[SimulatedChip]:
+        if not (chips := self._mux.open):
+            raise OSError(errno.EREMOTEIO, "no chip answers")
+        return chips
+
+
+def _at_zero(joint: str) -> float:
+    return 0.0
+
+
+class SimulatedJoints(SimulatedSensor):
+    """A multiplexer and the encoders behind it.
+
+    Args:
+        plan: The sensor.
+        world: World with these joints; in a world without joints all stand at zero.
+
+    Attributes:
+        encoders: Encoders by joint.
+
+    Raises:
+        RobotError: If the world has other joints.
+    """
+
+    def __init__(self, plan: SensorPlan, world: World) -> None:
+        settings = plan.settings
+        measured = world.measured_angle if isinstance(world, JointWorld) else _at_zero
+        self.encoders: dict[str, SimulatedAs5600] = {}
+        behind: dict[int, SimulatedAs5600] = {}
+        for encoder in _encoders(plan):
+            joint = encoder.joint
+            measured(joint)  # Raises for an unknown joint.
+            chip = SimulatedAs5600(joint, partial(measured, joint), encoder.zero, encoder.direction)
+            self.encoders[joint] = behind[encoder.channel] = chip
+        mux = Tca9548a(behind)
+        bus = settings["bus"]
+        super().__init__({(bus, settings["mux"]): mux, (bus, ADDRESS): ChannelsBehind(mux)})
+
+
+def _features(plan: SensorPlan) -> list[Feature]:
+    """Return the angle of each joint, within half a turn of its zero."""
+    from shapechanger.layout import Element, Feature  # The guard needs no layouts.
+
+    return [
+        Feature(f"{name}/angle", "rad", -math.pi, math.pi, Element("joint", name))
+        for name in plan.settings["joints"]
+    ]
+
+
+AS5600: Final = SensorChip(
+    measures="joints",
+    keys=As5600Keys,
+    open=open_driver,
+    simulate=SimulatedJoints,
+    features=_features,
+    rows=JointKeys,
+)
+"""Magnetic encoders at joints."""

@@ -6,15 +6,23 @@ from pathlib import Path
 from typing import Final
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import FilePath, Keys
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
 _PERIOD_NS: Final = 1_000_000_000
 
 
+class CpuTemperatureKeys(Keys, frozen=True, kw_only=True):
+    """Keys of the CPU's temperature: the file of the kernel."""
+
+    path: FilePath = "/sys/class/thermal/thermal_zone0/temp"
+
+
 class CpuTemperature:
-    """Temperature in a kernel file; see `SensorDriver`. Its setting is the file, `path`."""
+    """Temperature in a kernel file; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         self._path = Path(plan.settings["path"])
@@ -41,3 +49,9 @@ class CpuTemperature:
         except ValueError as error:
             words = f"{self._name} read {written!r} at {self._path}, which is no temperature."
             raise RobotError(words) from error
+
+
+CPU_TEMPERATURE: Final = SensorChip(
+    measures="temperature", keys=CpuTemperatureKeys, open=CpuTemperature
+)
+"""The temperature of the CPU."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Literal
 
-from gpiozero import InputDevice
-
 
 class EdgeInput:
     """Input with a callback on each change of its level.
@@ -26,6 +24,8 @@ class EdgeInput:
         factory: Any,
         changed: Callable[[float, int], None],
     ) -> None:
+        from gpiozero import InputDevice  # A twin's worlds need no gpiozero.
+
         self._active = 0 if pull == "up" else 1
         self._changed = changed
         self._device = InputDevice(pin, pull_up=pull == "up", pin_factory=factory)

@@ -5,12 +5,21 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from typing import Final
+from typing import TYPE_CHECKING, Annotated, Final
 
+from msgspec import Meta
+
+from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin
+from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
+
+if TYPE_CHECKING:  # Only a twin has a world.
+    from shapechanger.contract.world import Readings, World
 
 # Time without an edge after which the wheel counts as standing.
 _STANDS_AFTER_S: Final = 0.5
@@ -32,14 +41,27 @@ _STEPS: Final = {
 }
 
 
+class EncoderKeys(Keys, frozen=True, kw_only=True):
+    """Keys of a wheel encoder.
+
+    Attributes:
+        a: Pin of its first channel.
+        b: Pin of its second; -1 for one channel, whose sign is that of the command.
+        counts_per_turn: Rising edges of one channel for a turn of the wheel.
+        wheel_m: Circumference of the wheel, m.
+    """
+
+    a: Pin
+    b: OptionalPin = NO_PIN
+    counts_per_turn: Annotated[float, Meta(gt=0, le=1e6)]
+    wheel_m: Annotated[float, Meta(gt=0, le=100)]
+
+
 class Encoder:
     """Encoder with one or two channels; see `SensorDriver`.
 
     With two channels (quadrature) it measures the direction, and each edge is a quarter of a count.
     With one, each rising edge is a count, and the direction is that of the propulsion.
-
-    The settings are the BCM pins `a` and `b` (-1 for none), `counts_per_turn` (rising edges of one
-    channel for a turn of the wheel) and `wheel_m` (circumference).
     """
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
@@ -122,3 +144,49 @@ class Encoder:
                 self._edges.clear()
         self._edges.append((at_s, step))
         self._count += 1
+
+
+class SimulatedEncoder(SimulatedSensor):
+    """A wheel encoder; forward, channel a leads.
+
+    Args:
+        plan: The sensor.
+        world: The world, in which the wheel rolls.
+    """
+
+    def __init__(self, plan: SensorPlan, world: World) -> None:
+        self._pins = (plan.settings["a"], plan.settings["b"])
+        self._states = ((0, 0), (1, 0), (1, 1), (0, 1)) if self._pins[1] >= 0 else ((0,), (1,))
+        count_m: float = plan.settings["wheel_m"] / plan.settings["counts_per_turn"]
+        self._edge_m = count_m / len(self._states)
+        travelled_m = world.inputs().travelled_m
+        # The distance rolled before power-on makes no edges.
+        self._travelled = travelled_m
+        self._position = math.floor(travelled_m / self._edge_m)
+        state = self._states[self._position % len(self._states)]
+        # A single channel has no second pin.
+        super().__init__(levels=dict(zip(self._pins, state, strict=False)))
+
+    def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
+        """Return an edge for each boundary that the wheel has passed."""
+        before, self._travelled = self._travelled, seen.travelled_m
+        found: list[Edge] = []
+        target = math.floor(seen.travelled_m / self._edge_m)
+        step = 1 if target > self._position else -1
+        while self._position != target:
+            boundary = max(self._position, self._position + step) * self._edge_m
+            share = (boundary - before) / (seen.travelled_m - before or 1.0)
+            t = start_ns + round(min(max(share, 0.0), 1.0) * (end_ns - start_ns))
+            old = self._states[self._position % len(self._states)]
+            self._position += step
+            new = self._states[self._position % len(self._states)]
+            for pin, was, level in zip(self._pins, old, new, strict=False):
+                if was != level:
+                    found.append(Edge(t, pin, level))
+        return found
+
+
+ENCODER: Final = SensorChip(
+    measures="speed", keys=EncoderKeys, open=Encoder, simulate=SimulatedEncoder
+)
+"""A wheel encoder."""

@@ -8,15 +8,22 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Final
+from typing import TYPE_CHECKING, Annotated, Final
 
-from gpiozero import DigitalOutputDevice
+from msgspec import Meta
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, RealClock
+
+if TYPE_CHECKING:  # Only a twin has a world.
+    from shapechanger.contract.world import World
 
 _TRIGGER_NS: Final = 10_000  # A pulse of 10 µs starts a ping.
 _CYCLE_NS: Final = 60_000_000  # The user guide: at least 60 ms from ping to ping.
@@ -24,12 +31,22 @@ _MOST_MISSED: Final = 3  # Pings without an echo before it fails: about 200 ms, 
 _SOUND_M_PER_S: Final = 343.2  # Dry air at 20 degrees Celsius; 0.6 m/s more for each degree.
 
 
-class Hcsr04:
-    """Distance sensor; see `SensorDriver`. It does not wait for the echo: the next read has it.
+class Hcsr04Keys(Keys, frozen=True, kw_only=True):
+    """Keys of an HC-SR04.
 
-    The settings are the BCM pins `trigger` and `echo`, and `max_m`, the distance without an
-    obstacle.
+    Attributes:
+        trigger: Pin of its trigger.
+        echo: Pin of its echo, through a divider to 3.3 V.
+        max_m: Distance without an obstacle, m.
     """
+
+    trigger: Pin
+    echo: Pin
+    max_m: Annotated[float, Meta(gt=0, le=5)] = 2.0
+
+
+class Hcsr04:
+    """Distance sensor; see `SensorDriver`. It does not wait for the echo: the next read has it."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         settings = plan.settings
@@ -45,6 +62,8 @@ class Hcsr04:
         self._pinged_ns: int | None = None
         self._unanswered = 0  # Pings since the line changed.
         with device_errors(self._name):
+            from gpiozero import DigitalOutputDevice
+
             factory = hardware.pin_factory()
             self._ticks_diff = factory.ticks_diff
             self._trigger = DigitalOutputDevice(settings["trigger"], pin_factory=factory)
@@ -95,3 +114,50 @@ class Hcsr04:
             elif self._rise is not None:
                 self._echo_s = self._ticks_diff(at_s, self._rise)
                 self._rise = None
+
+
+# A ping takes eight cycles of 40 kHz, and the echo line is high for as long as the sound travels;
+# after 38 ms without an echo it gives up. It measures 2 cm to 4 m.
+_PING_NS: Final = 450_000
+_NO_ECHO_NS: Final = 38_000_000
+_NEAREST_M: Final = 0.02
+_FARTHEST_M: Final = 4.0
+
+
+class SimulatedHcsr04(SimulatedSensor):
+    """An HC-SR04, which answers a ping at the falling edge of its trigger.
+
+    Args:
+        plan: The sensor.
+        world: What it measures.
+
+    Attributes:
+        override_m: Distance to measure, m; None for the truth.
+        dead: Whether it does not answer at all.
+    """
+
+    def __init__(self, plan: SensorPlan, world: World) -> None:
+        self._trigger = plan.settings["trigger"]
+        self._echo = plan.settings["echo"]
+        self._world = world
+        self._busy_until_ns = 0
+        self.override_m: float | None = None
+        self.dead = False
+        super().__init__(levels={self._echo: 0})
+
+    def output_changed(self, t: int, pin: int, level: float) -> list[Edge]:
+        """Return the edges of the echo."""
+        if pin != self._trigger or level or self.dead or t < self._busy_until_ns:
+            return []
+        distance = self._world.distance_m() if self.override_m is None else self.override_m
+        echo_ns = _NO_ECHO_NS
+        if distance <= _FARTHEST_M:
+            echo_ns = round(2e9 * max(distance, _NEAREST_M) / _SOUND_M_PER_S)
+        self._busy_until_ns = t + _PING_NS + echo_ns
+        return [Edge(t + _PING_NS, self._echo, 1), Edge(self._busy_until_ns, self._echo, 0)]
+
+
+HCSR04: Final = SensorChip(
+    measures="distance", keys=Hcsr04Keys, open=Hcsr04, simulate=SimulatedHcsr04
+)
+"""An ultrasonic distance sensor."""

@@ -5,11 +5,20 @@ Registers: Texas Instruments, INA219 data sheet, SBOS448G, section 8.6.
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Final
 
+from msgspec import Meta
+
+from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
+from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
+
+if TYPE_CHECKING:  # Only a twin has a world.
+    from shapechanger.contract.world import World
 
 _CONFIGURATION: Final = 0x00
 _BUS_VOLTAGE: Final = 0x02
@@ -19,8 +28,19 @@ _STATUS_BITS: Final = 3  # Below the voltage: two flags and one unused bit.
 _PERIOD_NS: Final = 100_000_000  # A battery changes slowly, and the bus is shared.
 
 
+class Ina219Keys(Keys, frozen=True, kw_only=True):
+    """Keys of an INA219: its I2C bus and its address."""
+
+    bus: BusNumber = 1
+    address: Annotated[int, Meta(ge=0x40, le=0x4F)] = 0x40
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claims of the bus and the address."""
+        return i2c_claims(self.bus, "address", self.address)
+
+
 class Ina219:
-    """Voltage sensor; see `SensorDriver`. Its settings are `bus` and `address`."""
+    """Voltage sensor; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         bus, self._address = plan.settings["bus"], plan.settings["address"]
@@ -43,3 +63,43 @@ class Ina219:
     def close(self) -> None:
         """Close the bus."""
         self._bus.close()
+
+
+_RESET: Final = 0x8000  # Bit of the configuration.
+_AT_POWER_ON: Final = 0x399F
+_CONVERSION_READY: Final = 0x2
+
+
+class SimulatedIna219(SimulatedChip):
+    """INA219: voltage of the battery, in registers of 16 bits; the current is not simulated.
+
+    Args:
+        world: What it measures.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._configuration = _AT_POWER_ON
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Read one register; its two bytes repeat."""
+        word = self._configuration if register == _CONFIGURATION else 0
+        if register == _BUS_VOLTAGE:
+            steps = round(self._world.inputs().battery_v / _V_PER_STEP)
+            word = min(steps, 0x1FFF) << _STATUS_BITS | _CONVERSION_READY
+        return [word >> 8 if i % 2 == 0 else word & 0xFF for i in range(length)]
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write the configuration; the chip accepts only whole registers."""
+        if register == _CONFIGURATION and len(data) == 2:
+            word = data[0] << 8 | data[1]
+            self._configuration = _AT_POWER_ON if word & _RESET else word
+
+
+def _simulate(plan: SensorPlan, world: World) -> SimulatedSensor:
+    at = plan.settings["bus"], plan.settings["address"]
+    return SimulatedSensor({at: SimulatedIna219(world)})
+
+
+INA219: Final = SensorChip(measures="battery", keys=Ina219Keys, open=Ina219, simulate=_simulate)
+"""A voltage sensor."""

@@ -3,20 +3,69 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import ExitStack
+from typing import Annotated, Any, Final
 
-from gpiozero import DigitalOutputDevice, Motor, PhaseEnableMotor
+from msgspec import Meta
 
+from shapechanger.robot.drivers.chip import OutputChip
 from shapechanger.robot.drivers.duty import Duty
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import KeyMistake, Keys
+from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin
+from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
 
+class _DutyKeys(Keys, frozen=True, kw_only=True):
+    """Keys of a motor whose speed is a duty cycle.
+
+    Attributes:
+        pwm_hz: Frequency of the PWM, Hz; gpiozero's takes up to 10 kHz.
+        start: Smallest duty that moves the motor; values just above 0 get it.
+        full: Duty at full speed.
+    """
+
+    pwm_hz: Annotated[int, Meta(ge=1, le=10_000)] = 50
+    start: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    full: Annotated[float, Meta(gt=0, le=1)] = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse an empty range of duties."""
+        if not self.start < self.full:
+            raise KeyMistake("start", f"must be below full, which is {self.full:g}")
+
+
+class HBridgeKeys(_DutyKeys, frozen=True, kw_only=True):
+    """Keys of an H-bridge.
+
+    Attributes:
+        forward: Input for forward or right.
+        backward: Input for backward or left.
+        enable: Input that enables both; -1 for none.
+    """
+
+    forward: Pin
+    backward: Pin
+    enable: OptionalPin = NO_PIN
+
+
+class PhaseEnableKeys(_DutyKeys, frozen=True, kw_only=True):
+    """Keys of a driver in phase/enable mode.
+
+    Attributes:
+        phase: Input for the direction; high is backward.
+        enable: Input for the speed.
+    """
+
+    phase: Pin
+    enable: Pin
+
+
 class _DutyMotor:
     """Bidirectional motor; see `OutputDriver`.
-
-    All of them have the settings `pwm_hz`, `start` and `full` (see `Duty`).
 
     Args:
         plan: The output.
@@ -69,16 +118,16 @@ class HBridge(_DutyMotor):
     One input turns the motor forward, the other backward, each with PWM. They are never on
     together: `Motor` turns one off before it turns the other on, and on a Pi `LowAtOncePin` makes
     that immediate. Some boards have a third input that enables both. A released motor coasts.
-
-    The settings are the BCM pins `forward`, `backward` and `enable` (-1 for none).
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        from gpiozero import DigitalOutputDevice, Motor  # A twin's worlds need no gpiozero.
+
         super().__init__(plan, ("forward", "backward"))
         settings = plan.settings
         with device_errors(self._name), ExitStack() as undo:
             factory = hardware.pin_factory()
-            self._enable: DigitalOutputDevice | None = None
+            self._enable: Any = None
             if settings["enable"] >= 0:
                 # Not the one of `Motor`, which would be on before the first write.
                 self._enable = DigitalOutputDevice(settings["enable"], pin_factory=factory)
@@ -118,11 +167,11 @@ class PhaseEnable(_DutyMotor):
 
     The speed is zero while the direction changes: `PhaseEnableMotor` ensures that, and on a Pi
     `LowAtOncePin` makes it immediate. Such drivers brake when released, and cannot coast.
-
-    The settings are the BCM pins `phase` (high is backward) and `enable` (speed).
     """
 
     def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        from gpiozero import PhaseEnableMotor
+
         super().__init__(plan, ("phase", "enable"))
         pins = plan.settings["phase"], plan.settings["enable"]
         with device_errors(self._name), ExitStack() as undo:
@@ -144,3 +193,42 @@ class PhaseEnable(_DutyMotor):
 
     def _stop(self) -> None:
         self._motor.stop()
+
+
+def _wired_hbridge(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
+    forward, backward, enable = (plan.settings[key] for key in ("forward", "backward", "enable"))
+
+    def state(levels: Levels) -> WiredOutput:
+        drive = duty(levels, forward) - duty(levels, backward)
+        return _turning(plan, drive * (duty(levels, enable) if enable >= 0 else 1.0), rest)
+
+    return state
+
+
+def _wired_phase_enable(
+    plan: OutputPlan, rest: float, duty: DutyOf
+) -> Callable[[Levels], WiredOutput]:
+    enable, phase = plan.settings["enable"], plan.settings["phase"]
+
+    def state(levels: Levels) -> WiredOutput:
+        # A phase that is high part of the time turns the motor back and forth.
+        return _turning(plan, duty(levels, enable) * (1.0 - 2.0 * duty(levels, phase)), rest)
+
+    return state
+
+
+def _turning(plan: OutputPlan, drive: float, rest: float) -> WiredOutput:
+    size = Duty(plan.settings["start"], plan.settings["full"]).size_at(abs(drive))
+    value = math.copysign(size, drive)
+    return WiredOutput(value, abs(value - rest) <= (0.01 if rest else 0.0))
+
+
+_OFF: Final = WiredOutput(0.0, True)
+
+HBRIDGE: Final = OutputChip(keys=HBridgeKeys, open=HBridge, wire=_wired_hbridge, unpowered=_OFF)
+"""A motor on an H-bridge."""
+
+PHASE_ENABLE: Final = OutputChip(
+    keys=PhaseEnableKeys, open=PhaseEnable, wire=_wired_phase_enable, unpowered=_OFF
+)
+"""A motor on a driver in phase/enable mode."""

@@ -8,12 +8,21 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Final
+
+from msgspec import Meta
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
+from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
+
+if TYPE_CHECKING:  # Only a twin has a world.
+    from shapechanger.contract.world import World
 
 _CONFIG: Final = 0x1A
 _GYRO_CONFIG: Final = 0x1B
@@ -38,8 +47,19 @@ _MOST_ZERO_RAD_PER_S: Final = math.radians(25.0)
 _ZERO_SHARE: Final = 0.02
 
 
+class Mpu6050Keys(Keys, frozen=True, kw_only=True):
+    """Keys of an MPU-6050: its I2C bus and its address."""
+
+    bus: BusNumber = 1
+    address: Annotated[int, Meta(ge=0x68, le=0x69)] = 0x68
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claims of the bus and the address."""
+        return i2c_claims(self.bus, "address", self.address)
+
+
 class Mpu6050:
-    """Inertial sensor; see `SensorDriver`. Its settings are `bus` and `address`."""
+    """Inertial sensor; see `SensorDriver`."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         number, self._address = plan.settings["bus"], plan.settings["address"]
@@ -84,3 +104,74 @@ class Mpu6050:
     def close(self) -> None:
         """Close the bus."""
         self._bus.close()
+
+
+_GYRO_ZOUT_L: Final = 0x48
+_MEASURED: Final = struct.Struct(">7h")  # Acceleration, temperature, rate of turn.
+_RESET: Final = 0x80  # PWR_MGMT_1.
+_SLEEP: Final = 0x40
+
+_STANDARD_GRAVITY: Final = 9.80665  # m/s2
+_LSB_PER_G: Final = (16384.0, 8192.0, 4096.0, 2048.0)  # Section 4.17.
+_LSB_PER_DEG_PER_S: Final = (131.0, 65.5, 32.8, 16.4)  # Section 4.19.
+_ROOM_TEMPERATURE: Final = round((22.0 - 36.53) * 340.0)  # Section 4.18.
+
+
+class SimulatedMpu6050(SimulatedChip):
+    """MPU-6050: acceleration and rate of turn, with x ahead, y to the left and z up.
+
+    Args:
+        world: What it measures.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._registers = bytearray(128)
+        self._wake_up()
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Read bytes, starting at a register."""
+        if register <= _GYRO_ZOUT_L and register + length > _ACCEL_XOUT_H:
+            self._measure()
+        return [self._registers[(register + i) % 128] for i in range(length)]
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write bytes, starting at a register."""
+        for i, byte in enumerate(data):
+            at = (register + i) % 128
+            if at == _PWR_MGMT_1 and byte & _RESET:
+                self._wake_up()
+            elif at != _WHO_AM_I:
+                self._registers[at] = byte
+
+    def _wake_up(self) -> None:
+        self._registers[:] = bytes(128)
+        self._registers[_PWR_MGMT_1] = _SLEEP
+        self._registers[_WHO_AM_I] = _IDENTITY
+
+    def _measure(self) -> None:
+        if self._registers[_PWR_MGMT_1] & _SLEEP:
+            return
+        seen = self._world.inputs()
+        per_g = _LSB_PER_G[self._registers[_ACCEL_CONFIG] >> 3 & 3]
+        per_rate = _LSB_PER_DEG_PER_S[self._registers[_GYRO_CONFIG] >> 3 & 3]
+        values = (
+            seen.acceleration_x / _STANDARD_GRAVITY * per_g,
+            seen.acceleration_y / _STANDARD_GRAVITY * per_g,
+            per_g,
+            _ROOM_TEMPERATURE,
+            0.0,
+            0.0,
+            math.degrees(seen.yaw_rate) * per_rate,
+        )
+        words = [max(-32768, min(32767, round(value))) for value in values]
+        _MEASURED.pack_into(self._registers, _ACCEL_XOUT_H, *words)
+
+
+def _simulate(plan: SensorPlan, world: World) -> SimulatedSensor:
+    at = plan.settings["bus"], plan.settings["address"]
+    return SimulatedSensor({at: SimulatedMpu6050(world)})
+
+
+MPU6050: Final = SensorChip(measures="imu", keys=Mpu6050Keys, open=Mpu6050, simulate=_simulate)
+"""An inertial sensor."""

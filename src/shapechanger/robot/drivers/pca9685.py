@@ -7,14 +7,25 @@ Registers and formulas: NXP, PCA9685 product data sheet, rev. 4 (2015-04-16), se
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-from gpiozero import DigitalOutputDevice
+from msgspec import Meta
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.chip import PulseSource
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
+from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin
+from shapechanger.robot.drivers.simulation import (
+    DutyOf,
+    I2cChips,
+    Levels,
+    Pulse,
+    PwmChannel,
+    SimulatedChip,
+)
 from shapechanger.robot.hardware import Hardware, RealClock
 
 _MODE1: Final = 0x00
@@ -35,6 +46,31 @@ _WAKE_UP_S: Final = 0.0005  # 500 us at most until the oscillator is up (section
 # Unchanged pulses are not rewritten; the chip is polled now and then, because it sleeps after a
 # short loss of power.
 _UNCHANGED_PER_CHECK: Final = 50
+
+
+class Pca9685Keys(Keys, frozen=True, kw_only=True):
+    """Keys of a channel of a PCA9685.
+
+    Attributes:
+        bus: I2C bus.
+        address: Address of the board.
+        channel: Channel of the board.
+        output_enable: Pin at the board's OE input, active low, with a pull-up; given for one
+            output, it applies to the board. -1 for none.
+    """
+
+    bus: BusNumber = 1
+    address: Annotated[int, Meta(ge=0x40, le=0x7F)] = 0x40
+    channel: Annotated[int, Meta(ge=0, le=15)]
+    output_enable: OptionalPin = NO_PIN
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claims of the channel, and of what all channels of the board share."""
+        board = f"the PCA9685 at {self.address:#x} of I2C bus {self.bus}"
+        yield Claim("channel", f"channel {self.channel} of {board}")
+        yield from i2c_claims(self.bus, "address", self.address, board)
+        if self.output_enable != NO_PIN:
+            yield Claim("output_enable", f"GPIO{self.output_enable}", board)
 
 
 def prescale_for(hz: float) -> int:
@@ -63,9 +99,11 @@ class Pca9685:
         self._steps: dict[int, int] = {}  # By channel; missing for a channel in doubt.
         self._must_start = False
         self._unchanged = 0
-        self._enable: DigitalOutputDevice | None = None
+        self._enable: Any = None
         with device_errors(self.name), ExitStack() as undo:
             if output_enable >= 0:
+                from gpiozero import DigitalOutputDevice  # Boards without such a pin need none.
+
                 # OE is active low, and a resistor pulls it up until we drive it.
                 self._enable = DigitalOutputDevice(
                     output_enable, active_high=False, pin_factory=hardware.pin_factory()
@@ -240,3 +278,115 @@ def open_channel(settings: Mapping[str, Any], hardware: Hardware) -> Pca9685Chan
         chip.leave(number)  # A retry finds the channel free.
         raise
     return channel
+
+
+_CHANNELS: Final = 16
+_LAST_LED: Final = 0x45
+_FIRST_ALL_LED: Final = 0xFA
+_MIN_PRESCALE: Final = 3
+_RESTART: Final = 0x80
+_FULL: Final = 0x10  # Bit 4 of ON_H and OFF_H: always on, always off. Off wins.
+
+
+class SimulatedPca9685(SimulatedChip):
+    """PCA9685: 16 PWM channels, which continue when the process that set them has ended.
+
+    Comments name sections of the data sheet.
+    """
+
+    def __init__(self) -> None:
+        self._registers = bytearray(256)
+        # Section 7.3, table 4: after power-on it sleeps, with all channels fully off.
+        self._registers[_MODE1] = 0x11
+        self._registers[0x01] = 0x04
+        self._registers[0x02:0x06] = bytes((0xE2, 0xE4, 0xE8, 0xE0))
+        for channel in range(_CHANNELS):
+            self._registers[_CHANNEL_0 + 4 * channel + 3] = _FULL
+        self._registers[_PRESCALE] = 0x1E
+        self._halted: set[int] = set()  # Channels that wait for RESTART after a sleep.
+
+    @property
+    def pulses(self) -> list[Pulse]:
+        """Pulses of all channels; 0 us for a channel that is off."""
+        period_s = _STEPS * (self._registers[_PRESCALE] + 1) / (_OSCILLATOR_MHZ * 1e6)
+        hz = 1.0 / period_s
+        return [
+            Pulse(self._counts(channel) / _STEPS * period_s * 1e6, hz)
+            for channel in range(_CHANNELS)
+        ]
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Read bytes, starting at a register; without auto-increment all of that register."""
+        return [self._registers[at] for at in self._addressed(register, length)]
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write bytes, starting at a register."""
+        # Auto-increment is as MODE1 had it when the transfer began.
+        for at, byte in zip(self._addressed(register, len(data)), data, strict=True):
+            self._write_byte(at, byte)
+
+    def _addressed(self, register: int, length: int) -> list[int]:
+        if self._registers[_MODE1] & _AUTO_INCREMENT:
+            return [(register + i) % 256 for i in range(length)]
+        return [register] * length
+
+    def _write_byte(self, at: int, byte: int) -> None:
+        if at == _MODE1:
+            self._write_mode1(byte)
+        elif at == _PRESCALE:
+            if self._registers[_MODE1] & _SLEEP:  # Section 7.3.5: only while it sleeps.
+                self._registers[at] = max(byte, _MIN_PRESCALE)
+        elif _FIRST_ALL_LED <= at <= _ALL_OFF_H:
+            for channel in range(_CHANNELS):
+                self._registers[_CHANNEL_0 + 4 * channel + at - _FIRST_ALL_LED] = byte
+            self._halted.clear()
+        else:
+            self._registers[at] = byte
+            if _CHANNEL_0 <= at <= _LAST_LED:
+                self._halted.discard((at - _CHANNEL_0) // 4)
+
+    def _write_mode1(self, byte: int) -> None:
+        before = self._registers[_MODE1]
+        after = byte & ~_RESTART
+        if byte & _SLEEP and not before & _SLEEP:
+            # Section 7.3.1.1: channels that were on stop until RESTART is written as 1.
+            self._halted = {c for c in range(_CHANNELS) if self._counts(c)}
+        if byte & _RESTART and not byte & _SLEEP:
+            self._halted.clear()
+        if self._halted:
+            after |= _RESTART
+        self._registers[_MODE1] = after
+
+    def _counts(self, channel: int) -> int:
+        """Return for how many counts of a period a channel is on."""
+        if self._registers[_MODE1] & _SLEEP or channel in self._halted:
+            return 0
+        at = _CHANNEL_0 + 4 * channel
+        on_low, on_high, off_low, off_high = self._registers[at : at + 4]
+        if off_high & _FULL:
+            return 0
+        if on_high & _FULL:
+            return _STEPS
+        on = (on_high & 0x0F) << 8 | on_low
+        off = (off_high & 0x0F) << 8 | off_low
+        return (off - on) % _STEPS
+
+
+def _pulse_of(settings: Mapping[str, Any], duty: DutyOf) -> Callable[[Levels], float]:
+    channel = PwmChannel(*(settings[key] for key in ("bus", "address", "channel")))
+
+    def pulse_us(levels: Levels) -> float:
+        enable = settings["output_enable"]
+        if enable >= 0 and duty(levels, enable) > 0.0:
+            return 0.0
+        return levels.channels.get(channel, Pulse(0.0, 0.0)).us
+
+    return pulse_us
+
+
+def _chips(settings: Mapping[str, Any]) -> I2cChips:
+    return {(settings["bus"], settings["address"]): SimulatedPca9685()}
+
+
+PCA9685: Final = PulseSource(keys=Pca9685Keys, open=open_channel, pulse_of=_pulse_of, chips=_chips)
+"""A board with 16 channels of pulses."""

@@ -3,21 +3,51 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Annotated, Any, ClassVar, Final
+
+from msgspec import Meta
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, PulseChannel, PulseSource
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import Claim, KeyMistake, Keys
+from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.simulation import DutyOf, Levels, Pulse
 from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
-PULSE_KEYS: Final = {
-    "servo": ("left_us", "centre_us", "right_us"),
-    "esc": ("backward_us", "neutral_us", "forward_us"),
-}
-"""Settings of each driver that are pulse widths, at -1, 0 and 1."""
+_SECOND_US: Final = 1_000_000
+
+Width = Annotated[int, Meta(ge=500, le=2500)]
+"""Width of a pulse, µs, that lgpio.tx_servo accepts; servos and controllers use no others."""
+
+
+class PulsedKeys(Keys, frozen=True, kw_only=True):
+    """Keys of an output that takes pulses.
+
+    Attributes:
+        over: Source of the pulses, see `PULSES`.
+        hz: Pulses per second; equal for all channels of a chip.
+    """
+
+    widths: ClassVar[tuple[str, str, str]]
+    """Keys of the widths at -1, 0 and 1."""
+
+    over: str
+    hz: Annotated[int, Meta(ge=40, le=400)] = 50
+
+    def __post_init__(self) -> None:
+        """Refuse an empty range of pulses, or a pulse that is longer than its period."""
+        first, middle, last = (getattr(self, key) for key in self.widths)
+        low, high = sorted((first, last))
+        if not low < middle < high:
+            ends = f"{self.widths[0]} and {self.widths[2]}, {low} and {high}"
+            raise KeyMistake(self.widths[1], f"must lie between {ends}")
+        if high * self.hz >= _SECOND_US:
+            raise KeyMistake("hz", f"leaves no time for a pulse of {high} µs")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +75,7 @@ class PulseRange:
     @classmethod
     def of(cls, output: OutputPlan) -> PulseRange:
         """Return the pulse widths of a servo or a controller."""
-        return cls(*(output.settings[key] for key in PULSE_KEYS[output.driver]))
+        return cls(*(output.settings[key] for key in OUTPUTS[output.driver].pulses))
 
     def width_us(self, value: float) -> float:
         """Return the width for a value, which is clipped to -1 to 1."""
@@ -60,40 +90,29 @@ class PulseRange:
         return -(width_us - self.middle_us) / (self.low_us - self.middle_us)
 
 
-class PulseChannel(Protocol):
-    """Source of the pulses of one servo."""
+DEAD_BAND_US: Final = 20.0
+"""Dead band of a speed controller on each side of neutral; makers state 10 to 50."""
 
-    def write_us(self, width_us: float) -> float:
-        """Send pulses of this width from now on, and return the applied width."""
-        ...
 
-    def release(self) -> None:
-        """Stop the pulses."""
-        ...
+def wired_pulse(plan: OutputPlan, duty: DutyOf) -> Callable[[Levels], float]:
+    """Return what reads the width of an output's pulses on a twin, µs; 0 for none.
 
-    def close(self) -> None:
-        """Stop the pulses and close."""
-        ...
+    Raises:
+        RobotError: If a twin has no such source of pulses.
+    """
+    over = plan.settings["over"]
+    pulse_of = PULSES[over].pulse_of
+    if pulse_of is None:
+        has = " and ".join(repr(name) for name, one in PULSES.items() if one.pulse_of)
+        raise RobotError(
+            f"Output {plan.name!r}: the twin has no servos over {over!r}; it has them over {has}."
+        )
+    return pulse_of(plan.settings, duty)
 
 
 def open_pulse_channel(settings: Mapping[str, Any], hardware: Hardware) -> PulseChannel:
-    """Open a source of pulses without sending any.
-
-    Args:
-        settings: `over` names the source: "pca9685" (with `bus`, `address`, `channel` and
-            `output_enable`, a BCM pin or -1), "lgpio" (with `pin`) or "sysfs" (with `chip` and
-            `channel`); `hz` is the number of pulses per second.
-        hardware: Where the buses and pins are.
-    """
-    match settings["over"]:
-        case "pca9685":
-            from shapechanger.robot.drivers.pca9685 import open_channel
-
-            return open_channel(settings, hardware)
-        case "lgpio":
-            return _PinChannel(settings["pin"], settings["hz"], hardware)
-        case _:
-            return SysfsPwm(settings["chip"], settings["channel"], settings["hz"])
+    """Open the source of pulses of an output, without sending any."""
+    return PULSES[settings["over"]].open(settings, hardware)
 
 
 class _WholeMicroseconds:
@@ -138,6 +157,25 @@ class _PinChannel(_WholeMicroseconds):
 
     def _pulse(self, width_us: int) -> None:
         self._pins.pulse(self._pin, width_us, self._hz)
+
+
+class _LgpioKeys(Keys, frozen=True, kw_only=True):
+    """Pulses directly on a pin."""
+
+    pin: Pin
+
+
+def _pulse_on_pin(settings: Mapping[str, Any], duty: DutyOf) -> Callable[[Levels], float]:
+    pin = settings["pin"]
+    return lambda levels: levels.pulses.get(pin, Pulse(0.0, 0.0)).us
+
+
+LGPIO: Final = PulseSource(
+    keys=_LgpioKeys,
+    open=lambda settings, hardware: _PinChannel(settings["pin"], settings["hz"], hardware),
+    pulse_of=_pulse_on_pin,
+)
+"""Pulses on a pin, by lgpio."""
 
 
 _ROOT: Final = Path("/sys/class/pwm")
@@ -189,3 +227,21 @@ class SysfsPwm(_WholeMicroseconds):
                 if time.monotonic() > deadline:
                     raise
                 time.sleep(0.01)
+
+
+class _SysfsKeys(Keys, frozen=True, kw_only=True):
+    """Pulses by the kernel's PWM."""
+
+    chip: Annotated[int, Meta(ge=0, le=99)] = 0
+    channel: Annotated[int, Meta(ge=0, le=15)]
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claim of the channel."""
+        yield Claim("channel", f"channel {self.channel} of PWM chip {self.chip}")
+
+
+SYSFS: Final = PulseSource(
+    keys=_SysfsKeys,
+    open=lambda settings, _: SysfsPwm(settings["chip"], settings["channel"], settings["hz"]),
+)
+"""Pulses of the kernel's PWM."""

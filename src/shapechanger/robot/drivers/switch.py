@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Annotated, Final, Literal
+
+from msgspec import Meta
+
+from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
+if TYPE_CHECKING:  # Only a twin has a world.
+    from shapechanger.contract.world import Readings, World
+
+
+class SwitchKeys(Keys, frozen=True, kw_only=True):
+    """Keys of bumper switches.
+
+    Attributes:
+        pins: Pin of each.
+        pull: "up" for switches to ground, "down" for switches to 3.3 V.
+    """
+
+    pins: Annotated[list[Pin], Meta(min_length=1)]
+    pull: Literal["up", "down"] = "up"
+
 
 class Switch:
-    """One or more switches; see `SensorDriver`. Pushes between two reads are not missed.
-
-    The settings are the BCM `pins` and `pull`: "up" for switches to ground, "down" for switches to
-    3.3 V.
-    """
+    """One or more switches; see `SensorDriver`. Pushes between two reads are not missed."""
 
     def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
         pull = plan.settings["pull"]
@@ -42,3 +61,37 @@ class Switch:
     def _changed(self, at_s: float, level: int) -> None:
         if level == self._pressed_level:
             self._was_pressed = True
+
+
+class SimulatedSwitch(SimulatedSensor):
+    """Bumper switches to ground (pull "up") or to 3.3 V, all pressed at once.
+
+    Args:
+        plan: The sensor.
+        world: Not used: their state is in its readings.
+
+    Attributes:
+        held: Whether something outside the world presses them.
+    """
+
+    def __init__(self, plan: SensorPlan, world: World) -> None:
+        self._pins: list[int] = plan.settings["pins"]
+        self._open = int(plan.settings["pull"] == "up")
+        self._pressed = False
+        self.held = False
+        super().__init__(levels=self._levels())
+
+    def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
+        """Return the edges of a push or its end."""
+        pressed = seen.bumped or self.held
+        if pressed == self._pressed:
+            return []
+        self._pressed = pressed
+        return [Edge(end_ns, pin, level) for pin, level in self._levels().items()]
+
+    def _levels(self) -> dict[int, int]:
+        return dict.fromkeys(self._pins, self._open ^ self._pressed)
+
+
+SWITCH: Final = SensorChip(measures="bump", keys=SwitchKeys, open=Switch, simulate=SimulatedSwitch)
+"""Bumper switches."""

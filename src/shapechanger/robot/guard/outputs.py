@@ -10,8 +10,9 @@ from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.output import (
-    OUTPUT_DRIVERS,
+from shapechanger.robot.drivers.chip import (
+    OUTPUTS,
+    PULSES,
     OutputDriver,
     SharedDevice,
     open_output,
@@ -79,12 +80,6 @@ class Switches:
 # that of a controller whose profile uses a fifth of it.
 _STEP: Final = 0.06
 
-_WHY: Final = {
-    "esc": "its controller waits, brakes or changes direction",
-    "bus_servo": "its bus has a fault and released it",
-    "servo": "it turns no faster than its profile allows",
-}
-
 
 class Applied(NamedTuple):
     """Applied outputs.
@@ -127,7 +122,7 @@ class ActionEstimator:
             return Applied(tuple(actions), "")
         outputs = self._plan.outputs
         reasons = [
-            f"Output {outputs[i].name}: {_WHY.get(outputs[i].driver, 'it does not follow')}."
+            f"Output {outputs[i].name}: {OUTPUTS[outputs[i].driver].differs}."
             for i in sorted(deviating)
         ]
         applied = tuple(self._action(i, value, deviating, has) for i, value in enumerate(actions))
@@ -288,11 +283,6 @@ def errors_noted(failures: list[str], what: str = "") -> Generator[None]:
         failures.append(f"{what}: {words}" if what else words)
 
 
-# Servos on a bus release by their own watchdog when it is silent, or lose their power by the enable
-# pin; talking to them now would only keep them energised.
-_STOPS_ITSELF: Final = ("bus_servo",)
-
-
 def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     """Put every output to rest by opening and closing it, independently of the others.
 
@@ -308,7 +298,7 @@ def make_safe(plan: GuardPlan, hardware: Hardware) -> list[str]:
     failures: list[str] = []
     opened: list[tuple[str, OutputDriver]] = []
     for output in _propelling_first(plan).outputs:
-        if output.driver in _STOPS_ITSELF:
+        if OUTPUTS[output.driver].stops_itself:
             continue
         with errors_noted(failures, f"Output {output.name}"):
             opened.append((output.name, open_output(output, hardware)))
@@ -331,13 +321,13 @@ def preload(plan: GuardPlan, source: str) -> None:
     """
     load(source)
     for output in plan.outputs:
-        if output.driver not in _STOPS_ITSELF:
-            load(OUTPUT_DRIVERS[output.driver])
-    if plan.enable_pin is not None:
-        importlib.import_module("gpiozero")
-    if source != REAL:
-        return
-    for library in ("shapechanger.robot.drivers.lgpio_pins", "gpiozero.pins.lgpio", "smbus2"):
-        # `RealHardware` loads these when it needs them; a robot without pins has no lgpio.
+        OUTPUTS[output.driver]
+        if over := output.settings.get("over"):
+            PULSES[over]
+    # A robot without pins may lack the libraries, which are imported when they are needed.
+    libraries = ("gpiozero",)
+    if source == REAL:
+        libraries += ("shapechanger.robot.drivers.lgpio_pins", "gpiozero.pins.lgpio", "smbus2")
+    for library in libraries:
         with contextlib.suppress(ImportError):
             importlib.import_module(library)

@@ -1,8 +1,8 @@
 """The guard's plan of a robot: its actions, outputs, sensors and limits.
 
-These are the tables of a profile (`shapechanger.robot.profile`), as plain dataclasses, because the
-guard loads nothing but the standard library and its drivers. They cross from the command line to
-the guard as JSON.
+These are the tables of a profile (`shapechanger.robot.profile`), with the bounds that it checks, as
+plain dataclasses: the guard loads nothing but msgspec and its drivers. They cross from the command
+line to the guard as JSON.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
+
+from msgspec import Meta
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,17 +36,17 @@ class ActionPlan:
     """
 
     name: str
-    low: float = -1.0
-    high: float = 1.0
-    rest: float = 0.0
-    slew_per_s: float = math.inf
-    slew_down_per_s: float = math.inf
+    low: Annotated[float, Meta(ge=-1, le=1)] = -1.0
+    high: Annotated[float, Meta(ge=-1, le=1)] = 1.0
+    rest: Annotated[float, Meta(ge=-1, le=1)] = 0.0
+    slew_per_s: Annotated[float, Meta(gt=0)] = math.inf
+    slew_down_per_s: Annotated[float, Meta(gt=0)] = math.inf
     levels: Literal["any", "three"] = "any"
-    threshold: float = 0.33
+    threshold: Annotated[float, Meta(gt=0, le=1)] = 0.33
     propels: bool = False
     one_sided: bool = False
-    unit: str = "1"
-    gain: float = 1.0
+    unit: Literal["1", "deg", "rad", "m", "m/s", "N", "N·m"] = "1"
+    gain: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,14 +109,14 @@ class LimitPlan:
         high_temperature_c: CPU temperature above which the robot stops, °C; 0 to disable.
     """
 
-    deadline_ms: int = 250
-    camera_stale_ms: int = 0
-    bump_hold_ms: int = 750
-    stop_distance_m: float = 0.0
-    stall_s: float = 0.4
-    stall_throttle: float = 0.2
-    low_battery_v: float = 0.0
-    high_temperature_c: float = 0.0
+    deadline_ms: Annotated[int, Meta(ge=20, le=1000)] = 250
+    camera_stale_ms: Annotated[int, Meta(ge=50, le=5000)] = 0
+    bump_hold_ms: Annotated[int, Meta(ge=0, le=60_000)] = 750
+    stop_distance_m: Annotated[float, Meta(ge=0, le=5)] = 0.0
+    stall_s: Annotated[float, Meta(ge=0, le=10)] = 0.4
+    stall_throttle: Annotated[float, Meta(gt=0, le=1)] = 0.2
+    low_battery_v: Annotated[float, Meta(ge=0, le=100)] = 0.0
+    high_temperature_c: Annotated[float, Meta(ge=0, le=120)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,8 +129,8 @@ class StopPlan:
         then: Whether the outputs then hold at rest or are released.
     """
 
-    hold_ms: int = 0
-    ramp_ms: int = 0
+    hold_ms: Annotated[int, Meta(ge=0, le=10_000)] = 0
+    ramp_ms: Annotated[int, Meta(ge=0, le=10_000)] = 0
     then: Literal["hold", "release"] = "hold"
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.sensor import SensorDriver, open_sensor
+from shapechanger.robot.drivers.chip import SensorDriver, open_sensor
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 

@@ -11,12 +11,8 @@ from typing import Final, Literal, NamedTuple
 
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.guard.plan import (
-    ActionPlan,
-    GuardPlan,
-    OutputPlan,
-    SensorPlan,
-)
+from shapechanger.robot.drivers.chip import SENSORS
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan
 
 _INF: Final = math.inf
 # Unit, smallest and largest value of each quantity in `GuardState.quantities`, in the order of the
@@ -57,31 +53,10 @@ def _state_features(plan: GuardPlan) -> list[Feature]:
         for name, (unit, low, high, measures) in _QUANTITIES.items()
         if measures in sources
     ]
-    known += [f for s in plan.sensors if s.measures == "tendons" for f in _tendon_features(s)]
-    return known + [f for s in plan.sensors if s.measures == "joints" for f in _joint_features(s)]
-
-
-def _tendon_features(sensor: SensorPlan) -> list[Feature]:
-    """Return length, speed and tension of each tendon on a servo bus."""
-    most = dict(zip(sensor.settings["tendons"], sensor.settings["most_tensions_n"], strict=True))
-    parts = {name: Element("tendon", name) for name in most}
-    spans = zip(most, sensor.settings["lengths_m"], strict=True)
-    lengths: dict[str, tuple[float, float]] = {
-        name: tuple(span) if span else (-math.inf, math.inf) for name, span in spans
-    }
-    return [
-        *(Feature(f"{n}/length", "m", *ends, element=parts[n]) for n, ends in lengths.items()),
-        *(Feature(f"{name}/speed", "m/s", element=part) for name, part in parts.items()),
-        *(Feature(f"{name}/tension", "N", 0.0, most[name], part) for name, part in parts.items()),
-    ]
-
-
-def _joint_features(sensor: SensorPlan) -> list[Feature]:
-    """Return the angle of each joint, within half a turn of its zero."""
-    names: list[str] = sensor.settings["joints"]
-    return [
-        Feature(f"{name}/angle", "rad", -math.pi, math.pi, Element("joint", name)) for name in names
-    ]
+    for sensor in plan.sensors:
+        if (features := SENSORS[sensor.driver].features) is not None:
+            known += features(sensor)
+    return known
 
 
 def _tendon_spans(outputs: Sequence[OutputPlan]) -> dict[str, tuple[float, str]]:

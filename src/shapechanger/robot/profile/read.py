@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Annotated, Any, Final, Literal, cast
+
+import msgspec
+from msgspec import Meta
 
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.drivers.pulse import PULSE_KEYS
+from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
+from shapechanger.robot.drivers.keys import FilePath, Keys, Text
+from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.pulse import PulsedKeys
+from shapechanger.robot.drivers.servos.settings import ServoBusKeys
 from shapechanger.robot.guard.plan import (
     ActionPlan,
     LimitPlan,
@@ -20,11 +28,143 @@ from shapechanger.robot.guard.plan import (
     SensorPlan,
     StopPlan,
 )
-from shapechanger.robot.profile import schema
 from shapechanger.robot.profile.mistakes import Place, Source, called, choice
 from shapechanger.robot.profile.profile import Profile, ResetStep
-from shapechanger.robot.profile.schema import ProfileKey, Section
+from shapechanger.robot.profile.section import Section, fields_of
 from shapechanger.robot.profile.wiring import PinAllocation, with_servo_bus
+
+DRIVING_PARTS: Final = (
+    "wheels",
+    "left track",
+    "right track",
+    "propeller",
+    "left propeller",
+    "right propeller",
+)
+"""Parts that propel the robot."""
+
+Part = Literal[
+    "",
+    "wheels",
+    "left track",
+    "right track",
+    "propeller",
+    "left propeller",
+    "right propeller",
+    "steering",
+    "rudder",
+    "gear",
+    "bed",
+    "joint",
+    "tendon",
+]
+"""Part that an output may move."""
+
+
+class RobotKeys(Keys, frozen=True, kw_only=True):
+    """Keys of `[robot]`; see `Profile`."""
+
+    name: Text
+    body: Text
+    control_hz: Annotated[float, Meta(ge=1, le=100)] = 20.0
+    calibrated: datetime.date | None = None
+    turn_deg_per_m: Annotated[float, Meta(ge=0, le=10_000)] | None = None
+    turn_deg_per_s: Annotated[float, Meta(ge=0, le=10_000)] | None = None
+
+
+class OutputKeys(Keys, frozen=True, kw_only=True):
+    """Keys of every output; see `OutputPlan`."""
+
+    driver: str
+    part: Part = ""
+    mix: dict[str, Annotated[float, Meta(ge=-10, le=10)]]
+    offset: Annotated[float, Meta(ge=-1, le=1)] = 0.0
+
+
+class SensorKeys(Keys, frozen=True, kw_only=True):
+    """Key of every sensor."""
+
+    driver: str
+
+
+class CommandKeys(Keys, frozen=True, kw_only=True):
+    """Keys of `[limits]` that concern clients and their commands; see `Profile`."""
+
+    max_observation_age_ms: Annotated[int, Meta(ge=20, le=5000)] = 400
+    arming: Literal["person", "anyone"] = "person"
+
+
+class RewardKeys(Keys, frozen=True, kw_only=True):
+    """Keys of `[reward]`; see `Profile.reward`."""
+
+    velocity: Annotated[float, Meta(ge=0, le=1e6)] = 1.0
+    collision: Annotated[float, Meta(ge=-1e6, le=0)] = -10.0
+    stall: Annotated[float, Meta(ge=-1e6, le=0)] = -1.0
+    collision_ends_episode: bool = True
+
+
+class ResetKeys(Keys, frozen=True, kw_only=True):
+    """Keys of a step of the reset routine; see `ResetStep`."""
+
+    values: dict[str, Annotated[float, Meta(ge=-1, le=1)]]
+    seconds: Annotated[float, Meta(gt=0, le=60)]
+
+
+class EnableKeys(Keys, frozen=True, kw_only=True):
+    """Keys of `[enable]`.
+
+    Attributes:
+        pin: Pin that the guard toggles.
+        hold_ms: How long the one-shot holds the line after an edge. The guard toggles the pin at
+            each tick, every 10 ms, and may be a few ms late.
+    """
+
+    pin: Pin
+    hold_ms: Annotated[int, Meta(ge=30, le=1000)] = 100
+
+
+class EmergencyButtonKeys(Keys, frozen=True, kw_only=True):
+    """Key of `[emergency_button]`: pin of a button to ground."""
+
+    pin: Pin
+
+
+class _NumberKeys(Keys, frozen=True, kw_only=True):
+    number: Annotated[int, Meta(ge=0, le=9)] = 0
+
+
+class _DeviceKeys(Keys, frozen=True, kw_only=True):
+    device: FilePath = "/dev/video0"
+
+
+class _PathKeys(Keys, frozen=True, kw_only=True):
+    path: FilePath
+
+
+CAMERAS: Final[Mapping[str, type[Keys]]] = {
+    "picamera2": _NumberKeys,
+    "v4l2": _DeviceKeys,
+    "file": _PathKeys,
+    "pipe": _PathKeys,
+    "pattern": Keys,
+}
+"""Keys of each camera driver."""
+
+TABLES: Final[Mapping[str, tuple[type, ...]]] = {
+    "robot": (RobotKeys,),
+    "action": (ActionPlan,),
+    "output": (OutputKeys,),
+    "sensor": (SensorKeys,),
+    "camera": (CameraPlan,),
+    "limits": (LimitPlan, CommandKeys),
+    "stop": (StopPlan,),
+    "reward": (RewardKeys,),
+    "reset": (ResetKeys,),
+    "enable": (EnableKeys,),
+    "emergency_button": (EmergencyButtonKeys,),
+    "servo_bus": (ServoBusKeys,),
+}
+"""Tables of a profile, with their keys; `action`, `output` and `sensor` hold one table per name."""
 
 _MOST_NAMED: Final = 64  # As in the messages, see `shapechanger.robot.link.messages`.
 _AT: Final = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.DOTALL)
@@ -44,54 +184,60 @@ def read_profile(text: str, path: Path) -> Profile:
     data = _toml(text, path)
     source = Source(path, text)
     for name in data:
-        if name not in schema.TABLES:
-            words = f"a profile has no table or key {choice(name, schema.TABLES)}"
+        if name not in TABLES:
+            words = f"a profile has no table or key {choice(name, TABLES)}"
             raise source.mistake((name,), words)
     root = Section(source, (), data)
     wiring = PinAllocation(source)
-    robot = root.section("robot").read(schema.ROBOT_KEYS)
+    robot: RobotKeys = _table(root, "robot")
     actions = {name: _read_action(name, table) for name, table in _named(root, "action").items()}
     if not actions:
         raise root.mistake("a robot needs an action, such as [action.throttle]", "action")
-    outputs = tuple(_read_output(name, table) for name, table in _named(root, "output").items())
+    outputs = tuple(
+        _read_output(name, table, wiring) for name, table in _named(root, "output").items()
+    )
     _check_mix(source, actions, outputs)
-    outputs = wiring.take_outputs(outputs)
-    sensors = tuple(_read_sensor(name, table) for name, table in _named(root, "sensor").items())
-    for sensor in sensors:
-        wiring.take_sensor(sensor)
+    outputs = wiring.shared(outputs)
+    sensors = tuple(
+        _read_sensor(name, table, wiring) for name, table in _named(root, "sensor").items()
+    )
     camera = _read_camera(root.section("camera")) if "camera" in root else None
-    stop = StopPlan(**root.section("stop").read(schema.STOP_KEYS))
+    stop: StopPlan = _table(root, "stop")
     _check_stop(source, stop, actions, outputs)
-    bus = root.section("servo_bus").read(schema.SERVO_BUS_KEYS) if "servo_bus" in root else None
+    bus: ServoBusKeys | None = _table(root, "servo_bus") if "servo_bus" in root else None
     pins: dict[str, Any] = {}
     if "enable" in root:
-        enable = root.section("enable").read(schema.ENABLE_KEYS)
-        wiring.take_pin(enable["pin"], ("enable", "pin"))
-        pins = {"enable_pin": enable["pin"], "enable_hold_ms": enable["hold_ms"]}
+        enable: EnableKeys = _table(root, "enable")
+        wiring.take(("enable",), enable)
+        pins = {"enable_pin": enable.pin, "enable_hold_ms": enable.hold_ms}
     if "emergency_button" in root:
-        pins["stop_pin"] = root.section("emergency_button").read(schema.EMERGENCY_BUTTON_KEYS)[
-            "pin"
-        ]
-        wiring.take_pin(pins["stop_pin"], ("emergency_button", "pin"))
+        button: EmergencyButtonKeys = _table(root, "emergency_button")
+        wiring.take(("emergency_button",), button)
+        pins["stop_pin"] = button.pin
     hold_ms: int | None = pins.get("enable_hold_ms")
     outputs, sensors = with_servo_bus(source, bus, outputs, sensors, stop, hold_ms)
-    limits = _read_limits(root.section("limits"), robot["control_hz"], camera, sensors)
-    reward = root.section("reward").read(schema.REWARD_KEYS)
+    limits, commands = _read_limits(root.section("limits"), robot.control_hz, camera, sensors)
+    reward: RewardKeys = _table(root, "reward")
     return Profile(
         path=path,
-        **robot,
+        **msgspec.structs.asdict(robot),
         actions=tuple(actions.values()),
         outputs=outputs,
         sensors=sensors,
         camera=camera,
-        max_observation_age_ms=limits.pop("max_observation_age_ms"),
-        arming=limits.pop("arming"),
-        limits=LimitPlan(**limits),
+        limits=limits,
+        **msgspec.structs.asdict(commands),
         stop=stop,
-        reward={name: float(weight) for name, weight in reward.items()},
+        reward={key: float(weight) for key, weight in msgspec.structs.asdict(reward).items()},
         reset=_reset(root, actions),
         **pins,
     )
+
+
+def _table(root: Section, name: str) -> Any:
+    """Return the keys of a table that is there once."""
+    (keys,) = root.section(name).read(*TABLES[name])
+    return keys
 
 
 def _named(root: Section, kind: str) -> dict[str, Section]:
@@ -111,9 +257,8 @@ def _reset(root: Section, actions: Mapping[str, ActionPlan]) -> tuple[ResetStep,
     steps: list[ResetStep] = []
     for i, table in enumerate(cast("list[Any]", tables)):
         section = Section(root.source, ("reset", i), table)
-        step = section.read(schema.RESET_KEYS)
-        values: dict[str, float] = step["values"]
-        for name, value in values.items():
+        (step,) = section.read(ResetKeys)
+        for name, value in step.values.items():
             if name not in actions:
                 words = f"values of {section} name no action: {choice(name, actions)}"
                 raise section.mistake(words, "values", name)
@@ -121,8 +266,8 @@ def _reset(root: Section, actions: Mapping[str, ActionPlan]) -> tuple[ResetStep,
             if not low <= value <= high:
                 words = f"{name} of {section} must be {low:g} to {high:g}, its own caps"
                 raise section.mistake(words, "values", name)
-        filled = tuple(values.get(action.name, action.rest) for action in actions.values())
-        steps.append(ResetStep(filled, step["seconds"]))
+        filled = tuple(step.values.get(action.name, action.rest) for action in actions.values())
+        steps.append(ResetStep(filled, step.seconds))
     return tuple(steps)
 
 
@@ -146,16 +291,11 @@ def _toml(text: str, path: Path) -> dict[str, Any]:
 
 
 def _read_action(name: str, section: Section) -> ActionPlan:
-    """Read one number of a command, which must be able to rest within its caps.
-
-    Args:
-        name: Name of the action.
-        section: Its table.
-    """
-    values = section.read(schema.ACTION_KEYS)
-    lowest = 0.0 if values["one_sided"] else -1.0
-    low: float = lowest if values["low"] is None else values["low"]
-    action = replace(ActionPlan(name), **{**values, "low": low})
+    """Read one number of a command, which must be able to rest within its caps."""
+    action: ActionPlan
+    (action,) = section.read(ActionPlan, given={"name": name})
+    lowest = 0.0 if action.one_sided else -1.0
+    low = action.low if "low" in section else lowest
     if low < lowest:
         raise section.mistake(f"low of {section} must be 0 to 1, because it is one-sided", "low")
     if not low < action.high:
@@ -171,104 +311,61 @@ def _read_action(name: str, section: Section) -> ActionPlan:
         raise section.mistake(words, "slew_down_per_s")
     if action.gain != 1.0 and action.unit == "1":
         raise section.mistake(f"gain of {section} needs a unit, such as unit = 'deg'", "gain")
-    return action
+    return replace(action, low=low)
 
 
-_NOT_GPIOZERO: Final = (
-    "gpiozero makes the pulses of a servo in steps of 200 µs, and 1.4 ms out of a neutral of "
-    "1.5 ms (gpiozero#1209); use the driver servo or esc, over one of "
-    f"{', '.join(schema.OVER_KEY.names)}"
-)
-
-
-def _read_device(
-    section: Section,
-    common: tuple[ProfileKey, ...],
-    drivers: Mapping[str, tuple[ProfileKey, ...]],
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Read an output, a sensor or a camera.
-
-    Args:
-        section: Its table.
-        common: Keys that do not depend on the driver; the first is the driver.
-        drivers: Keys of each driver.
-
-    Returns:
-        The values of the common keys, and the settings of the driver.
-    """
-    keys = drivers[section.value(common[0])]
-    owners = {"the driver": drivers}
-    if drivers is schema.OUTPUT_SETTINGS:
-        owners["the pulse source"] = schema.OVER_SETTINGS
-    if schema.OVER_KEY in keys:
-        keys += schema.OVER_SETTINGS[section.value(schema.OVER_KEY)]
-    values = section.read((*common, *keys), owners)
-    settings = {key.name: values.pop(key.name) for key in keys}
-    return values, settings
-
-
-def _read_output(name: str, section: Section) -> OutputPlan:
-    """Read one motor, servo or controller.
-
-    Args:
-        name: Name of the output.
-        section: Its table.
-    """
+def _read_output(name: str, section: Section, wiring: PinAllocation) -> OutputPlan:
+    """Read one motor, servo or controller."""
     for key in ("driver", "over"):
         written = section.table.get(key)
         if isinstance(written, str) and "gpiozero" in written.lower():
-            words = f"{key} of {section} cannot be {written!r}: {_NOT_GPIOZERO}"
+            words = (
+                f"{key} of {section} cannot be {written!r}: gpiozero makes the pulses of a servo "
+                "in steps of 200 µs, and 1.4 ms out of a neutral of 1.5 ms (gpiozero#1209); use "
+                f"the driver servo or esc, over one of {', '.join(PULSES)}"
+            )
             raise section.mistake(words, key)
-    common, settings = _read_device(section, schema.OUTPUT_KEYS, schema.OUTPUT_SETTINGS)
-    output = OutputPlan(name=name, **common, settings=settings)
-    _check_pulses(section, output)
-    return output
+    kinds = [OUTPUTS[section.chosen("driver", OUTPUTS)].keys]
+    given: dict[str, Any] = {"name": name} if "name" in fields_of(kinds[0]) else {}
+    if issubclass(kinds[0], PulsedKeys):
+        kinds.append(PULSES[section.chosen("over", PULSES)].keys)
+    others = {"the driver": OUTPUTS, "the pulse source": PULSES}
+    common, *parts = section.read(OutputKeys, *kinds, given=given, others=others)
+    for keys in parts:
+        wiring.take(section.place, keys)
+    settings = {key: value for keys in parts for key, value in keys.settings().items()}
+    return OutputPlan(name=name, **msgspec.structs.asdict(common), settings=settings)
 
 
-def _read_sensor(name: str, section: Section) -> SensorPlan:
-    """Read one sensor.
-
-    Args:
-        name: Name of the sensor.
-        section: Its table.
-    """
-    is_encoder = section.table.get("driver") == "as5600"
-    joints = {k for k, v in section.table.items() if is_encoder and isinstance(v, dict)}
-    table = {k: v for k, v in section.table.items() if k not in joints}
-    own = Section(section.source, section.place, table)
-    common, settings = _read_device(own, schema.SENSOR_KEYS, schema.SENSOR_SETTINGS)
-    if is_encoder:
-        by_joint = {k: section.table[k] for k in section.table if k in joints}
-        settings |= _joints(Section(section.source, section.place, by_joint))
-    return SensorPlan(name, **common, measures=schema.MEASURES[common["driver"]], settings=settings)
-
-
-def _joints(sensor: Section) -> dict[str, Any]:
-    """Return names, channels, zeros and directions of all joints, in the order of the file."""
-    if not sensor.table:
-        example = called((*sensor.place, "knee"))
-        raise sensor.mistake(f"{sensor} needs a table for each joint, such as {example}")
-    rows: list[dict[str, Any]] = []
-    users: dict[int, str] = {}
-    for name, joint in sensor.named().items():
-        row = joint.read(schema.JOINT_KEYS)
-        if row["direction"] == 0:
-            raise joint.mistake(f"direction of {joint} must be 1 or -1, not 0", "direction")
-        other = users.setdefault(row["channel"], name)
-        if other != name:
-            words = f"channel {row['channel']} of {joint} is that of {other}, too"
-            raise joint.mistake(words, "channel")
-        rows.append(row)
-    columns = (("channels", "channel"), ("zeros", "zero"), ("directions", "direction"))
-    return {"joints": list(sensor.table)} | {
-        column: [row[key] for row in rows] for column, key in columns
-    }
+def _read_sensor(name: str, section: Section, wiring: PinAllocation) -> SensorPlan:
+    """Read one sensor; where it has a table for each joint, these are its rows."""
+    chip = SENSORS[section.chosen("driver", SENSORS)]
+    given: dict[str, Any] = {}
+    if chip.rows is not None:
+        rows = {
+            key: cast("Any", value)
+            for key, value in section.table.items()
+            if isinstance(value, dict)
+        }
+        nested = Section(section.source, section.place, rows).named()
+        if not nested:
+            example = called((*section.place, "knee"))
+            raise section.mistake(f"{section} needs a table for each joint, such as {example}")
+        given["rows"] = {key: one.read(chip.rows)[0] for key, one in nested.items()}
+        table = {key: value for key, value in section.table.items() if key not in rows}
+        section = Section(section.source, section.place, table)
+    others = {"the driver": SENSORS}
+    common, keys = section.read(SensorKeys, chip.keys, given=given, others=others)
+    wiring.take(section.place, keys)
+    return SensorPlan(name, common.driver, measures=chip.measures, settings=keys.settings())
 
 
 def _read_camera(section: Section) -> CameraPlan:
     """Read the camera."""
-    common, settings = _read_device(section, schema.CAMERA_KEYS, schema.CAMERA_SETTINGS)
-    return CameraPlan(**common, settings=settings)
+    keys = CAMERAS[section.chosen("driver", CAMERAS)]
+    others = {"the driver": CAMERAS}
+    camera, own = section.read(CameraPlan, keys, given={"settings": {}}, others=others)
+    return replace(camera, settings=own.settings())
 
 
 _CAMERA_STALE_MS: Final = 500
@@ -286,7 +383,7 @@ def _read_limits(
     control_hz: float,
     camera: CameraPlan | None,
     sensors: Iterable[SensorPlan],
-) -> dict[str, Any]:
+) -> tuple[LimitPlan, CommandKeys]:
     """Read the limits; refuse those that need something that is missing or too slow.
 
     Args:
@@ -295,8 +392,9 @@ def _read_limits(
         camera: The camera; None without one.
         sensors: The sensors.
     """
-    limits = section.read(schema.LIMIT_KEYS)
-    if limits["deadline_ms"] * control_hz < 1000:
+    limits: LimitPlan
+    limits, commands = section.read(*TABLES["limits"])
+    if limits.deadline_ms * control_hz < 1000:
         words = (
             f"deadline_ms of {section} must be at least {1000 / control_hz:.0f} ms, the time from "
             f"one command to the next at control_hz = {control_hz:g}"
@@ -305,24 +403,18 @@ def _read_limits(
     measured = {sensor.measures for sensor in sensors}
     for name, what in _NEEDS.items():
         if section.table.get(name) and what not in measured:
-            drivers = " or ".join(d for d, m in schema.MEASURES.items() if m == what)
+            drivers = " or ".join(d for d in SENSORS if SENSORS[d].measures == what)
             words = (
                 f"{name} of {section} needs a sensor that measures {what}, such as one with the "
                 f"driver {drivers}"
             )
             raise section.mistake(words, name)
-    limits["camera_stale_ms"] = _camera_stale_ms(section, limits["camera_stale_ms"], camera)
-    return limits
-
-
-def _camera_stale_ms(section: Section, stale_ms: int | None, camera: CameraPlan | None) -> int:
     key = "camera_stale_ms"
     if camera is None:
-        if stale_ms is not None:
+        if key in section:
             raise section.mistake(f"{key} of {section} needs a [camera]", key)
-        return 0
-    if stale_ms is None:
-        stale_ms = _CAMERA_STALE_MS
+        return limits, commands
+    stale_ms = limits.camera_stale_ms or _CAMERA_STALE_MS
     needed_ms = 2000 / camera.fps  # One frame may be lost.
     if stale_ms < needed_ms:
         words = (
@@ -330,30 +422,10 @@ def _camera_stale_ms(section: Section, stale_ms: int | None, camera: CameraPlan 
             f"fps = {camera.fps:g}"
         )
         raise section.mistake(words, key)
-    return stale_ms
+    return replace(limits, camera_stale_ms=stale_ms), commands
 
 
 _NEARLY_ZERO: Final = 1e-9
-# 1 s in µs; a pulse must end before the next one begins.
-_SECOND_US: Final = 1_000_000
-
-
-def _check_pulses(section: Section, output: OutputPlan) -> None:
-    """Refuse a range of duties or pulses that is empty, or a pulse longer than its period."""
-    settings = output.settings
-    if "full" in settings and not settings["start"] < settings["full"]:
-        words = f"start of {section} must be below full, which is {settings['full']:g}"
-        raise section.mistake(words, "start")
-    if output.driver not in PULSE_KEYS:
-        return
-    names = PULSE_KEYS[output.driver]
-    first, middle, last = (settings[name] for name in names)
-    low, high = sorted((first, last))
-    if not low < middle < high:
-        words = f"{names[1]} of {section} must lie between {names[0]} and {names[2]}"
-        raise section.mistake(f"{words}, {low} and {high}", names[1])
-    if high * settings["hz"] >= _SECOND_US:
-        raise section.mistake(f"hz of {section} leaves no time for a pulse of {high} µs", "hz")
 
 
 def _check_mix(
@@ -428,7 +500,7 @@ def _check_stop(
 def _check_rest(source: Source, actions: Mapping[str, ActionPlan], output: OutputPlan) -> None:
     place: Place = ("output", output.name)
     propelled = any(actions[name].propels for name in output.mix)
-    if output.part in schema.DRIVING_PARTS and not propelled:
+    if output.part in DRIVING_PARTS and not propelled:
         words = (
             f"{called(place)} moves the {output.part}, so an action in its mix must have "
             "propels = true"
@@ -448,7 +520,7 @@ def _check_rest(source: Source, actions: Mapping[str, ActionPlan], output: Outpu
 def _drives(actions: Mapping[str, ActionPlan], output: OutputPlan) -> bool:
     """Return whether an output can propel the robot."""
     return (
-        output.driver == "esc"
-        or output.part in schema.DRIVING_PARTS
+        OUTPUTS[output.driver].drives
+        or output.part in DRIVING_PARTS
         or any(actions[name].propels for name in output.mix)
     )

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.pulse import PULSE_KEYS, PulseRange
+from shapechanger.robot.drivers.chip import OUTPUTS
+from shapechanger.robot.drivers.pulse import PulseRange
 from shapechanger.robot.guard.plan import OutputPlan
 
 # A servo must not be driven against its stop while it is jogged. Makers state 500 to 2500 us as the
@@ -33,7 +34,7 @@ class JogResult:
 
 def with_widest_pulses(output: OutputPlan) -> OutputPlan:
     """Return a servo or controller with the widest pulse range, for jogging; its middle stays."""
-    low, _, high = PULSE_KEYS[output.driver]
+    low, _, high = OUTPUTS[output.driver].pulses
     turned = output.settings[low] > output.settings[high]
     ends = (_WIDEST_US, _NARROWEST_US) if turned else (_NARROWEST_US, _WIDEST_US)
     settings = {**output.settings, low: ends[0], high: ends[1]}
@@ -47,7 +48,7 @@ def reading(output: OutputPlan, value: float) -> str:
         output: A servo, a motor controller or a motor.
         value: -1 to 1.
     """
-    if output.driver in PULSE_KEYS:
+    if OUTPUTS[output.driver].pulses:
         return f"{PulseRange.of(output).width_us(value):.0f} µs"
     return f"duty {abs(value) * output.settings['full']:.2f}"
 
@@ -62,7 +63,7 @@ def pulse_changes(output: OutputPlan, found: JogResult) -> dict[str, int]:
     Raises:
         RobotError: If the middle does not lie between the ends.
     """
-    keys, jogged = PULSE_KEYS[output.driver], PulseRange.of(output)
+    keys, jogged = OUTPUTS[output.driver].pulses, PulseRange.of(output)
     widths = [round(jogged.width_us(v)) for v in (found.low, found.middle, found.high)]
     PulseRange(*map(float, widths))  # Checks the order.
     return {f"output.{output.name}.{key}": us for key, us in zip(keys, widths, strict=True)}

@@ -21,6 +21,8 @@ import msgspec
 
 from shapechanger.contract.world import RESTING_V
 from shapechanger.errors import RobotError, WorldError
+from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
+from shapechanger.robot.drivers.switch import SimulatedSwitch
 from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
@@ -174,7 +176,8 @@ class Board:
                 self.camera.break_down(fault)
                 return f"camera {fault or 'well'}"
             case "bumper", bool(down):
-                self._pins.sensors.hold_bumpers(down)
+                for bumper in self._pins.sensors.of_kind(SimulatedSwitch):
+                    bumper.held = down
                 return f"bumper {'down' if down else 'up'}"
             case "stop", bool(down):
                 self._pins.sensors.press_stop(down)
@@ -183,7 +186,8 @@ class Board:
                 self.world.resting_v = RESTING_V if volts is None else volts
                 return f"battery {volts}"
             case "distance", (float() | None) as metres, bool(dead):
-                self._pins.sensors.override_distance(metres, dead=dead)
+                for sensor in self._pins.sensors.of_kind(SimulatedHcsr04):
+                    sensor.override_m, sensor.dead = metres, dead
                 return f"distance {'dead' if dead else metres}"
             case "chip", int(bus), int(address), bool(dead):
                 dead_chips = self._pins.dead_chips

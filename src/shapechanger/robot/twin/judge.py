@@ -10,8 +10,9 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from shapechanger.robot.twin.signals import Levels, Transition
-from shapechanger.robot.twin.wiring import TwinWiring, WiredOutput
+from shapechanger.robot.drivers.simulation import Levels, WiredOutput
+from shapechanger.robot.twin.signals import Transition, apply
+from shapechanger.robot.twin.wiring import TwinWiring
 
 
 class ExpectedCommand(NamedTuple):
@@ -130,7 +131,7 @@ def _moments(
         ends_ns = wiring.power_ends_ns(levels)
         if ends_ns is not None and ends_ns < transition.t:
             yield ends_ns, wiring.read(levels, ends_ns)
-        levels.apply(transition)
+        apply(levels, transition)
         yield transition.t, wiring.read(levels, transition.t)
     ends_ns = wiring.power_ends_ns(levels)
     if ends_ns is not None:

@@ -13,6 +13,8 @@ from typing import Any, Final, Literal, NamedTuple, Protocol
 
 import msgspec
 
+from shapechanger.robot.drivers.simulation import Edge
+
 MAX_MESSAGE: Final = 64 * 1024
 """Size of the largest message in bytes."""
 
@@ -21,20 +23,6 @@ MAX_EDGES: Final = 500
 
 Role = Literal["hardware", "operator", "clock"]
 """A robot's process, a person beside the robot, or a connection that only sleeps."""
-
-
-class Edge(NamedTuple):
-    """A change of an input pin.
-
-    Attributes:
-        t: Time of the change, ns.
-        pin: BCM number.
-        level: Level from then on, 0 or 1.
-    """
-
-    t: int
-    pin: int
-    level: int
 
 
 class Whereabouts(NamedTuple):

@@ -9,17 +9,18 @@ from typing import Any, Literal, Protocol
 
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
-from shapechanger.robot.twin.chips import (
-    Chip,
-    SimulatedAs5600,
-    SimulatedPca9685,
-    Tca9548a,
-    chips_of,
+from shapechanger.robot.drivers.as5600 import SimulatedAs5600, SimulatedJoints
+from shapechanger.robot.drivers.chip import PULSES
+from shapechanger.robot.drivers.simulation import (
+    Edge,
+    Levels,
+    Pulse,
+    PwmChannel,
+    SimulatedChip,
 )
 from shapechanger.robot.twin.messages import (
     ClaimPin,
     DrivePin,
-    Edge,
     HardwareRequest,
     InstructServos,
     PulsePin,
@@ -28,7 +29,7 @@ from shapechanger.robot.twin.messages import (
 )
 from shapechanger.robot.twin.sensors import Surroundings
 from shapechanger.robot.twin.servos.rig import Rig
-from shapechanger.robot.twin.signals import LedgerWriter, Levels, Pulse, PwmChannel
+from shapechanger.robot.twin.signals import LedgerWriter
 from shapechanger.robot.twin.wiring import TwinWiring
 
 
@@ -64,7 +65,7 @@ class PinBoard:
 
     Attributes:
         levels: State of all outputs.
-        sensors: Sensors on input pins.
+        sensors: The sensors.
         rig: Servos on a bus; None without any.
         dead_chips: Bus and address of the chips that do not answer.
 
@@ -76,7 +77,6 @@ class PinBoard:
         self, wiring: TwinWiring, world: World, ledger: LedgerWriter | None, seed: int, now_ns: int
     ) -> None:
         self._wiring = wiring
-        self._chips = chips_of(wiring.plan, world)
         self._ledger = ledger
         self._random = random.Random(f"phase {seed}")
         self._claims: dict[int, _Claim] = {}
@@ -85,9 +85,15 @@ class PinBoard:
         self.sensors = self._surroundings.sensors
         self.rig = self._surroundings.rig
         self.dead_chips: set[tuple[int, int]] = set()
+        self._chips: dict[tuple[int, int], SimulatedChip] = {}
+        for output in wiring.plan.outputs:
+            if over := output.settings.get("over"):
+                # Channels of one board share it.
+                self._chips = {**PULSES[over].chips(output.settings), **self._chips}
+        for sensor in self.sensors.sensors.values():
+            self._chips.update(sensor.chips)
         for address, chip in self._chips.items():
-            if isinstance(chip, SimulatedPca9685):
-                self._update_channels(address, chip)
+            self._update_channels(address, chip)
 
     def advance(self, now_ns: int) -> list[Edge]:
         """Advance the world to a time and return the edges of inputs on the way."""
@@ -166,9 +172,8 @@ class PinBoard:
         Raises:
             UnknownName: If no such joint has an encoder.
         """
-        muxes = [chip for chip in self._chips.values() if isinstance(chip, Tca9548a)]
-        behind = [chip for mux in muxes for chip in mux.channels.values()]
-        encoders = {chip.joint: chip for chip in behind if isinstance(chip, SimulatedAs5600)}
+        joints = self.sensors.of_kind(SimulatedJoints)
+        encoders = {name: one for some in joints for name, one in some.encoders.items()}
         if joint not in encoders:
             raise UnknownName("joint with an encoder", joint, encoders)
         return encoders[joint]
@@ -208,21 +213,18 @@ class PinBoard:
         t, bus, address = request.t, request.bus, request.address
         chip = self._chip(bus, address)
         chip.write(request.register, request.data)
-        if isinstance(chip, Tca9548a):
-            return  # It moves nothing, and hundreds of writes a second would fill the ledger.
+        if not chip.is_logged:
+            return
         at = {"bus": bus, "address": address}
         self._record(t, "i2c", **at, register=request.register, data=request.data, pid=pid)
-        if isinstance(chip, SimulatedPca9685):
-            for channel, pulse in self._update_channels((bus, address), chip):
-                us, hz = round(pulse.us, 3), round(pulse.hz, 3)
-                self._record(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
+        for channel, pulse in self._update_channels((bus, address), chip):
+            us, hz = round(pulse.us, 3), round(pulse.hz, 3)
+            self._record(t, "i2c", **at, channel=channel, us=us, hz=hz, pid=pid)
 
-    def _update_channels(
-        self, at: tuple[int, int], chip: SimulatedPca9685
-    ) -> list[tuple[int, Pulse]]:
+    def _update_channels(self, at: tuple[int, int], chip: SimulatedChip) -> list[tuple[int, Pulse]]:
         """Update the levels of a chip's channels and return those that changed."""
         changed: list[tuple[int, Pulse]] = []
-        for number, pulse in enumerate(chip.channels):
+        for number, pulse in enumerate(chip.pulses):
             channel = PwmChannel(*at, number)
             before = self.levels.channels.get(channel, Pulse(0.0, 0.0))
             if pulse.us != before.us or (pulse.us and pulse.hz != before.hz):
@@ -246,7 +248,7 @@ class PinBoard:
         self._record(t, "pin", pin=pin, duty=duty, hz=hz, pid=pid)
         self.sensors.output_changed(t, pin, duty)
 
-    def _chip(self, bus: int, address: int) -> Chip:
+    def _chip(self, bus: int, address: int) -> SimulatedChip:
         chip = self._chips.get((bus, address))
         if chip is None or (bus, address) in self.dead_chips:
             raise OSError(errno.EREMOTEIO, "no chip answers")

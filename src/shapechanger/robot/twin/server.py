@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 import msgspec
 
 from shapechanger.errors import ShapechangerError
+from shapechanger.robot.drivers.simulation import Edge
 from shapechanger.robot.twin.messages import (
     MAX_EDGES,
     MAX_MESSAGE,
@@ -21,7 +22,6 @@ from shapechanger.robot.twin.messages import (
     ClaimPin,
     ConnectClient,
     DrivePin,
-    Edge,
     HardwareRequest,
     InputEdges,
     InstructServos,

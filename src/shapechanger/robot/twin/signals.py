@@ -1,4 +1,4 @@
-"""Signals of the board: the state of its outputs, and the ledger with all their changes.
+"""Ledger of the board: all changes of its outputs.
 
 The board writes each change of a pin, pulse or chip to one line of the ledger, as JSON.
 
@@ -25,13 +25,14 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.simulation import Levels, Pulse, PwmChannel
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,83 +123,19 @@ def read_ledger(path: str | os.PathLike[str]) -> list[Transition]:
     return sorted(transitions, key=lambda transition: transition.t)
 
 
-class Pulse(NamedTuple):
-    """Servo pulses.
-
-    Attributes:
-        us: Width in microseconds; 0 for none.
-        hz: Frequency, Hz.
-    """
-
-    us: float
-    hz: float
-
-
-class PwmChannel(NamedTuple):
-    """A PWM channel of a chip: bus, address of the chip, number of the channel."""
-
-    bus: int
-    address: int
-    number: int
-
-
-@dataclass(slots=True)
-class Levels:
-    """State of all outputs.
-
-    Attributes:
-        duties: Share of the time at which a pin is high, for each driven pin.
-        pulses: Servo pulses by pin.
-        channels: Pulses by channel of a chip.
-        edges_ns: Time at which a pin last changed between low and high, PWM aside.
-    """
-
-    duties: dict[int, float] = field(default_factory=dict[int, float])
-    pulses: dict[int, Pulse] = field(default_factory=dict[int, Pulse])
-    channels: dict[PwmChannel, Pulse] = field(default_factory=dict[PwmChannel, Pulse])
-    edges_ns: dict[int, int] = field(default_factory=dict[int, int])
-
-    def drive(self, pin: int, duty: float, t: int) -> None:
-        """Drive a pin.
-
-        Args:
-            pin: BCM number.
-            duty: Share of the time at which it is high, 0 to 1.
-            t: Time of the change, ns.
-        """
-        if duty in (0.0, 1.0) and self.duties.get(pin, 0.0) == 1.0 - duty:
-            self.edges_ns[pin] = t
-        self.duties[pin] = duty
-        self.pulses.pop(pin, None)
-
-    def release(self, pin: int) -> None:
-        """Stop driving a pin."""
-        self.duties.pop(pin, None)
-        self.pulses.pop(pin, None)
-
-    def pulse(self, pin: int, pulse: Pulse) -> None:
-        """Send servo pulses on a pin.
-
-        Args:
-            pin: BCM number.
-            pulse: The pulses.
-        """
-        self.duties[pin] = pulse.us * pulse.hz / 1e6
-        self.pulses[pin] = pulse
-
-    def apply(self, transition: Transition) -> None:
-        """Apply one line of the ledger."""
-        pin, us, hz = transition.pin, transition.us, transition.hz
-        if transition.kind == "pin" and pin is not None:
-            if transition.released or transition.duty is None:
-                self.release(pin)
-            else:
-                self.drive(pin, transition.duty, transition.t)
-        elif us is None or hz is None:
-            return
-        elif transition.kind == "pulse" and pin is not None:
-            self.pulse(pin, Pulse(us, hz))
-        elif transition.kind == "i2c":
-            bus, address, channel = transition.bus, transition.address, transition.channel
-            if bus is not None and address is not None and channel is not None:
-                self.channels[PwmChannel(bus, address, channel)] = Pulse(us, hz)
+def apply(levels: Levels, transition: Transition) -> None:
+    """Apply one line of the ledger."""
+    pin, us, hz = transition.pin, transition.us, transition.hz
+    if transition.kind == "pin" and pin is not None:
+        if transition.released or transition.duty is None:
+            levels.release(pin)
+        else:
+            levels.drive(pin, transition.duty, transition.t)
+    elif us is None or hz is None:
+        return
+    elif transition.kind == "pulse" and pin is not None:
+        levels.pulse(pin, Pulse(us, hz))
+    elif transition.kind == "i2c":
+        bus, address, channel = transition.bus, transition.address, transition.channel
+        if bus is not None and address is not None and channel is not None:
+            levels.channels[PwmChannel(bus, address, channel)] = Pulse(us, hz)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 from dynamixel_sdk import PortHandler
+from msgspec.structs import replace
 
 from shapechanger.robot.drivers.servos.bus import ServoBus
 from shapechanger.robot.drivers.servos.health import BusState
@@ -48,7 +48,9 @@ def feetech(name: str, **changes: Any) -> ServoSettings:
 
 def settings(**changes: Any) -> BusSettings:
     """Return the settings of the bus."""
-    return replace(BusSettings("the twin", tuple(servo(name) for name in NAMES)), **changes)
+    return replace(
+        BusSettings(device="the twin", servos=tuple(servo(name) for name in NAMES)), **changes
+    )
 
 
 def of(family: str, **changes: Any) -> BusSettings:

@@ -6,15 +6,22 @@ tensions, which are sent in one packet when all of them are staged.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.chip import OutputChip, SensorChip
+from shapechanger.robot.drivers.keys import Keys
 from shapechanger.robot.drivers.servos.bus import ServoBus
 from shapechanger.robot.drivers.servos.health import BusState
 from shapechanger.robot.drivers.servos.settings import ServoSettings, bus_settings, servo_settings
+from shapechanger.robot.drivers.simulation import WiredOutput
 from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware
+
+if TYPE_CHECKING:  # The guard loads none.
+    from shapechanger.layout import Feature
 
 
 class SharedBus:
@@ -250,3 +257,36 @@ class TendonSensor:
 
     def close(self) -> None:
         """Do nothing: the bus belongs to the outputs."""
+
+
+def _features(sensor: SensorPlan) -> list[Feature]:
+    """Return length, speed and tension of each tendon."""
+    from shapechanger.layout import Element, Feature  # The guard needs no layouts.
+
+    most = dict(zip(sensor.settings["tendons"], sensor.settings["most_tensions_n"], strict=True))
+    parts = {name: Element("tendon", name) for name in most}
+    spans = zip(most, sensor.settings["lengths_m"], strict=True)
+    lengths: dict[str, tuple[float, float]] = {
+        name: tuple(span) if span else (-math.inf, math.inf) for name, span in spans
+    }
+    return [
+        *(Feature(f"{n}/length", "m", *ends, element=parts[n]) for n, ends in lengths.items()),
+        *(Feature(f"{name}/speed", "m/s", element=part) for name, part in parts.items()),
+        *(Feature(f"{name}/tension", "N", 0.0, most[name], part) for name, part in parts.items()),
+    ]
+
+
+BUS_SERVO: Final = OutputChip(
+    keys=ServoSettings,
+    open=TendonOutput,
+    # On a bus, no level of a pin determines its state.
+    wire=lambda plan, rest, duty: lambda levels: WiredOutput(None, True),
+    differs="its bus has a fault and released it",
+    # By its own watchdog when the bus is silent, or without power by the enable pin; talking to it
+    # would only keep it energised.
+    stops_itself=True,
+)
+"""A servo on a bus that winds a tendon."""
+
+TENDONS: Final = SensorChip(measures="tendons", keys=Keys, open=TendonSensor, features=_features)
+"""The tendons of a servo bus."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
-from shapechanger.errors import RobotError, UnknownName
+from msgspec import Meta
+
+from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.keys import Claim, FilePath, KeyMistake, Keys
 from shapechanger.robot.drivers.servos.family import (
     COUNTS_PER_TURN,
     DYNAMIXEL,
@@ -25,6 +27,10 @@ DRIVER: Final = "bus_servo"
 
 _ROUNDING: Final = 1e-9
 """Added to a quotient before rounding down: 3 may come out as 2.9999999999."""
+
+
+ModelName = Literal["XL330-M288", "XL330-M077", "XC330-M288", "XM430-W210", "XM430-W350", "STS3215"]
+"""Name of a model that the driver supports."""
 
 
 class Gears(NamedTuple):
@@ -130,34 +136,19 @@ MODELS: Final[Mapping[str, ServoModel]] = MappingProxyType({one.name: one for on
 """Models that the driver supports, by name."""
 
 
-def model_named(name: str) -> ServoModel:
-    """Return a model by its name.
-
-    Raises:
-        UnknownName: If there is no such model.
-    """
-    if name not in MODELS:
-        raise UnknownName("servo model", name, MODELS)
-    return MODELS[name]
-
-
 def stops_itself(output: OutputPlan) -> bool:
     """Return whether an output is a servo that stops by itself when its bus is silent."""
     return output.driver == DRIVER and MODELS[output.settings["model"]].family.has_watchdog
 
 
-_MOST_WATCHDOG_MS: Final = 127 * WATCHDOG_STEP_MS
-
-
-@dataclass(frozen=True, slots=True)
-class ServoSettings:
-    """A servo and its tendon, as a profile has checked it.
+class ServoSettings(Keys, frozen=True, kw_only=True):
+    """A servo and its tendon.
 
     A tension is that of the current without friction. The gears take some newtons of it when the
     spool winds in, and add as much when the tendon pulls it out; see `Gears.friction_nm`.
 
     Attributes:
-        name: Name of the tendon, such as "FDP".
+        name: Name of the tendon, such as "FDP"; that of its output.
         id: Id on the bus.
         model: Name of its model; see `MODELS`.
         spool_radius_m: Radius at which the tendon leaves the spool, half its thickness included, m.
@@ -168,52 +159,58 @@ class ServoSettings:
         control: Control of its tendon.
         longest_m: With control "length": length beyond the zero at the lowest command, m.
         shortest_m: The same at the highest command, m.
+        zero: Position while the finger is straight, in counts of 1/4096 turn.
     """
 
     name: str
-    id: int
-    model: str
-    spool_radius_m: float
-    most_tension_n: float
-    pretension_n: float
-    homing_n: float
-    direction: int = 1
+    id: Annotated[int, Meta(ge=0, le=253)]
+    model: ModelName
+    spool_radius_m: Annotated[float, Meta(gt=0, le=0.1)]
+    most_tension_n: Annotated[float, Meta(gt=0, le=1000)]
+    pretension_n: Annotated[float, Meta(gt=0, le=1000)]
+    homing_n: Annotated[float, Meta(gt=0, le=1000)] = 3.0
+    direction: Literal[1, -1] = 1
     control: Control = "tension"
-    longest_m: float = 0.0
-    shortest_m: float = 0.0
+    longest_m: Annotated[float, Meta(ge=-1, le=1)] = 0.0
+    shortest_m: Annotated[float, Meta(ge=-1, le=1)] = 0.0
+    zero: Annotated[int, Meta(ge=-1_000_000, le=1_000_000)] = 0
 
     def __post_init__(self) -> None:
-        family = model_named(self.model).family
-        if not 0 <= self.id <= family.most_id:
-            self._refuse(f"its id must be 0 to {family.most_id}, not {self.id}")
-        if self.direction not in (1, -1):
-            self._refuse(f"its direction must be 1 or -1, not {self.direction}")
-        if self.control == "tension" and "tension" not in family.modes:
-            why = f"a {family.name} servo has no control of its current"
-            self._refuse(f"its control must be 'length', not 'tension', because {why}")
+        """Refuse what the model cannot do."""
+        family = self.known.family
+        if self.id > family.most_id:
+            raise KeyMistake("id", f"must be 0 to {family.most_id}, not {self.id}")
         if self.control not in family.modes:
-            raise UnknownName("control of a tendon", self.control, family.modes)
-        if self.control == "length" and not -math.inf < self.shortest_m < self.longest_m < math.inf:
-            words = f"{self.shortest_m:g} and {self.longest_m:g} m"
-            self._refuse(f"control of its length needs shortest_m below longest_m, not {words}")
-        if not 0.0 < self.spool_radius_m < math.inf:  # Also refuses NaN.
-            self._refuse(f"its spool radius must be above 0, not {self.spool_radius_m:g}")
+            why = f"a {family.name} servo has no control of its current"
+            raise KeyMistake("control", f"must be 'length', not 'tension', because {why}")
+        if self.control == "length" and not self.shortest_m < self.longest_m:
+            words = f"must be below longest_m, not {self.shortest_m:g} and {self.longest_m:g} m"
+            raise KeyMistake("shortest_m", f"{words}, for control of the length")
         half = math.pi * self.spool_radius_m
         if not family.has_watchdog and max(-self.shortest_m, self.longest_m) >= half:
-            self._refuse(
-                f"its lengths must be within {half:.4f} m of the zero, half a turn of the spool, "
-                "because it forgets its turns with its power"
+            far = "longest_m" if self.longest_m >= half else "shortest_m"
+            raise KeyMistake(
+                far,
+                f"must be within {half:.4f} m of the zero, half a turn of the spool, because the "
+                "servo forgets its turns with its power",
             )
         least, most = self.newton_per_goal, self.known.most_counts * self.newton_per_goal
-        for label, value in (
-            ("most tension", self.most_tension_n),
-            ("pretension", self.pretension_n),
-            ("tension for homing", self.homing_n),
-        ):
-            if not least <= value <= most:
-                end = f"{most:.0f} N with this spool" if label == "most tension" else f"{most:g} N"
-                self._refuse(f"its {label} must be {least:.2g} to {end}, not {value:g} N")
+        end = f"{most:.0f} N with this spool"
+        for key in ("most_tension_n", "pretension_n", "homing_n"):
+            if not least <= (value := getattr(self, key)) <= most:
+                raise KeyMistake(key, f"must be {least:.2g} to {end}, not {value:g} N")
             most = self.most_tension_n  # Of the others.
+            end = f"{most:g} N"
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings of the output, which has the name."""
+        settings = super().settings()
+        del settings["name"]
+        return settings
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claim of its id."""
+        yield Claim("id", f"id {self.id} of the servo bus")
 
     @property
     def known(self) -> ServoModel:
@@ -305,58 +302,49 @@ class ServoSettings:
         """Name and id for messages."""
         return f"Servo {self.name} (id {self.id})"
 
-    def _refuse(self, why: str) -> None:
-        raise RobotError(f"Servo {self.name!r}: {why}.")
 
-
-@dataclass(frozen=True, slots=True)
-class BusSettings:
-    """A bus and its servos, as a profile has checked it.
+class ServoBusKeys(Keys, frozen=True, kw_only=True):
+    """Keys of a bus.
 
     Attributes:
         device: Serial device, such as "/dev/ttyUSB0".
-        servos: Servos of one family, in the order in which they are read.
         baud: Baud rate; one that the SDK supports.
-        answer_ms: Time for the servos to start an answer, ms. The latency timer of an FTDI adapter
-            must be below: `/sys/bus/usb-serial/devices/ttyUSB0/latency_timer`, by default 16 ms and
-            at best 1 ms.
-        watchdog_ms: Silence after which the servos stop by themselves, ms; a multiple of 20.
-        most_missed: Missed cycles in a row that make a fault.
+        watchdog_ms: Silence after which the servos stop by themselves, ms.
         ramp_ms: Time in which a stop lowers the tensions to the pretension, ms.
+        answer_ms: Time for the servos to start an answer, ms: one silent servo must delay the guard
+            by less than the limit for sensors. The latency timer of an FTDI adapter must be below:
+            `/sys/bus/usb-serial/devices/ttyUSB0/latency_timer`, by default 16 ms and at best 1 ms.
+    """
+
+    device: FilePath = "/dev/ttyUSB0"
+    baud: Annotated[int, Meta(ge=9600, le=4_500_000)] = 1_000_000
+    watchdog_ms: Annotated[int, Meta(ge=20, le=2540, multiple_of=WATCHDOG_STEP_MS)] = 100
+    ramp_ms: Annotated[int, Meta(ge=0, le=10_000)] = 300
+    answer_ms: Annotated[float, Meta(ge=0.1, le=100)] = 3.0
+
+
+class BusSettings(ServoBusKeys, frozen=True, kw_only=True):
+    """A bus and its servos.
+
+    Attributes:
+        servos: Servos of one family, in the order in which they are read.
+        most_missed: Missed cycles in a row that make a fault.
         cut_ms: Time after which a power switch that is not fed has cut the servos' power, ms.
     """
 
-    device: str
     servos: tuple[ServoSettings, ...]
-    baud: int = 1_000_000
-    answer_ms: float = 6.0
-    watchdog_ms: int = 100
     most_missed: int = 5
-    ramp_ms: int = 300
     cut_ms: int = 200
 
     def __post_init__(self) -> None:
-        if not self.servos:
-            raise RobotError(f"The bus at {self.device} needs at least one servo.")
-        for label, values in (
-            ("id", [one.id for one in self.servos]),
-            ("name", [one.name for one in self.servos]),
-        ):
-            value, times = Counter[object](values).most_common(1)[0]
-            if times > 1:
-                raise RobotError(f"The bus at {self.device} has {times} servos of {label} {value}.")
+        """Refuse what the servos cannot do together."""
         names = {one.known.family.name: None for one in self.servos}
         if len(names) > 1:
-            raise RobotError(f"The bus at {self.device} cannot have {' and '.join(names)} servos.")
+            raise KeyMistake("device", f"cannot have {' and '.join(names)} servos together")
         rates = self.family.baud_rates
         if self.baud not in rates:
             words = ", ".join(map(str, rates))
-            raise RobotError(f"No servo has {self.baud} baud; the baud rates are {words}.")
-        if not 20 <= self.watchdog_ms <= _MOST_WATCHDOG_MS or self.watchdog_ms % WATCHDOG_STEP_MS:
-            raise RobotError(
-                f"watchdog_ms must be 20 to {_MOST_WATCHDOG_MS} in steps of 20, "
-                f"not {self.watchdog_ms}."
-            )
+            raise KeyMistake("baud", f"must be one that the servos have, {words}, not {self.baud}")
 
     @property
     def family(self) -> ServoFamily:
@@ -371,23 +359,14 @@ class BusSettings:
 
 
 def servo_settings(plan: OutputPlan) -> ServoSettings:
-    """Return the servo of an output; its name is that of the output.
-
-    Raises:
-        RobotError: If a setting is out of range.
-        UnknownName: If there is no such model.
-    """
-    keys = [field.name for field in fields(ServoSettings) if field.name != "name"]
-    return ServoSettings(plan.name, **{key: plan.settings[key] for key in keys})
+    """Return the servo of an output, which a profile has checked, by the name of the output."""
+    keys = plan.settings.keys() & set(ServoSettings.__struct_fields__)
+    return ServoSettings(name=plan.name, **{key: plan.settings[key] for key in keys})
 
 
 def bus_settings(outputs: Sequence[OutputPlan]) -> BusSettings:
-    """Return the bus of outputs, each of which has its settings.
-
-    Raises:
-        RobotError: If a setting is out of range, or two servos have the same id or name.
-    """
+    """Return the bus of outputs, each of which has its settings."""
     settings = outputs[0].settings
-    keys = [field.name for field in fields(BusSettings) if field.name in settings]
+    keys = settings.keys() & set(BusSettings.__struct_fields__)
     servos = tuple(map(servo_settings, outputs))
     return BusSettings(servos=servos, **{key: settings[key] for key in keys})

@@ -13,13 +13,14 @@ from shapechanger.errors import RobotError
 from shapechanger.robot.check.lamps import BenchLamp
 from shapechanger.robot.check.pins import probed_pin
 from shapechanger.robot.drivers.edges import EdgeInput
+from shapechanger.robot.drivers.simulation import PwmChannel
 from shapechanger.robot.guard.outputs import make_safe
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.judge import time_to_rest
 from shapechanger.robot.twin.robot import Operator, RunningRobot, run_robot
-from shapechanger.robot.twin.signals import PwmChannel, read_ledger
+from shapechanger.robot.twin.signals import read_ledger
 from shapechanger.robot.twin.start import BoardAt, start_board
 from shapechanger.robot.twin.wiring import TwinWiring
 

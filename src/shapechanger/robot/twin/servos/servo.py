@@ -30,7 +30,7 @@ from shapechanger.robot.drivers.servos.family import (
     Register,
 )
 from shapechanger.robot.drivers.servos.registers import ServoReply
-from shapechanger.robot.drivers.servos.settings import model_named
+from shapechanger.robot.drivers.servos.settings import MODELS
 from shapechanger.robot.twin.servos.motor import SimulatedMotor, Tendon
 
 # Reasons of refusals.
@@ -88,13 +88,10 @@ class SimulatedServo:
         deaf: Whether it receives nothing, as without its data line.
         motor: Its motor.
         volts: Voltage of its supply; 0 without power.
-
-    Raises:
-        UnknownName: If there is no such model.
     """
 
     def __init__(self, plan: ServoPlan) -> None:
-        self._model = model = model_named(plan.model)
+        self._model = model = MODELS[plan.model]
         self.plan = plan
         self.family = family = model.family
         self.mute = self.deaf = False

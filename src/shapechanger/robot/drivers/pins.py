@@ -1,4 +1,4 @@
-"""Pins of a Raspberry Pi's header."""
+"""Pins of a Raspberry Pi's header, and how a profile writes them."""
 
 from __future__ import annotations
 
@@ -24,6 +24,18 @@ _POWER_OF_BOARD: Final = (
     | dict.fromkeys((6, 9, 14, 20, 25, 30, 34, 39), "ground")
 )
 _WRITTEN: Final = re.compile(r"(GPIO|BOARD)([0-9]{1,3})")
+
+
+class Pin(int):
+    """BCM number of a pin, 0 to 27; a profile writes 22, "GPIO22" or "BOARD15"."""
+
+
+class OptionalPin(Pin):
+    """A `Pin`, or -1 for none."""
+
+
+NO_PIN: Final = OptionalPin(-1)
+"""Value of an unconnected pin."""
 
 
 def bcm(written: object) -> int:

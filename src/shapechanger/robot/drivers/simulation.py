@@ -1,0 +1,181 @@
+"""Simulations of chips: levels of a board's outputs, edges of its inputs, and interfaces.
+
+The simulation of a chip is in the chip's own module, beside its driver. It is plain Python over
+`shapechanger.contract.world.World`; a twin's board runs it, and no robot does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:  # It needs NumPy, and a guard loads none.
+    from shapechanger.contract.world import Readings
+
+
+class Edge(NamedTuple):
+    """A change of an input pin.
+
+    Attributes:
+        t: Time of the change, ns.
+        pin: BCM number.
+        level: Level from then on, 0 or 1.
+    """
+
+    t: int
+    pin: int
+    level: int
+
+
+class Pulse(NamedTuple):
+    """Servo pulses.
+
+    Attributes:
+        us: Width in microseconds; 0 for none.
+        hz: Frequency, Hz.
+    """
+
+    us: float
+    hz: float
+
+
+class PwmChannel(NamedTuple):
+    """A PWM channel of a chip: bus, address of the chip, number of the channel."""
+
+    bus: int
+    address: int
+    number: int
+
+
+@dataclass(slots=True)
+class Levels:
+    """State of all outputs.
+
+    Attributes:
+        duties: Share of the time at which a pin is high, for each driven pin.
+        pulses: Servo pulses by pin.
+        channels: Pulses by channel of a chip.
+        edges_ns: Time at which a pin last changed between low and high, PWM aside.
+    """
+
+    duties: dict[int, float] = field(default_factory=dict[int, float])
+    pulses: dict[int, Pulse] = field(default_factory=dict[int, Pulse])
+    channels: dict[PwmChannel, Pulse] = field(default_factory=dict[PwmChannel, Pulse])
+    edges_ns: dict[int, int] = field(default_factory=dict[int, int])
+
+    def drive(self, pin: int, duty: float, t: int) -> None:
+        """Drive a pin.
+
+        Args:
+            pin: BCM number.
+            duty: Share of the time at which it is high, 0 to 1.
+            t: Time of the change, ns.
+        """
+        if duty in (0.0, 1.0) and self.duties.get(pin, 0.0) == 1.0 - duty:
+            self.edges_ns[pin] = t
+        self.duties[pin] = duty
+        self.pulses.pop(pin, None)
+
+    def release(self, pin: int) -> None:
+        """Stop driving a pin."""
+        self.duties.pop(pin, None)
+        self.pulses.pop(pin, None)
+
+    def pulse(self, pin: int, pulse: Pulse) -> None:
+        """Send servo pulses on a pin.
+
+        Args:
+            pin: BCM number.
+            pulse: The pulses.
+        """
+        self.duties[pin] = pulse.us * pulse.hz / 1e6
+        self.pulses[pin] = pulse
+
+
+DutyOf = Callable[[Levels, int], float]
+"""Share of the time at which a pin is high, 0 to 1; of an undriven pin by its resistors."""
+
+
+class WiredOutput(NamedTuple):
+    """State of an output.
+
+    Attributes:
+        value: Value from -1 to 1, as its driver takes it; None for a servo or speed controller
+            without pulses or power.
+        at_rest: Whether it is in the state after a stop; a motor with any duty above 0 is not.
+    """
+
+    value: float | None
+    at_rest: bool
+
+
+class SimulatedChip:
+    """A chip at one address of an I2C bus.
+
+    Attributes:
+        is_logged: Whether the ledger has what is written to it.
+    """
+
+    is_logged = True
+
+    @property
+    def pulses(self) -> Sequence[Pulse]:
+        """Pulses of its channels; 0 us for a channel that is off."""
+        return ()
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Read bytes.
+
+        Args:
+            register: Register of the first byte.
+            length: Number of bytes.
+        """
+        raise NotImplementedError
+
+    def write(self, register: int, data: Sequence[int]) -> None:
+        """Write bytes; a chip without settings ignores them.
+
+        Args:
+            register: Register of the first byte.
+            data: The bytes.
+        """
+
+
+I2cChips = Mapping[tuple[int, int], SimulatedChip]
+"""Chips by bus and address."""
+
+
+class SimulatedSensor:
+    """A sensor at a twin's board; a kind overrides what it has.
+
+    Attributes:
+        chips: Its chips on I2C buses.
+        levels: Level of each pin that it drives.
+    """
+
+    def __init__(
+        self, chips: I2cChips | None = None, levels: Mapping[int, int] | None = None
+    ) -> None:
+        self.chips: I2cChips = chips or {}
+        self.levels: Mapping[int, int] = levels or {}
+
+    def edges(self, start_ns: int, end_ns: int, seen: Readings) -> list[Edge]:
+        """Return the edges between two times.
+
+        Args:
+            start_ns: End of the last call.
+            end_ns: Current time.
+            seen: Current state of the world.
+        """
+        return []
+
+    def output_changed(self, t: int, pin: int, level: float) -> list[Edge]:
+        """Return the edges that will follow from an output.
+
+        Args:
+            t: Time, ns.
+            pin: BCM number of the output.
+            level: Its level or duty, 0 to 1.
+        """
+        return []

@@ -1,0 +1,74 @@
+"""Light sensor BH1750 over I2C, as another package would add it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
+
+from msgspec import Meta
+
+from shapechanger.layout import Element, Feature
+from shapechanger.robot.drivers.chip import SensorChip
+from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
+from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
+from shapechanger.robot.guard.plan import SensorPlan
+from shapechanger.robot.hardware import Hardware
+
+if TYPE_CHECKING:
+    from shapechanger.contract.world import World
+
+_MEASURE = 0x10  # Continuously, in steps of 1/1.2 lx.
+_COUNTS_PER_LUX = 1.2
+LUX = 240.0
+"""Light in the twin's world, which has no sun."""
+
+
+class Bh1750Keys(Keys, frozen=True, kw_only=True):
+    """Keys of a BH1750: its I2C bus and its address."""
+
+    bus: BusNumber = 1
+    address: Annotated[int, Meta(ge=0x23, le=0x5C)] = 0x23
+
+    def claims(self) -> Iterator[Claim]:
+        """Return the claims of the bus and the address."""
+        return i2c_claims(self.bus, "address", self.address)
+
+
+class Bh1750:
+    """Light sensor; see `SensorDriver`."""
+
+    def __init__(self, plan: SensorPlan, hardware: Hardware) -> None:
+        self._name, self._address = plan.name, plan.settings["address"]
+        self._bus = hardware.i2c(plan.settings["bus"])
+
+    def read(self, now_ns: int, direction: float) -> dict[str, float]:
+        """Return the light, lx."""
+        with device_errors(f"Sensor {self._name!r}"):
+            high, low = self._bus.read_i2c_block_data(self._address, _MEASURE, 2)
+        return {f"{self._name}/light": (high << 8 | low) / _COUNTS_PER_LUX}
+
+    def close(self) -> None:
+        """Close the bus."""
+        self._bus.close()
+
+
+class SimulatedBh1750(SimulatedChip):
+    """A BH1750 in constant light."""
+
+    def read(self, register: int, length: int) -> list[int]:
+        """Return the measurement."""
+        return list(round(LUX * _COUNTS_PER_LUX).to_bytes(length, "big"))
+
+
+def _simulate(plan: SensorPlan, world: World) -> SimulatedSensor:
+    return SimulatedSensor({(plan.settings["bus"], plan.settings["address"]): SimulatedBh1750()})
+
+
+def _features(plan: SensorPlan) -> list[Feature]:
+    return [Feature(f"{plan.name}/light", "lx", 0.0, 65_535.0, Element("sensor", plan.name))]
+
+
+CHIP = SensorChip(
+    measures="light", keys=Bh1750Keys, open=Bh1750, simulate=_simulate, features=_features
+)

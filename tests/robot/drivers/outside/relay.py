@@ -1,0 +1,55 @@
+"""Relay on a pin, as another package would add it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from shapechanger.robot.drivers.chip import OutputChip
+from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
+from shapechanger.robot.guard.plan import OutputPlan
+from shapechanger.robot.hardware import Hardware
+
+
+class RelayKeys(Keys, frozen=True, kw_only=True):
+    """Keys of a relay: the pin of its coil."""
+
+    pin: Pin
+
+
+class Relay:
+    """Relay that is on above one half; see `OutputDriver`."""
+
+    def __init__(self, plan: OutputPlan, hardware: Hardware) -> None:
+        from gpiozero import DigitalOutputDevice
+
+        with device_errors(f"Output {plan.name!r}"):
+            factory = hardware.pin_factory()
+            self._coil = DigitalOutputDevice(plan.settings["pin"], pin_factory=factory)
+
+    def write(self, value: float, now_ns: int) -> float:
+        """Switch the relay."""
+        self._coil.value = value > 0.5
+        return float(value > 0.5)
+
+    def release(self) -> None:
+        """Switch it off."""
+        self._coil.off()
+
+    def close(self) -> None:
+        """Switch it off and close the pin."""
+        self._coil.off()
+        self._coil.close()
+
+
+def _wired(plan: OutputPlan, rest: float, duty: DutyOf) -> Callable[[Levels], WiredOutput]:
+    def state(levels: Levels) -> WiredOutput:
+        value = duty(levels, plan.settings["pin"])
+        return WiredOutput(value, value == rest)
+
+    return state
+
+
+CHIP = OutputChip(keys=RelayKeys, open=Relay, wire=_wired)

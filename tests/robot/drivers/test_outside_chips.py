@@ -1,0 +1,111 @@
+"""A sensor and an actuator of another package: one file each, and an entry point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from shapechanger.errors import ProfileError, RobotError
+from shapechanger.layout import Layout
+from shapechanger.robot.drivers import chip
+from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS
+from shapechanger.robot.profile import Profile, read_profile, shipped_profiles
+from shapechanger.robot.twin.in_process import InProcessRobot
+from shapechanger.robot.twin.wiring import TwinWiring
+from shapechanger.robot.twin.world.vehicle import DrivingWorld
+from tests.robot.drivers.outside.bh1750 import LUX
+
+_HERE = "tests.robot.drivers.outside"
+_LINES = """
+[action.horn]
+one_sided = true
+
+[output.horn]
+driver = "relay"
+pin = 4
+mix = { horn = 1.0 }
+
+[sensor.sky]
+driver = "bh1750"
+"""
+
+
+def _install(folder: Path, monkeypatch: pytest.MonkeyPatch, entries: str) -> None:
+    """Install a package that consists of entry points."""
+    info = folder / "outside-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: outside\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[shapechanger.drivers]\n{entries}")
+    monkeypatch.syspath_prepend(folder)
+    chip._others.cache_clear()
+
+
+@pytest.fixture
+def _outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    entries = f"bh1750 = {_HERE}.bh1750:CHIP\nrelay = {_HERE}.relay:CHIP\n"
+    _install(tmp_path, monkeypatch, entries)
+    yield
+    chip._others.cache_clear()
+
+
+def _read(lines: str) -> Profile:
+    text = shipped_profiles()["lab-car"].read_text() + lines
+    return read_profile(text, Path("lab-car.toml"))
+
+
+@pytest.mark.usefixtures("_outside")
+def test_chips_of_another_package_are_driven_on_the_twin() -> None:
+    """The state has the light of the sensor, and the pin the value of the actuator."""
+    profile = _read(_LINES)
+    world = DrivingWorld({"wheels", "steering"}, (160, 120), seed=1)
+    robot = InProcessRobot(profile, world, pictures=False)
+    wiring = TwinWiring(profile.guard_plan())
+    names = Layout.from_json(robot.welcome.state_layout).names
+    robot.start()
+    for horn in (1.0, 0.0):
+        seen, _ = robot.step((0.0, 0.0, horn))
+        assert seen.state[names.index("sky/light")] == pytest.approx(LUX)
+        assert seen.action_applied[2] == horn
+        assert wiring.read(robot.pins.levels, robot.now_ns)["horn"] == (horn, horn == 0.0)
+    robot.close()
+
+
+@pytest.mark.usefixtures("_outside")
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"bh1750"', '"bh175"', "not 'bh175' (did you mean 'bh1750'?)"),
+        (
+            '"bh1750"\n',
+            '"bh1750"\naddress = 0x5D\n',
+            "address of [sensor.sky] must be a whole numb",
+        ),
+        ("pin = 4\n", "", "[output.horn] lacks the key 'pin', a BCM pin"),
+        (
+            "pin = 4\n",
+            "pin = 2\n",
+            "by bus of [output.steer] (line 25) and by pin of [output.horn]",
+        ),
+        ("pin = 4\n", "pim = 4\n", "[output.horn] has no key 'pim' (did you mean 'pin'?)"),
+        ('"relay"', '"bh1750"', "not 'bh1750'"),
+    ],
+)
+def test_mistakes_in_their_keys_are_named(old: str, new: str, words: str) -> None:
+    """Keys of another package are checked as ours: with line, reason and nearest spelling."""
+    assert _LINES.count(old) == 1
+    with pytest.raises(ProfileError, match=r"^lab-car\.toml, line \d+: ") as caught:
+        _read(_LINES.replace(old, new))
+    assert words in str(caught.value)
+
+
+def test_an_entry_point_must_name_a_chip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Anything else is refused; a name of ours cannot be replaced."""
+    _install(tmp_path, monkeypatch, f"servo = {_HERE}.relay:CHIP\nlux = {_HERE}.bh1750:LUX\n")
+    with pytest.raises(
+        RobotError, match=r"entry point lux in shapechanger\.drivers must name a Sen"
+    ):
+        list(SENSORS)
+    assert OUTPUTS["servo"].pulses
+    chip._others.cache_clear()
