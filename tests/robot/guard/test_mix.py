@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan, output_values
+from shapechanger.robot.drivers.plan import OutputPlan
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, output_values
 
 _PLAN = GuardPlan(
     "tank",

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.guard import outputs as safe_pins
 from shapechanger.robot.guard import start, supervisor
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, OutputPlan, output_values
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, output_values
 from shapechanger.robot.guard.serve_plan import (
     ServePlan,
     descriptors,

@@ -26,7 +26,7 @@ GIVEN = {"rows", "settings"}  # No keys of a table.
 
 def test_vehicle_of_the_guide_is_a_profile() -> None:
     """The example of the guide is a valid profile."""
-    (text,) = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)
+    (text,) = re.findall(r"```toml\n(\[robot\].*?)```", GUIDE, re.DOTALL)
     assert read(text).body == "hovercraft"
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from shapechanger.errors import RobotError
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.pulse import PulseRange
-from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.setup.calibration import (
     JogResult,
     motor_changes,

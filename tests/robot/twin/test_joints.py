@@ -19,7 +19,8 @@ from shapechanger.robot.drivers.as5600 import (
     connect_encoders,
     open_driver,
 )
-from shapechanger.robot.guard.plan import GuardPlan, SensorPlan
+from shapechanger.robot.drivers.plan import SensorPlan
+from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.twin.in_process import LocalBoard
 from shapechanger.robot.twin.wiring import TwinWiring
 from shapechanger.robot.twin.world.vehicle import DrivingWorld

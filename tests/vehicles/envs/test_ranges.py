@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from shapechanger.errors import SpaceMismatch, UnknownName, WorldError
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
+from shapechanger.robot.drivers.plan import OutputPlan
+from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan
 from shapechanger.vehicles.courses.course import HELD_OUT, HOME
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
 from shapechanger.vehicles.envs.ranges import (

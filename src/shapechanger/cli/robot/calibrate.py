@@ -23,7 +23,7 @@ from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.client.teleop import STOPS, Terminal
 from shapechanger.robot.drivers.chip import OUTPUTS
-from shapechanger.robot.guard.plan import OutputPlan
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.calibration import (

@@ -10,8 +10,9 @@ from typing import Final, NamedTuple
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.check import Finding, judged
 from shapechanger.robot.drivers.chip import open_output
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.guard.outputs import enable_device
-from shapechanger.robot.guard.plan import GuardPlan, OutputPlan
+from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
 SHOWN_S: Final = 0.5

@@ -20,8 +20,8 @@ from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import BusNumber, Claim, KeyMistake, Keys, i2c_claims
+from shapechanger.robot.drivers.plan import SensorPlan
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
-from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware, I2cBus
 
 if TYPE_CHECKING:  # The guard loads neither.

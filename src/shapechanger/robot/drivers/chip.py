@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.simulation import (
     DutyOf,
     I2cChips,
@@ -23,7 +24,6 @@ from shapechanger.robot.drivers.simulation import (
     SimulatedSensor,
     WiredOutput,
 )
-from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware, load
 
 if TYPE_CHECKING:  # The guard loads neither.

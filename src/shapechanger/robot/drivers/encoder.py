@@ -14,8 +14,8 @@ from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import Keys
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin
+from shapechanger.robot.drivers.plan import SensorPlan
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
-from shapechanger.robot.guard.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
 if TYPE_CHECKING:  # Only a twin has a world.

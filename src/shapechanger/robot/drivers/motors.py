@@ -14,8 +14,8 @@ from shapechanger.robot.drivers.duty import Duty
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import KeyMistake, Keys
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
-from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
 

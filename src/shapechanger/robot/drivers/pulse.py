@@ -15,8 +15,8 @@ from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, PulseChannel, Pulse
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import Claim, KeyMistake, Keys
 from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, Pulse
-from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
 _SECOND_US: Final = 1_000_000

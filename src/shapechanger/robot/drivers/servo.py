@@ -10,6 +10,7 @@ from msgspec import Meta
 
 from shapechanger.robot.drivers.chip import OutputChip
 from shapechanger.robot.drivers.errors import device_errors
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.pulse import (
     DEAD_BAND_US,
     PulsedKeys,
@@ -19,7 +20,6 @@ from shapechanger.robot.drivers.pulse import (
     wired_pulse,
 )
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
-from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
 _DEG_PER_VALUE: Final = 90.0  # Assumed travel from end to end, a value of 2: 180 degrees.

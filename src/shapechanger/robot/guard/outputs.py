@@ -17,7 +17,8 @@ from shapechanger.robot.drivers.chip import (
     SharedDevice,
     open_output,
 )
-from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, output_values
+from shapechanger.robot.drivers.plan import OutputPlan
+from shapechanger.robot.guard.plan import GuardPlan, output_values
 from shapechanger.robot.hardware import REAL, Hardware, load
 
 

@@ -8,8 +8,8 @@ from typing import Any, Final, Literal
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OUTPUTS
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.pulse import PulseRange
-from shapechanger.robot.guard.plan import OutputPlan
 
 # A servo must not be driven against its stop while it is jogged. Makers state 500 to 2500 us as the
 # full range of standard servos, and 900 to 2100 us as what most of them reach.

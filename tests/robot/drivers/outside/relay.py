@@ -8,8 +8,8 @@ from shapechanger.robot.drivers.chip import OutputChip
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import Keys
 from shapechanger.robot.drivers.pins import Pin
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
-from shapechanger.robot.guard.plan import OutputPlan
 from shapechanger.robot.hardware import Hardware
 
 

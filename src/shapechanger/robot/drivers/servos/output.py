@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Final
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OutputChip, SensorChip
 from shapechanger.robot.drivers.keys import Keys
+from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.servos.bus import ServoBus
 from shapechanger.robot.drivers.servos.health import BusState
 from shapechanger.robot.drivers.servos.settings import ServoSettings, bus_settings, servo_settings
 from shapechanger.robot.drivers.simulation import WiredOutput
-from shapechanger.robot.guard.plan import OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Hardware
 
 if TYPE_CHECKING:  # The guard loads none.

@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.keys import Claim, FilePath, KeyMistake, Keys
+from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.servos.family import (
     COUNTS_PER_TURN,
     DYNAMIXEL,
@@ -20,7 +21,6 @@ from shapechanger.robot.drivers.servos.family import (
     Control,
     ServoFamily,
 )
-from shapechanger.robot.guard.plan import OutputPlan
 
 DRIVER: Final = "bus_servo"
 """Driver of the outputs and of the sensor of a servo bus, in a profile."""
