@@ -236,11 +236,9 @@ class Section:
 
 def _no_choice(written: Any, names: Iterable[str]) -> str:
     """Return the end of a sentence about a value that is none of several."""
-    return (
-        f"not {written!r}{nearest(written, names)}"
-        if isinstance(written, str)
-        else (f"not {shown(written)}")
-    )
+    if isinstance(written, str):
+        return f"not {written!r}{nearest(written, names)}"
+    return f"not {shown(written)}"
 
 
 def _wrong_weight(weights: dict[str, Any], bounds: Any) -> str:
