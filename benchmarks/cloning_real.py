@@ -55,7 +55,7 @@ from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import DEMOS, Augmentation, CloneSettings
 from shapechanger.demos.dataset import Dataset, load_dataset
-from shapechanger.transfer.learners.cloning import record_demonstrations
+from shapechanger.vehicles.cloning import record_demonstrations
 from shapechanger.vehicles.envs.demonstrators import CLONES
 
 SPLITS: Final = 5

@@ -29,10 +29,11 @@ from shapechanger.files import read_json
 from shapechanger.finger.env import SMOOTHNESS
 from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.policies import POLICIES
+from shapechanger.policy import load_policy
 from shapechanger.reports.numbers import share_text
 from shapechanger.transfer.executor import Processes
 from shapechanger.transfer.learners.evaluation import evaluation_seed
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
 from shapechanger.transfer.runs import RunResult, load_result

@@ -23,8 +23,9 @@ from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.files import write_atomic
 from shapechanger.finger.gap import GAPS
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import PpoSettings

@@ -18,7 +18,7 @@ from shapechanger.finger.identify.result import replay
 from shapechanger.finger.parameters import FingerParameters
 from shapechanger.finger.plant import CONTROL_DT
 from shapechanger.finger.policies import POLICIES
-from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.policy import load_policy
 
 _SECONDS = 10.0
 # Exactly one tick of the guard, on the twin's clock.

@@ -24,9 +24,9 @@ from scipy import stats
 from benchmarks.row import Row
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body
 from shapechanger.files import read_json, write_json
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
-from shapechanger.transfer.learners.policy_file import load_policy, save_policy
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import LimbSettings

@@ -35,8 +35,9 @@ from benchmarks.row import Row
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.warp.devices import on, wp
 from shapechanger.morphology import Stretch
+from shapechanger.policy import save_policy
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, save_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import learner_settings
 
 GPU: Final = torch.cuda.is_available()

@@ -22,6 +22,7 @@ from benchmarks.row import Row, asked
 from shapechanger.cli.env_arguments import default_learner
 from shapechanger.contract.env_ref import EnvRef, measures_of
 from shapechanger.files import read_json, write_atomic, write_json
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,
@@ -30,7 +31,6 @@ from shapechanger.transfer.learners.evaluation import (
     random_actions,
     zero_actions,
 )
-from shapechanger.transfer.learners.policy_file import load_policy, save_policy
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import Sb3Settings

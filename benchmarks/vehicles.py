@@ -21,7 +21,8 @@ from benchmarks.driving import LIMIT_S, METRES, Act, DriveScore, drive
 from benchmarks.row import Row, asked
 from shapechanger.cli.train import Train
 from shapechanger.demos.cloning.policy import CameraPolicy
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
+from shapechanger.policy import load_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.vehicles.bodies import VEHICLES
 from shapechanger.vehicles.courses.course import HELD_OUT
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv

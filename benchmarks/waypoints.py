@@ -37,10 +37,9 @@ from shapechanger.demos.drivers import DriverDecision, ExpertPilot, record_steps
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import run_robot
-from shapechanger.transfer.learners.cloning import record_demonstrations, state_actions
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.transfer.learners.sb3 import use_one_thread
-from shapechanger.transfer.learners.settings import CloningSettings
+from shapechanger.vehicles.cloning import CloningSettings, record_demonstrations, state_actions
 from shapechanger.vehicles.courses.course import FLOODED, HELD_OUT
 from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
 from shapechanger.vehicles.envs.demonstrators import CLONES

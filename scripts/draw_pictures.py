@@ -28,7 +28,7 @@ from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.files import read_json
 from shapechanger.finger.controller import FingerController
 from shapechanger.finger.policies import POLICIES
-from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.policy import load_policy
 from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import STUDY_FILE, Study
 from shapechanger.vehicles.courses.course import FLOODED

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any, Final
 from shapechanger.envs.catalogue import register_all
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
+from shapechanger.registry import LEARNERS, METHODS, POLICIES
 
 if TYPE_CHECKING:
     from shapechanger.contract.testing import examine
@@ -70,10 +71,9 @@ if TYPE_CHECKING:
         reshape,
     )
     from shapechanger.morphology.certificate import Certificate, certify
+    from shapechanger.policy import load_policy, save_policy
     from shapechanger.robot.client.client import RobotClient
     from shapechanger.transfer import BodyMap, TransferTask
-    from shapechanger.transfer.learners.policy_file import save_policy
-    from shapechanger.transfer.policies import load_policy
     from shapechanger.transfer.study import make_plan, run_study
     from shapechanger.transfer.transplant import transplant
 
@@ -144,16 +144,53 @@ _MODULES: Final = {
         "register_edit",
     ),
     "morphology.certificate": ("Certificate", "certify"),
+    "policy": ("load_policy", "save_policy"),
     "robot.client.client": ("RobotClient",),
     "transfer": ("BodyMap", "TransferTask"),
-    "transfer.learners.policy_file": ("save_policy",),
-    "transfer.policies": ("load_policy",),
     "transfer.study": ("make_plan", "run_study"),
     "transfer.transplant": ("transplant",),
 }
 _LAZY: Final = {name: module for module, names in _MODULES.items() for name in names}
 
 register_all()
+_BASIC: Final = "transfer.methods.basic"
+METHODS.ship(
+    {
+        "scratch": f"{_BASIC}:Scratch",
+        "zero-shot": f"{_BASIC}:ZeroShot",
+        "fine-tune": f"{_BASIC}:FineTune",
+        "frozen-trunk": "transfer.methods.frozen_trunk:FrozenTrunk",
+        "rehearsal": "transfer.methods.rehearsal:Rehearsal",
+        "kickstart": "transfer.methods.kickstart:Kickstart",
+        "evolution": "transfer.methods.evolution:Evolution",
+        "prefilled-replay": "transfer.methods.replay:PrefilledReplay",
+        "off-dynamics": "transfer.methods.replay:OffDynamics",
+        "shuffled-map": "transfer.methods.shuffled_map:ShuffledMap",
+        "randomised": "transfer.methods.adapted_source:Randomised",
+        "identified": "transfer.methods.adapted_source:Identified",
+        "generalist": "transfer.methods.generalist:Generalist",
+    }
+)
+_SETTINGS: Final = "transfer.learners.settings"
+LEARNERS.ship(
+    {
+        "ppo": f"{_SETTINGS}:PpoSettings",
+        "ppo-limbs": f"{_SETTINGS}:LimbSettings",
+        "rsl-ppo": f"{_SETTINGS}:RslPpoSettings",
+        "rsl-limbs": f"{_SETTINGS}:RslLimbSettings",
+        "off-policy": f"{_SETTINGS}:OffPolicySettings",
+        "imported": f"{_SETTINGS}:ImportedSettings",
+        "cloning": "vehicles.cloning:CloningSettings",
+    }
+)
+POLICIES.ship(
+    {
+        "trained": "transfer.learners.policy_file:TrainedPolicy.load",
+        "trained-onnx": "transfer.onnx_policy:OnnxPolicy",
+        "clone": "demos.cloning.policy:CameraPolicy.load",
+        "clone-onnx": "demos.cloning.onnx_policy:OnnxClone",
+    }
+)
 
 
 def __getattr__(name: str) -> Any:

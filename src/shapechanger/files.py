@@ -132,9 +132,19 @@ def read_json(path: Path, kind: type[_T], remedy: str) -> _T:
         CorruptStudy: If the file cannot be read or has other content.
     """
     try:
-        return msgspec.json.decode(path.read_bytes(), type=kind)
+        return msgspec.json.decode(path.read_bytes(), type=kind, dec_hook=from_builtins)
     except (OSError, msgspec.MsgspecError, ValueError) as error:
         raise CorruptStudy(f"{path} cannot be read ({error}): {remedy}.") from error
+
+
+def from_builtins(kind: Any, value: Any) -> Any:
+    """Read a value whose class says how, by `from_builtins`: a `dec_hook` of msgspec.
+
+    Args:
+        kind: The class.
+        value: What JSON holds.
+    """
+    return kind.from_builtins(value)
 
 
 def cannot_write(path: Path, error: OSError) -> OutputError:

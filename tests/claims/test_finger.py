@@ -13,7 +13,8 @@ import shapechanger  # noqa: F401 - Registers the ids.
 from shapechanger.finger.controller import FingerController
 from shapechanger.finger.policies import POLICIES
 from shapechanger.finger.tensions import DRIVES
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy
+from shapechanger.policy import load_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 
 FINGER = "shapechanger/Finger-v1"
 TRACK = "shapechanger/FingerTrack-v1"

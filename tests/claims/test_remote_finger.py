@@ -18,9 +18,9 @@ from shapechanger.finger.identify.result import PATH_DELAY_ERROR_S
 from shapechanger.finger.parameters import NOMINAL, FingerParameters
 from shapechanger.finger.paths import as_path
 from shapechanger.finger.policies import POLICIES
+from shapechanger.policy import load_policy
 from shapechanger.robot.profile.load import find_profile
 from shapechanger.robot.twin.robot import RunningRobot, run_robot
-from shapechanger.transfer.learners.policy_file import load_policy
 from tests.robot.twin.robots import until
 
 Env = gym.Env[Any, Any]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.policy import load_policy
 from shapechanger.transfer.onnx_policy import OnnxPolicy
 
 _TINY = [

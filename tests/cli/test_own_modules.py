@@ -40,7 +40,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The current folder, which an installed program does not search for modules."""
     found = [path for path in sys.path if path not in ("", str(Path.cwd()))]
     monkeypatch.setattr(sys, "path", found)
-    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

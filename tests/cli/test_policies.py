@@ -17,7 +17,7 @@ from torch import nn
 
 from shapechanger.cli import main
 from shapechanger.finger.policies import POLICIES
-from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.policy import load_policy
 from shapechanger.transfer.learners.settings import OffPolicySettings
 from shapechanger.vehicles.envs.demonstrators import CLONES
 

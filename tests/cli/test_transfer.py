@@ -17,7 +17,7 @@ import pytest
 
 from shapechanger.cli import main, pictures
 from shapechanger.errors import OutputError
-from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.policy import load_policy
 from tests.envs.own_robots import DOG
 
 pytestmark = pytest.mark.system

@@ -31,7 +31,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.syspath_prepend(str(folder))
-        patch.setattr("shapechanger.transfer.methods._registered", {})
+        patch.setattr("shapechanger.registry.METHODS._registered", {})
         study_of(plan_of("cliown", task=task_of("cliown")), Path("suite", "a-to-b"))
         forget("cliown")
     return folder
@@ -42,7 +42,7 @@ def folder(done: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """That folder, as an installed program sees it: modules are not looked for there."""
     monkeypatch.chdir(done)
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each not in ("", str(done))])
-    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
     forget("cliown")
     return done
 
@@ -86,7 +86,7 @@ def test_a_suite_is_watched_with_own_methods(
     main(["suite", "watch", "suite"])
     assert "a-to-b" in capsys.readouterr().out
     monkeypatch.setattr(sys, "path", [each for each in sys.path if each != str(folder)])
-    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
     forget("cliown")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit):

@@ -13,7 +13,7 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.pictures import Framing
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.transfer.learners.settings import CloningSettings
+from shapechanger.vehicles.cloning import CloningSettings
 
 _ROWS, _COLUMNS = 12, 20
 HELD_OUT: Final = 1_000

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
-from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
-from shapechanger.transfer.learners.cloning import CloneLearner
+from shapechanger.transfer.learners import PolicyOrigin
 from shapechanger.transfer.learners.presets import learner_settings
-from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import TransferTask
 from shapechanger.transfer.study import make_plan
+from shapechanger.vehicles.cloning import CloneLearner, CloningSettings
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.transfer.lane import LANE, TINY_CLONING
 from tests.transfer.studies import BIG
@@ -27,19 +24,6 @@ def test_envs_without_a_demonstrator_are_refused(order: int) -> None:
         StudyError, match=r"InvertedPendulum-v1 has no camera and no demonstrator, and cloning"
     ):
         make_plan(task, "cloning", TINY_CLONING, seeds=2)
-
-
-def test_a_callback_is_refused(tmp_path: Path) -> None:
-    """Cloning takes no callback of Stable-Baselines3."""
-    with pytest.raises(StudyError, match="cloning takes no callback of Stable-Baselines3"):
-        CloneLearner("cloning", TINY_CLONING).train(
-            LANE,
-            30,
-            0,
-            demonstrations=DemonstrationFile(tmp_path / "shown.npz", 0),
-            callback=object(),
-            on_evaluation=lambda evaluation: None,
-        )
 
 
 @pytest.mark.parametrize("vehicle", CLONES)

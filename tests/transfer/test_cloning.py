@@ -9,22 +9,23 @@ import msgspec
 import numpy as np
 import pytest
 
+from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
+from shapechanger.files import from_builtins
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners import DemonstrationFile, cloning
-from shapechanger.transfer.learners.cloning import (
-    CloneLearner,
-    Demonstrations,
-    load_or_record,
-    record_demonstrations,
-)
-from shapechanger.transfer.learners.evaluation import Evaluation, evaluation_envs
+from shapechanger.transfer.learners import SharedFile
+from shapechanger.transfer.learners.evaluation import Evaluation
 from shapechanger.transfer.learners.presets import LEARNERS, learner_settings
-from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import ARMS, Plan, TransferTask
 from shapechanger.transfer.report.study import study_html
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
+from shapechanger.vehicles import cloning
+from shapechanger.vehicles.cloning import (
+    CloneLearner,
+    CloningSettings,
+    record_demonstrations,
+)
 from tests.transfer.lane import HELD_OUT, LANE, SLIPPERY, TINY_CLONING
 from tests.transfer.studies import BIG
 
@@ -91,7 +92,7 @@ def _cloned(
         LANE,
         steps,
         5,
-        demonstrations=DemonstrationFile(folder / "shown.npz", 6),
+        demonstrations=SharedFile(folder / "shown.npz", 6),
         start=start,
         only_last=only_last,
         on_evaluation=found.append,
@@ -136,20 +137,18 @@ def test_rehearsal_starts_from_the_source_and_learns_from_both(
         assert [e.steps for e in rehearsed.curve] == [0, 30, 60, 120]
         assert rehearsed.curve[0] == tuned.curve[0]
     shown = folder / "demonstrations"
-    source = load_or_record(
-        DemonstrationFile(shown / "source-0.npz", 0), LANE, 60, TINY_CLONING.episode_steps, _FRAMING
-    )
+    source = LANE, 60, SharedFile(shown / "source-0.npz", 0)
     first = study.of("rehearsal")[0]
 
-    def curve(rehearsal: Demonstrations | None) -> list[Evaluation]:
+    def curve(rehearsed: tuple[EnvRef, int, SharedFile] | None) -> list[Evaluation]:
         found: list[Evaluation] = []
         _LEARNER.train(
             SLIPPERY,
             120,
             first.seed,
-            demonstrations=DemonstrationFile(shown / "scratch-0.npz", 0),
+            demonstrations=SharedFile(shown / "scratch-0.npz", 0),
             start=CameraPolicy.load(folder / "runs" / "source-0" / "policy.safetensors"),
-            rehearsal=rehearsal,
+            rehearsed=rehearsed,
             on_evaluation=found.append,
         )
         return found
@@ -174,7 +173,7 @@ def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_clones_are_evaluated_on_held_out_courses() -> None:
     """Evaluations are on held-out courses, with the settings' number of steps."""
-    envs = evaluation_envs(LANE, TINY_CLONING)
+    envs = _LEARNER.evaluation_envs(LANE)
     try:
         assert len(envs) == 2
         for env in envs:
@@ -268,6 +267,6 @@ def test_the_learner_is_found_by_name() -> None:
     assert isinstance(settings, CloningSettings)
     assert settings is LEARNERS["cloning"]
     plan = _plan()
-    again = msgspec.json.decode(msgspec.json.encode(plan), type=Plan)
+    again = msgspec.json.decode(msgspec.json.encode(plan), type=Plan, dec_hook=from_builtins)
     assert again == plan
     assert isinstance(again.settings, CloningSettings)

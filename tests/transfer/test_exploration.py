@@ -11,9 +11,10 @@ import pytest
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.learners import ignore
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.sb3 import START_LOG_STD, Sb3Learner
 from shapechanger.transfer.learners.settings import Sb3Settings
 from tests.transfer.studies import BIG, SMALL, TINY

@@ -11,14 +11,14 @@ import pytest
 from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy, SpaceMismatch, StudyError
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners import DemonstrationFile
-from shapechanger.transfer.learners.cloning import CloneLearner
-from shapechanger.transfer.learners.policy_file import load_policy, save_policy
+from shapechanger.transfer.learners import SharedFile
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.metrics import Summary, summarise
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 from shapechanger.transfer.study import make_plan, run_study
+from shapechanger.vehicles.cloning import CloneLearner
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 from tests.transfer.studies import SMALL, TINY, tiny_plan
 
@@ -31,7 +31,7 @@ def clone_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         DRY,
         40,
         3,
-        demonstrations=DemonstrationFile(folder / "shown.npz", 3),
+        demonstrations=SharedFile(folder / "shown.npz", 3),
         on_evaluation=lambda evaluation: None,
     )
     policy.save(folder / "dry.safetensors")

@@ -16,13 +16,15 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import MlpPolicy
 
 from shapechanger.errors import CorruptStudy, StudyError, UnknownName
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.export import export_onnx
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import resolve_learner
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import ImportedSettings, OffPolicySettings, Sb3Settings
-from shapechanger.transfer.onnx_policy import OnnxPolicy, export_onnx
+from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.study import run_study
 from tests.transfer.studies import BIG, SMALL, tiny_plan
 
@@ -248,10 +250,3 @@ def test_a_training_that_diverges_is_refused() -> None:
     """Weights of NaN raise a StudyError."""
     with pytest.raises(StudyError, match="diverged after"):
         trained(f"{HERE}:Unstable")
-
-
-def test_learners_by_trial_rehearse_nothing() -> None:
-    """Demonstrations of the source are refused before anything is trained."""
-    learner = Sb3Learner("sac", settings_of("sac"))
-    with pytest.raises(StudyError, match="sac learns by trial and rehearses no demonstrations"):
-        learner.train(SMALL, 32, 0, rehearsal=object(), on_evaluation=_ignore)

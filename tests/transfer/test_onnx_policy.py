@@ -12,9 +12,10 @@ import onnx
 import pytest
 
 from shapechanger.errors import CorruptStudy, StudyError
+from shapechanger.policy import load_policy
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners.policy_file import load_policy
-from shapechanger.transfer.onnx_policy import OnnxPolicy, export_onnx
+from shapechanger.transfer.export import export_onnx
+from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.plan import Run
 from shapechanger.transfer.study import run_study
 from tests.transfer.studies import TINY, TINY_NORMALISED, tiny_plan

@@ -11,8 +11,10 @@ import shapechanger
 from shapechanger.demos.cloning.onnx_policy import OnnxClone, export_clone
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.onnx_policy import OnnxPolicy, export_onnx
+from shapechanger.policy import load_policy, save_policy
+from shapechanger.transfer.export import export_onnx
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
+from shapechanger.transfer.onnx_policy import OnnxPolicy
 from shapechanger.transfer.references import reference_policy
 from shapechanger.vehicles.envs.demonstrators import CLONES
 

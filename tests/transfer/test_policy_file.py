@@ -19,9 +19,9 @@ import shapechanger
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import CorruptStudy
 from shapechanger.finger.policies import POLICIES
-from shapechanger.tensor_file import tensor_bytes
+from shapechanger.policy import load_policy, save_policy, tensor_bytes
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
 from tests.transfer.studies import SMALL, TINY, TINY_NORMALISED

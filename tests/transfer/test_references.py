@@ -8,8 +8,8 @@ from shapechanger.cli.env_arguments import default_learner
 from shapechanger.contract.env_ref import EnvRef, measures_of
 from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.errors import UnknownName
+from shapechanger.policy import load_policy
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
-from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.references import FOLDER, load_references, reference_of, reference_policy
 
 REFERENCES = load_references()

@@ -14,9 +14,9 @@ import torch
 import shapechanger
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.policy_file import load_policy, save_policy
 from shapechanger.transfer.learners.rsl import RslLearner, RslVecEnv
 from shapechanger.transfer.learners.settings import RslPpoSettings
 from shapechanger.transfer.plan import TransferTask
@@ -47,9 +47,7 @@ def test_a_short_training_balances_longer(tmp_path: Path) -> None:
     found: list[Evaluation] = []
     counted: list[int] = []
     learner = learner_of("rsl-ppo", SETTINGS)
-    policy = learner.train(
-        PENDULUM, 2048, 0, demonstrations=None, on_evaluation=found.append, on_steps=counted.append
-    )
+    policy = learner.train(PENDULUM, 2048, 0, on_evaluation=found.append, on_steps=counted.append)
     assert [evaluation.steps for evaluation in found] == [0, 2048]
     assert counted == list(range(8, 2049, 8))
     assert found[-1].mean_return > 2.0 * found[0].mean_return

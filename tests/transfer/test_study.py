@@ -29,8 +29,8 @@ from shapechanger.errors import (
 )
 from shapechanger.files import read_json
 from shapechanger.layout import Feature, Layout
+from shapechanger.policy import load_policy
 from shapechanger.transfer.executor import Job, OnProgress, Serial
-from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.plan import ARMS, Run, TransferTask
 from shapechanger.transfer.study import (
     STUDY_FILE,

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from shapechanger.errors import ForeignStudy
-from shapechanger.transfer.learners.policy_file import load_policy
+from shapechanger.policy import load_policy
 from shapechanger.transfer.plan import Run
 from shapechanger.transfer.runs import load_result, perform_run
 from shapechanger.transfer.suite import merge_study, open_study_folder
@@ -35,7 +35,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.syspath_prepend(str(folder))
-        patch.setattr("shapechanger.transfer.methods._registered", {})
+        patch.setattr("shapechanger.registry.METHODS._registered", {})
         study_of(plan_of("shared"), Path("study"))
         forget("shared")
     return folder
@@ -48,7 +48,7 @@ def copied(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(done, folder)
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend(str(folder))
-    monkeypatch.setattr("shapechanger.transfer.methods._registered", {})
+    monkeypatch.setattr("shapechanger.registry.METHODS._registered", {})
     forget("shared")
     return folder
 

@@ -12,7 +12,8 @@ from shapechanger.cli.main import main
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.errors import StudyError
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, save_policy
+from shapechanger.policy import save_policy
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.sb3 import Sb3Learner
 from shapechanger.transfer.learners.settings import PpoSettings
 from shapechanger.vehicles.learning import STUDENT_CLONING, train_student

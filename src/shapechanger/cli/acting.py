@@ -11,16 +11,14 @@ from shapechanger.cli.console import say
 from shapechanger.cli.env_arguments import allow_own_modules
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.identity import identify_env
+from shapechanger.policy import load_policy
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv
-from shapechanger.transfer.learners.settings import LimbSettings
-from shapechanger.transfer.policies import load_policy
-from shapechanger.transfer.versions import ENV, require_same_env
+from shapechanger.transfer.identities import ENV, require_same_env
 
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Act
     from shapechanger.transfer.learners.policy_file import PolicyCard
     from shapechanger.transfer.onnx_policy import OnnxCard
-    from shapechanger.transfer.policies import AnyPolicy
 
 
 def acting_in(
@@ -56,7 +54,7 @@ def acting_in(
     return env, policy.act
 
 
-def load_any_policy(file: Path, learner: str = "") -> AnyPolicy:
+def load_any_policy(file: Path, learner: str = "") -> Any:
     """Load a policy of any kind, which may name a learner of the user's own.
 
     Args:
@@ -72,7 +70,8 @@ def load_any_policy(file: Path, learner: str = "") -> AnyPolicy:
 
 def _fitting(env: gym.Env[Any, Any], card: PolicyCard | OnnxCard) -> gym.Env[Any, Any]:
     """Return an env with a policy's layouts, through the body map of same names if needed."""
-    if isinstance(settings := getattr(card, "settings", None), LimbSettings):
+    settings: Any = getattr(card, "settings", None)
+    if settings is not None and "many bodies" in settings.takes:
         from shapechanger.transfer.limbs.envs import fitted
 
         return fitted(env, card.observation, settings.room)

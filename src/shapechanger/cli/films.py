@@ -15,7 +15,6 @@ from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, measures_of
 from shapechanger.envs.catalogue import CATALOGUE
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act
-from shapechanger.transfer.learners.settings import CloningSettings
 from shapechanger.transfer.plan import SOURCE, Run
 from shapechanger.transfer.report.suite import FilmStrip
 from shapechanger.transfer.report.verdict import finals
@@ -116,13 +115,13 @@ def view_distance(env_ref: EnvRef) -> float:
 def _scenes(study: Study, folder: Path, given: Path | None) -> list[_Scene]:
     plan = study.plan
     learner = learner_of(plan.learner, plan.settings)
-    drives = isinstance(plan.settings, CloningSettings)
+    drives = "demonstrations" in plan.settings.takes
     scenes: list[_Scene] = []
 
     def policy(run: Run) -> Act:
         file = given if given is not None and run.kind == SOURCE else run.policy_file(folder)
         loaded = learner.load(file)
-        return loaded.predict_many if drives else loaded.act
+        return loaded.act
 
     trained = bool(study.of(SOURCE))
     has_source = trained or given is not None

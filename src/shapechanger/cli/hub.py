@@ -159,10 +159,9 @@ class PullDemonstrations:
 def _described_policy(file: Path) -> dict[str, Any]:
     """Load a policy, which checks its hash, and return what its card says."""
     from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.transfer.learners.cloning import is_clone
-    from shapechanger.transfer.learners.policy_file import load_policy
+    from shapechanger.policy import kind_of, load_policy
 
-    if is_clone(file):
+    if kind_of(file) == "clone":
         clone = CameraPolicy.load(file).card
         return {
             "env": clone.data.get("env", "recorded"),

@@ -30,14 +30,9 @@ from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError, no_
 from shapechanger.identity import identify_env
 from shapechanger.own_modules import texts_in
 from shapechanger.transfer.body_map.envs import check_size
-from shapechanger.transfer.learners.settings import (
-    LimbSettings,
-    OffPolicySettings,
-    PpoSettings,
-    Sb3Settings,
-)
+from shapechanger.transfer.identities import ENV, known, single_body
+from shapechanger.transfer.learners.settings import OffPolicySettings, PpoSettings, Sb3Settings
 from shapechanger.transfer.references import load_references
-from shapechanger.transfer.versions import ENV, known, single_body
 
 if TYPE_CHECKING:
     from shapechanger.demos.cloning.card import CloneCard
@@ -275,11 +270,9 @@ class ExportPolicy:
 
     def _export(self, policy: TrainedPolicy) -> None:
         """Write a policy that is no clone."""
-        from shapechanger.transfer.onnx_policy import export_onnx
+        from shapechanger.transfer.export import export_limbs, export_onnx
 
-        if isinstance(policy.card.settings, LimbSettings):
-            from shapechanger.transfer.limbs.export import export_limbs
-
+        if "many bodies" in policy.card.settings.takes:
             ref = _env_of(self.file, self.env, self.body)
             with opened(ref) as env:
                 export_limbs(policy, env, ref, self.out)
@@ -321,11 +314,7 @@ class Convert:
     def run(self) -> None:
         """Convert the policy."""
         import shapechanger
-        from shapechanger.transfer.learners.policy_file import (
-            PolicyCard,
-            TrainedPolicy,
-            save_policy,
-        )
+        from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
         from shapechanger.transfer.transplant.model import check_supported
 
         if not self.trust:
@@ -353,7 +342,7 @@ class Convert:
             identity,
             command_line(),
         )
-        save_policy(TrainedPolicy(model, None, card), self.out)
+        TrainedPolicy(model, None, card).save(self.out)
         say(f"wrote {self.out}")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -26,13 +26,7 @@ from shapechanger.cli.env_arguments import (
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.files import make_folder
-from shapechanger.transfer.learners.presets import IN_MANY_BODIES, resolve_learner, tuning_text
-from shapechanger.transfer.learners.settings import (
-    LimbSettings,
-    RslSettings,
-    Sb3Settings,
-    require_budget,
-)
+from shapechanger.transfer.learners.presets import in_many_bodies, resolve_learner, tuning_text
 
 if TYPE_CHECKING:
     from shapechanger.transfer.learners.evaluation import Evaluation
@@ -104,28 +98,26 @@ class Train:
 
     def _by_learner(self, env: EnvRef, out: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training by a learner, after checking both."""
-        from shapechanger.transfer.learners import DemonstrationFile
-        from shapechanger.transfer.learners.cloning import CloneLearner
-        from shapechanger.transfer.learners.policy_file import save_policy
-        from shapechanger.transfer.learners.sb3 import Sb3Learner
+        from shapechanger.transfer.learners import SharedFile
         from shapechanger.transfer.runs import learner_of
 
         own = "limbs" if self.bodies else default_learner(env)
         wanted = self.learner or own
         if self.bodies:
-            wanted = IN_MANY_BODIES.get(wanted, wanted)
+            wanted = in_many_bodies(wanted)
         learner, settings = resolve_learner(wanted, settings_of(self.set))
-        if self.bodies and not isinstance(settings, LimbSettings):
+        if self.bodies and "many bodies" not in settings.takes:
             raise StudyError(
                 f"{learner} learns in one body: give --learner limbs, or rsl-ppo for worlds on a "
                 "GPU, which fit many, with --bodies."
             )
         steps = settings.steps if self.steps is None else self.steps
-        require_budget(steps, settings)
+        settings.require_budget(steps)
+        trains = learner_of(learner, settings)
         with opened(each_body(env)[0]) as made:
-            learner_of(learner, settings).require(env, env_traits(made))
+            trains.require(env, env_traits(made))
         if self.tensorboard is not None:
-            if not isinstance(settings, Sb3Settings) or isinstance(settings, RslSettings):
+            if "callback" not in settings.takes:
                 raise StudyError(f"{learner} has no TensorBoard logs: leave out --tensorboard.")
             try:
                 import_module("torch.utils.tensorboard")
@@ -136,37 +128,27 @@ class Train:
 
         def training(on_steps: Callable[[int], None]) -> None:
             say(f"{learner}: {tuning_text(learner, env.id)}")
-            if isinstance(settings, Sb3Settings):
-                if isinstance(settings, RslSettings):
-                    from shapechanger.transfer.learners.rsl import RslLearner
-
-                    trains: Sb3Learner = RslLearner(learner, settings)
-                else:
-                    trains = Sb3Learner(
-                        learner, settings, tensorboard=self.tensorboard, threads=None
-                    )
-                policy = trains.train(
-                    env, steps, self.seed, on_evaluation=_print_evaluation, on_steps=on_steps
-                )
-                save_policy(policy.described(command=command_line()), out)
-                return
-            name = f"{env.id.split('/')[-1]}-{self.seed}.npz"
-            demonstrations = Path("results", "demonstrations", name)
-            clone = CloneLearner(learner, settings).train(
+            more: dict[str, Any] = {}
+            if "demonstrations" in settings.takes:
+                name = f"{env.id.split('/')[-1]}-{self.seed}.npz"
+                file = Path("results", "demonstrations", name)
+                more["demonstrations"] = SharedFile(file, self.seed)
+            trains.threads, trains.tensorboard = None, self.tensorboard
+            policy = trains.train(
                 env,
                 whole,
                 self.seed,
-                demonstrations=DemonstrationFile(demonstrations, self.seed),
                 on_evaluation=_print_evaluation,
                 on_steps=on_steps,
+                **more,
             )
-            clone.described(command=command_line()).save(out)
+            policy.described(command=command_line()).save(out)
 
         return whole, training
 
     def _by_teacher(self, env: EnvRef, out: Path, teacher: Path) -> tuple[int, _Training]:
         """Return the number of steps, and the training of a student of another policy."""
-        from shapechanger.transfer.learners.policy_file import load_policy
+        from shapechanger.policy import load_policy
         from shapechanger.vehicles.learning import STUDENT_STEPS, train_student
 
         if self.learner is not None or self.set or self.tensorboard is not None:

@@ -30,12 +30,15 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.files import read_text
+from shapechanger.registry import METHODS
+from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.presets import resolve_learner
-from shapechanger.transfer.learners.settings import Settings, study_budgets
-from shapechanger.transfer.methods import load_method, method_names
+from shapechanger.transfer.learners.settings import study_budgets
+from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.plan import Plan, Run, TransferTask
 
 if TYPE_CHECKING:
+    from shapechanger.transfer.report.verdict import Findings
     from shapechanger.transfer.study import Study, TaskTraits
 
 # Divisor of the budget and number of seeds of --quick: enough to see that everything works.
@@ -123,6 +126,8 @@ class Transfer:
 
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
+        from shapechanger.transfer.report.verdict import findings
+
         traits = inspect_task(task)
         given = self.source_policy and policy_file(self.source_policy, task.source)
         plan = self._plan(task, learner, settings, steps, traits, given)
@@ -147,8 +152,9 @@ class Transfer:
             raise Interrupted(f"Stopped. {_way_on(plan, out)}".rstrip()) from None
         except OutputError as error:
             raise OutputError(f"{error} {_way_on(plan, out)}".rstrip()) from error
-        _print(study)
-        report = write_study_report(study, out)
+        found = findings(study)
+        _print(found)
+        report = write_study_report(study, out, found)
         say(f"\nwrote {out / 'study.json'} and {report}")
 
     def _require_sense(self) -> None:
@@ -172,7 +178,7 @@ class Transfer:
             target.having(options_of(self.target_options, "--target-options")),
         )
 
-    def _learner(self, task: TransferTask) -> tuple[str, Settings, int | None]:
+    def _learner(self, task: TransferTask) -> tuple[str, LearnerSettings, int | None]:
         """Return the learner's name, its settings, and the steps in the target if they are set."""
         learner, settings = resolve_learner(
             self.learner or default_learner(task.target), settings_of(self.set)
@@ -187,7 +193,7 @@ class Transfer:
         self,
         task: TransferTask,
         learner: str,
-        settings: Settings,
+        settings: LearnerSettings,
         steps: int | None,
         traits: TaskTraits,
         given: Path | None,
@@ -221,19 +227,20 @@ class Methods:
     def run(self) -> None:
         """Print a table."""
         table = Table("method", "what it does", "source", box=None)
-        for name in method_names():
+        for name in METHODS.names():
             method = load_method(name)
             about = (type(method).__doc__ or "").strip().partition("\n")[0]
             table.add_row(name, about, method.paper)
         print_table(table)
 
 
-def write_study_report(study: Study, out: Path) -> Path:
+def write_study_report(study: Study, out: Path, found: Findings | None = None) -> Path:
     """Write the report of a study, without pictures of the bodies if they cannot be rendered.
 
     Args:
         study: The study.
         out: Its folder.
+        found: What it has found; None to compute it.
 
     Returns:
         The page.
@@ -247,7 +254,7 @@ def write_study_report(study: Study, out: Path) -> Path:
         pictures = _pictures(study.plan.task.source, study.plan.task.target)
     except RenderError as error:
         note = str(error)
-    write_atomic(path, study_html(study, pictures, note).encode())
+    write_atomic(path, study_html(study, pictures, note, found).encode())
     return path
 
 
@@ -305,22 +312,15 @@ def _way_on(plan: Plan, out: Path) -> str:
     return f"Runs that had ended are kept in {out}; go on with: {command_line()}"
 
 
-def _print(study: Study) -> None:
+def _print(found: Findings) -> None:
     """Print the table of measures and the verdict."""
-    from shapechanger.transfer.report.verdict import (
-        measure_rows,
-        other_arms,
-        verdict,
-        weak_individuals,
-    )
-
     table = Table("arm", "measure", "in target steps", "in total steps", "unit", box=None)
     # Measures that are undefined for an arm, such as zero-shot, are in the report with the reason.
-    for row in [row for row in measure_rows(study) if row.target != "undefined"]:
+    for row in [row for row in found.measures if row.target != "undefined"]:
         table.add_row(row.arm, row.measure, row.target, row.total, row.unit)
     print_table(table, _FILE_WIDTH)
-    say(f"\n{verdict(study)}")
-    if others := other_arms(study):
-        say(others)
-    for sentence in weak_individuals(study):
+    say(f"\n{found.verdict}")
+    if found.other_arms:
+        say(found.other_arms)
+    for sentence in found.weak:
         say(sentence)

@@ -49,7 +49,9 @@ def _environment(folder: Path) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    cast("Any", environment).filters.update(count=count, decimal="{:.1f}".format)
+    cast("Any", environment).filters.update(
+        count=count, decimal="{:.1f}".format, jpeg=jpeg_uri, png=png_uri, svg=svg_uri
+    )
     return environment
 
 

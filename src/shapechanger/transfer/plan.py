@@ -15,7 +15,7 @@ from shapechanger.contract.measure import RETURN
 from shapechanger.errors import StudyError, check_seed
 from shapechanger.identity import Identity
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.learners.settings import Settings
+from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.methods import load_method
 
 ARMS: Final = ("scratch", "zero-shot", "fine-tune")
@@ -84,7 +84,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     measure: str = RETURN.name
     unit: str = RETURN.unit
     learner: str
-    settings: Settings
+    settings: LearnerSettings
     steps: int
     source_steps: int
     own_steps: int = 0

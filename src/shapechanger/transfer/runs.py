@@ -6,9 +6,11 @@ Everything random in a run follows from its own seed.
 from __future__ import annotations
 
 import math
+import pkgutil
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
@@ -16,17 +18,14 @@ from shapechanger.errors import CorruptStudy, ForeignStudy, StudyError
 from shapechanger.files import append_line, make_folder, read_json, write_json
 from shapechanger.identity import Identity
 from shapechanger.transfer.executor import ReportSteps
-from shapechanger.transfer.learners import Learner
-from shapechanger.transfer.learners.cloning import CloneLearner
+from shapechanger.transfer.learners import Learner, LearnerSettings, SharedFile
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
-    evaluation_envs,
     random_actions,
     zero_actions,
 )
-from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
-from shapechanger.transfer.learners.settings import RslSettings, Sb3Settings, Settings
+from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.methods import MethodRun, load_method
 from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 from shapechanger.transfer.versions import differences, parts_of, require_planned
@@ -55,34 +54,14 @@ class RunResult(msgspec.Struct, frozen=True):
     identity: dict[str, Identity] = {}
 
 
-def learner_of(name: str, settings: Settings) -> Learner:
+def learner_of(name: str, settings: LearnerSettings) -> Learner[Any]:
     """Return the learner that the settings belong to.
 
     Args:
         name: Name of the learner.
         settings: Its settings.
     """
-    if isinstance(settings, RslSettings):
-        from shapechanger.transfer.learners.rsl import RslLearner
-
-        return RslLearner(name, settings)
-    if isinstance(settings, Sb3Settings):
-        return Sb3Learner(name, settings)
-    return CloneLearner(name, settings)
-
-
-def device_of(settings: Settings) -> str:
-    """Return where a learner learns: "CPU", or the name of a GPU.
-
-    Args:
-        settings: The learner's settings.
-    """
-    if not isinstance(settings, RslSettings):
-        return "CPU"
-    import torch
-
-    device = settings.device or ("cuda" if torch.cuda.is_available() else "cpu")
-    return "CPU" if device == "cpu" else torch.cuda.get_device_name(device)
+    return pkgutil.resolve_name(settings.learner)(name, settings)
 
 
 def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
@@ -169,13 +148,11 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
         append_line(folder / _CURVE, evaluation)
 
     policy = None
+    learner = learner_of(plan.learner, plan.settings)
     if run.kind in NO_SKILL:
-        on_evaluation(_evaluate_unskilled(plan, run))
+        on_evaluation(_evaluate_unskilled(plan, run, learner))
     else:
-        learner = learner_of(plan.learner, plan.settings)
-        context = MethodRun(
-            plan, run, Path(study), learner, given=given, report=on_evaluation, on_steps=report
-        )
+        context = _method_run(plan, run, Path(study), learner, given, on_evaluation, report)
         if run.kind == SOURCE:
             policy = context.train(
                 context.source, context.source_steps, on_evaluation=context.report
@@ -184,7 +161,7 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
             policy = load_method(run.kind).learn(context)
         if policy is not None:
             context.save(policy)
-    device = "" if policy is None else device_of(plan.settings)
+    device = "" if policy is None else learner.device
     wall_s = time.monotonic() - began
     require_planned(plan, run)
     parts = parts_of(plan, run)
@@ -192,9 +169,44 @@ def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: Re
     write_json(folder / _RESULT, result)
 
 
-def _evaluate_unskilled(plan: Plan, run: Run) -> Evaluation:
+def _method_run(
+    plan: Plan,
+    run: Run,
+    study: Path,
+    learner: Learner[Any],
+    given: Path | None,
+    on_evaluation: Callable[[Evaluation], None],
+    on_steps: ReportSteps,
+) -> MethodRun:
+    """Return a run as its method sees it."""
+
+    def shared(kind: str) -> SharedFile:
+        one = msgspec.structs.replace(run, kind=kind)
+        return SharedFile(study / "demonstrations" / f"{one.name}.npz", plan.seed_of(one))
+
+    part = f"method {run.kind}"
+    return MethodRun(
+        source=plan.task.source,
+        target=plan.target_of(run),
+        body_map=plan.body_map,
+        learner=learner,
+        steps=plan.steps,
+        source_steps=plan.source_steps_of(run.kind),
+        seed=plan.seed_of(run),
+        folder=run.folder(study),
+        source_file=given or msgspec.structs.replace(run, kind=SOURCE).policy_file(study),
+        policy_file=run.policy_file(study),
+        shared=shared,
+        kind=run.kind,
+        identity={part: plan.identity[part]} if part in plan.identity else {},
+        report=on_evaluation,
+        on_steps=on_steps,
+    )
+
+
+def _evaluate_unskilled(plan: Plan, run: Run, learner: Learner[Any]) -> Evaluation:
     """Evaluate random actions, or the action zero, in the target."""
-    envs = evaluation_envs(plan.target_of(run), plan.settings)
+    envs = learner.evaluation_envs(plan.target_of(run))
     try:
         # Each run draws its own actions, from starts of its own.
         seed = plan.seed_of(run)

@@ -33,21 +33,19 @@ from shapechanger.errors import (
 from shapechanger.files import make_folder, read_json, write_json
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.executor import Executor, Job, OnProgress, Processes
-from shapechanger.transfer.learners.settings import RslSettings, Settings, study_budgets
+from shapechanger.transfer.identities import Identities, known, require_same_env, steady
+from shapechanger.transfer.learners import LearnerSettings
+from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
 from shapechanger.transfer.plan import ARMS, NO_SKILL, SOURCE, Plan, Run, TransferTask
 from shapechanger.transfer.references import reference_of
 from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
 from shapechanger.transfer.versions import (
-    Identities,
     changes_between,
     identities_of_code,
     keep_models,
-    known,
-    require_same_env,
     require_versions,
-    steady,
 )
 
 PLAN_FILE: Final = "plan.json"
@@ -57,7 +55,6 @@ STUDY_FILE: Final = "study.json"
 _ADAPTED: Final = ("randomised", "identified")
 # Packages that the numbers depend on.
 _PACKAGES: Final = ("numpy", "scipy", "gymnasium", "mujoco", "torch", "stable-baselines3")
-_DEVICE_PACKAGES: Final = ("rsl-rl-lib", "mujoco-warp", "warp-lang")  # Where arms learn on one.
 
 
 class Study(msgspec.Struct, frozen=True, kw_only=True):
@@ -168,7 +165,7 @@ def default_arms(traits: TaskTraits) -> tuple[str, ...]:
 def make_plan(
     task: TransferTask,
     learner: str,
-    settings: Settings,
+    settings: LearnerSettings,
     *,
     seeds: int = 5,
     steps: int | None = None,
@@ -253,7 +250,6 @@ def make_plan(
         traits.source.action_layout,
         traits.target.action_layout,
     )
-    packages = (*_PACKAGES, *(_DEVICE_PACKAGES if isinstance(settings, RslSettings) else ()))
     return Plan(
         task=task,
         body_map=(
@@ -278,13 +274,13 @@ def make_plan(
         versions={
             "shapechanger": version_of("shapechanger"),
             "python": platform.python_version(),
-            **{name: version_of(name) for name in packages},
+            **{name: version_of(name) for name in (*_PACKAGES, *settings.packages)},
         },
         identity=_identities(traits, settings, arms),
     )
 
 
-def _identities(traits: TaskTraits, settings: Settings, arms: Sequence[str]) -> Identities:
+def _identities(traits: TaskTraits, settings: LearnerSettings, arms: Sequence[str]) -> Identities:
     """Return the versions of the two envs, the learner and the methods."""
     envs = {"source": traits.source.identified, "target": traits.target.identified}
     found = known({part: each.identity for part, each in envs.items()})

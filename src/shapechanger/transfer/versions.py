@@ -1,118 +1,53 @@
-"""Versions of what a study and a policy are made of, and how two of them differ.
+"""Versions of what a study is made of, and how those of two studies differ.
 
-Identities are kept by the part that something plays: "source" and "target", "env" for the only env
-of a policy, "learner", and "method NAME" for each arm. Parts without a model and without own files
-have none.
+Identities are kept by the part that something plays: "source" and "target", "learner", and "method
+NAME" for each arm. Parts without a model and without own files have none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
-import gymnasium as gym
 import msgspec
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import ForeignStudy, ShapechangerError
 from shapechanger.files import make_folder, write_atomic
-from shapechanger.identity import (
-    IdentifiedEnv,
-    Identity,
-    identify_code,
-    identify_env,
-    model_changes,
+from shapechanger.identity import IdentifiedEnv, Identity, identify_code, model_changes
+from shapechanger.transfer.identities import (
+    LEARNER,
+    NOTHING,
+    Identities,
+    identify,
+    identify_learner,
+    known,
 )
-from shapechanger.own_modules import texts_in
 from shapechanger.transfer.methods import load_method
+from shapechanger.transfer.plan import NO_SKILL, SOURCE, Plan, Run
 
-if TYPE_CHECKING:
-    from shapechanger.transfer.learners.settings import Settings
-    from shapechanger.transfer.plan import Plan, Run
-
-Identities = dict[str, Identity]
-"""Identities by part."""
-
-ENV: Final = "env"
-"""Part of the env in a policy's card."""
-_LEARNER: Final = "learner"
 _METHOD: Final = "method "
-_NOTHING: Final = Identity()
-_OURS: Final = "shapechanger/"
 _MODELS: Final = "models"
 _SETTINGS: Final = ("learner", "settings")
 
 
-def known(identities: Mapping[str, Identity]) -> Identities:
-    """Return the parts that have a model or own files."""
-    return {part: each for part, each in identities.items() if each != _NOTHING}
-
-
-def identities_of_code(settings: Settings, arms: Sequence[str] = ()) -> Identities:
+def identities_of_code(settings: object, arms: Sequence[str] = ()) -> Identities:
     """Return the identities of a learner and of methods.
 
     Args:
         settings: Settings of the learner, which may name an algorithm of the user's own.
         arms: Names of methods.
     """
-    learner = identify_code(texts_in(msgspec.to_builtins(settings)))
     methods = {f"{_METHOD}{arm}": identify_code([arm], load_method(arm)) for arm in arms}
-    return known({_LEARNER: learner, **methods})
-
-
-def identities_in(ref: EnvRef, made: gym.Env[Any, Any], settings: Settings) -> Identities:
-    """Return the identities of the env and the learner of a policy.
-
-    Args:
-        ref: The env.
-        made: The same, before its first reset, which may change its model.
-        settings: Settings of the learner.
-    """
-    one = single_body(ref)
-    env = steady(ref, identify_env(made, ref.id)) if one == ref else identify(ref)
-    return known({ENV: env.identity, **identities_of_code(settings)})
-
-
-def identify(ref: EnvRef) -> IdentifiedEnv:
-    """Make an env, and return its identity.
-
-    Args:
-        ref: The env; one of many bodies has the identity of the unedited one.
-    """
-    with closing(single_body(ref).make()) as made:
-        return steady(ref, identify_env(made, ref.id))
-
-
-def steady(ref: EnvRef, found: IdentifiedEnv) -> IdentifiedEnv:
-    """Return an identity without its model if the env draws another one each time it is made.
-
-    Args:
-        ref: The env; only those of others may draw.
-        found: Its identity.
-    """
-    if not found.numbers or ref.id.startswith(_OURS):
-        return found
-    with closing(single_body(ref).make()) as made:
-        again = identify_env(made, ref.id).identity
-    if again == found.identity:
-        return found
-    return IdentifiedEnv(Identity(files=found.identity.files), b"")
-
-
-def single_body(ref: EnvRef) -> EnvRef:
-    """Return the env of one body, where a reference stands for many."""
-    return EnvRef(ref.id, {name: v for name, v in ref.kwargs.items() if name != "bodies"})
+    return known({LEARNER: identify_learner(settings), **methods})
 
 
 def parts_of(plan: Plan, run: Run) -> Identities:
     """Return the identities that a run depends on."""
-    from shapechanger.transfer.plan import NO_SKILL, SOURCE
-
-    parts = {"target"} if run.kind in NO_SKILL else {"target", _LEARNER, f"{_METHOD}{run.kind}"}
+    parts = {"target"} if run.kind in NO_SKILL else {"target", LEARNER, f"{_METHOD}{run.kind}"}
     if run.kind == SOURCE:
-        parts = {"source", _LEARNER}
+        parts = {"source", LEARNER}
     elif run.kind not in NO_SKILL and load_method(run.kind).uses_source:
         parts.add("source")
     return {part: each for part, each in plan.identity.items() if part in parts}
@@ -127,13 +62,13 @@ def shared(mine: Plan, theirs: Plan) -> Iterator[tuple[str, Identity, Identity]]
             if ref == getattr(theirs.task, other):
                 yield f"{ref}", *_pair(mine, part, theirs, other)
     if all(getattr(mine, name) == getattr(theirs, name) for name in _SETTINGS):
-        yield f"the learner {mine.learner}", *_pair(mine, _LEARNER, theirs, _LEARNER)
+        yield f"the learner {mine.learner}", *_pair(mine, LEARNER, theirs, LEARNER)
     for arm in (arm for arm in mine.arms if arm in theirs.arms):
         yield f"the method {arm}", *_pair(mine, _METHOD + arm, theirs, _METHOD + arm)
 
 
 def _pair(mine: Plan, part: str, theirs: Plan, other: str) -> tuple[Identity, Identity]:
-    return mine.identity.get(part, _NOTHING), theirs.identity.get(other, _NOTHING)
+    return mine.identity.get(part, NOTHING), theirs.identity.get(other, NOTHING)
 
 
 def changes_between(old: Plan, new: Plan, *folders: Path) -> str:
@@ -229,7 +164,7 @@ def differences(plan: Plan, old: Identities, new: Identities) -> str:
     """
     titles = {"source": f"{plan.task.source}", "target": f"{plan.task.target}"}
     changed = {
-        titles.get(part, f"the {part}"): old.get(part, _NOTHING).changes_to(new.get(part, _NOTHING))
+        titles.get(part, f"the {part}"): old.get(part, NOTHING).changes_to(new.get(part, NOTHING))
         for part in sorted({*old, *new})
     }
     return "; ".join(f"{title}: {words}" for title, words in changed.items() if words)
@@ -256,22 +191,3 @@ def require_planned(plan: Plan, run: Run) -> None:
             found[part] = parts[part]
     remedy = "Restore it and run the same command again, or start again with another --out."
     require_versions(plan, parts, found, remedy)
-
-
-def require_same_env(
-    card: Mapping[str, Identity], ref: EnvRef, made: Identity, policy: object, remedy: str
-) -> None:
-    """Refuse a policy whose env has changed since its training.
-
-    Args:
-        card: Identities of its card.
-        ref: The env.
-        made: Its present identity.
-        policy: The policy's file, for the message.
-        remedy: What the user can do, as the end of a sentence.
-
-    Raises:
-        ForeignStudy: If it has.
-    """
-    if words := card.get(ENV, _NOTHING).changes_to(made):
-        raise ForeignStudy(f"{ref} has changed since {policy} was trained in it: {words}. {remedy}")

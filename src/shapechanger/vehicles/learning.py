@@ -25,9 +25,9 @@ from shapechanger.demos.cloning.pictures import prepare
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError
-from shapechanger.transfer.learners.cloning import stated
+from shapechanger.transfer.identities import ENV, identify, require_same_env
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
-from shapechanger.transfer.versions import ENV, identify, require_same_env
+from shapechanger.vehicles.cloning import stated
 from shapechanger.vehicles.envs.ranges import LEAST_THROTTLE
 
 STUDENT_STEPS: Final = 7200

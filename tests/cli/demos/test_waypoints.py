@@ -21,7 +21,7 @@ from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import DemosError, WorldError
 from shapechanger.layout import Feature, Layout
 from shapechanger.transfer.learners.presets import LEARNERS
-from shapechanger.transfer.learners.settings import CloningSettings
+from shapechanger.vehicles.cloning import CloningSettings
 from shapechanger.vehicles.envs import WaypointEnv
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT, SteeringResponse
 

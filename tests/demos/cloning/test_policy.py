@@ -17,7 +17,7 @@ from shapechanger.demos.cloning.pictures import CloningError, PolicyError
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
 from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import OutputError
-from shapechanger.tensor_file import read_tensors, tensor_bytes
+from shapechanger.policy import read_tensors, tensor_bytes
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from tests.demos.cloning.small import SMALL, demonstrations
 

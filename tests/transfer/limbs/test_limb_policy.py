@@ -13,13 +13,14 @@ import torch
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError, TransplantError
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.export import export_limbs
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.sb3 import Sb3Learner
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.settings import LimbSettings
 from shapechanger.transfer.limbs.envs import fitted, limb_envs
-from shapechanger.transfer.limbs.export import export_limbs
+from shapechanger.transfer.limbs.learner import LimbLearner
 from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.methods import generalist
 from shapechanger.transfer.onnx_policy import OnnxPolicy
@@ -44,8 +45,8 @@ TINY: Final = LimbSettings(
 _NO_MAP: Any = object()
 
 
-def _learner(**changed: Any) -> Sb3Learner:
-    return Sb3Learner("limbs", msgspec.structs.replace(TINY, **changed))
+def _learner(**changed: Any) -> LimbLearner:
+    return LimbLearner("limbs", msgspec.structs.replace(TINY, **changed))
 
 
 @pytest.fixture(scope="module")
@@ -217,13 +218,13 @@ def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.M
         arms=("scratch", "generalist"),
     )
     trained: list[EnvRef] = []
-    train = Sb3Learner.train
+    train = LimbLearner.train
 
-    def recorded(self: Sb3Learner, env: EnvRef, *arguments: Any, **more: Any) -> TrainedPolicy:
+    def recorded(self: LimbLearner, env: EnvRef, *arguments: Any, **more: Any) -> TrainedPolicy:
         trained.append(env)
         return train(self, env, *arguments, **more)
 
-    monkeypatch.setattr(Sb3Learner, "train", recorded)
+    monkeypatch.setattr(LimbLearner, "train", recorded)
     study = run_study(plan, tmp_path / "study", executor=Serial())
     many = task.source.having({"bodies": {"split": "train", "count": 4, "seed": 0}})
     assert [trained.count(env) for env in (many, task.target)] == [2, 4]

@@ -15,13 +15,15 @@ from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError, TransplantError, UnknownName
 from shapechanger.morphology import JointRange
 from shapechanger.morphology.body import to_json
+from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.executor import Serial
+from shapechanger.transfer.export import export_limbs
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.policy_file import TrainedPolicy, load_policy, save_policy
-from shapechanger.transfer.learners.rsl import RslLearner, RslVecEnv, _LimbModel
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
+from shapechanger.transfer.learners.rsl import RslVecEnv
 from shapechanger.transfer.learners.settings import RslLimbSettings
+from shapechanger.transfer.limbs.device import DeviceRows, LimbModel, RslLimbLearner
 from shapechanger.transfer.limbs.envs import fitted, rows_of_each
-from shapechanger.transfer.limbs.export import export_limbs
 from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.methods import generalist
 from shapechanger.transfer.onnx_policy import OnnxPolicy
@@ -53,8 +55,8 @@ TINY: Final = RslLimbSettings(
 _NO_MAP: Any = object()
 
 
-def _learner(**changed: Any) -> RslLearner:
-    return RslLearner("rsl-limbs", msgspec.structs.replace(TINY, **changed))
+def _learner(**changed: Any) -> RslLimbLearner:
+    return RslLimbLearner("rsl-limbs", msgspec.structs.replace(TINY, **changed))
 
 
 def _worlds(bodies: list[str]) -> RslVecEnv:
@@ -67,7 +69,8 @@ def _worlds(bodies: list[str]) -> RslVecEnv:
         bodies=bodies,
         max_episode_steps=20,
     )
-    return RslVecEnv(envs, 0, rows_of_each([ANT.having({"body": body}) for body in bodies]))
+    rows = rows_of_each([ANT.having({"body": body}) for body in bodies])
+    return RslVecEnv(envs, 0, DeviceRows(envs, rows))
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +89,8 @@ def test_actions_are_those_of_the_policy_in_every_body(policy: TrainedPolicy) ->
     """In bodies of 12 and of 8 limbs rsl-rl's actor acts as the policy does on the CPU."""
     worlds = _worlds(["ExtendedAnt", "Ant", "ExtendedAnt"])
     net = _net(policy)
-    actor = _LimbModel(net, net.actor_net, acts=True)
-    critic = _LimbModel(net, net.critic_net, acts=False)
+    actor = LimbModel(net, net.actor_net, acts=True)
+    critic = LimbModel(net, net.critic_net, acts=False)
     seen = worlds.get_observations()
     with torch.no_grad():
         actions = actor(seen)
@@ -111,7 +114,7 @@ def test_probabilities_are_those_of_the_policy(policy: TrainedPolicy) -> None:
     """Limbs that a body does not have, or that have no motor, count in no probability."""
     worlds = _worlds(["ExtendedAnt", "Ant", "ExtendedAntPassive"])
     net = _net(policy)
-    actor = _LimbModel(net, net.actor_net, acts=True)
+    actor = LimbModel(net, net.actor_net, acts=True)
     with torch.no_grad():
         actor.distribution.log_std_param.copy_(net.log_std)
         seen = worlds.get_observations()
@@ -131,7 +134,7 @@ def test_worlds_of_equal_spaces_and_several_batches() -> None:
     envs = shapechanger.make_vec("Swimmer", 2, backend="warp", device="cpu", bodies=bodies)
     assert len(envs.batches) == 2
     rows = rows_of_each([swimmer.having({"body": body}) for body in bodies])
-    worlds = RslVecEnv(envs, 0, rows)
+    worlds = RslVecEnv(envs, 0, DeviceRows(envs, rows))
     own = envs.reset(seed=0)[0].numpy()
     for i, one in enumerate(rows):
         np.testing.assert_allclose(
@@ -189,13 +192,13 @@ def test_a_generalist_is_an_arm_of_a_study(tmp_path: Path, monkeypatch: pytest.M
     """It learns in drawn bodies on the device first, and is evaluated before the first step."""
     monkeypatch.setattr(generalist, "BODIES", 2)
     trained: list[EnvRef] = []
-    train = RslLearner.train
+    train = RslLimbLearner.train
 
-    def recorded(self: RslLearner, env: EnvRef, *arguments: Any, **more: Any) -> TrainedPolicy:
+    def recorded(self: RslLimbLearner, env: EnvRef, *arguments: Any, **more: Any) -> TrainedPolicy:
         trained.append(env)
         return train(self, env, *arguments, **more)
 
-    monkeypatch.setattr(RslLearner, "train", recorded)
+    monkeypatch.setattr(RslLimbLearner, "train", recorded)
     settings = msgspec.structs.replace(TINY, eval_episodes=1)
     plan = make_plan(
         TransferTask(ANT, EXTENDED), "rsl-limbs", settings, seeds=2, arms=("scratch", "generalist")

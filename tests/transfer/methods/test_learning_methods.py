@@ -13,9 +13,9 @@ import torch
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
+from shapechanger.policy import load_policy
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.executor import Serial
-from shapechanger.transfer.learners.policy_file import load_policy
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.methods import kickstart
 from shapechanger.transfer.methods.evolution import bodies_between

@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
+from shapechanger import registry
 from shapechanger.errors import StudyError, UnknownName
-from shapechanger.transfer import methods
+from shapechanger.registry import METHODS
 from shapechanger.transfer.executor import Processes, Serial
-from shapechanger.transfer.methods import Method, MethodRun, load_method, method_names, register
+from shapechanger.transfer.methods import Method, MethodRun, load_method, register
 from shapechanger.transfer.plan import ARMS, Run
 from shapechanger.transfer.study import run_study
 from tests.transfer.studies import tiny_plan
@@ -37,7 +38,7 @@ class Patient(Method):
 def no_other(monkeypatch: pytest.MonkeyPatch) -> dict[str, type[Method]]:
     """An empty registry."""
     found: dict[str, type[Method]] = {}
-    monkeypatch.setattr(methods, "_registered", found)
+    monkeypatch.setattr(METHODS, "_registered", found)
     return found
 
 
@@ -53,7 +54,7 @@ def plugin(
     return "my_methods:patient"
 
 
-@pytest.mark.parametrize("name", method_names())
+@pytest.mark.parametrize("name", METHODS.names())
 def test_shipped_methods_have_their_names(name: str) -> None:
     """Each shipped method loads under its name and has a docstring."""
     method = load_method(name)
@@ -101,17 +102,17 @@ def test_methods_of_other_packages(
 ) -> None:
     """Methods load from entry points; other objects are refused."""
     points = {
-        "patient": EntryPoint("patient", "my_methods:Patient", methods._GROUP),
-        "broken": EntryPoint("broken", "pathlib:Path", methods._GROUP),
+        "patient": EntryPoint("patient", "my_methods:Patient", "shapechanger.methods"),
+        "broken": EntryPoint("broken", "pathlib:Path", "shapechanger.methods"),
     }
 
     def installed(group: str, name: str = "") -> list[EntryPoint]:
         assert group == "shapechanger.methods"
         return [point for key, point in points.items() if name in ("", key)]
 
-    monkeypatch.setattr(methods, "entry_points", installed)
+    monkeypatch.setattr(registry, "entry_points", installed)
     assert load_method("patient").name == "patient"
-    assert {"patient", "broken"} < set(method_names())
+    assert {"patient", "broken"} < set(METHODS.names())
     with pytest.raises(StudyError, match="not a subclass of Method"):
         load_method("broken")
 

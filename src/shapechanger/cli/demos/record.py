@@ -108,15 +108,14 @@ def _expert(env: gym.Env[Any, Any], seed: int) -> TaskExpert:
 
 def _policy(path: Path, env: gym.Env[Any, Any]) -> Act:
     """Load a policy and check that its observations and actions fit the env."""
-    from shapechanger.transfer.learners.cloning import is_clone
-    from shapechanger.transfer.learners.policy_file import load_policy
+    from shapechanger.policy import kind_of, load_policy
 
     box = cast("gym.spaces.Box", env.action_space)
 
     def fitting(actions: NDArray[Any]) -> NDArray[np.float32]:
         return np.clip(np.asarray(actions, np.float32)[0], box.low, box.high)
 
-    if is_clone(path):
+    if kind_of(path) == "clone":
         clone = _clone(path, env)
         return lambda seen: fitting(clone(seen))
     policy = load_policy(path)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from shapechanger.demos.cloning.judge import Judgement
     from shapechanger.demos.cloning.learn import MemberCheck
     from shapechanger.demos.cloning.policy import CameraPolicy
-    from shapechanger.transfer.learners.settings import CloningSettings
+    from shapechanger.vehicles.cloning import CloningSettings
     from shapechanger.vehicles.waypoints import SteeringResponse
 
 

@@ -20,7 +20,7 @@ from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import MissingExtra, no_policy_file
 from shapechanger.files import cannot_write, write_atomic
 from shapechanger.identity import Identity
-from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
+from shapechanger.policy import UNUSABLE, read_tensors, tensor_bytes
 
 try:
     import torch
@@ -32,10 +32,7 @@ except ImportError as error:
     raise MissingExtra("torch", "learn") from error
 
 KIND: Final = "clone"
-"""Kind of the file of a cloned policy, see `shapechanger.tensor_file`."""
-
-# Raised by PyTorch for cards of impossible sizes, and for weights that are not the card's.
-_UNBUILDABLE: Final = (RuntimeError, TypeError, ArithmeticError, MemoryError)
+"""Kind of the file of a cloned policy, see `shapechanger.policy`."""
 _CHUNK: Final = 256  # Examples at a time, to bound the memory.
 
 
@@ -225,7 +222,7 @@ class CameraPolicy:
             return cls(_network(card, weights), card)
         except FileNotFoundError as error:
             raise PolicyError(no_policy_file(path)) from error
-        except (*UNREADABLE, CloningError, *_UNBUILDABLE) as error:
+        except (*UNUSABLE, CloningError) as error:
             # Messages of PyTorch fill a page; the first line is enough.
             reason = str(error).strip().partition("\n")[0].rstrip(".:") or type(error).__name__
             raise PolicyError(f"{path} is not a cloned policy: {reason}.") from error

@@ -1,19 +1,35 @@
-"""Learners: settings, training, evaluation and stored policies."""
+"""Learners: their settings declare what they take, and a `Learner` trains, evaluates and stores.
+
+A learner is one file, of Shapechanger or of another package: a class of settings, which the entry
+point of its name in the group `shapechanger.learners` gives, and the `Learner` that it names.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
+
+import msgspec
 
 from shapechanger.contract.env_ref import EnvRef, EnvTraits
+from shapechanger.errors import StudyError
 from shapechanger.identity import Identity
+from shapechanger.registry import LEARNERS
 
 if TYPE_CHECKING:
+    import gymnasium as gym
+
     from shapechanger.transfer.body_map import BodyMap
     from shapechanger.transfer.learners.evaluation import Evaluation
 
-__all__ = ["DemonstrationFile", "Learner", "PolicyOrigin", "ignore"]
+__all__ = ["Learner", "LearnerSettings", "PolicyOrigin", "SharedFile", "Takes", "ignore"]
+
+Takes = Literal[
+    "trial", "on-policy", "off-policy", "callback", "demonstrations", "many bodies", "device"
+]
+"""What a learner learns from, and in: steps in an env ("trial"), each once or from a replay buffer;
+a callback of Stable-Baselines3; demonstrations; many bodies at once; and worlds on a device."""
 
 
 def ignore(evaluation: Evaluation) -> None:
@@ -21,12 +37,86 @@ def ignore(evaluation: Evaluation) -> None:
     del evaluation
 
 
-class DemonstrationFile(NamedTuple):
-    """File of demonstrations, shared by the runs that learn from them.
+class LearnerSettings:
+    """Base class of the settings of learners, which are also structs of msgspec with a tag.
+
+    The tag is the name of the learner's kind, and `type` in files.
+
+    Attributes:
+        takes: What the learner takes.
+        learner: Its class, as `module:class`.
+        packages: Packages that its numbers depend on, besides those of every study.
+        steps: Default env steps of a training.
+        source_steps: Default env steps of a source policy; 0 for half as many as on the target.
+        eval_every: Steps between two evaluations.
+        eval_episodes: Episodes of an evaluation.
+        last_k: Number of final evaluations that count as the end of a run.
+        episode_limit: Steps after which an evaluation episode is truncated; None for the env's own
+            limit.
+    """
+
+    __slots__ = ()
+
+    takes: ClassVar[frozenset[Takes]]
+    learner: ClassVar[str]
+    packages: ClassVar[tuple[str, ...]] = ()
+    steps: int
+    source_steps: int
+    eval_every: int
+    eval_episodes: int
+    last_k: int
+    episode_limit: int | None
+
+    @classmethod
+    def from_builtins(cls, value: Any) -> LearnerSettings:
+        """Read settings of any kind, see `shapechanger.files.read_json`.
+
+        Args:
+            value: A table with the kind as `type`.
+
+        Raises:
+            ValueError: If there is no such kind, or a value is wrong.
+        """
+        table: dict[str, Any] = msgspec.convert(value, dict[str, Any])
+        return msgspec.convert(table, LEARNERS.load(str(table.get("type", ""))))
+
+    def whole_updates(self, steps: int) -> int:
+        """Round `steps` up to whole updates."""
+        raise NotImplementedError
+
+    def for_budget(self, steps: int) -> LearnerSettings:
+        """Return the settings for a shorter budget of `steps`."""
+        raise NotImplementedError
+
+    def rhythm(self) -> str:
+        """Return when policies are evaluated, and what they learn from, as in "every 10 steps."."""
+        return f"every {self.eval_every:,} steps."
+
+    def require_budget(self, steps: int, which: str = "", option: str = "") -> None:
+        """Refuse a budget that ends before the first evaluation.
+
+        Args:
+            steps: The budget.
+            which: "target" or "source", where there are two budgets.
+            option: What sets the budget, where the user has not.
+
+        Raises:
+            StudyError: If it does.
+        """
+        if steps < self.eval_every:
+            budget = f"{steps} {which} steps" if which else f"{steps} steps"
+            raise StudyError(
+                f"A budget of {budget} is smaller than one evaluation, which comes every "
+                f"{self.eval_every} steps: give at least that{option and f' as {option}'}."
+            )
+
+
+class SharedFile(NamedTuple):
+    """File that the runs of a study share, such as demonstrations in one env.
 
     Attributes:
         path: The file.
-        seed: Seed of the recording.
+        seed: Seed of what is in it.
     """
 
     path: Path
@@ -47,8 +137,35 @@ class PolicyOrigin(NamedTuple):
     identity: dict[str, Identity]
 
 
-class Learner(Protocol):
-    """A learner as the methods of a study use it; its policies are of its own type."""
+_Settings = TypeVar("_Settings", bound=LearnerSettings, covariant=True)
+
+
+class Learner(Generic[_Settings]):
+    """Base class of learners; their policies are of their own type.
+
+    Attributes:
+        name: Name of the learner, for the cards of its policies.
+        settings: Its settings.
+        threads: Threads that step the envs, None for one per core; the result is the same. One by
+            default: a study runs as many trainings at a time as there are cores.
+        tensorboard: Folder of TensorBoard's logs; None for none.
+
+    Args:
+        name: See the attribute.
+        settings: See the attribute.
+    """
+
+    threads: int | None = 1
+    tensorboard: Path | None = None
+
+    def __init__(self, name: str, settings: _Settings) -> None:  # pyright: ignore[reportGeneralTypeIssues]
+        self.name = name
+        self.settings = settings
+
+    @property
+    def device(self) -> str:
+        """Where it learns: "CPU", or the name of a GPU."""
+        return "CPU"
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
         """Refuse an env that it cannot learn in.
@@ -61,7 +178,7 @@ class Learner(Protocol):
             StudyError: If it lacks something.
             SpaceMismatch: If its spaces do not fit its layouts.
         """
-        ...
+        raise NotImplementedError
 
     def train(
         self,
@@ -69,35 +186,39 @@ class Learner(Protocol):
         steps: int,
         seed: int,
         *,
-        demonstrations: DemonstrationFile,
         start: Any = None,
         body_map: BodyMap | None = None,
-        only_last: bool = False,
-        callback: Any = None,
-        rehearsal: Any = None,
-        on_evaluation: Callable[[Evaluation], None],
-        on_steps: Callable[[int], None],
+        on_evaluation: Callable[[Evaluation], None] = ignore,
+        on_steps: Callable[[int], None] = lambda steps: None,
     ) -> Any:
-        """Train a policy.
+        """Train a policy. A kind of learner may take more arguments, see `Takes`.
 
         Args:
             env: The env.
             steps: Budget, in steps.
             seed: Seed of the training.
-            demonstrations: File of the demonstrations, for learners that need some.
             start: A source policy to start from; None for a new policy.
             body_map: Map between the bodies of `start` and `env`.
-            only_last: Whether only the final evaluation is needed.
-            callback: A callback of Stable-Baselines3 for the training; None for none.
-            rehearsal: Demonstrations that `start` was cloned from, to mix in; None for none.
             on_evaluation: Called with each evaluation; `ignore` where none is needed.
             on_steps: Called with the number of steps done.
 
         Raises:
-            StudyError: If a callback or a rehearsal is given to a learner that takes none, or the
-                training diverges.
+            StudyError: If the training diverges.
         """
-        ...
+        raise NotImplementedError
+
+    def evaluation_envs(self, env: EnvRef) -> list[gym.Env[Any, Any]]:
+        """Make the envs in which its policies are evaluated.
+
+        Args:
+            env: The env.
+
+        Returns:
+            One env for each episode; a single env if only one instance can exist.
+        """
+        from shapechanger.transfer.learners.evaluation import evaluation_envs
+
+        return evaluation_envs(env, self.settings.eval_episodes, self.settings.episode_limit)
 
     def evaluate(self, env: EnvRef, policy: Any, body_map: BodyMap) -> Evaluation:
         """Evaluate a source policy in another env without training it.
@@ -107,20 +228,11 @@ class Learner(Protocol):
             policy: The policy.
             body_map: Map between the two bodies.
         """
-        ...
+        raise NotImplementedError
 
     def load(self, path: Path) -> Any:
         """Load a policy."""
-        ...
-
-    def save(self, policy: Any, path: Path) -> None:
-        """Write a policy to a file.
-
-        Args:
-            policy: The policy.
-            path: The file.
-        """
-        ...
+        raise NotImplementedError
 
     def origin(self, path: Path) -> PolicyOrigin:
         """Read where a stored policy comes from.
@@ -128,4 +240,4 @@ class Learner(Protocol):
         Raises:
             StudyError: If another kind of learner trained it.
         """
-        ...
+        raise NotImplementedError

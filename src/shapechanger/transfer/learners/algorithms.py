@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import pkgutil
 import sys
 from importlib import import_module
 from typing import Any, Final
@@ -11,11 +12,7 @@ import gymnasium as gym
 import msgspec
 
 from shapechanger.errors import CorruptStudy, MissingExtra, StudyError, UnknownName
-from shapechanger.transfer.learners.settings import (
-    ImportedSettings,
-    LimbSettings,
-    Sb3Settings,
-)
+from shapechanger.transfer.learners.settings import ImportedSettings, Sb3Settings
 
 try:
     from sb3_contrib import TQC
@@ -53,10 +50,13 @@ def build_model(
         if _is_class(made):
             arguments.setdefault("policy_kwargs", {"net_arch": list(settings.net_arch)})
             arguments |= {"seed": seed, "device": "cpu", "tensorboard_log": tensorboard}
-            return made(_policy_class(settings), envs, **arguments)
+            policy: Any = settings.policy_class
+            if ":" in policy:
+                policy = pkgutil.resolve_name(policy)
+            return made(policy, envs, **arguments)
         model = made(envs, seed, **arguments)
     except (TypeError, ValueError, AssertionError) as error:
-        if not isinstance(settings, ImportedSettings):
+        if settings.algorithm in _SHIPPED:
             raise
         raise StudyError(f"{settings.algorithm} refuses its arguments: {error}.") from error
     if not isinstance(model, BaseAlgorithm):
@@ -65,15 +65,6 @@ def build_model(
             "Stable-Baselines3."
         )
     return model
-
-
-def _policy_class(settings: Sb3Settings) -> Any:
-    """Return the class of the policy, or the name that Stable-Baselines3 has for it."""
-    if isinstance(settings, LimbSettings):
-        from shapechanger.transfer.limbs.policy import LimbPolicy
-
-        return LimbPolicy
-    return "MlpPolicy"
 
 
 def _is_class(algorithm: object) -> bool:

@@ -20,7 +20,6 @@ from shapechanger.contract.env_ref import (
 )
 from shapechanger.contract.measure import RETURN, Measure
 from shapechanger.errors import UnknownName
-from shapechanger.transfer.learners.settings import LimbSettings, Settings
 
 EVALUATION_SEED: Final = 10_000_000
 """Seed of the first evaluation episode: far from those of training."""
@@ -84,25 +83,23 @@ def evaluation_seed(env: EnvRef, episodes: int) -> int:
     return EVALUATION_SEED + min(episodes, _MOST_EPISODES) * individual
 
 
-def evaluation_envs(env: EnvRef, settings: Settings) -> list[gym.Env[Any, Any]]:
+def evaluation_envs(
+    env: EnvRef, episodes: int, limit: int | None = None
+) -> list[gym.Env[Any, Any]]:
     """Make the envs in which a learner's policies are evaluated, in held-out surroundings if any.
 
     Args:
         env: The env.
-        settings: Settings of the learner.
+        episodes: Number of episodes of an evaluation.
+        limit: Steps after which an episode is truncated; None for the env's own limit.
 
     Returns:
         One env for each episode; a single env if only one instance can exist.
     """
-    if isinstance(settings, LimbSettings):
-        from shapechanger.transfer.limbs.envs import limb_envs
-
-        return limb_envs(env, settings.eval_episodes, settings.room)
-    limit = settings.episode_limit
     more = {} if limit is None else {"max_episode_steps": limit}
     envs = [env.make(**more)]
     if not is_single_instance(envs[0]):
-        envs += [env.make(**more) for _ in range(settings.eval_episodes - 1)]
+        envs += [env.make(**more) for _ in range(episodes - 1)]
     for one in envs:
         if isinstance(one.unwrapped, HasHeldOutStarts):
             one.unwrapped.hold_out()

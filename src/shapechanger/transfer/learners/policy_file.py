@@ -13,7 +13,6 @@ import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -24,14 +23,13 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import CorruptStudy, MissingExtra, no_policy_file
-from shapechanger.files import write_atomic
+from shapechanger.files import from_builtins, write_atomic
 from shapechanger.identity import Identity
 from shapechanger.layout import Layout
-from shapechanger.tensor_file import UNREADABLE, read_tensors, tensor_bytes
+from shapechanger.policy import UNUSABLE, read_tensors, refusal, tensor_bytes
 from shapechanger.transfer.actions import ActionScale
+from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model, require_class
-from shapechanger.transfer.learners.settings import RslSettings, Sb3Settings
-from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.transplant.layers import CLIP, EPSILON
 
 try:
@@ -51,9 +49,6 @@ _WEIGHTS: Final = "policy."
 _STATISTICS: Final = "normalisation."
 _SPACES: Final = "spaces."
 _MOST_ENVS: Final = 4096
-
-# Raised by Stable-Baselines3 and PyTorch for settings and weights that do not make a model.
-_UNBUILDABLE: Final = (RuntimeError, TypeError, AssertionError, ArithmeticError, MemoryError)
 
 
 class PolicyCard(msgspec.Struct, frozen=True):
@@ -78,7 +73,7 @@ class PolicyCard(msgspec.Struct, frozen=True):
     observation: Layout
     action: Layout
     learner: str
-    settings: Sb3Settings
+    settings: LearnerSettings
     steps: int
     seed: int
     version: str
@@ -137,6 +132,55 @@ class TrainedPolicy:
         )
         return replace(self, card=card)
 
+    def save(self, path: Path) -> None:
+        """Write the policy to one file of safetensors.
+
+        Args:
+            path: The file, such as `Ant-v1.safetensors`.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        tensors: dict[str, NDArray[Any]] = {
+            _WEIGHTS + name: value.detach().cpu().numpy()
+            for name, value in self.model.policy.state_dict().items()
+        }
+        for side in ("observation", "action"):
+            space = cast("gym.spaces.Box", getattr(self.model, f"{side}_space"))
+            tensors |= {f"{_SPACES}{side}.low": space.low, f"{_SPACES}{side}.high": space.high}
+        if self.normalisation is not None:
+            for side in ("observation", "reward"):
+                statistics = getattr(self.normalisation, side)
+                for name in ("mean", "var", "count"):
+                    tensors[f"{_STATISTICS}{side}.{name}"] = np.asarray(getattr(statistics, name))
+        write_atomic(path, tensor_bytes(tensors, msgspec.json.encode(self.card)))
+
+    @classmethod
+    def load(cls, path: Path, algorithm: str = "") -> TrainedPolicy:
+        """Read what `save` wrote; `shapechanger.load_policy` reads every kind of policy.
+
+        Args:
+            path: The file.
+            algorithm: As of `shapechanger.load_policy`.
+
+        Raises:
+            CorruptStudy: If the file is missing, is not such a policy, or has been changed.
+        """
+        try:
+            content, tensors = read_tensors(path)
+            card = msgspec.json.decode(content, type=PolicyCard, dec_hook=from_builtins)
+            _require_numbers(card, tensors)
+            return cls(_model(card, tensors, algorithm), _read_statistics(card, tensors), card)
+        except FileNotFoundError as error:
+            raise CorruptStudy(no_policy_file(path)) from error
+        except CorruptStudy:  # Which is a ValueError, too.
+            raise
+        except UNUSABLE as error:
+            raise CorruptStudy(
+                f"{path} is not a policy that `shapechanger train` or a study has written "
+                f"({refusal(error)})."
+            ) from error
+
 
 def actor(
     model: BaseAlgorithm,
@@ -155,8 +199,8 @@ def actor(
     """
     mean = _mean_action(model) if deterministic else None
     scale = ActionScale.between(cast("Any", model).action_space, action)
-    if mean is not None and isinstance(model.policy, LimbPolicy):
-        return mean  # Its observations are scaled already, and of any body.
+    if mean is not None and hasattr(model.policy, "act"):
+        return mean  # Rows of limbs are scaled already, and of any body.
 
     def act(observations: NDArray[Any]) -> NDArray[Any]:
         inputs = observations
@@ -176,7 +220,7 @@ def _mean_action(model: BaseAlgorithm) -> Act | None:
     long as the network itself.
     """
     policy: Any = model.policy
-    if isinstance(policy, LimbPolicy):
+    if hasattr(policy, "act"):  # It has mean actions of its own.
         return policy.act
     kinds: Any = (type(policy), type(policy.features_extractor), type(policy.action_space))
     if kinds != (ActorCriticPolicy, FlattenExtractor, gym.spaces.Box):
@@ -198,63 +242,6 @@ def _normalised(observations: NDArray[Any], statistics: RunningMeanStd) -> NDArr
     return np.clip(scaled, -CLIP, CLIP).astype(np.float32)
 
 
-def save_policy(policy: TrainedPolicy, path: str | PathLike[str]) -> None:
-    """Write a policy to one file of safetensors.
-
-    Args:
-        policy: The policy.
-        path: The file, such as `Ant-v1.safetensors`.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
-    tensors: dict[str, NDArray[Any]] = {
-        _WEIGHTS + name: value.detach().cpu().numpy()
-        for name, value in policy.model.policy.state_dict().items()
-    }
-    for side in ("observation", "action"):
-        space = cast("gym.spaces.Box", getattr(policy.model, f"{side}_space"))
-        tensors |= {f"{_SPACES}{side}.low": space.low, f"{_SPACES}{side}.high": space.high}
-    if policy.normalisation is not None:
-        for side in ("observation", "reward"):
-            statistics = getattr(policy.normalisation, side)
-            for name in ("mean", "var", "count"):
-                tensors[f"{_STATISTICS}{side}.{name}"] = np.asarray(getattr(statistics, name))
-    write_atomic(Path(path), tensor_bytes(tensors, msgspec.json.encode(policy.card)))
-
-
-def load_policy(path: str | PathLike[str], algorithm: str = "") -> TrainedPolicy:
-    """Read what `save_policy` wrote; `shapechanger.load_policy` reads every kind of policy.
-
-    Args:
-        path: The file.
-        algorithm: An algorithm of yours, a class or function as `module:name`, that the file may
-            name. A file alone may only name classes of models, of Stable-Baselines3, sb3-contrib
-            or a module that is already imported.
-
-    Raises:
-        CorruptStudy: If the file is missing, is not such a policy, or has been changed.
-    """
-    path = Path(path)
-    try:
-        content, tensors = read_tensors(path)
-        card = msgspec.json.decode(content, type=PolicyCard)
-        _require_numbers(card, tensors)
-        model = _model(card, tensors, algorithm)
-        return TrainedPolicy(model, _read_statistics(card, tensors), card)
-    except FileNotFoundError as error:
-        raise CorruptStudy(no_policy_file(path)) from error
-    except CorruptStudy:  # Which is a ValueError, too.
-        raise
-    except (*UNREADABLE, *_UNBUILDABLE) as error:
-        reason = str(error).partition("\n")[0].rstrip(".:") or "it needs more memory than there is"
-        if isinstance(error, KeyError):
-            reason = f"it lacks {reason}"
-        raise CorruptStudy(
-            f"{path} is not a policy that `shapechanger train` or a study has written ({reason})."
-        ) from error
-
-
 def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> None:
     """Refuse numbers that are not finite, and a network that is larger than the file.
 
@@ -264,7 +251,7 @@ def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
         is_bound = name.startswith(f"{_SPACES}observation")  # May be infinite.
         if (np.isnan(value) if is_bound else ~np.isfinite(value)).any():
             raise ValueError(f"its numbers {name!r} must be finite")
-    settings = card.settings
+    settings: Any = card.settings
     widths = (card.observation.size, *settings.net_arch)
     weights = sum(before * after for before, after in pairwise(widths))
     known = sum(value.size for value in tensors.values())
@@ -272,13 +259,13 @@ def _require_numbers(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> N
     if settings.algorithm in {"PPO", "SAC", "TQC"} and weights > known:
         raise ValueError(f"its card needs at least {weights} weights, and it has {known} numbers")
     # Worlds on a device are not built again.
-    if settings.n_envs > _MOST_ENVS and not isinstance(settings, RslSettings):
+    if settings.n_envs > _MOST_ENVS and "device" not in settings.takes:
         raise ValueError(f"its card has {settings.n_envs} envs, more than {_MOST_ENVS}")
 
 
 def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str) -> BaseAlgorithm:
     """Build the model that the card describes, with the weights of the file."""
-    settings = card.settings
+    settings: Any = card.settings
     if settings.algorithm != algorithm:
         require_class(settings.algorithm)
     spaces: list[gym.spaces.Box] = []
@@ -289,7 +276,7 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
         if low.shape != (layout.size,):
             raise ValueError(f"its {side} has {low.size} numbers, and its layout {layout.size}")
         spaces.append(gym.spaces.Box(low, high, dtype=low.dtype.type))
-    if isinstance(settings, RslSettings):
+    if "device" in settings.takes:
         settings = settings.for_one_env()  # As in its training.
     envs = DummyVecEnv([lambda: SpacesOnly(*spaces)] * settings.n_envs)
     # Building a model seeds Python, NumPy and PyTorch; a training around it must not repeat itself.
@@ -316,7 +303,7 @@ def _model(card: PolicyCard, tensors: Mapping[str, NDArray[Any]], algorithm: str
 
 def _read_statistics(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> Normalisation | None:
     if not any(name.startswith(_STATISTICS) for name in tensors):
-        if card.settings.normalise:
+        if cast("Any", card.settings).normalise:
             raise ValueError("its learner normalises, and it has no statistics")
         return None
 

@@ -11,8 +11,7 @@ are the same as those of other learners.
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any, Final, cast
 
@@ -23,42 +22,34 @@ from shapechanger.contract.vector import make_vec
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.transfer.actions import ActionScale, learners_space, require_ranges
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.learners import DemonstrationFile, ignore
-from shapechanger.transfer.learners import sb3 as _sb3
+from shapechanger.transfer.identities import identities_in
+from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.algorithms import SpacesOnly
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,
     evaluate,
-    evaluation_envs,
 )
 from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy, actor
-from shapechanger.transfer.learners.sb3 import Sb3Learner
-from shapechanger.transfer.learners.settings import LimbSettings, RslSettings, require_budget
-from shapechanger.transfer.limbs.device import DeviceRows
-from shapechanger.transfer.limbs.envs import bodies_in_turn, together
-from shapechanger.transfer.limbs.policy import LimbPolicy
-from shapechanger.transfer.limbs.rows import LimbRows, require_same_columns
-from shapechanger.transfer.versions import identities_in
+from shapechanger.transfer.learners.sb3 import Sb3Learner, statistics_of
 
 try:
     import torch
     from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
-    from torch import Tensor, nn
+    from torch import Tensor
 except ImportError as error:
     raise MissingExtra("stable-baselines3", "learn") from error
 try:
     from rsl_rl.algorithms import PPO
     from rsl_rl.env import VecEnv
     from rsl_rl.models import MLPModel
-    from rsl_rl.modules.distribution import GaussianDistribution
     from rsl_rl.storage import RolloutStorage
     from tensordict import TensorDict
 except ImportError as error:
     raise MissingExtra("rsl-rl-lib", "gpu") from error
 
 # The group of observations that actor and critic read.
-_GROUP: Final = "policy"
+GROUP: Final = "policy"
 # Stable-Baselines3's, for both.
 _VALUE_WEIGHT: Final = 0.5
 _LONGEST_GRADIENT: Final = 0.5
@@ -76,16 +67,14 @@ class RslVecEnv(VecEnv):
     Args:
         envs: The worlds; they are reset.
         seed: Seed of the first world; None for seeds of the system.
-        rows: The rows of each world's body, for a policy of limbs, which then observes rows and
+        rows: The `DeviceRows` of the worlds, for a policy of limbs, which then observes rows and
             gives a number from -1 to 1 for each limb; None for the body's own numbers.
 
     Raises:
         StudyError: If the worlds have several spaces and no rows.
     """
 
-    def __init__(
-        self, envs: Any, seed: int | None = None, rows: Sequence[LimbRows] | None = None
-    ) -> None:
+    def __init__(self, envs: Any, seed: int | None = None, rows: Any = None) -> None:
         seen = envs.reset(seed=seed)[0]
         if rows is None and isinstance(seen, tuple):
             raise StudyError(
@@ -97,7 +86,7 @@ class RslVecEnv(VecEnv):
         self.max_episode_length = envs.max_episode_steps or 0
         self.device = envs.device
         self.cfg = {}
-        self._rows = None if rows is None else DeviceRows(envs, rows)
+        self._rows = rows
         if self._rows is not None:
             self.num_actions = self._rows.room
         else:
@@ -121,7 +110,7 @@ class RslVecEnv(VecEnv):
 
     def get_observations(self) -> TensorDict:
         """Return the present observations."""
-        return TensorDict({_GROUP: self._observations}, batch_size=[self.num_envs])
+        return TensorDict({GROUP: self._observations}, batch_size=[self.num_envs])
 
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
         """Take one step in each world.
@@ -144,16 +133,15 @@ class RslVecEnv(VecEnv):
 
 
 class RslLearner(Sb3Learner):
-    """PPO of rsl-rl on a device: a `shapechanger.transfer.learners.Learner`.
+    """PPO of rsl-rl on a device."""
 
-    Args:
-        name: Name of the learner, for the cards of its policies.
-        settings: Its settings.
-    """
+    settings: Any
 
-    def __init__(self, name: str, settings: RslSettings) -> None:
-        super().__init__(name, settings)
-        self._ppo = settings
+    @property
+    def device(self) -> str:
+        """Where it learns: "CPU", or the name of a GPU."""
+        device = self.settings.device or ("cuda" if torch.cuda.is_available() else "cpu")
+        return "CPU" if device == "cpu" else torch.cuda.get_device_name(device)
 
     def train(
         self,
@@ -161,37 +149,26 @@ class RslLearner(Sb3Learner):
         steps: int,
         seed: int,
         *,
-        demonstrations: DemonstrationFile | None = None,
         start: TrainedPolicy | None = None,
         body_map: BodyMap | None = None,
-        only_last: bool = False,
-        callback: Any = None,
-        rehearsal: Any = None,
-        on_evaluation: Callable[[Evaluation], None],
+        on_evaluation: Callable[[Evaluation], None] = ignore,
         on_steps: Callable[[int], None] = lambda steps: None,
+        callback: Any = None,
     ) -> TrainedPolicy:
         """Train a policy, evaluating it before the first step, along the way, and at the end.
 
         Raises:
-            StudyError: If `steps` is smaller than one evaluation, a callback or a rehearsal is
-                given, there are more bodies than worlds, or the training diverges.
+            StudyError: If `steps` is smaller than one evaluation, there are more bodies than
+                worlds, or the training diverges.
             TransplantError: If the source policy is of another family than the bodies.
             UnknownName: If there is no such device.
             VectorEnvError: If the task has no functions for a device.
         """
-        del demonstrations, only_last
-        if callback is not None or rehearsal is not None:
-            raise StudyError(f"{self._name} takes no callback and rehearses no demonstrations.")
-        settings = self._ppo
-        require_budget(steps, settings)
-        rows: list[LimbRows] | None = None
-        if isinstance(settings, LimbSettings):
-            bodies, rows = bodies_in_turn(env, settings.n_envs, settings.room)
-            made = together(bodies)
-            if start is not None:
-                require_same_columns(start.card.observation, rows[0].layouts()[0], env.id)
-        else:
-            made = env
+        if callback is not None:
+            raise StudyError(f"{self.name} takes no callback of Stable-Baselines3.")
+        settings = self.settings
+        settings.require_budget(steps)
+        made, rows = self._worlds(env)
         worlds = make_vec(
             made.id,
             settings.n_envs,
@@ -200,22 +177,22 @@ class RslLearner(Sb3Learner):
             task_infos=False,
             **made.kwargs,
         )
-        eval_envs = evaluation_envs(env, settings)
+        eval_envs = self.evaluation_envs(env)
         try:
             one: Any = eval_envs[0]
             identity = identities_in(env, one, settings)
             layouts = layouts_of(one)
             spaces = SpacesOnly(one.observation_space, learners_space(one.action_space))
-            envs: Any = _sb3._with_statistics(DummyVecEnv([lambda: spaces]), settings)
+            envs: Any = self._with_statistics(DummyVecEnv([lambda: spaces]))
             single = settings.for_one_env()
             # Stable-Baselines3 leaves out types.
             model: Any
-            model, explores = _sb3._first_model(envs, single, seed, None, start, body_map)
-            training = _Training(RslVecEnv(worlds, seed, rows), model, envs, settings)
+            model, explores = self._first_model(envs, single, seed, start, body_map, layouts[0])
+            training = self._begin(worlds, seed, rows, model, envs)
 
             def evaluated(done: int) -> None:
-                _sb3._require_finite(model, self._name)
-                act = actor(model, _sb3._statistics(envs), layouts[1])
+                self.require_finite(model)
+                act = actor(model, statistics_of(envs), layouts[1])
                 episodes = settings.eval_episodes
                 on_evaluation(evaluate(act, eval_envs, EVALUATION_SEED, done, episodes=episodes))
 
@@ -236,7 +213,7 @@ class RslLearner(Sb3Learner):
             card = PolicyCard(
                 env,
                 *layouts,
-                self._name,
+                self.name,
                 settings,
                 done,
                 seed,
@@ -244,50 +221,20 @@ class RslLearner(Sb3Learner):
                 identity,
                 start_log_std=explores,
             )
-            return TrainedPolicy(model, _sb3._statistics(envs), card)
+            return TrainedPolicy(model, statistics_of(envs), card)
         finally:
             worlds.close()
             for one in eval_envs:
                 one.close()
 
+    def _worlds(self, env: EnvRef) -> tuple[EnvRef, Any]:
+        """Return the envs of all worlds as one, and the rows of each body; None without limbs."""
+        return env, None
 
-class _LimbModel(MLPModel):
-    """A network of a policy of limbs as rsl-rl's actor or critic.
-
-    Args:
-        policy: The policy.
-        net: One of its networks, of which this has a copy.
-        acts: Whether it is the actor.
-    """
-
-    def __init__(self, policy: LimbPolicy, net: nn.Module, *, acts: bool) -> None:
-        # Not that of MLPModel, which builds a network.
-        nn.Module.__init__(self)
-        self.obs_groups, self.obs_normalization = [_GROUP], False
-        self.obs_normalizer = nn.Identity()
-        self.mlp: Any = copy.deepcopy(net)
-        # One deviation for all limbs, however many there are.
-        self.distribution: Any = GaussianDistribution(1, std_type="log") if acts else None
-        self._as_rows = policy.rows
-
-    def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> Tensor:
-        """Return the rows, shape (n, 1 + limbs, width)."""
-        self._rows = self._as_rows(super().get_latent(obs, masks, hidden_state))
-        return self._rows
-
-    def forward(self, *arguments: Any, **more: Any) -> Tensor:
-        """Return actions, shape (n, limbs), or values, shape (n, 1)."""
-        found = super().forward(*arguments, **more)
-        return found.unsqueeze(-1) if self.distribution is None else found
-
-    @property
-    def output_entropy(self) -> Tensor:
-        """Entropy of the actions of limbs that have a motor, shape (n,)."""
-        return LimbPolicy.over_motors(self.distribution._distribution.entropy(), self._rows)
-
-    def get_output_log_prob(self, outputs: Tensor) -> Tensor:
-        """Return logarithms of the probabilities of actions, (n, limbs); shape (n,)."""
-        return LimbPolicy.over_motors(self.distribution._distribution.log_prob(outputs), self._rows)
+    def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> Training:
+        """Return the training on worlds of `_worlds`."""
+        del rows
+        return Training(RslVecEnv(worlds, seed), model, statistics, self.settings)
 
 
 class _Returns:
@@ -344,7 +291,7 @@ class _Returns:
             found.count = float(self._count)
 
 
-class _Training:
+class Training:
     """rsl-rl's PPO with the weights and statistics of a model of Stable-Baselines3.
 
     Args:
@@ -354,7 +301,7 @@ class _Training:
         settings: The settings.
     """
 
-    def __init__(self, envs: RslVecEnv, model: Any, statistics: Any, settings: RslSettings) -> None:
+    def __init__(self, envs: RslVecEnv, model: Any, statistics: Any, settings: Any) -> None:
         self._envs = envs
         self._model = model
         self._statistics = statistics if isinstance(statistics, VecNormalize) else None
@@ -392,13 +339,7 @@ class _Training:
 
     def _networks(self, seen: TensorDict) -> tuple[Any, Any]:
         """Return an actor and a critic of the shapes of the model's."""
-        policy = self._model.policy
-        if isinstance(policy, LimbPolicy):
-            return (
-                _LimbModel(policy, policy.actor_net, acts=True),
-                _LimbModel(policy, policy.critic_net, acts=False),
-            )
-        groups = {"actor": [_GROUP], "critic": [_GROUP]}
+        groups = {"actor": [GROUP], "critic": [GROUP]}
         shape: dict[str, Any] = {
             "hidden_dims": self._settings.net_arch,
             "activation": "tanh",  # Stable-Baselines3's.
@@ -437,8 +378,6 @@ class _Training:
     def _pairs(self) -> list[tuple[Any, Any]]:
         """Return modules of rsl-rl's networks, each with that of Stable-Baselines3's policy."""
         policy = self._model.policy
-        if isinstance(policy, LimbPolicy):
-            return [(self._actor.mlp, policy.actor_net), (self._critic.mlp, policy.critic_net)]
         extractor = policy.mlp_extractor
         pairs: list[tuple[Any, Any]] = []
         for network, hidden, head in (

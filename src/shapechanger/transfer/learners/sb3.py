@@ -14,22 +14,21 @@ import numpy as np
 from shapechanger.contract.env_ref import (
     EnvRef,
     EnvTraits,
-    each_body,
     is_single_instance,
     layouts_of,
 )
-from shapechanger.errors import MissingExtra, SpaceMismatch, StudyError, TransplantError
+from shapechanger.errors import MissingExtra, SpaceMismatch, StudyError
 from shapechanger.layout import Layout
+from shapechanger.policy import kind_of
 from shapechanger.transfer.actions import require_ranges
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.body_map.envs import check_size
-from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin, ignore
+from shapechanger.transfer.identities import identities_in
+from shapechanger.transfer.learners import Learner, PolicyOrigin, ignore
 from shapechanger.transfer.learners.algorithms import build_model
-from shapechanger.transfer.learners.cloning import is_clone
 from shapechanger.transfer.learners.evaluation import (
     Evaluation,
     evaluate,
-    evaluation_envs,
     evaluation_seed,
 )
 from shapechanger.transfer.learners.policy_file import (
@@ -37,20 +36,10 @@ from shapechanger.transfer.learners.policy_file import (
     PolicyCard,
     TrainedPolicy,
     actor,
-    load_policy,
-    save_policy,
 )
-from shapechanger.transfer.learners.settings import (
-    LimbSettings,
-    OffPolicySettings,
-    Sb3Settings,
-    require_budget,
-)
+from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.learners.vec_env import training_vec_env, with_scaled_actions
-from shapechanger.transfer.limbs.envs import LimbVecEnv, rows_of_each
-from shapechanger.transfer.limbs.rows import require_same_columns
 from shapechanger.transfer.transplant import transplant
-from shapechanger.transfer.versions import identities_in
 
 try:
     import torch
@@ -76,37 +65,14 @@ more keeps its own deviation, and none starts above that of a new policy because
 """
 
 
-class Sb3Learner:
-    """Any algorithm of Stable-Baselines3: a `shapechanger.transfer.learners.Learner`.
-
-    Args:
-        name: Name of the learner, for the cards of its policies.
-        settings: Its settings.
-        tensorboard: Folder of TensorBoard's logs; None for none.
-        threads: Threads that step the envs, None for one per core; the result is the same. One by
-            default: a study runs as many trainings at a time as there are cores.
-    """
-
-    def __init__(
-        self,
-        name: str,
-        settings: Sb3Settings,
-        *,
-        tensorboard: Path | None = None,
-        threads: int | None = 1,
-    ) -> None:
-        self._name = name
-        self._settings = settings
-        self._tensorboard = None if tensorboard is None else str(tensorboard)
-        self._threads = threads
+class Sb3Learner(Learner[Sb3Settings]):
+    """Any algorithm of Stable-Baselines3."""
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
         """Refuse an env whose spaces are not flat boxes of the sizes of its layouts."""
         check_size(f"observation of {env}", traits.observation_space, traits.observation_layout)
         check_size(f"action of {env}", traits.action_space, traits.action_layout)
         require_ranges(env.id, traits.action_space, traits.action_layout)
-        if isinstance(self._settings, LimbSettings):
-            rows_of_each(each_body(env), self._settings.room)
 
     def train(
         self,
@@ -114,57 +80,46 @@ class Sb3Learner:
         steps: int,
         seed: int,
         *,
-        demonstrations: DemonstrationFile | None = None,
         start: TrainedPolicy | None = None,
         body_map: BodyMap | None = None,
-        only_last: bool = False,
-        callback: BaseCallback | None = None,
-        rehearsal: Any = None,
-        on_evaluation: OnEvaluation,
+        on_evaluation: OnEvaluation = ignore,
         on_steps: OnSteps = lambda steps: None,
+        callback: BaseCallback | None = None,
     ) -> TrainedPolicy:
         """Train a policy, evaluating it before the first step, along the way, and at the end.
 
         `steps` are rounded up to whole updates, `on_steps` is called after each step of all envs,
-        and `demonstrations` and `only_last` are not used.
+        and `callback` is one of Stable-Baselines3's for the training.
 
         Raises:
-            StudyError: If `steps` is smaller than one evaluation, a rehearsal is given, or the
-                training diverges.
+            StudyError: If `steps` is smaller than one evaluation, or the training diverges.
             TransplantError: If the source policy is of a kind that cannot be transplanted.
         """
-        del demonstrations, only_last
-        if rehearsal is not None:
-            raise StudyError(f"{self._name} learns by trial and rehearses no demonstrations.")
-        settings = self._settings
-        require_budget(steps, settings)
+        settings = self.settings
+        settings.require_budget(steps)
         # These import the module of the id, if it names one.
-        eval_envs = evaluation_envs(env, settings)
+        eval_envs = self.evaluation_envs(env)
         identity = identities_in(env, eval_envs[0], settings)
         if single := is_single_instance(eval_envs[0]):
             # It is trained in the env that it is evaluated in.
             settings = settings.for_one_env()
             together: VecEnv = DummyVecEnv([lambda: eval_envs[0]])
         else:
-            together = _training_envs(env, settings, self._threads)
+            together = self._training_envs(env)
         layouts = layouts_of(eval_envs[0])
         try:
             scaled = with_scaled_actions(together, layouts[1], env.id)
         except SpaceMismatch:
             together.close()
             raise
-        envs = _with_statistics(VecMonitor(scaled), settings)
+        envs = self._with_statistics(VecMonitor(scaled))
         try:
-            if start is not None and isinstance(settings, LimbSettings):
-                require_same_columns(start.card.observation, layouts[0], env.id)
-            model, explores = _first_model(envs, settings, seed, self._tensorboard, start, body_map)
-            first_seed = evaluation_seed(env, settings.eval_episodes)
+            model, explores = self._first_model(envs, settings, seed, start, body_map, layouts[0])
             evaluations = _PeriodicEvaluation(
-                self._name,
-                settings,
+                self,
                 eval_envs,
                 layouts[1],
-                first_seed,
+                evaluation_seed(env, settings.eval_episodes),
                 single,
                 on_evaluation,
                 on_steps,
@@ -173,41 +128,38 @@ class Sb3Learner:
             if on_evaluation is not ignore:
                 on_evaluation(evaluations.evaluate(model, envs))
             callbacks: list[BaseCallback] = [] if callback is None else [callback]
-            if start is not None and isinstance(settings, OffPolicySettings):
-                callbacks.append(_ActFirst(settings.learning_starts))
+            if start is not None and "off-policy" in settings.takes:
+                callbacks.append(_ActFirst(cast("Any", model).learning_starts))
             callbacks.append(evaluations)
             try:
                 cast("Any", model).learn(settings.whole_updates(steps), callback=callbacks)
             except ValueError as error:  # PyTorch refuses distributions of NaN.
-                _require_finite(model, self._name)
+                self.require_finite(model)
                 raise error
             evaluations.evaluate_now()
+            done = int(cast("Any", model).num_timesteps)
             card = PolicyCard(
                 env,
                 *layouts,
-                self._name,
+                self.name,
                 settings,
-                int(cast("Any", model).num_timesteps),
+                done,
                 seed,
                 version("shapechanger"),
                 identity,
                 start_log_std=explores,
             )
-            return TrainedPolicy(model, _statistics(envs), card)
+            return TrainedPolicy(model, statistics_of(envs), card)
         finally:
             envs.close()
             for one in eval_envs:
                 one.close()
 
     def evaluate(self, env: EnvRef, policy: TrainedPolicy, body_map: BodyMap) -> Evaluation:
-        """Evaluate a policy through the body map, which a policy of limbs does not need."""
-        envs: list[gym.Env[Any, Any]] = evaluation_envs(env, self._settings)
-        if isinstance(self._settings, LimbSettings):
-            require_same_columns(policy.card.observation, layouts_of(envs[0])[0], env.id)
-        else:
-            envs = [MappedEnv(one, body_map) for one in envs]
+        """Evaluate a policy through the body map."""
+        envs = self._adapted(self.evaluation_envs(env), policy, body_map)
         try:
-            episodes = self._settings.eval_episodes
+            episodes = self.settings.eval_episodes
             return evaluate(policy.act, envs, evaluation_seed(env, episodes), episodes=episodes)
         finally:
             for one in envs:
@@ -215,11 +167,7 @@ class Sb3Learner:
 
     def load(self, path: Path) -> TrainedPolicy:
         """Load a policy."""
-        return load_policy(path, self._settings.algorithm)
-
-    def save(self, policy: TrainedPolicy, path: Path) -> None:
-        """Write a policy to a file."""
-        save_policy(policy, path)
+        return TrainedPolicy.load(path, self.settings.algorithm)
 
     def origin(self, path: Path) -> PolicyOrigin:
         """Read where a policy comes from.
@@ -227,76 +175,97 @@ class Sb3Learner:
         Raises:
             StudyError: If it is a clone, or another algorithm trained it.
         """
-        if is_clone(path):
+        if kind_of(path):
             raise StudyError(
-                f"{path} is a clone, and {self._name} does not learn from pictures: give "
-                f"--learner cloning, or a policy trained with {self._name}."
+                f"{path} is a clone, and {self.name} does not learn from pictures: give "
+                f"--learner cloning, or a policy trained with {self.name}."
             )
         card = self.load(path).card
-        if card.settings.algorithm != self._settings.algorithm:
+        other: Any = card.settings
+        if other.algorithm != self.settings.algorithm:
             raise StudyError(
-                f"{path} was trained with {card.settings.algorithm}, and {self._name} is "
-                f"{self._settings.algorithm}: give --learner {card.learner}."
+                f"{path} was trained with {other.algorithm}, and {self.name} is "
+                f"{self.settings.algorithm}: give --learner {card.learner}."
             )
         return PolicyOrigin(card.env, card.steps, card.identity)
 
+    def _training_envs(self, env: EnvRef) -> VecEnv:
+        """Make the parallel envs of a training."""
+        return training_vec_env(env, self.settings.n_envs, self.threads)
 
-def _training_envs(env: EnvRef, settings: Sb3Settings, threads: int | None) -> VecEnv:
-    """Make the parallel envs of a training."""
-    if isinstance(settings, LimbSettings):
-        return LimbVecEnv(env, settings.n_envs, threads=threads, room=settings.room)
-    return training_vec_env(env, settings.n_envs, threads)
+    def _adapted(
+        self, envs: list[gym.Env[Any, Any]], policy: TrainedPolicy, body_map: BodyMap
+    ) -> list[gym.Env[Any, Any]]:
+        """Return envs as a policy of another body senses them."""
+        del policy
+        return [MappedEnv(one, body_map) for one in envs]
 
+    def _with_statistics(self, envs: VecEnv) -> VecEnv:
+        """Return envs that keep the statistics of a learner that normalises."""
+        if not self.settings.normalise:
+            return envs
+        gamma = self.settings.model_arguments.get("gamma", 0.99)
+        return VecNormalize(envs, norm_obs=self._normalises_observations, gamma=gamma)
 
-def _with_statistics(envs: VecEnv, settings: Sb3Settings) -> VecEnv:
-    """Return envs that keep the statistics of a learner that normalises."""
-    if not settings.normalise:
-        return envs
-    # Rows of limbs are scaled already.
-    seen = not isinstance(settings, LimbSettings)
-    gamma = settings.model_arguments.get("gamma", 0.99)
-    return VecNormalize(envs, norm_obs=seen, gamma=gamma)
+    _normalises_observations = True
 
+    def _first_model(
+        self,
+        envs: VecEnv,
+        settings: Sb3Settings,
+        seed: int,
+        start: TrainedPolicy | None,
+        body_map: BodyMap | None,
+        observation: Layout,
+    ) -> tuple[BaseAlgorithm, tuple[float, ...] | None]:
+        """Return the model that a training begins with.
 
-def _first_model(
-    envs: VecEnv,
-    settings: Sb3Settings,
-    seed: int,
-    tensorboard: str | None,
-    start: TrainedPolicy | None,
-    body_map: BodyMap | None,
-) -> tuple[BaseAlgorithm, tuple[float, ...] | None]:
-    """Return the model that a training begins with.
+        Returns:
+            The model, and what `_explore` returns if it begins with the weights of a policy.
+        """
+        logs = None if self.tensorboard is None else str(self.tensorboard)
+        if start is None or body_map is None:
+            return build_model(settings, envs, seed, logs), None
+        if start.normalisation is not None and isinstance(envs, VecNormalize):
+            # The critic predicts rewards divided by these.
+            envs.ret_rms = start.normalisation.reward.copy()
+        model = self._moved(envs, settings, seed, logs, start, body_map, observation)
+        return model, _explore(model, settings)
 
-    Returns:
-        The model, and what `_explore` returns if it begins with the weights of a policy.
-    """
-    if start is None or body_map is None:
-        return build_model(settings, envs, seed, tensorboard), None
-    if isinstance(settings, LimbSettings):
-        model = build_model(settings, envs, seed, tensorboard)
-        _take_weights(model, envs, start)
-    else:
-        model = _transplanted_model(envs, settings, seed, tensorboard, start, body_map)
-    return model, _explore(model, settings)
+    def _moved(
+        self,
+        envs: VecEnv,
+        settings: Sb3Settings,
+        seed: int,
+        tensorboard: str | None,
+        source: TrainedPolicy,
+        body_map: BodyMap,
+        observation: Layout,
+    ) -> BaseAlgorithm:
+        """The source policy in the target's shapes, with its statistics, ready for training."""
+        del observation
+        arguments = dict(settings.model_arguments)
+        arguments.pop("policy_kwargs", None)
+        statistics = source.normalisation
+        return transplant(
+            source.model,
+            body_map,
+            envs,
+            normalisation=None if statistics is None else statistics.observation,
+            seed=seed,
+            device="cpu",
+            tensorboard_log=tensorboard,
+            **arguments,
+        )
 
-
-def _take_weights(model: BaseAlgorithm, envs: VecEnv, source: TrainedPolicy) -> None:
-    """Give a model the weights of a policy of limbs, which fit any body of its family.
-
-    Raises:
-        TransplantError: If its network is padded for another number of limbs.
-    """
-    statistics = source.normalisation
-    if statistics is not None and isinstance(envs, VecNormalize):
-        envs.ret_rms = statistics.reward.copy()
-    try:
-        cast("Any", model.policy).load_state_dict(source.model.policy.state_dict())
-    except RuntimeError as error:
-        raise TransplantError(
-            f"The network of the policy of {source.card.env.id} is padded for another number of "
-            "limbs than this training's: give the same --set room."
-        ) from error
+    def require_finite(self, model: BaseAlgorithm) -> None:
+        """Refuse a model whose weights are not all finite."""
+        weights = cast("Any", model.policy).state_dict().values()
+        if not all(torch.isfinite(one).all() for one in weights):
+            raise StudyError(
+                f"{self.name} diverged after {model.num_timesteps} steps: its weights are not "
+                "finite. Try a smaller learning rate or a milder body."
+            )
 
 
 def use_one_thread() -> None:
@@ -306,34 +275,6 @@ def use_one_thread() -> None:
     order are other sums.
     """
     torch.set_num_threads(1)
-
-
-def _transplanted_model(
-    envs: VecEnv,
-    settings: Sb3Settings,
-    seed: int,
-    tensorboard: str | None,
-    source: TrainedPolicy,
-    body_map: BodyMap,
-) -> BaseAlgorithm:
-    """The source policy in the target's shapes, with its statistics, ready for training."""
-    statistics = source.normalisation
-    if statistics is not None and isinstance(envs, VecNormalize):
-        # The critic predicts rewards divided by these.
-        envs.ret_rms = statistics.reward.copy()
-    arguments = {
-        name: value for name, value in settings.model_arguments.items() if name != "policy_kwargs"
-    }
-    return transplant(
-        source.model,
-        body_map,
-        envs,
-        normalisation=None if statistics is None else statistics.observation,
-        seed=seed,
-        device="cpu",
-        tensorboard_log=tensorboard,
-        **arguments,
-    )
 
 
 def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] | None:
@@ -351,17 +292,8 @@ def _explore(model: BaseAlgorithm, settings: Sb3Settings) -> tuple[float, ...] |
     return tuple(map(float, log_std.detach().numpy()))
 
 
-def _require_finite(model: BaseAlgorithm, learner: str) -> None:
-    """Refuse a model whose weights are not all finite."""
-    weights = cast("Any", model.policy).state_dict().values()
-    if not all(torch.isfinite(one).all() for one in weights):
-        raise StudyError(
-            f"{learner} diverged after {model.num_timesteps} steps: its weights are not finite. "
-            "Try a smaller learning rate or a milder body."
-        )
-
-
-def _statistics(envs: VecEnv) -> Normalisation | None:
+def statistics_of(envs: VecEnv) -> Normalisation | None:
+    """Return the statistics that envs keep; None if they keep none."""
     if not isinstance(envs, VecNormalize):
         return None
     observation = (
@@ -395,8 +327,7 @@ class _PeriodicEvaluation(BaseCallback):
 
     def __init__(
         self,
-        learner: str,
-        settings: Sb3Settings,
+        learner: Sb3Learner,
         envs: list[gym.Env[Any, Any]],
         action: Layout,
         first_seed: int,
@@ -406,7 +337,6 @@ class _PeriodicEvaluation(BaseCallback):
     ) -> None:
         super().__init__()
         self._learner = learner
-        self._settings = settings
         self._envs = envs
         self._action = action
         self._first_seed = first_seed
@@ -414,7 +344,7 @@ class _PeriodicEvaluation(BaseCallback):
         self._on_evaluation = on_evaluation
         self._on_steps = on_steps
         # A third of the time of a finger's training is evaluation.
-        self._next = math.inf if on_evaluation is ignore else settings.eval_every
+        self._next = math.inf if on_evaluation is ignore else learner.settings.eval_every
 
     def _on_step(self) -> bool:
         self._on_steps(self.num_timesteps)
@@ -423,7 +353,7 @@ class _PeriodicEvaluation(BaseCallback):
     def _on_rollout_start(self) -> None:
         if self.num_timesteps >= self._next:
             self.evaluate_now()
-            self._next += self._settings.eval_every
+            self._next += self._learner.settings.eval_every
             if self._single:
                 self._restart_episode()
 
@@ -436,16 +366,16 @@ class _PeriodicEvaluation(BaseCallback):
             steps: Training steps so far.
         """
         return evaluate(
-            actor(model, _statistics(envs), self._action),
+            actor(model, statistics_of(envs), self._action),
             self._envs,
             self._first_seed,
             steps,
-            episodes=self._settings.eval_episodes,
+            episodes=self._learner.settings.eval_episodes,
         )
 
     def evaluate_now(self) -> None:
         """Evaluate, log and report the current policy."""
-        _require_finite(self.model, self._learner)
+        self._learner.require_finite(self.model)
         result = self.evaluate(self.model, self.training_env, self.num_timesteps)
         self.logger.record("eval/mean_return", result.mean_return)
         self.logger.record("eval/mean_length", result.mean_length)

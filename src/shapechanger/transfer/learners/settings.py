@@ -1,17 +1,18 @@
-"""Settings of learners: Stable-Baselines3's, of policies of limbs, and cloning."""
+"""Settings of the learners of Stable-Baselines3 and rsl-rl."""
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Final, Literal, Self
 
 import msgspec
 
-from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError
+from shapechanger.transfer.learners import LearnerSettings, Takes
+
+_RSL: Final = ("rsl-rl-lib", "mujoco-warp", "warp-lang")
 
 
-class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
+class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
     """Settings that all learners of Stable-Baselines3 share.
 
     Attributes:
@@ -36,8 +37,17 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
     eval_every: int
     eval_episodes: int = 5
 
+    takes = frozenset[Takes]({"trial", "callback"})
+    learner = "shapechanger.transfer.learners.sb3:Sb3Learner"
+    last_k = 3
+    episode_limit = None
+    policy_class: ClassVar[str] = "MlpPolicy"
+    """The class of its policies: a name of Stable-Baselines3's, or `module:class`."""
+
     # Name of the setting that is the steps of each env between two updates.
     _steps_per_update: ClassVar[str]
+    # Settings besides the shared ones that are no arguments of the class.
+    _ours: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         if min(self.n_envs, self.update_steps, self.eval_episodes) < 1:
@@ -58,16 +68,6 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
         """Arguments of the class besides policy, env and seed."""
         raise NotImplementedError
 
-    @property
-    def last_k(self) -> int:
-        """Number of final evaluations that count as the end of a run."""
-        return 3
-
-    @property
-    def episode_limit(self) -> int | None:
-        """Steps after which an evaluation episode is truncated; None for the env's own limit."""
-        return None
-
     def whole_updates(self, steps: int) -> int:
         """Round `steps` up to whole updates."""
         return -(-steps // self.update_steps) * self.update_steps
@@ -86,13 +86,23 @@ class _Sb3Base(msgspec.Struct, frozen=True, kw_only=True):
         every = min(self.eval_every, self.whole_updates(steps // 4))
         return msgspec.structs.replace(self, eval_every=every, source_steps=0)
 
+    def rhythm(self) -> str:
+        """Return when policies are evaluated, and whether their observations are normalised."""
+        seen = (
+            "Observations and rewards are normalised for the learner by running estimates of their "
+            "standard deviation. Returns in this report never are."
+            if self.normalise
+            else "Observations and rewards reach the learner as they are."
+        )
+        return f"{super().rhythm()} {seen}"
+
     def _own(self) -> dict[str, Any]:
-        """The settings that not all learners share, by name."""
-        shared = _Sb3Base.__struct_fields__
-        return {name: getattr(self, name) for name in self.__struct_fields__ if name not in shared}
+        """The arguments of the class, by name."""
+        left_out = {*Sb3Settings.__struct_fields__, *self._ours}
+        return {n: getattr(self, n) for n in self.__struct_fields__ if n not in left_out}
 
 
-class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
+class PpoSettings(Sb3Settings, frozen=True, kw_only=True, tag="ppo"):
     """Settings of Stable-Baselines3's PPO, under its names.
 
     Attributes:
@@ -118,6 +128,7 @@ class PpoSettings(_Sb3Base, frozen=True, kw_only=True, tag="ppo"):
     ent_coef: float = 0.0
     log_std_init: float = 0.0
 
+    takes = Sb3Settings.takes | {"on-policy"}
     _steps_per_update = "n_steps"
 
     @property
@@ -146,6 +157,11 @@ class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
     network: Literal["limbs", "padded"] = "limbs"
     room: int = 0
 
+    takes = frozenset[Takes]({"trial", "callback", "many bodies"})
+    learner = "shapechanger.transfer.limbs.learner:LimbLearner"
+    policy_class = "shapechanger.transfer.limbs.policy:LimbPolicy"
+    _ours = ("network", "room")
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.network == "padded" and self.room < 1:
@@ -156,8 +172,7 @@ class LimbSettings(PpoSettings, frozen=True, kw_only=True, tag="ppo-limbs"):
         """Arguments of the class besides policy, env and seed."""
         arguments = super().model_arguments
         policy = arguments["policy_kwargs"]
-        policy |= {"network": arguments.pop("network"), "hidden": policy.pop("net_arch")}
-        del arguments["room"]
+        policy |= {"network": self.network, "hidden": policy.pop("net_arch")}
         return arguments
 
 
@@ -171,12 +186,10 @@ class RslPpoSettings(PpoSettings, frozen=True, kw_only=True, tag="rsl-ppo"):
 
     device: str = ""
 
-    @property
-    def model_arguments(self) -> dict[str, Any]:
-        """Arguments of Stable-Baselines3's class, which holds the policy between updates."""
-        arguments = super().model_arguments
-        del arguments["device"]
-        return arguments
+    takes = frozenset[Takes]({"trial", "device"})
+    learner = "shapechanger.transfer.learners.rsl:RslLearner"
+    packages = _RSL
+    _ours = ("device",)
 
 
 class RslLimbSettings(LimbSettings, frozen=True, kw_only=True, tag="rsl-limbs"):
@@ -188,19 +201,13 @@ class RslLimbSettings(LimbSettings, frozen=True, kw_only=True, tag="rsl-limbs"):
 
     device: str = ""
 
-    @property
-    def model_arguments(self) -> dict[str, Any]:
-        """Arguments of Stable-Baselines3's class, which holds the policy between updates."""
-        arguments = super().model_arguments
-        del arguments["device"]
-        return arguments
+    takes = frozenset[Takes]({"trial", "device", "many bodies"})
+    learner = "shapechanger.transfer.limbs.device:RslLimbLearner"
+    packages = _RSL
+    _ours = (*LimbSettings._ours, "device")
 
 
-RslSettings = RslPpoSettings | RslLimbSettings
-"""The settings of any learner on worlds of one device."""
-
-
-class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
+class OffPolicySettings(Sb3Settings, frozen=True, kw_only=True, tag="off-policy"):
     """Settings of SAC of Stable-Baselines3, or TQC of sb3-contrib, under their names.
 
     Attributes:
@@ -230,6 +237,7 @@ class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
     tau: float = 0.005
     ent_coef: float | str = "auto"
 
+    takes = Sb3Settings.takes | {"off-policy"}
     _steps_per_update = "train_freq"
 
     @property
@@ -239,7 +247,7 @@ class OffPolicySettings(_Sb3Base, frozen=True, kw_only=True, tag="off-policy"):
         return {"policy_kwargs": policy, **self._own()}
 
 
-class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
+class ImportedSettings(Sb3Settings, frozen=True, kw_only=True, tag="imported"):
     """Settings of any class that is compatible with Stable-Baselines3, or of a function.
 
     Attributes:
@@ -273,100 +281,8 @@ class ImportedSettings(_Sb3Base, frozen=True, kw_only=True, tag="imported"):
         return self
 
 
-class CloningSettings(msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
-    """Settings of behavioural cloning, in which a step is a demonstrated step.
-
-    Attributes:
-        budgets: Numbers of demonstrated steps; a policy is trained on each, from the same start.
-        episode_steps: Steps of a demonstration; the next begins on another course.
-        eval_episodes: Episodes of an evaluation.
-        eval_steps: Steps of each of them.
-        clone: Settings of each training.
-    """
-
-    budgets: tuple[int, ...]
-    episode_steps: int
-    eval_episodes: int
-    eval_steps: int
-    clone: CloneSettings = CloneSettings()
-
-    def __post_init__(self) -> None:
-        if self.eval_episodes < 1 or min(self.episode_steps, self.eval_steps) < 1:
-            raise StudyError("A learner needs at least one episode, of at least one step.")
-        if (
-            not self.budgets
-            or self.budgets[0] < 1
-            or any(a >= b for a, b in pairwise(self.budgets))
-        ):
-            raise StudyError(f"Budgets are numbers of steps that grow, got {self.budgets}.")
-
-    @property
-    def steps(self) -> int:
-        """Default number of demonstrated steps."""
-        return self.budgets[-1]
-
-    @property
-    def eval_every(self) -> int:
-        """The first budget; later ones are farther apart."""
-        return self.budgets[0]
-
-    def whole_updates(self, steps: int) -> int:
-        """Round `steps` up to a budget; the largest if all are smaller."""
-        return next((budget for budget in self.budgets if budget >= steps), self.budgets[-1])
-
-    @property
-    def last_k(self) -> int:
-        """Number of final evaluations that count: each one is of another clone."""
-        return 1
-
-    @property
-    def episode_limit(self) -> int | None:
-        """Steps after which an evaluation episode is truncated; None for the env's own limit."""
-        return self.eval_steps
-
-    @property
-    def source_steps(self) -> int:
-        """Default steps of a source policy: none of its own."""
-        return 0
-
-    def for_budget(self, steps: int) -> CloningSettings:
-        """Return the settings for a shorter budget: the same."""
-        return self
-
-    def within(self, steps: int) -> tuple[int, ...]:
-        """Return the budgets up to `steps`."""
-        return tuple(budget for budget in self.budgets if budget <= steps)
-
-
-Sb3Settings = PpoSettings | LimbSettings | RslSettings | OffPolicySettings | ImportedSettings
-"""The settings of any learner of Stable-Baselines3."""
-
-Settings = Sb3Settings | CloningSettings
-"""The settings of any learner."""
-
-
-def require_budget(steps: int, settings: Settings, which: str = "", option: str = "") -> None:
-    """Refuse a budget that ends before the first evaluation.
-
-    Args:
-        steps: The budget.
-        settings: Settings of the learner.
-        which: "target" or "source", where there are two budgets.
-        option: What sets the budget, where the user has not.
-
-    Raises:
-        StudyError: If it does.
-    """
-    if steps < settings.eval_every:
-        budget = f"{steps} {which} steps" if which else f"{steps} steps"
-        raise StudyError(
-            f"A budget of {budget} is smaller than one evaluation, which comes every "
-            f"{settings.eval_every} steps: give at least that{option and f' as {option}'}."
-        )
-
-
 def study_budgets(
-    settings: Settings, steps: int | None, source_steps: int | None, *, is_given: bool
+    settings: LearnerSettings, steps: int | None, source_steps: int | None, *, is_given: bool
 ) -> tuple[int, int]:
     """Return the budgets in the target and in the source, as whole updates.
 
@@ -380,12 +296,12 @@ def study_budgets(
         StudyError: If one ends before the first evaluation.
     """
     wanted = settings.steps if steps is None else steps
-    require_budget(wanted, settings, "target")
+    settings.require_budget(wanted, "target")
     budget = settings.whole_updates(wanted)
     option = "source_steps" if source_steps is None else ""
     before = source_steps
     if before is None:
         before = settings.source_steps or settings.whole_updates(budget // 2)
     if not is_given or source_steps:
-        require_budget(before, settings, "source", option)
+        settings.require_budget(before, "source", option)
     return budget, settings.whole_updates(before)

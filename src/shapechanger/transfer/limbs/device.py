@@ -1,21 +1,27 @@
-"""Observations and actions of many worlds on a device as rows of limbs, without leaving it."""
+"""Policies of limbs on many worlds of one device: rows, networks of rsl-rl, and the learner."""
+
+# pyright: reportPrivateUsage=false, reportMissingTypeStubs=false
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import torch
+from rsl_rl.models import MLPModel
+from rsl_rl.modules.distribution import GaussianDistribution
+from tensordict import TensorDict
+from torch import Tensor, nn
 
-from shapechanger.errors import MissingExtra
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.transfer.learners.rsl import GROUP, RslLearner, RslVecEnv, Training
+from shapechanger.transfer.limbs.envs import bodies_in_turn, together
+from shapechanger.transfer.limbs.learner import LimbLearner
+from shapechanger.transfer.limbs.policy import LimbPolicy
 from shapechanger.transfer.limbs.rows import LimbRows
-
-try:
-    import torch
-    from torch import Tensor
-except ImportError as error:
-    raise MissingExtra("torch", "gpu") from error
 
 
 class DeviceRows:
@@ -103,3 +109,70 @@ class _Batch:
         """Return the worlds' own actions; `limbs` has the shape (k, room)."""
         share = 0.5 * (limbs[:, self._actuators] + 1.0)
         return self._low + share * (self._high - self._low)
+
+
+class LimbModel(MLPModel):
+    """A network of a policy of limbs as rsl-rl's actor or critic.
+
+    Args:
+        policy: The policy.
+        net: One of its networks, of which this has a copy.
+        acts: Whether it is the actor.
+    """
+
+    def __init__(self, policy: LimbPolicy, net: nn.Module, *, acts: bool) -> None:
+        # Not that of MLPModel, which builds a network.
+        nn.Module.__init__(self)
+        self.obs_groups, self.obs_normalization = [GROUP], False
+        self.obs_normalizer = nn.Identity()
+        self.mlp: Any = copy.deepcopy(net)
+        # One deviation for all limbs, however many there are.
+        self.distribution: Any = GaussianDistribution(1, std_type="log") if acts else None
+        self._as_rows = policy.rows
+
+    def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> Tensor:
+        """Return the rows, shape (n, 1 + limbs, width)."""
+        self._rows = self._as_rows(super().get_latent(obs, masks, hidden_state))
+        return self._rows
+
+    def forward(self, *arguments: Any, **more: Any) -> Tensor:
+        """Return actions, shape (n, limbs), or values, shape (n, 1)."""
+        found = super().forward(*arguments, **more)
+        return found.unsqueeze(-1) if self.distribution is None else found
+
+    @property
+    def output_entropy(self) -> Tensor:
+        """Entropy of the actions of limbs that have a motor, shape (n,)."""
+        return LimbPolicy.over_motors(self.distribution._distribution.entropy(), self._rows)
+
+    def get_output_log_prob(self, outputs: Tensor) -> Tensor:
+        """Return logarithms of the probabilities of actions, (n, limbs); shape (n,)."""
+        return LimbPolicy.over_motors(self.distribution._distribution.log_prob(outputs), self._rows)
+
+
+class LimbTraining(Training):
+    """rsl-rl's PPO with the weights of a policy of limbs."""
+
+    def _networks(self, seen: TensorDict) -> tuple[Any, Any]:
+        del seen
+        policy = self._model.policy
+        return (
+            LimbModel(policy, policy.actor_net, acts=True),
+            LimbModel(policy, policy.critic_net, acts=False),
+        )
+
+    def _pairs(self) -> list[tuple[Any, Any]]:
+        policy = self._model.policy
+        return [(self._actor.mlp, policy.actor_net), (self._critic.mlp, policy.critic_net)]
+
+
+class RslLimbLearner(RslLearner, LimbLearner):
+    """PPO of rsl-rl with a policy of limbs, on worlds of different bodies."""
+
+    def _worlds(self, env: EnvRef) -> tuple[EnvRef, list[LimbRows]]:
+        bodies, rows = bodies_in_turn(env, self.settings.n_envs, self.settings.room)
+        return together(bodies), rows
+
+    def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> Training:
+        envs = RslVecEnv(worlds, seed, DeviceRows(worlds, rows))
+        return LimbTraining(envs, model, statistics, self.settings)

@@ -203,20 +203,12 @@ class LimbVecEnv(VecEnv):
         return found
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of each env."""
-        del indices
-        for group in self._groups:
-            group.envs.set_attr(attr_name, value)
+        """Refuse to change attributes."""
+        raise NotImplementedError
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        """Call a method of each env; return the results in the order of the envs."""
-        del indices
-        found: list[Any] = [None] * self.num_envs
-        for group in self._groups:
-            each = group.envs.env_method(method_name, *args, **kwargs)
-            for i, value in zip(group.numbers, each, strict=True):
-                found[i] = value
-        return found
+        """Refuse to call methods."""
+        raise NotImplementedError
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Return that no env is wrapped."""

@@ -8,7 +8,7 @@ from typing import Any, Final, cast
 
 from shapechanger.contract.env_ref import EnvTraits, HasBodyFamily, SourceAdaptation
 from shapechanger.files import write_json
-from shapechanger.transfer.learners.settings import Settings
+from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.methods import Method, MethodRun
 
 # The env in the folder of the run.
@@ -58,7 +58,7 @@ class Randomised(AdaptedSource):
     name = "randomised"
     paper = "X. B. Peng and others, Sim-to-Real Transfer with Dynamics Randomization, ICRA 2018"
 
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+    def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
         """Require two bodies of one family and space, or a target that knows its own range."""
         del settings
         alike = source.family and source.family == target.family
@@ -83,7 +83,7 @@ class Identified(AdaptedSource):
     name = "identified"
     paper = "J. Tan and others, Sim-to-Real: Learning Agile Locomotion, RSS 2018"
 
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+    def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
         """Refuse a target that cannot adapt its source."""
         del source, settings
         if not target.adapts_source:

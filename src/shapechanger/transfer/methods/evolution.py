@@ -11,8 +11,8 @@ import msgspec
 from shapechanger.contract.env_ref import EnvRef, EnvTraits, HasBodyFamily, layouts_of
 from shapechanger.errors import StudyError
 from shapechanger.transfer.body_map import BodyMap
+from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.evaluation import Evaluation
-from shapechanger.transfer.learners.settings import Sb3Settings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
 # Share of the target steps that is spent on the bodies in between.
@@ -28,12 +28,12 @@ class Evolution(Method):
     """
 
     name = "evolution"
+    needs = (("trial", "a learner of Stable-Baselines3"),)
     paper = "X. Liu, D. Pathak and K. M. Kitani, REvolveR, ICML 2022"
 
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
-        """Refuse bodies of two families, and learners that are not of Stable-Baselines3."""
-        if not isinstance(settings, Sb3Settings):
-            raise self._lacks("a learner of Stable-Baselines3")
+    def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
+        """Refuse bodies of two families, and learners without what it needs."""
+        super().require(source, target, settings)
         if not source.family or source.family != target.family:
             raise self._lacks("two bodies of one family, such as two ants")
 

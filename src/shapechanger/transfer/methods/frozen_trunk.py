@@ -8,10 +8,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from torch import nn
 
 from shapechanger.contract.env_ref import EnvTraits
-from shapechanger.transfer.learners.settings import PpoSettings, Settings
+from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.methods import Method, MethodRun
 
 _LEAST_LAYERS = 2
+_PPO = f"PPO with at least {_LEAST_LAYERS} hidden layers"
 
 
 class FrozenTrunk(Method):
@@ -22,13 +23,14 @@ class FrozenTrunk(Method):
     """
 
     name = "frozen-trunk"
+    needs = (("on-policy", _PPO), ("callback", "PPO on the CPU"))
     paper = "C. Devin and others, Learning Modular Neural Network Policies, ICRA 2017"
 
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
-        """Refuse learners other than PPO, and networks without a layer in the middle."""
-        del source, target
-        if not isinstance(settings, PpoSettings) or len(settings.net_arch) < _LEAST_LAYERS:
-            raise self._lacks(f"PPO with at least {_LEAST_LAYERS} hidden layers")
+    def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
+        """Refuse learners without what it needs, and networks without a layer in the middle."""
+        super().require(source, target, settings)
+        if len(cast("Any", settings).net_arch) < _LEAST_LAYERS:
+            raise self._lacks(_PPO)
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target, starting from the source policy."""

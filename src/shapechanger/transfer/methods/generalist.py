@@ -7,7 +7,7 @@ from typing import Any, Final
 import msgspec
 
 from shapechanger.contract.env_ref import BodyDraw, EnvTraits
-from shapechanger.transfer.learners.settings import LimbSettings, Settings
+from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.methods import Method, MethodRun
 
 BODIES: Final = 32
@@ -22,13 +22,13 @@ class Generalist(Method):
     """
 
     name = "generalist"
+    needs = (("many bodies", "a policy that fits many bodies: give --learner limbs or rsl-limbs"),)
     paper = "A. Gupta and others, MetaMorph: Learning Universal Controllers, ICLR 2022"
     uses_source_policy = False
 
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+    def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
         """Require a policy that fits many bodies, and a family to draw them from."""
-        if not isinstance(settings, LimbSettings):
-            raise self._lacks("a policy that fits many bodies: give --learner limbs or rsl-limbs")
+        super().require(source, target, settings)
         if not source.family or source.family != target.family:
             raise self._lacks("two bodies of one family")
 

@@ -11,13 +11,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 from torch.nn.utils import clip_grad_norm_
 
-from shapechanger.contract.env_ref import EnvTraits
 from shapechanger.layout import Layout
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.body_map.rules import Learn
 from shapechanger.transfer.learners.evaluation import Act
-from shapechanger.transfer.learners.settings import PpoSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
 # Weight of the distillation at the start, and the share of the steps after which it is 0.
@@ -35,13 +33,8 @@ class Kickstart(Method):
     """
 
     name = "kickstart"
+    needs = (("on-policy", "PPO"), ("callback", "PPO on the CPU"))
     paper = "S. Schmitt and others, Kickstarting Deep Reinforcement Learning, arXiv:1803.03835"
-
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
-        """Refuse learners other than PPO."""
-        del source, target
-        if not isinstance(settings, PpoSettings):
-            raise self._lacks("PPO")
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target with the source policy as the teacher."""

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
-from shapechanger.contract.env_ref import EnvTraits
-from shapechanger.transfer.learners.cloning import load_or_record
-from shapechanger.transfer.learners.settings import CloningSettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
 
@@ -19,29 +16,16 @@ class Rehearsal(Method):
     """
 
     name = "rehearsal"
+    needs = (("demonstrations", "a learner that clones demonstrations"),)
     paper = "A. Robins, Catastrophic Forgetting, Rehearsal and Pseudorehearsal, Conn. Sci., 1995"
-
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
-        """Refuse learners that do not clone demonstrations."""
-        del source, target
-        if not isinstance(settings, CloningSettings):
-            raise self._lacks("a learner that clones demonstrations")
 
     def learn(self, run: MethodRun) -> Any:
         """Train on both, starting from the source policy."""
-        settings = cast("CloningSettings", run.settings)
-        seen = load_or_record(
-            run.source_demonstrations(),
-            run.source,
-            run.source_steps,
-            settings.episode_steps,
-            settings.clone.framing,
-        )
         return run.train(
             run.target,
             run.steps,
             start=run.source_policy(),
             body_map=run.body_map,
-            rehearsal=seen,
+            rehearsed=(run.source, run.source_steps, run.shared("source")),
             on_evaluation=run.report,
         )

@@ -19,9 +19,9 @@ from shapechanger.contract.env_ref import EnvRef, EnvTraits, layouts_of
 from shapechanger.layout import Layout
 from shapechanger.transfer.actions import ActionScale
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.learners.evaluation import evaluate, evaluation_envs, evaluation_seed
+from shapechanger.transfer.learners import LearnerSettings
+from shapechanger.transfer.learners.evaluation import evaluate, evaluation_seed
 from shapechanger.transfer.learners.policy_file import TrainedPolicy, actor
-from shapechanger.transfer.learners.settings import OffPolicySettings, Settings
 from shapechanger.transfer.methods import Method, MethodRun
 
 # Number of prefilled source transitions, as a share of the target steps.
@@ -65,13 +65,8 @@ class PrefilledReplay(Method):
     """
 
     name = "prefilled-replay"
+    needs = (("off-policy", _REPLAY),)
     paper = "A. Lazaric, M. Restelli and A. Bonarini, Transfer of Samples in Batch RL, ICML 2008"
-
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
-        """Refuse learners without a replay buffer."""
-        del source, target
-        if not isinstance(settings, OffPolicySettings):
-            raise self._lacks(_REPLAY)
 
     def learn(self, run: MethodRun) -> Any:
         """Train on the target."""
@@ -96,16 +91,16 @@ class OffDynamics(Method):
     """
 
     name = "off-dynamics"
+    needs = (("off-policy", _REPLAY),)
     paper = "B. Eysenbach and others, Off-Dynamics Reinforcement Learning (DARC), ICLR 2021"
     uses_source_policy = False
 
-    def require(self, source: EnvTraits, target: EnvTraits, settings: Settings) -> None:
+    def require(self, source: EnvTraits, target: EnvTraits, settings: LearnerSettings) -> None:
         """Refuse learners without a replay buffer, or that normalise, and bodies of two spaces."""
-        if not isinstance(settings, OffPolicySettings):
-            raise self._lacks(_REPLAY)
+        super().require(source, target, settings)
         if not source.same_layouts(target):
             raise self._lacks("two bodies with the same spaces")
-        if settings.normalise:
+        if cast("Any", settings).normalise:
             raise self._lacks("a learner with normalise=false")
 
     def learn(self, run: MethodRun) -> Any:
@@ -277,7 +272,7 @@ class _Correction(BaseCallback):
         self._run = run
         self._env = run.target.make()
         self._action = layouts_of(self._env)[1]
-        self._judges = evaluation_envs(run.target, run.settings)
+        self._judges = run.learner.evaluation_envs(run.target)
         self._seen, _ = self._env.reset(seed=run.seed)
         self._next = 0
         self._steps = 0

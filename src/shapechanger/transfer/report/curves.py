@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from shapechanger.reports.charts import (
 )
 from shapechanger.reports.numbers import t_interval
 from shapechanger.transfer.methods import load_method
+from shapechanger.transfer.report.verdict import finals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,8 +82,8 @@ def _line_style(study: Study, kind: str) -> _LineStyle:
     return _OTHER_STYLES[others.index(kind) % len(_OTHER_STYLES)]
 
 
-def learning_curves(study: Study, counting: Counting) -> str:
-    """Plot the learning curves of a study.
+def learning_curves(study: Study, *countings: Counting) -> dict[Counting, str]:
+    """Plot the learning curves of a study, once for each way of counting.
 
     A thin line is one seed, a thick one the mean over seeds, a band its 95 % t-interval over seeds;
     of fewer than three seeds each evaluation is a point, because an interval of two says nothing. A
@@ -90,23 +92,26 @@ def learning_curves(study: Study, counting: Counting) -> str:
 
     Args:
         study: The study.
-        counting: "target" counts target steps; "total" shifts the arms that start from the source
+        *countings: "target" counts target steps; "total" shifts the arms that start from the source
             to the right by its source steps.
     """
     # Here, because `charts` says which extra is missing.
     from matplotlib.ticker import EngFormatter, FuncFormatter, MaxNLocator
 
-    def draw(figure: Figure, axes: Axes) -> None:
+    def tick(value: float, place: int | None) -> str:
+        return f"{value:,.10g}".replace("e+", "e")
+
+    def draw(figure: Figure, axes: Axes, counting: Counting) -> None:
         _draw_arms(axes, study, float(study.plan.source_steps) if counting == "total" else 0.0)
         axes.set_xlabel("Target steps" if counting == "target" else "Source and target steps")
         axes.set_ylabel(_axis_label(study))
         axes.set_ylim(*_return_limits(study))
         axes.xaxis.set_major_formatter(EngFormatter(sep="\N{THIN SPACE}"))
         axes.xaxis.set_major_locator(MaxNLocator(5))
-        axes.yaxis.set_major_formatter(FuncFormatter(_tick_label))
+        axes.yaxis.set_major_formatter(FuncFormatter(tick))
         figure.legend(loc="outside lower center", ncols=2, handlelength=2.5)
 
-    return svg_chart(PANEL, draw)
+    return {each: svg_chart(PANEL, partial(draw, counting=each)) for each in countings}
 
 
 def _draw_arms(axes: Axes, study: Study, source_steps: float) -> None:
@@ -187,11 +192,6 @@ def _return_limits(study: Study) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _tick_label(value: float, place: int | None) -> str:
-    """Format a tick; `place` is matplotlib's."""
-    return f"{value:,.10g}".replace("e+", "e")
-
-
 def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
     """Plot the end of each arm over a number in which the targets of several studies differ.
 
@@ -207,7 +207,7 @@ def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
         values = sorted(studies)
         for arm in first.plan.arms:
             style = _line_style(first, arm)
-            ends = [_ends(studies[value], arm) for value in values]
+            ends = [finals(studies[value], arm) for value in values]
             for value, end in zip(values, ends, strict=True):
                 axes.plot([value] * end.size, end, ".", color=style.colour, alpha=0.4, markersize=4)
             axes.plot(
@@ -225,9 +225,3 @@ def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
         figure.legend(loc="outside lower center", ncols=3, handlelength=2.5)
 
     return svg_chart(WIDE, draw)
-
-
-def _ends(study: Study, arm: str) -> NDArray[np.float64]:
-    """Return the mean of the last evaluations of each run of an arm."""
-    returns = study.curves(arm).returns
-    return returns[:, -min(study.plan.last_k, returns.shape[1]) :].mean(axis=1)

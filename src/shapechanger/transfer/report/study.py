@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.reports.numbers import UNDEFINED, count, number
-from shapechanger.reports.page import png_uri, render, svg_uri
+from shapechanger.reports.page import render
 from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
 from shapechanger.transfer.body_map.rules import SAME_NAME
 from shapechanger.transfer.learners.presets import tuning_text
-from shapechanger.transfer.learners.settings import CloningSettings, Settings
-from shapechanger.transfer.metrics import Reference, Summary
+from shapechanger.transfer.metrics import Summary
 from shapechanger.transfer.report.verdict import (
     ASYMPTOTIC_GAIN,
     EXPLANATIONS,
@@ -25,14 +24,9 @@ from shapechanger.transfer.report.verdict import (
     TIME_TO_THRESHOLD,
     TOTAL_REWARD_GAIN,
     ArmRow,
+    Findings,
     MeasureRow,
-    arm_rows,
-    caveats,
-    machine_text,
-    measure_rows,
-    other_arms,
-    verdict,
-    weak_individuals,
+    findings,
 )
 from shapechanger.transfer.study import Study
 
@@ -43,13 +37,19 @@ _HEADLINE: Final = (TOTAL_REWARD_GAIN, JUMPSTART, ASYMPTOTIC_GAIN)
 _MAX_ARGUMENT_LENGTH: Final = 40
 
 
-def study_html(study: Study, pictures: Pictures | None = None, picture_note: str = "") -> str:
+def study_html(
+    study: Study,
+    pictures: Pictures | None = None,
+    picture_note: str = "",
+    found: Findings | None = None,
+) -> str:
     """Render the report of a study.
 
     Args:
         study: The study.
         pictures: The two bodies; None if there are none.
         picture_note: Why there are no pictures, or what they show.
+        found: What it has found; None to compute it.
 
     Raises:
         MissingExtra: If matplotlib or Jinja2 is not installed.
@@ -57,41 +57,39 @@ def study_html(study: Study, pictures: Pictures | None = None, picture_note: str
     from shapechanger.transfer.report.curves import learning_curves
 
     plan = study.plan
-    measures = measure_rows(study)
-    arms = arm_rows(study)
+    found = findings(study) if found is None else found
+    measures, arms = found.measures, found.arms
     notes = list(dict.fromkeys(row.note for row in measures if _defined(row) and row.note))
     return render(
         Path(__file__).with_name("study.html"),
         title=f"{_short_name(plan.task.source)} → {_short_name(plan.task.target)}",
         plan=plan,
-        verdict=verdict(study),
-        other_arms=other_arms(study),
-        weak=weak_individuals(study),
+        verdict=found.verdict,
+        other_arms=found.other_arms,
+        weak=found.weak,
         headline_arm=study.headline_arm,
         cards=_cards(study, measures),
         bodies=_bodies(study, pictures) if pictures is not None else [],
         picture_note=picture_note,
-        curves={
-            "target": svg_uri(learning_curves(study, "target")),
-            "total": svg_uri(learning_curves(study, "total")),
-        },
+        curves=learning_curves(study, "target", "total"),
         measures=[_measure_table(arm, measures, notes) for arm in study.summaries],
         notes=notes,
         explanations=EXPLANATIONS,
         scale=_scale(next(iter(study.summaries.values()))),
-        caveats=caveats(study),
+        caveats=found.caveats,
         good=f"{100.0 * GOOD:.0f} %",
         arms=[_arm_cells(row) for row in arms],
         terms=_terms(arms),
         shift=study.shift,
         map=_body_map(plan.body_map),
-        rhythm=_rhythm(plan.settings),
+        rhythm=plan.settings.rhythm(),
         tuning=tuning_text(plan.learner, plan.task.target.id),
         settings=[
-            (name, _setting(value)) for name, value in msgspec.structs.asdict(plan.settings).items()
+            (name, _setting(value))
+            for name, value in msgspec.structs.asdict(cast("Any", plan.settings)).items()
         ],
         command=study.command,
-        machine=machine_text([study]),
+        machine=found.machine,
         wall_time=_duration(sum(result.wall_s for result in study.runs)),
         runs=[
             (
@@ -141,7 +139,7 @@ def _cards(study: Study, measures: tuple[MeasureRow, ...]) -> list[dict[str, str
     return cards
 
 
-def _bodies(study: Study, pictures: Pictures) -> list[dict[str, str]]:
+def _bodies(study: Study, pictures: Pictures) -> list[dict[str, Any]]:
     plan = study.plan
     ours = plan.body_map
     sides = (
@@ -150,7 +148,7 @@ def _bodies(study: Study, pictures: Pictures) -> list[dict[str, str]]:
     )
     return [
         {
-            "source": png_uri(picture),
+            "picture": picture,
             "caption": f"{side}: {_short_name(env)}, {_plural(observation.size, 'observation')}, "
             f"{_plural(action.size, 'action')}",
             "alt": f"The body of {env}",
@@ -190,6 +188,7 @@ def _scale(summary: Summary) -> str:
     """Describe the score, or why there is none."""
     reference = summary.reference
     zero, one = number(reference.zero), number(reference.one)
+    why = "which ships with its policy" if reference.shipped else "the best arm"
     if summary.unit == "value":
         return (
             f"There are no scores: {reference.one_of} ended at {one}, which is not above "
@@ -201,13 +200,9 @@ def _scale(summary: Summary) -> str:
         f"zero = {zero} is the most that takes no skill, here {reference.zero_of}, of random "
         "actions, the action zero and untrained policies; one = "
         f"{one} is the mean of the last {summary.last_k} evaluations of {reference.one_of}, "
-        f"{_why_one(reference)}. The intervals take these two numbers as given. A gain in values "
+        f"{why}. The intervals take these two numbers as given. A gain in values "
         f"is one in scores times {number(reference.one - reference.zero)}."
     )
-
-
-def _why_one(reference: Reference) -> str:
-    return "which ships with its policy" if reference.shipped else "the best arm"
 
 
 def _arm_cells(row: ArmRow) -> tuple[Any, ...]:
@@ -283,23 +278,6 @@ def _unused(ours: BodyMap) -> list[str]:
         if left:
             sentences.append(f"{what}: {', '.join(left)}.")
     return sentences
-
-
-def _rhythm(settings: Settings) -> str:
-    """When policies are evaluated, and what they learn from."""
-    if isinstance(settings, CloningSettings):
-        budgets = ", ".join(count(budget) for budget in settings.budgets)
-        return (
-            f"after {budgets} steps. Steps are demonstrated steps: at each budget a policy is "
-            "cloned anew from the same start, and all arms use the same demonstrations."
-        )
-    normalised = (
-        "Observations and rewards are normalised for the learner by running estimates of their "
-        "standard deviation. Returns in this report never are."
-        if settings.normalise
-        else "Observations and rewards reach the learner as they are."
-    )
-    return f"every {count(settings.eval_every)} steps. {normalised}"
 
 
 def _setting(value: Any) -> str:

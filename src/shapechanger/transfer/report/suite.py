@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import StudyError
 from shapechanger.reports.numbers import count, number
-from shapechanger.reports.page import jpeg_uri, render, svg_uri
+from shapechanger.reports.page import render
 from shapechanger.transfer.metrics import (
     Estimate,
     Reference,
@@ -96,7 +96,7 @@ def suite_html(
     swept = None
     if sweep is not None:
         by_value = {sweep.values[one]: study for one, study in studies.items()}
-        swept = svg_uri(sweep_chart(by_value, sweep.name))
+        swept = sweep_chart(by_value, sweep.name)
     return render(
         Path(__file__).with_name("suite.html"),
         title=name,
@@ -112,11 +112,9 @@ def suite_html(
             {
                 "name": one,
                 "verdict": verdict(study),
-                "curves": svg_uri(learning_curves(study, "target")),
+                "curves": learning_curves(study, "target")["target"],
                 "film": (films or {}).get(one, ""),
-                "strips": [
-                    (strip.caption, jpeg_uri(strip.jpeg)) for strip in (strips or {}).get(one, ())
-                ],
+                "strips": [(strip.caption, strip.jpeg) for strip in (strips or {}).get(one, ())],
             }
             for one, study in studies.items()
         ],

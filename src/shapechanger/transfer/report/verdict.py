@@ -91,6 +91,41 @@ class MeasureRow(NamedTuple):
     note: str
 
 
+class Findings(NamedTuple):
+    """All that a study has found, as text.
+
+    Attributes:
+        verdict: See `verdict`.
+        other_arms: See `other_arms`.
+        weak: See `weak_individuals`.
+        measures: See `measure_rows`.
+        arms: See `arm_rows`.
+        caveats: See `caveats`.
+        machine: See `machine_text`.
+    """
+
+    verdict: str
+    other_arms: str
+    weak: list[str]
+    measures: tuple[MeasureRow, ...]
+    arms: tuple[ArmRow, ...]
+    caveats: tuple[str, ...]
+    machine: str
+
+
+def findings(study: Study) -> Findings:
+    """Return all that a study has found, as text."""
+    return Findings(
+        verdict(study),
+        other_arms(study),
+        weak_individuals(study),
+        measure_rows(study),
+        arm_rows(study),
+        caveats(study),
+        machine_text([study]),
+    )
+
+
 def measure_rows(study: Study) -> tuple[MeasureRow, ...]:
     """Format every measure of every arm other than scratch."""
     rows: list[MeasureRow] = []
@@ -142,6 +177,8 @@ def _measure_row(
 ) -> MeasureRow:
     """One row; what both ways of counting share appears once."""
     methods = [estimate.method for estimate in (target, total)]
+    sides = (("In target steps", target), ("In total steps", total))
+    notes = [f"{where}: {estimate.note}" for where, estimate in sides if estimate.note]
     return MeasureRow(
         arm=arm,
         measure=measure,
@@ -149,16 +186,8 @@ def _measure_row(
         target=estimate_text(target, signed=signed),
         total=estimate_text(total, signed=signed),
         method=methods[0] if methods[0] == methods[1] else " / ".join(methods),
-        note=_merge_notes(target.note, total.note),
+        note=target.note if target.note == total.note else " ".join(notes),
     )
-
-
-def _merge_notes(target: str, total: str) -> str:
-    """Merge two notes."""
-    if target == total:
-        return target
-    notes = (("In target steps", target), ("In total steps", total))
-    return " ".join(f"{where}: {note}" for where, note in notes if note)
 
 
 def _reached(
@@ -294,6 +323,7 @@ def _row(study: Study, kind: str) -> ArmRow:
     results = study.of(kind)
     ends = [evaluation for result in results for evaluation in _end(study, result)]
     at_the_end = finals(study, kind)
+    terms = {name: None for evaluation in ends for name in evaluation.terms}
     return ArmRow(
         kind=kind,
         seeds=len(results),
@@ -306,7 +336,8 @@ def _row(study: Study, kind: str) -> ArmRow:
         success=share_text(successes(study, kind)),
         good=_good(study, kind),
         per_seed=list_text([float(value) for value in at_the_end]),
-        terms=_terms(ends),
+        # A missing term counts as 0.
+        terms={name: float(np.mean([e.terms.get(name, 0.0) for e in ends])) for name in terms},
     )
 
 
@@ -332,12 +363,6 @@ def _good(study: Study, kind: str) -> str:
     results = study.of(kind)
     reached = sum(max(_value(study, e) for e in result.curve) >= height for result in results)
     return f"{reached} of {len(results)}"
-
-
-def _terms(ends: list[Evaluation]) -> dict[str, float]:
-    """Mean of each reward term; a missing one counts as 0."""
-    names = {name: None for evaluation in ends for name in evaluation.terms}
-    return {name: float(np.mean([e.terms.get(name, 0.0) for e in ends])) for name in names}
 
 
 Direction = Literal["up", "down", "unclear"]
@@ -415,7 +440,11 @@ def other_arms(study: Study) -> str:
             estimate = measures.total_reward_gain if learns else measures.jumpstart
             values = curves.auc() if learns else curves.returns
             others[_outcome(estimate)].append(f"{arm} ({_mean_text(values, study.plan.unit)})")
-    parts = [f"{_joined(arms)} {found}" for found, arms in others.items() if arms]
+    parts = [
+        f"{' and '.join(filter(None, (', '.join(arms[:-1]), arms[-1])))} {found}"
+        for found, arms in others.items()
+        if arms
+    ]
     if is_flat(study) or not parts:
         return ""
     return f"Of the other arms, {'; '.join(parts)}."
@@ -425,12 +454,6 @@ def _mean_text(values: NDArray[np.float64], unit: str) -> str:
     """Format the mean of a measure with its unit."""
     mean = f"{float(f'{values.mean():.3g}'):,.10g}"
     return mean if unit == "1" else f"{mean} {unit}"
-
-
-def _joined(words: list[str]) -> str:
-    """Join words as in `a, b and c`."""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def is_flat(study: Study) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import closing
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -17,20 +18,93 @@ from shapechanger.contract.env_ref import EnvRef, EnvTraits, HasDemonstrator, la
 from shapechanger.demos.cloning.learn import clone
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.cloning.policy import KIND, CameraPolicy
+from shapechanger.demos.cloning.settings import CloneSettings
 from shapechanger.errors import StudyError
 from shapechanger.files import make_folder
-from shapechanger.tensor_file import kind_of
+from shapechanger.policy import kind_of, load_policy
 from shapechanger.transfer.body_map import BodyMap
-from shapechanger.transfer.learners import DemonstrationFile, PolicyOrigin
+from shapechanger.transfer.identities import ENV, identify, known
+from shapechanger.transfer.learners import (
+    Learner,
+    LearnerSettings,
+    PolicyOrigin,
+    SharedFile,
+    Takes,
+    ignore,
+)
 from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,
     evaluate,
-    evaluation_envs,
 )
-from shapechanger.transfer.learners.policy_file import load_policy
-from shapechanger.transfer.learners.settings import CloningSettings
-from shapechanger.transfer.versions import ENV, identify, known
+
+
+class CloningSettings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True, tag="cloning"):
+    """Settings of behavioural cloning, in which a step is a demonstrated step.
+
+    Attributes:
+        budgets: Numbers of demonstrated steps; a policy is trained on each, from the same start.
+        episode_steps: Steps of a demonstration; the next begins on another course.
+        eval_episodes: Episodes of an evaluation.
+        eval_steps: Steps of each of them.
+        clone: Settings of each training.
+    """
+
+    budgets: tuple[int, ...]
+    episode_steps: int
+    eval_episodes: int
+    eval_steps: int
+    clone: CloneSettings = CloneSettings()
+
+    takes = frozenset[Takes]({"demonstrations"})
+    learner = f"{__name__}:CloneLearner"
+    last_k = 1  # Each evaluation is of another clone.
+    source_steps = 0
+
+    def __post_init__(self) -> None:
+        if self.eval_episodes < 1 or min(self.episode_steps, self.eval_steps) < 1:
+            raise StudyError("A learner needs at least one episode, of at least one step.")
+        if (
+            not self.budgets
+            or self.budgets[0] < 1
+            or any(a >= b for a, b in pairwise(self.budgets))
+        ):
+            raise StudyError(f"Budgets are numbers of steps that grow, got {self.budgets}.")
+
+    @property
+    def steps(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Default number of demonstrated steps."""
+        return self.budgets[-1]
+
+    @property
+    def eval_every(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The first budget; later ones are farther apart."""
+        return self.budgets[0]
+
+    def whole_updates(self, steps: int) -> int:
+        """Round `steps` up to a budget; the largest if all are smaller."""
+        return next((budget for budget in self.budgets if budget >= steps), self.budgets[-1])
+
+    @property
+    def episode_limit(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Steps after which an evaluation episode is truncated."""
+        return self.eval_steps
+
+    def for_budget(self, steps: int) -> CloningSettings:
+        """Return the settings for a shorter budget: the same."""
+        return self
+
+    def rhythm(self) -> str:
+        """Return when policies are evaluated, and what they learn from."""
+        budgets = ", ".join(f"{budget:,}" for budget in self.budgets)
+        return (
+            f"after {budgets} steps. Steps are demonstrated steps: at each budget a policy is "
+            "cloned anew from the same start, and all arms use the same demonstrations."
+        )
+
+    def within(self, steps: int) -> tuple[int, ...]:
+        """Return the budgets up to `steps`."""
+        return tuple(budget for budget in self.budgets if budget <= steps)
 
 
 class Demonstrations(NamedTuple):
@@ -110,7 +184,7 @@ def record_demonstrations(
 
 
 def load_or_record(
-    file: DemonstrationFile, env: EnvRef, steps: int, episode_steps: int, framing: Framing
+    file: SharedFile, env: EnvRef, steps: int, episode_steps: int, framing: Framing
 ) -> Demonstrations:
     """Load demonstrations from a file that has enough of them, or record and write it.
 
@@ -145,19 +219,11 @@ class _CardData(msgspec.Struct):
     demonstrated_steps: int
 
 
-class CloneLearner:
-    """Behavioural cloning of an env's demonstrator: a `shapechanger.transfer.learners.Learner`.
+class CloneLearner(Learner[CloningSettings]):
+    """Behavioural cloning of an env's demonstrator.
 
     All vehicles share one camera and action, so body maps are not used.
-
-    Args:
-        name: Name of the learner.
-        settings: Its settings.
     """
-
-    def __init__(self, name: str, settings: CloningSettings) -> None:
-        self._name = name
-        self._settings = settings
 
     def require(self, env: EnvRef, traits: EnvTraits) -> None:
         """Refuse an env without a camera or a demonstrator."""
@@ -174,40 +240,45 @@ class CloneLearner:
             missing.append("no demonstrator")
         if missing:
             raise StudyError(
-                f"{env} has {' and '.join(missing)}, and {self._name} learns from the pictures of "
+                f"{env} has {' and '.join(missing)}, and {self.name} learns from the pictures of "
                 "a demonstrator: give a --learner that begins with ppo."
             )
 
-    def train(
+    def train(  # pyright: ignore[reportIncompatibleMethodOverride]
         self,
         env: EnvRef,
         steps: int,
         seed: int,
         *,
-        demonstrations: DemonstrationFile,
+        demonstrations: SharedFile,
         start: CameraPolicy | None = None,
         body_map: BodyMap | None = None,
         only_last: bool = False,
-        callback: Any = None,
-        rehearsal: Demonstrations | None = None,
-        on_evaluation: Callable[[Evaluation], None],
+        rehearsed: tuple[EnvRef, int, SharedFile] | None = None,
+        on_evaluation: Callable[[Evaluation], None] = ignore,
         on_steps: Callable[[int], None] = lambda steps: None,
     ) -> CameraPolicy:
         """Clone the demonstrator at each budget, from the same start, and evaluate each clone.
+
+        Besides the arguments of every learner, `demonstrations` is the file of the demonstrations,
+        `only_last` says that only the last budget is needed, and `rehearsed` names an env, steps
+        and a file of demonstrations to mix in.
 
         Returns:
             The clone of the last budget.
         """
         del body_map
-        if callback is not None:
-            raise StudyError(f"{self._name} takes no callback of Stable-Baselines3.")
-        settings = self._settings.clone
+        settings = self.settings.clone
         policy = CameraPolicy.fresh(settings, seed) if start is None else start
         on_evaluation(self.evaluate(env, policy))
-        recorded = load_or_record(
-            demonstrations, env, steps, self._settings.episode_steps, settings.framing
-        )
-        for budget in (steps,) if only_last else self._settings.within(steps):
+        length = self.settings.episode_steps
+        recorded = load_or_record(demonstrations, env, steps, length, settings.framing)
+        mixed = None
+        if rehearsed is not None:
+            of_source, some, file = rehearsed
+            seen = load_or_record(file, of_source, some, length, settings.framing)
+            mixed = seen.pictures, seen.actions
+        for budget in (steps,) if only_last else self.settings.within(steps):
             part = recorded.first(budget)
             policy, _ = clone(
                 part.pictures,
@@ -216,7 +287,7 @@ class CloneLearner:
                 seed=seed % 2**31,
                 episodes=part.episodes,
                 start=start,
-                rehearsal=None if rehearsal is None else (rehearsal.pictures, rehearsal.actions),
+                rehearsal=mixed,
             )
             on_evaluation(msgspec.structs.replace(self.evaluate(env, policy), steps=budget))
             on_steps(budget)
@@ -227,7 +298,7 @@ class CloneLearner:
     ) -> Evaluation:
         """Evaluate a policy."""
         del body_map
-        envs = evaluation_envs(env, self._settings)
+        envs = self.evaluation_envs(env)
         try:
             return evaluate(policy.predict_many, envs, EVALUATION_SEED)
         finally:
@@ -238,28 +309,24 @@ class CloneLearner:
         """Load a clone."""
         return CameraPolicy.load(path)
 
-    def save(self, policy: CameraPolicy, path: Path) -> None:
-        """Write a clone to a file."""
-        policy.save(path)
-
     def origin(self, path: Path) -> PolicyOrigin:
         """Read where a clone comes from.
 
         Raises:
             StudyError: If the policy is not a clone, or takes other pictures.
         """
-        if not is_clone(path):
+        if kind_of(path) != KIND:
             card = load_policy(path).card
             raise StudyError(
-                f"{path} was trained with {card.learner}, and {self._name} starts from "
+                f"{path} was trained with {card.learner}, and {self.name} starts from "
                 f"demonstrations: give --learner {card.learner}, or a clone."
             )
         card = CameraPolicy.load(path).card
-        wanted = self._settings.clone.framing
+        wanted = self.settings.clone.framing
         if card.framing != wanted:
             raise StudyError(
                 f"{path} takes pictures of {card.framing.height} x {card.framing.width} pixels "
-                f"from {card.framing.top:g} of their height on, and {self._name} "
+                f"from {card.framing.top:g} of their height on, and {self.name} "
                 f"{wanted.height} x {wanted.width} from {wanted.top:g}: give a clone that takes "
                 "the same pictures."
             )
@@ -300,8 +367,3 @@ def state_actions(policy: CameraPolicy, env: EnvRef) -> CameraPolicy:
         return policy
     card = msgspec.structs.replace(policy.card, action_layout=layout)
     return CameraPolicy(policy.network, card)
-
-
-def is_clone(path: Path) -> bool:
-    """Return whether a file holds a clone, rather than another policy or something else."""
-    return kind_of(path) == KIND

@@ -1,0 +1,107 @@
+"""Parts that packages add by name: learners, transfer methods and kinds of policies.
+
+A part ships with Shapechanger, is registered by a module that has been imported, or is an entry
+point of an installed package. It is imported when it is first asked for.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any, Final, Generic, TypeVar
+
+from shapechanger.errors import StudyError, UnknownName
+
+_Part = TypeVar("_Part")
+
+
+class Registry(Generic[_Part]):
+    """Parts of one kind by name.
+
+    Args:
+        kind: What a part is, for messages, such as "method".
+        group: Group of the entry points, such as "shapechanger.methods".
+    """
+
+    def __init__(self, kind: str, group: str) -> None:
+        self._kind = kind
+        self._group = group
+        self._places: dict[str, str] = {}
+        self._registered: dict[str, _Part] = {}
+
+    def ship(self, places: dict[str, str]) -> None:
+        """State where the parts are that come with Shapechanger.
+
+        Args:
+            places: `module:attribute` below `shapechanger` by name.
+        """
+        self._places |= places
+
+    def register(self, name: str, part: _Part) -> None:
+        """Register a part.
+
+        Args:
+            name: Its name.
+            part: The part, a class.
+
+        Raises:
+            StudyError: If the name is empty, has other characters than letters, digits, - and _, or
+                is taken.
+        """
+        title = getattr(part, "__name__", repr(part))
+        if not name.replace("-", "").replace("_", "").isalnum():
+            raise StudyError(
+                f"A {self._kind}'s name is made of letters, digits, - and _, and {title}'s is "
+                f"{name!r}."
+            )
+        other: Any = self._registered.get(name)
+        # A worker process may import the same class again under another module's name.
+        is_same = getattr(other, "__qualname__", None) == getattr(part, "__qualname__", "")
+        if name in self._places or not (other is None or is_same):
+            raise StudyError(
+                f"There is already a {self._kind} {name!r}: give {title} another name."
+            )
+        self._registered[name] = part
+
+    def names(self) -> tuple[str, ...]:
+        """Return all names: of parts that ship, are installed and are registered."""
+        installed = (point.name for point in entry_points(group=self._group))
+        return tuple(dict.fromkeys([*self._places, *installed, *self._registered]))
+
+    def added(self) -> frozenset[str]:
+        """Return the names of parts that do not come with Shapechanger."""
+        return frozenset(self.names()) - self._places.keys()
+
+    def load(self, name: str) -> _Part:
+        """Return a part.
+
+        Args:
+            name: Its name, or `module:name` to import a module first that registers it.
+
+        Raises:
+            UnknownName: If there is no such part or module.
+        """
+        module, _, own = name.rpartition(":")
+        if module:
+            try:
+                import_module(module)
+            except ModuleNotFoundError as error:
+                raise UnknownName(self._kind, name, self.names()) from error
+        if own in self._places:
+            return pkgutil.resolve_name(f"shapechanger.{self._places[own]}")
+        if own in self._registered:
+            return self._registered[own]
+        for point in entry_points(group=self._group, name=own):
+            return point.load()
+        raise UnknownName(self._kind, name, self.names())
+
+
+LEARNERS: Final[Registry[Any]] = Registry("learner", "shapechanger.learners")
+"""Classes of settings, subclasses of `shapechanger.transfer.learners.LearnerSettings`."""
+
+METHODS: Final[Registry[Any]] = Registry("method", "shapechanger.methods")
+"""Subclasses of `shapechanger.transfer.methods.Method`."""
+
+POLICIES: Final[Registry[Any]] = Registry("kind of policy", "shapechanger.policies")
+"""Functions that read a file, by the kind of policy that its header names."""

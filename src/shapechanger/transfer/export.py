@@ -1,0 +1,166 @@
+"""Export trained policies as ONNX, from their env's own observations to its own actions.
+
+The metadata has the names of the layouts and the card, so that a program that knows nothing of
+Shapechanger can see what each number is.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import msgspec
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.errors import StudyError, TransplantError
+from shapechanger.onnx_file import export_network
+from shapechanger.transfer.actions import ActionScale
+from shapechanger.transfer.identities import identities_in
+from shapechanger.transfer.learners.policy_file import TrainedPolicy
+from shapechanger.transfer.limbs.envs import fitted
+from shapechanger.transfer.limbs.rows import LimbRows
+from shapechanger.transfer.onnx_policy import OnnxCard
+from shapechanger.transfer.transplant.layers import CLIP, EPSILON
+from shapechanger.transfer.transplant.model import check_supported
+
+
+def export_onnx(policy: TrainedPolicy, path: Path) -> None:
+    """Write a policy as ONNX.
+
+    Its input `observation` is float64 of shape (n, observations), as the env returns it, and its
+    output `action` float32 of shape (n, actions), as the env takes it.
+
+    Args:
+        policy: The policy.
+        path: The file, such as `ant.onnx`.
+
+    Raises:
+        MissingExtra: If onnx or onnxscript is not installed.
+        StudyError: If its network is not the `MlpPolicy` of PPO, SAC or TQC.
+        OutputError: If the file cannot be written.
+    """
+    try:
+        check_supported(policy.model)
+    except TransplantError as error:
+        raise StudyError(f"This policy cannot be exported: {error}") from error
+    card = msgspec.convert(policy.card, OnnxCard, from_attributes=True)
+    _write(_MeanActions(policy), card, path)
+
+
+def export_limbs(policy: TrainedPolicy, env: gym.Env[Any, Any], ref: EnvRef, path: Path) -> None:
+    """Write a policy of limbs as ONNX for one body, whose rows are constants of the graph.
+
+    Args:
+        policy: The policy.
+        env: The env of the body.
+        ref: The same env, for the card.
+        path: The file.
+
+    Raises:
+        MissingExtra: If onnx or onnxscript is not installed.
+        TransplantError: If the body belongs to another family than the policy's.
+        StudyError: If it has more limbs than the policy has room for.
+        OutputError: If the file cannot be written.
+    """
+    settings: Any = policy.card.settings
+    rows = fitted(env, policy.card.observation, settings.room).rows
+    observation, action = layouts_of(env)
+    card = msgspec.structs.replace(
+        msgspec.convert(policy.card, OnnxCard, from_attributes=True),
+        env=ref,
+        observation=observation,
+        action=action,
+        identity=identities_in(ref, env, settings),
+    )
+    _write(_LimbActions(policy.model.policy, rows), card, path)
+
+
+def _write(network: nn.Module, card: OnnxCard, path: Path) -> None:
+    names = {
+        "observation_names": json.dumps(card.observation.names),
+        "action_names": json.dumps(card.action.names),
+    }
+    export_network(
+        network,
+        {"observation": torch.zeros((2, card.observation.size), dtype=torch.float64)},
+        "action",
+        path,
+        {**names, "shapechanger": msgspec.json.encode(card).decode()},
+    )
+
+
+def _constant(module: nn.Module, **arrays: Any) -> None:
+    """Give a module constants, double for double ones."""
+    for name, array in arrays.items():
+        module.register_buffer(name, torch.as_tensor(np.asarray(array)))
+
+
+class _MeanActions(nn.Module):
+    """The mean actions of a policy, with its normalisation and bounds."""
+
+    def __init__(self, policy: TrainedPolicy) -> None:
+        super().__init__()
+        model: Any = policy.model
+        net, space = model.policy, model.action_space
+        self.squashes = not hasattr(net, "mlp_extractor")
+        self.network = (
+            nn.Sequential(net.actor.latent_pi, net.actor.mu)
+            if self.squashes
+            else nn.Sequential(net.mlp_extractor.policy_net, net.action_net)
+        )
+        self.normalises = policy.normalisation is not None
+        if policy.normalisation is not None:
+            statistics = policy.normalisation.observation
+            deviation = np.sqrt(np.asarray(statistics.var, np.float64) + EPSILON)
+            _constant(self, mean=np.asarray(statistics.mean, np.float64), deviation=deviation)
+        _constant(self, low=space.low.astype(np.float32), high=space.high.astype(np.float32))
+        scale = {
+            name: side.astype(np.float32)
+            for name, side in ActionScale.between(space, policy.card.action)._asdict().items()
+        }
+        _constant(self, **{f"env_{name}": side for name, side in scale.items()})
+
+    def forward(self, observation: Tensor) -> Tensor:
+        """Return actions, shape (n, actions), in the units of the env."""
+        known: Any = self
+        seen = observation
+        if self.normalises:
+            seen = ((seen - known.mean) / known.deviation).clamp(-CLIP, CLIP)
+        action = self.network(seen.float())
+        if self.squashes:
+            action = torch.tanh(action) * (0.5 * (known.high - known.low))
+            action = action + 0.5 * (known.high + known.low)
+        action = torch.minimum(torch.maximum(action, known.low), known.high)
+        action = action * known.env_half + known.env_middle
+        return torch.minimum(torch.maximum(action, known.env_low), known.env_high)
+
+
+class _LimbActions(nn.Module):
+    """The actions of a policy of limbs for one body."""
+
+    def __init__(self, policy: Any, rows: LimbRows) -> None:
+        super().__init__()
+        self.network = policy.actor_net
+        self.shape = (-1, rows.room + 1, rows.columns.width)
+        _constant(
+            self,
+            scale=rows.scale,
+            offset=rows.offset,
+            selection=rows.selection,
+            constant=rows.constant,
+            actuators=rows.actuators.astype(np.int64),
+            low=rows.low.astype(np.float32),
+            half=(0.5 * (rows.high - rows.low)).astype(np.float32),
+        )
+
+    def forward(self, observation: Tensor) -> Tensor:
+        """Return actions, shape (n, actions), in the units of the env."""
+        known: Any = self
+        rows = (observation * known.scale + known.offset) @ known.selection + known.constant
+        limbs = self.network(rows.float().reshape(self.shape)).clamp(-1.0, 1.0)
+        return (limbs[:, known.actuators] + 1.0) * known.half + known.low

@@ -1,0 +1,103 @@
+"""Versions of the env and the learner that a policy is made of, by "env" and "learner"."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import closing
+from typing import Any, Final
+
+import gymnasium as gym
+import msgspec
+
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.errors import ForeignStudy
+from shapechanger.identity import IdentifiedEnv, Identity, identify_code, identify_env
+from shapechanger.own_modules import texts_in
+
+Identities = dict[str, Identity]
+"""Identities by part."""
+
+ENV: Final = "env"
+"""Part of the env in a policy's card."""
+LEARNER: Final = "learner"
+"""Part of the learner."""
+NOTHING: Final = Identity()
+"""Identity of a part without a model and without own files."""
+_OURS: Final = "shapechanger/"
+
+
+def known(identities: Mapping[str, Identity]) -> Identities:
+    """Return the parts that have a model or own files."""
+    return {part: each for part, each in identities.items() if each != NOTHING}
+
+
+def identify_learner(settings: object) -> Identity:
+    """Return the identity of a learner.
+
+    Args:
+        settings: Its settings, which may name an algorithm of the user's own.
+    """
+    return identify_code(texts_in(msgspec.to_builtins(settings)), settings)
+
+
+def identities_in(ref: EnvRef, made: gym.Env[Any, Any], settings: object) -> Identities:
+    """Return the identities of the env and the learner of a policy.
+
+    Args:
+        ref: The env.
+        made: The same, before its first reset, which may change its model.
+        settings: object of the learner.
+    """
+    one = single_body(ref)
+    env = steady(ref, identify_env(made, ref.id)) if one == ref else identify(ref)
+    return known({ENV: env.identity, LEARNER: identify_learner(settings)})
+
+
+def identify(ref: EnvRef) -> IdentifiedEnv:
+    """Make an env, and return its identity.
+
+    Args:
+        ref: The env; one of many bodies has the identity of the unedited one.
+    """
+    with closing(single_body(ref).make()) as made:
+        return steady(ref, identify_env(made, ref.id))
+
+
+def steady(ref: EnvRef, found: IdentifiedEnv) -> IdentifiedEnv:
+    """Return an identity without its model if the env draws another one each time it is made.
+
+    Args:
+        ref: The env; only those of others may draw.
+        found: Its identity.
+    """
+    if not found.numbers or ref.id.startswith(_OURS):
+        return found
+    with closing(single_body(ref).make()) as made:
+        again = identify_env(made, ref.id).identity
+    if again == found.identity:
+        return found
+    return IdentifiedEnv(Identity(files=found.identity.files), b"")
+
+
+def single_body(ref: EnvRef) -> EnvRef:
+    """Return the env of one body, where a reference stands for many."""
+    return EnvRef(ref.id, {name: v for name, v in ref.kwargs.items() if name != "bodies"})
+
+
+def require_same_env(
+    card: Mapping[str, Identity], ref: EnvRef, made: Identity, policy: object, remedy: str
+) -> None:
+    """Refuse a policy whose env has changed since its training.
+
+    Args:
+        card: Identities of its card.
+        ref: The env.
+        made: Its present identity.
+        policy: The policy's file, for the message.
+        remedy: What the user can do, as the end of a sentence.
+
+    Raises:
+        ForeignStudy: If it has.
+    """
+    if words := card.get(ENV, NOTHING).changes_to(made):
+        raise ForeignStudy(f"{ref} has changed since {policy} was trained in it: {words}. {remedy}")
