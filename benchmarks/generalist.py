@@ -28,9 +28,9 @@ from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.learners.presets import learner_settings
-from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import LimbSettings
 from shapechanger.transfer.limbs.envs import fitted
+from shapechanger.transfer.limbs.learner import LimbLearner, use_one_thread
 
 OUT: Final = Path("results", "generalist")
 RUNS: Final = Path("benchmarks", "results", "generalist-runs.json")
@@ -160,7 +160,7 @@ def _judged(network: Network, seed: int) -> Scores:
     if result.exists():
         return read_json(result, Scores, f"delete {result}")
     if not file.exists():
-        learner = Sb3Learner(network, _settings(network))
+        learner = LimbLearner(network, _settings(network))
         draw = BodyDraw(count=BODIES)
         policy = learner.train(
             ANT.having({"bodies": msgspec.to_builtins(draw)}), STEPS, seed, on_evaluation=ignore
@@ -235,7 +235,7 @@ def _scratch(split: str) -> list[float]:
     for seed, body in enumerate(_bodies(split)[:SCRATCH_BODIES]):
         found: list[float] = []
         settings = msgspec.structs.replace(_settings("limbs"), eval_every=SHARE, eval_episodes=1)
-        learner = Sb3Learner("limbs", settings)
+        learner = LimbLearner("limbs", settings)
         learner.train(
             body,
             SHARE,

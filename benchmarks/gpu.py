@@ -316,7 +316,7 @@ def _trained(
     The seconds contain the evaluation at the end, on a CPU env.
     """
     # It needs rsl-rl, which other parts do not.
-    from shapechanger.transfer.learners.rsl import RslLearner
+    from shapechanger.transfer.runs import learner_of
 
     times: list[float] = []
     speeds: list[float] = []
@@ -327,7 +327,7 @@ def _trained(
 
     plain: Any = learner_settings(learner)
     changed = msgspec.structs.replace(plain, **settings, eval_every=steps)
-    policy = RslLearner(learner, changed).train(
+    policy = learner_of(learner, changed).train(
         env, steps, 0, on_evaluation=on_evaluation, on_steps=cast("Any", on_steps)
     )
     return policy, times[-1] - times[0], speeds

@@ -27,7 +27,6 @@ from shapechanger.transfer.learners.evaluation import (
     EVALUATION_SEED,
     Evaluation,
     evaluate,
-    evaluation_envs,
     random_actions,
     zero_actions,
 )
@@ -35,7 +34,7 @@ from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.learners.sb3 import Sb3Learner, use_one_thread
 from shapechanger.transfer.learners.settings import Sb3Settings
 from shapechanger.transfer.references import FOLDER, EnvReference, load_references
-from shapechanger.transfer.runs import RunResult
+from shapechanger.transfer.runs import RunResult, learner_of
 
 RESULTS: Final = Path("results", "references")
 COMMAND: Final = "python -m benchmarks.run references"
@@ -185,7 +184,8 @@ def _write(name: str, curves: list[tuple[Evaluation, ...]], found: dict[str, Env
 
 def _played(env: EnvRef, policy: Path) -> Evaluation:
     """Evaluate a policy over as many episodes as the floor."""
-    envs = evaluation_envs(env, learner_settings(default_learner(env)))
+    learner = default_learner(env)
+    envs = learner_of(learner, learner_settings(learner)).evaluation_envs(env)
     try:
         act = load_policy(policy).act
         return evaluate(act, envs, EVALUATION_SEED, episodes=EPISODES)
@@ -196,8 +196,8 @@ def _played(env: EnvRef, policy: Path) -> Evaluation:
 
 def _floor(env: EnvRef) -> tuple[dict[str, dict[str, float]], list[str]]:
     """Return the values of each measure without skill, and the names of the measures."""
-    settings = learner_settings(default_learner(env))
-    envs = evaluation_envs(env, settings)
+    learner = default_learner(env)
+    envs = learner_of(learner, learner_settings(learner)).evaluation_envs(env)
     try:
         measures = [measure.name for measure in measures_of(envs[0])]
         floor: dict[str, dict[str, float]] = {}
