@@ -231,10 +231,10 @@ class RslLearner(Sb3Learner):
         """Return the envs of all worlds as one, and the rows of each body; None without limbs."""
         return env, None
 
-    def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> Training:
+    def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> RslTraining:
         """Return the training on worlds of `_worlds`."""
         del rows
-        return Training(RslVecEnv(worlds, seed), model, statistics, self.settings)
+        return RslTraining(RslVecEnv(worlds, seed), model, statistics, self.settings)
 
 
 class _Returns:
@@ -291,7 +291,7 @@ class _Returns:
             found.count = float(self._count)
 
 
-class Training:
+class RslTraining:
     """rsl-rl's PPO with the weights and statistics of a model of Stable-Baselines3.
 
     Args:

@@ -17,7 +17,7 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 
 from shapechanger.contract.env_ref import EnvRef
-from shapechanger.transfer.learners.rsl import GROUP, RslLearner, RslVecEnv, Training
+from shapechanger.transfer.learners.rsl import GROUP, RslLearner, RslTraining, RslVecEnv
 from shapechanger.transfer.limbs.envs import bodies_in_turn, together
 from shapechanger.transfer.limbs.learner import LimbLearner
 from shapechanger.transfer.limbs.policy import LimbPolicy
@@ -150,7 +150,7 @@ class LimbModel(MLPModel):
         return LimbPolicy.over_motors(self.distribution._distribution.log_prob(outputs), self._rows)
 
 
-class LimbTraining(Training):
+class LimbTraining(RslTraining):
     """rsl-rl's PPO with the weights of a policy of limbs."""
 
     def _networks(self, seen: TensorDict) -> tuple[Any, Any]:
@@ -173,6 +173,6 @@ class RslLimbLearner(RslLearner, LimbLearner):
         bodies, rows = bodies_in_turn(env, self.settings.n_envs, self.settings.room)
         return together(bodies), rows
 
-    def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> Training:
+    def _begin(self, worlds: Any, seed: int, rows: Any, model: Any, statistics: Any) -> RslTraining:
         envs = RslVecEnv(worlds, seed, DeviceRows(worlds, rows))
         return LimbTraining(envs, model, statistics, self.settings)
