@@ -49,6 +49,16 @@ def export_network(
         """Translate the length of an edge, which ONNX lacks."""
         return operators.Sqrt(operators.Add(operators.Mul(x, x), operators.Mul(y, y)))
 
+    class Positional(torch.nn.Module):
+        """The network with any number of inputs, which are then named alike."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.network = network
+
+        def forward(self, *given: torch.Tensor) -> torch.Tensor:
+            return self.network(*given)
+
     many = torch.export.Dim("n", min=1)
     # The exporter warns of packages that these networks do not need.
     log = logging.getLogger("torch.onnx")
@@ -58,7 +68,7 @@ def export_network(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             program: Any = cast("Any", torch.onnx).export(
-                network.eval(),
+                Positional().eval(),
                 tuple(inputs.values()),
                 input_names=[*inputs],
                 output_names=[output],

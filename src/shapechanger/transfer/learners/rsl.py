@@ -187,7 +187,9 @@ class RslLearner(Sb3Learner):
             single = settings.for_one_env()
             # Stable-Baselines3 leaves out types.
             model: Any
-            model, explores = self._first_model(envs, single, seed, start, body_map, layouts[0])
+            model, explores = self._first_model(
+                envs, single, seed, start, body_map, env, layouts[0]
+            )
             training = self._begin(worlds, seed, rows, model, envs)
 
             def evaluated(done: int) -> None:

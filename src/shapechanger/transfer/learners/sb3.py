@@ -114,7 +114,9 @@ class Sb3Learner(Learner[Sb3Settings]):
             raise
         envs = self._with_statistics(VecMonitor(scaled))
         try:
-            model, explores = self._first_model(envs, settings, seed, start, body_map, layouts[0])
+            model, explores = self._first_model(
+                envs, settings, seed, start, body_map, env, layouts[0]
+            )
             evaluations = _PeriodicEvaluation(
                 self,
                 eval_envs,
@@ -216,6 +218,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         seed: int,
         start: TrainedPolicy | None,
         body_map: BodyMap | None,
+        env: EnvRef,
         observation: Layout,
     ) -> tuple[BaseAlgorithm, tuple[float, ...] | None]:
         """Return the model that a training begins with.
@@ -229,7 +232,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         if start.normalisation is not None and isinstance(envs, VecNormalize):
             # The critic predicts rewards divided by these.
             envs.ret_rms = start.normalisation.reward.copy()
-        model = self._moved(envs, settings, seed, logs, start, body_map, observation)
+        model = self._moved(envs, settings, seed, logs, start, body_map, env, observation)
         return model, _explore(model, settings)
 
     def _moved(
@@ -240,10 +243,11 @@ class Sb3Learner(Learner[Sb3Settings]):
         tensorboard: str | None,
         source: TrainedPolicy,
         body_map: BodyMap,
+        env: EnvRef,
         observation: Layout,
     ) -> BaseAlgorithm:
         """The source policy in the target's shapes, with its statistics, ready for training."""
-        del observation
+        del env, observation
         arguments = dict(settings.model_arguments)
         arguments.pop("policy_kwargs", None)
         statistics = source.normalisation

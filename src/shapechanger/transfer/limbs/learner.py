@@ -61,10 +61,11 @@ class LimbLearner(Sb3Learner):
         tensorboard: str | None,
         source: TrainedPolicy,
         body_map: BodyMap,
+        env: EnvRef,
         observation: Layout,
     ) -> BaseAlgorithm:
         del body_map
-        require_same_columns(source.card.observation, observation, source.card.env.id)
+        require_same_columns(source.card.observation, observation, env.id)
         model = build_model(settings, envs, seed, tensorboard)
         try:
             cast("Any", model.policy).load_state_dict(source.model.policy.state_dict())
