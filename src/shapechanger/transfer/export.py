@@ -155,7 +155,7 @@ class _LimbActions(nn.Module):
             constant=rows.constant,
             actuators=rows.actuators.astype(np.int64),
             low=rows.low.astype(np.float32),
-            half=(0.5 * (rows.high - rows.low)).astype(np.float32),
+            reach=(0.5 * (rows.high - rows.low)).astype(np.float32),
         )
 
     def forward(self, observation: Tensor) -> Tensor:
@@ -163,4 +163,4 @@ class _LimbActions(nn.Module):
         known: Any = self
         rows = (observation * known.scale + known.offset) @ known.selection + known.constant
         limbs = self.network(rows.float().reshape(self.shape)).clamp(-1.0, 1.0)
-        return (limbs[:, known.actuators] + 1.0) * known.half + known.low
+        return (limbs[:, known.actuators] + 1.0) * known.reach + known.low
