@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, cast
 
 import msgspec
 
@@ -116,12 +116,12 @@ def resolve_learner(learner: str, changed: Mapping[str, Any]) -> tuple[str, Lear
         return learner, _imported(learner, changed)
     if learner not in LEARNERS and learner in KINDS.added():
         return learner, _converted(learner, KINDS.load(learner), dict(changed))
-    settings: Any = learner_settings(learner)
-    known: dict[str, Any] = msgspec.structs.asdict(settings)
+    settings = learner_settings(learner)
+    known: dict[str, Any] = msgspec.structs.asdict(cast("Any", settings))
     for setting in changed:
         if setting not in known:
             raise UnknownName(f"setting of {learner}", setting, known)
-    kind: type[Any] = type(settings)
+    kind = cast("Any", type(settings))
     return learner, _converted(learner, kind, {**msgspec.to_builtins(settings), **changed})
 
 
