@@ -28,9 +28,10 @@ from shapechanger.policy import load_policy, save_policy
 from shapechanger.transfer.learners import ignore
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate
 from shapechanger.transfer.learners.presets import learner_settings
+from shapechanger.transfer.learners.sb3 import use_one_thread
 from shapechanger.transfer.learners.settings import LimbSettings
 from shapechanger.transfer.limbs.envs import fitted
-from shapechanger.transfer.limbs.learner import LimbLearner, use_one_thread
+from shapechanger.transfer.limbs.learner import LimbLearner
 
 OUT: Final = Path("results", "generalist")
 RUNS: Final = Path("benchmarks", "results", "generalist-runs.json")
