@@ -19,6 +19,7 @@ from shapechanger.cli import suite as suite_command
 from shapechanger.cli.suite import SuiteFile
 from shapechanger.errors import FailedRuns
 from shapechanger.transfer.executor import Job, OnProgress, Serial
+from shapechanger.transfer.learners import presets
 from shapechanger.transfer.learners.presets import LEARNERS
 from tests.transfer.lane import DRY, ICY, QUICK_CLONING, WET
 
@@ -59,7 +60,8 @@ def lanes() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         suite = SuiteFile(envs=(DRY.id, WET.id, ICY.id), learner="cloning")
         patch.setattr(suite_command, "load_suite", lambda name: suite)
-        patch.setitem(LEARNERS, "cloning", QUICK_CLONING)
+        shipped = {**LEARNERS, "cloning": QUICK_CLONING}
+        patch.setattr(presets, "LEARNERS", shipped)
         yield
 
 

@@ -90,7 +90,7 @@ def test_invalid_files_are_refused(tmp_path: Path, kind: str) -> None:
         load_policy(path)
 
 
-SHIPPED = Path(shapechanger.__file__).parent / "envs"
+SHIPPED = Path(shapechanger.__file__).parent / "vehicles" / "envs"
 
 
 @pytest.mark.parametrize("path", POLICIES.values(), ids=POLICIES)
@@ -101,9 +101,7 @@ def test_shipped_policies_load(path: Path) -> None:
     assert np.abs(policy.act(seen)).max() <= 1.0
 
 
-@pytest.mark.parametrize(
-    "path", sorted(SHIPPED.glob("vehicle/clones/*.safetensors")), ids=lambda p: p.stem
-)
+@pytest.mark.parametrize("path", sorted(SHIPPED.glob("clones/*.safetensors")), ids=lambda p: p.stem)
 def test_shipped_clones_load(path: Path) -> None:
     """Shipped clones load without unpickling."""
     assert CameraPolicy.load(path).card.framing.width > 0

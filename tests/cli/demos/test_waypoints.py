@@ -20,6 +20,7 @@ from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
 from shapechanger.errors import DemosError, WorldError
 from shapechanger.layout import Feature, Layout
+from shapechanger.transfer.learners import presets
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.vehicles.cloning import CloningSettings
 from shapechanger.vehicles.envs import WaypointEnv
@@ -42,7 +43,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = LEARNERS["waypoint"]
     assert isinstance(settings, CloningSettings)
     clone = msgspec.structs.replace(settings.clone, fewest_steps=30, most_steps=30)
-    monkeypatch.setitem(LEARNERS, "waypoint", msgspec.structs.replace(settings, clone=clone))
+    quick = msgspec.structs.replace(settings, clone=clone)
+    monkeypatch.setattr(presets, "LEARNERS", {**LEARNERS, "waypoint": quick})
 
 
 def _record(folder: Path, n: int = 60, *, state: Layout | None = _STATE, **changes: Any) -> Path:

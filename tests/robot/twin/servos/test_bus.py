@@ -2,7 +2,7 @@
 
 import pytest
 
-from shapechanger.errors import RobotError, UnknownName
+from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.servos.registers import ServoReply
 from shapechanger.robot.twin.servos.bus import SimulatedBus
 from shapechanger.robot.twin.servos.servo import ServoPlan
@@ -170,11 +170,9 @@ def test_a_reboot_keeps_the_eeprom_and_clears_the_turn_count() -> None:
 
 
 def test_an_invalid_bus_is_refused() -> None:
-    """Two servos with one id and an unknown model raise an error."""
+    """Two servos with one id raise an error."""
     with pytest.raises(RobotError, match="same id"):
         SimulatedBus([ServoPlan(1), ServoPlan(1)])
-    with pytest.raises(UnknownName, match="Did you mean 'XL330-M288'"):
-        SimulatedBus([ServoPlan(1, "XL330-M28")])
 
 
 def _feetech(line: SimulatedBus, at: int, value: int, size: int = 1) -> int:
