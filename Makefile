@@ -42,7 +42,7 @@ INSTALL = $(RUN) -m pip install --quiet -c constraints.txt uv && \
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # Two installations at once would interfere.
-.PHONY: help setup demo test test-system test-ci test-all test-matrix release test-lerobot test-robots check bench docs gallery clean
+.PHONY: help setup demo test test-system test-all test-matrix release test-lerobot test-robots check bench docs gallery clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s%s\n", $$1, $$2 }' Makefile
@@ -60,9 +60,6 @@ test: $(INSTALLED_DEV)  ## run the fast tests, with the coverage gate
 
 test-system: $(INSTALLED_DEV)  ## run the tests of whole programs: processes, browsers, terminals
 	$(PYTEST) -m "system and not slow" -n $(SYSTEM_JOBS)
-
-test-ci: $(INSTALLED_DEV)  ## run what the two before run, in one pool
-	$(PYTEST) -m "not slow" -n $(SYSTEM_JOBS) --cov
 
 test-all: $(INSTALLED_DEV)  ## run all tests, including the slow ones
 	$(PYTEST) --cov
