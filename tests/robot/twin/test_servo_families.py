@@ -224,9 +224,7 @@ def _other(match: re.Match[str]) -> str:
 
 def test_two_servos_of_one_id_are_refused(family: str) -> None:
     """The profile refuses it, with the line of the bus."""
-    with pytest.raises(
-        ProfileError, match=r"line \d+: id 1 of the servo bus is used twice"
-    ):
+    with pytest.raises(ProfileError, match=r"line \d+: id 1 of the servo bus is used twice"):
         read(finger_text(family).replace("\nid = 2\n", "\nid = 1\n"))
 
 
