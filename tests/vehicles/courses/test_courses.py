@@ -253,12 +253,12 @@ def test_unknown_worlds_and_seeds_are_refused() -> None:
 
 def test_a_layout_that_never_fits_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     """The search for a layout gives up with an error."""
-    from shapechanger.vehicles import courses
+    from shapechanger.vehicles.courses import channel
 
-    def never(rng: np.random.Generator, seed: int) -> Course | None:
+    def never(world: str, rng: np.random.Generator, seed: int) -> Course | None:
         return None
 
-    monkeypatch.setattr(courses, "_MAKERS", {"yard": never})
+    monkeypatch.setattr(channel, "open_course", never)
     with pytest.raises(WorldError, match="No yard with seed 3"):
         lay_out("yard", 3)
 
