@@ -32,7 +32,7 @@ import torch
 
 import shapechanger
 from benchmarks.row import Row
-from shapechanger.contract.env_ref import EnvRef
+from shapechanger.contract.env_ref import EnvRef, each_body
 from shapechanger.envs.warp.devices import on, wp
 from shapechanger.morphology import Stretch
 from shapechanger.policy import save_policy
@@ -76,7 +76,9 @@ TASKS: Final = ("Ant", "HalfCheetah", "InvertedDoublePendulum", "Humanoid", "Fin
 def gpu() -> Iterator[Row]:
     """Measure all parts, in the order of what must be known first."""
     if _there():
-        yield from _all(parity, speed, waiting, graphs, construction, differing, training, humanoid)
+        yield from _all(
+            parity, speed, waiting, graphs, construction, differing, batches, training, humanoid
+        )
 
 
 def on_cpu() -> Iterator[Row]:
@@ -302,6 +304,36 @@ def differing() -> Iterator[Row]:
             f"<= {DEAREST:g}x",
             value <= DEAREST,
         )
+
+
+def batches() -> Iterator[Row]:
+    """Compare a step of ants of several shapes with the steps of each shape after another."""
+    drawn = ANT.having({"bodies": GENERALIST_BODIES | {"count": 32}})
+    bodies = [body.kwargs["body"] for body in each_body(drawn)]
+    count = MANY // 2 if GPU else FEW
+    worlds = [bodies[i % len(bodies)] for i in range(count)]
+    all_at_once = made("Ant", count, bodies=worlds, task_infos=False)
+    kinds = [[worlds[i] for i in batch.numbers.tolist()] for batch in all_at_once.batches]
+    each = [made("Ant", len(kind), bodies=kind, task_infos=False) for kind in kinds]
+    given = [actions(envs, 1)[0] for envs in each]
+
+    def together() -> None:
+        all_at_once.step(given)
+
+    def one_by_one() -> None:
+        for envs, action in zip(each, given, strict=True):
+            envs.step(action)
+
+    _seconds(together, 20)
+    _seconds(one_by_one, 20)
+    ratios = _ratio(one_by_one, together, 4)
+    yield Row(
+        f"Ant, N={count}: time of {len(kinds)} shapes one by one over that of all, {_card()}",
+        f"{statistics.median(ratios):.2f}x",
+        f"{ratios[0]:.2f} to {ratios[-1]:.2f}x in {ROUNDS} rounds",
+        "none: whatever comes out",
+        True,
+    )
 
 
 def _trained(
