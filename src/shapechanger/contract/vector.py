@@ -1,4 +1,4 @@
-"""Many envs at once for learners, which import no env: the function that makes them registers."""
+"""Registration of `make_vec`, so that learners make vector envs without importing any env."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What pages are made of: a template, pictures, charts and formatted numbers."""
+"""Parts of report pages: template, pictures, charts and formatted numbers."""

@@ -1,4 +1,4 @@
-"""The loader: sources are never changed, targets appear atomically, strangers have one budget.
+"""Files of datasets: sources stay unchanged, targets appear whole, and one budget limits all reads.
 
 The budget is `MAX_TEXT_BYTES` of text, `MAX_PICTURE_BYTES` and `MAX_PIXELS` of a picture,
 `MAX_UNPACKED` of anything compressed, and regular files inside the folder only. All functions raise

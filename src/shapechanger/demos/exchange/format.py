@@ -1,4 +1,4 @@
-"""Everything that a format is made of: names of columns, its declaration, episodes and findings."""
+"""Formats of datasets: column names, declaration, episodes and findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What mujoco-warp 4.0 computes otherwise than MuJoCo, or once for all worlds, written again.
+"""Replacements of functions in mujoco-warp 4.0 that differ from MuJoCo or ignore differing bodies.
 
 - **Contacts of capsules with planes.** MuJoCo turns the pyramid of friction of such a contact along
   the capsule. mujoco-warp does so only where the capsule leans by more than 30 degrees from the

@@ -1,4 +1,4 @@
-"""Chips: all that is known about a sensor, an output or a source of pulses, each in one file.
+"""Chips: sensors, outputs and sources of pulses, each with keys, driver and simulation in one file.
 
 The module of a chip has its keys in a profile, its driver and its simulation, and a `SensorChip`,
 `OutputChip` or `PulseSource` that names them. Other packages add chips by entry points of the group

@@ -1,4 +1,4 @@
-"""Around the board: sensors, controllers, servos, and the world that moves them."""
+"""Sensors, controllers and servos of a simulated board, and the world that moves them."""
 
 from __future__ import annotations
 
