@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 
 import msgspec
 import pytest
@@ -30,6 +31,23 @@ def test_every_shipped_robot_has_a_card_that_a_client_reads(kind: str) -> None:
     )
     assert Layout.from_json(card.action_layout) == profile.action_layout()
     assert len(card.slew_per_s) == len(card.slew_down_per_s) == len(profile.actions)
+
+
+def test_a_card_states_the_numbers_of_the_profile() -> None:
+    """Each fact comes from its own key; 0 is no limit of a slew, and defaults are stated too."""
+    card = card_of(load_profile(find_profile("lab-car")))
+    assert (card.robot, card.body, card.image_size) == ("lab-car", "car", (160, 120))
+    assert (card.control_hz, card.tick_hz) == (20.0, 100.0)
+    assert (card.deadline_ms, card.max_observation_age_ms) == (250, 400)
+    # Steering and throttle, which may fall to rest at once.
+    assert (card.slew_per_s, card.slew_down_per_s) == ((0.0, 4.0), (0.0, 0.0))
+    assert (card.camera_pitch_deg, card.camera_fovy_deg) == (0.0, 48.8)
+    assert card.turning == pytest.approx((math.radians(108.0), 0.0))
+    assert (card.arming, card.clock, card.reset) == ("person", "real", ())
+    assert card.reward == {
+        **{"velocity": 1.0, "collision": -10.0, "stall": -1.0},
+        "collision_ends_episode": 1.0,
+    }
 
 
 def test_a_twin_may_be_armed_by_anyone_and_needs_no_pictures() -> None:
