@@ -50,6 +50,8 @@ class FakeHub(ThreadingHTTPServer):
         repositories: Repositories by their type and name, such as "models/ada/ant".
         requests: Method and path of each request.
         cut: Number of bytes after which transfers of a file end, by its name.
+        stalled: Names of files whose transfers stop half-way until the server ends.
+        stalling: Whether such a transfer is under way.
     """
 
     daemon_threads = True
@@ -59,6 +61,9 @@ class FakeHub(ThreadingHTTPServer):
         self.repositories: dict[str, Repository] = {}
         self.requests: list[str] = []
         self.cut: dict[str, int] = {}
+        self.stalled: set[str] = set()
+        self.stalling = threading.Event()
+        self.released = threading.Event()
         self.blobs: dict[str, bytes] = {}
 
     @property
@@ -253,7 +258,12 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         if self.command == "GET":
             end = self.server.cut.get(file, len(content))
+            if file in self.server.stalled:
+                end = len(content) // 2
             self.wfile.write(content[start : max(start, end)])
+            if file in self.server.stalled:
+                self.server.stalling.set()
+                self.server.released.wait()
             self.close_connection = end < len(content)
 
 

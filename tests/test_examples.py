@@ -15,8 +15,6 @@ import pytest
 
 _FOLDER = Path(__file__).parents[1] / "examples"
 _EXAMPLES = sorted(_FOLDER.glob("*.py"))
-# Studies, which train in processes of their own for half a minute.
-_LONG = ("new_method", "study_on_ray")
 _FEW = ("--steps", "64")
 # A study needs as many steps as come before its first evaluation.
 _ARGUMENTS = dict.fromkeys(("new_method", "study_on_ray"), ("--steps", "4096", "--seeds", "2"))
@@ -37,13 +35,7 @@ _SAYS = {
 @pytest.mark.system
 @pytest.mark.realtime
 @pytest.mark.usefixtures("gl")
-@pytest.mark.parametrize(
-    "example",
-    [
-        pytest.param(path, marks=[pytest.mark.slow] if path.stem in _LONG else [], id=path.stem)
-        for path in _EXAMPLES
-    ],
-)
+@pytest.mark.parametrize("example", _EXAMPLES, ids=lambda example: example.stem)
 def test_an_example_runs(example: Path, tmp_path: Path) -> None:
     """Without warnings of ours, in a folder that it has never seen."""
     run = subprocess.run(
@@ -67,7 +59,6 @@ def test_an_example_is_short(example: Path) -> None:
 
 
 @pytest.mark.gl
-@pytest.mark.slow
 @pytest.mark.system
 @pytest.mark.usefixtures("gl")
 def test_the_cells_of_the_notebook_run(tmp_path: Path) -> None:

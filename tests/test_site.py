@@ -243,7 +243,6 @@ def _require(*packages: str) -> None:
             missing(f"The package {package} is not installed")
 
 
-@pytest.mark.slow
 @pytest.mark.system
 def test_the_site(tmp_path: Path, chromium: Browser) -> None:
     """The site builds strictly, has every public name and env, loads nothing, and is accessible.

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -55,6 +56,9 @@ def hub(served: FakeHub) -> FakeHub:
     served.repositories.clear()
     served.requests.clear()
     served.cut.clear()
+    served.stalled.clear()
+    served.stalling.clear()
+    served.released.clear()
     return served
 
 
@@ -291,3 +295,30 @@ def test_a_recording_that_is_too_large(run: Run, hub: FakeHub, tmp_path: Path) -
     assert "more than the limit of 1" in refused(run(*pull))
     assert not any("episodes" in request for request in hub.requests)
     assert not (tmp_path / "out").exists()
+
+
+def test_an_interrupted_pull_leaves_nothing(
+    run: Run, hub: FakeHub, environment: dict[str, str], tmp_path: Path
+) -> None:
+    """Ctrl-C during a transfer."""
+    drive(tmp_path / "data", 3)
+    assert run("demos", "push", tmp_path / "data", "ada/drive")[0] == 0
+    hub.stalled.update(
+        name for name in hub.repositories["datasets/ada/drive"].files if name.endswith(".jsonl")
+    )
+    before = {path.name for path in tmp_path.iterdir()}
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "demos", "pull", "ada/drive", "--out", "out"],
+        cwd=tmp_path,
+        env=environment | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert hub.stalling.wait(60.0)
+        process.send_signal(signal.SIGINT)
+        try:
+            errors = process.communicate(timeout=20.0)[1]
+        finally:
+            hub.released.set()
+    assert (process.returncode, errors) == (130, "Stopped.\n")
+    assert {path.name for path in tmp_path.iterdir()} == before

@@ -89,26 +89,28 @@ def _until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> Non
             pytest.fail(f"ended too early: {process.communicate()}")
 
 
-@pytest.mark.slow
-def test_an_interrupted_study_resumes_to_the_same_numbers(
+def test_a_killed_study_resumes_to_the_same_numbers(
     quick: tuple[Path, subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:
-    """After Ctrl-C, the same command gives the same curves."""
+    """After Ctrl-C and a kill, the same command gives the same curves."""
     out = tmp_path / "study"
-    process = subprocess.Popen(
-        [*COMMAND, *QUICK, "--out", str(out)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    _until((out / "runs" / "scratch-0" / "curve.jsonl").exists, process)
-    os.killpg(process.pid, signal.SIGINT)  # Ctrl-C reaches every process of the terminal.
-    _, message = process.communicate()
-    assert not (out / "study.json").exists()
-    assert process.returncode == 130
-    assert "go on with: shapechanger transfer" in message
-    assert "Traceback" not in message
+    for how, run_name in ((signal.SIGINT, "scratch-0"), (signal.SIGKILL, "fine-tune-0")):
+        process = subprocess.Popen(
+            [*COMMAND, *QUICK, "--out", str(out)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        _until((out / "runs" / run_name / "curve.jsonl").exists, process)
+        # Ctrl-C reaches every process of the terminal; a kill only the one.
+        (os.killpg if how == signal.SIGINT else os.kill)(process.pid, how)
+        _, message = process.communicate()
+        assert not (out / "study.json").exists()
+        if how == signal.SIGINT:
+            assert process.returncode == 130
+            assert "go on with: shapechanger transfer" in message
+            assert "Traceback" not in message
     done = run(*QUICK, "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert "had ended before" in done.stdout
@@ -355,7 +357,6 @@ def test_a_missing_extra_is_named_with_its_command(
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.slow
 def test_a_robot_and_a_task_of_ones_own_are_studied(tmp_path: Path) -> None:
     """Files and a module of the current folder, in worker processes, in two bodies."""
     (tmp_path / "dog.xml").write_text(DOG)
