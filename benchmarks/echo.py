@@ -21,6 +21,7 @@ import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
 
+from shapechanger.contract.plan import ActionPlan, GuardPlan
 from shapechanger.layout import Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.client.client import RobotClient
@@ -28,7 +29,6 @@ from shapechanger.robot.client.known_robots import KnownRobot
 from shapechanger.robot.daemon.credentials import make_credentials
 from shapechanger.robot.daemon.plan import DaemonPlan
 from shapechanger.robot.guard import messages as wire
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from shapechanger.robot.link.card import RobotCard
 from shapechanger.robot.twin.camera import with_capture_time

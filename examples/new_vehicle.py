@@ -14,7 +14,7 @@ import numpy as np
 import tyro
 
 import shapechanger  # noqa: F401  # Registers the ids.
-from shapechanger.robot.guard.plan import output_values
+from shapechanger.contract.plan import output_values
 from shapechanger.robot.profile import load_profile
 from shapechanger.robot.twin.robot import run_robot
 

@@ -12,8 +12,8 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
+from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, I2C_PINS
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 from shapechanger.robot.profile import Profile, find_profile, load_profile
 
 _NO_PIN: Final = -1

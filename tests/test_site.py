@@ -29,10 +29,10 @@ from scripts.site_pages import (
     reference_path,
 )
 from scripts.wiring_diagrams import devices_of, draw_wiring, part_list, pin_table
+from shapechanger.contract.plan import driven_pins
 from shapechanger.envs.catalogue import ODRL_ENVS
 from shapechanger.errors import RenderError
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD
-from shapechanger.robot.guard.plan import driven_pins
 from shapechanger.robot.profile import Profile, load_profile, read_profile, shipped_profiles
 from tests.drawing import missing
 from tests.robot.profile.texts import EVERYTHING, HOVERCRAFT

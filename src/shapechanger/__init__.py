@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any, Final
 from shapechanger.envs.catalogue import register_all
 from shapechanger.errors import ShapechangerError
 from shapechanger.layout import Element, Feature, Layout
-from shapechanger.registry import LEARNERS, METHODS, POLICIES
+from shapechanger.registry import LEARNERS, METHODS, POLICIES, ROBOTS
 
 if TYPE_CHECKING:
     from shapechanger.contract.testing import examine
@@ -191,6 +191,7 @@ POLICIES.ship(
         "clone-onnx": "demos.cloning.onnx_policy:OnnxClone",
     }
 )
+ROBOTS.ship({"profile": "vehicles.twin:read_robot"})
 
 
 def __getattr__(name: str) -> Any:

@@ -105,3 +105,6 @@ METHODS: Final[Registry[Any]] = Registry("method", "shapechanger.methods")
 
 POLICIES: Final[Registry[Any]] = Registry("kind of policy", "shapechanger.policies")
 """Functions that read a file, by the kind of policy that its header names."""
+
+ROBOTS: Final[Registry[Any]] = Registry("reader of robots", "shapechanger.robots")
+"""Functions that read what a simulation needs of a robot: numbers only, so that none imports it."""

@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from shapechanger.contract.limits import slewed as slewed_by_guard
+from shapechanger.contract.plan import ActionPlan
 from shapechanger.errors import FingerError, UnknownName
 from shapechanger.finger.parameters import NOMINAL, CommandPath, FingerParameters
 from shapechanger.finger.plant import FingerPlant, slewed
 from shapechanger.finger.tensions import drive_of
-from shapechanger.robot.guard.limits import slewed as slewed_by_guard
-from shapechanger.robot.guard.plan import ActionPlan
 
 _RIG = NOMINAL.replace(tendon_stiffness=10e3, motor_kg=1.4, motor_lag=0.001)
 _MOST = np.array(NOMINAL.most_tension)

@@ -274,7 +274,7 @@ def hold_controls(
 def slewed(
     path: CommandPath, now: NDArray[np.float64], aim: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the tensions of the next tick, as `shapechanger.robot.guard.limits.slewed` does.
+    """Return the tensions of the next tick, as `shapechanger.contract.limits.slewed` does.
 
     All tensions, also those of `now` and those that are the `aim`, are shares of their ranges, 0 to
     1, (n,).

@@ -1,13 +1,48 @@
-"""Courses in MuJoCo as places of a robot's twin."""
+"""Courses in MuJoCo as places of a robot's twin, and the numbers of robots for simulations."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
 
 from shapechanger.contract.world import World
 from shapechanger.errors import MissingExtra
 from shapechanger.robot.cameras.camera import CameraPlan
+from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.world.place import Place
+
+if TYPE_CHECKING:
+    from shapechanger.vehicles.envs.drive import SimulatedRobot
+
+
+def read_robot(robot: str | os.PathLike[str]) -> SimulatedRobot:
+    """Read the numbers of a robot that its simulation needs.
+
+    Args:
+        robot: Path or name of its profile.
+
+    Raises:
+        UnknownName: If there is no such profile.
+        ProfileError: If it cannot be read or is not valid.
+    """
+    from shapechanger.vehicles.envs.drive import SimulatedRobot
+
+    profile = load_profile(find_profile(robot))
+    camera = profile.camera
+    return SimulatedRobot(
+        robot=profile.name,
+        body=profile.body,
+        path=str(profile.path),
+        plan=profile.guard_plan(),
+        control_hz=profile.control_hz,
+        reward=profile.reward,
+        action_layout=profile.action_layout(),
+        state_layout=profile.state_layout(),
+        size=(0, 0) if camera is None else camera.size,
+        camera_pitch_deg=None if camera is None else camera.pitch_deg,
+        camera_fovy_deg=None if camera is None else camera.fovy_deg,
+    )
 
 
 def course_place(world: str, vehicle: str, lenses: Sequence[str] = ()) -> Place:

@@ -10,13 +10,12 @@ from typing import Any, Self, cast
 
 import pytest
 
+from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan, Frame
 from shapechanger.robot.check.check import Finding
 from shapechanger.robot.check.computer import examine
 from shapechanger.robot.check.standing import StandingRobot
-from shapechanger.robot.drivers.plan import OutputPlan
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.hardware import RealClock
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.systemd import unit_name

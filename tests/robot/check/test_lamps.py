@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.check import Finding
 from shapechanger.robot.check.lamps import lamps_of, walk
-from shapechanger.robot.guard.plan import GuardPlan
 from tests.robot.check.held_pins import HeldPins, shipped
 
 

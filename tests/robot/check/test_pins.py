@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 from gpiozero.pins.mock import MockConnectedPin, MockFactory
 
+from shapechanger.contract.plan import GuardPlan, OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.pins import check_jumper, plan_of_pins, probed_pin
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
 

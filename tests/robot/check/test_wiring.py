@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from gpiozero.pins.mock import MockFactory, MockPin
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.check.computer import examine
 from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import RealHardware
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.in_process import LocalBoard

@@ -16,9 +16,9 @@ from typing import BinaryIO
 
 import pytest
 
+from shapechanger.contract.plan import ActionPlan, GuardPlan
 from shapechanger.robot.daemon.guard_link import LIFELINE, send_lifeline
 from shapechanger.robot.guard.messages import encode
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from tests.robot.daemon.plans import car_plan, guard_state
 

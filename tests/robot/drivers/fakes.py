@@ -8,9 +8,9 @@ from typing import Any
 
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
+from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OutputDriver, SensorDriver, open_output, open_sensor
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.servos.registers import ServoPort
 from shapechanger.robot.drivers.servos.settings import BusSettings
 from shapechanger.robot.hardware import RealClock

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shapechanger.contract.duty import Duty
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.duty import Duty
 from tests.robot.drivers.fakes import FakeHardware
 
 _HBRIDGE = {"forward": 22, "backward": 27, "enable": -1, "pwm_hz": 50, "start": 0.0, "full": 1.0}

@@ -2,9 +2,15 @@
 
 from dataclasses import replace
 
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
+from shapechanger.contract.plan import (
+    ActionPlan,
+    GuardPlan,
+    LimitPlan,
+    OutputPlan,
+    SensorPlan,
+    StopPlan,
+)
 from shapechanger.robot.guard.messages import Order
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, StopPlan
 
 MS = 1_000_000
 """Nanoseconds of a millisecond."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.guard.serve_plan import ServePlan, plan_fd
 from tests.robot.guard.plans import quick_car
 from tests.robot.guard.recording import Record

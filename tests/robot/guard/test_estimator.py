@@ -2,9 +2,8 @@
 
 import pytest
 
-from shapechanger.robot.drivers.plan import OutputPlan
+from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.robot.guard.outputs import ActionEstimator
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 
 _CAR = GuardPlan(
     "car",

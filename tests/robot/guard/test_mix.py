@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shapechanger.robot.drivers.plan import OutputPlan
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, output_values
+from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, output_values
 
 _PLAN = GuardPlan(
     "tank",

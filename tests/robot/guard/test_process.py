@@ -11,12 +11,11 @@ import pytest
 from gpiozero import OutputDevice
 from gpiozero.pins.mock import MockFactory, MockPWMPin
 
+from shapechanger.contract.plan import GuardPlan, LimitPlan, SensorPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.plan import SensorPlan
 from shapechanger.robot.guard import sensors
 from shapechanger.robot.guard.channel import DaemonChannel, Heartbeat
 from shapechanger.robot.guard.messages import GuardState, Order, decode_state, encode
-from shapechanger.robot.guard.plan import GuardPlan, LimitPlan
 from shapechanger.robot.guard.process import Guard, main
 from tests.robot.guard.plans import MS, arm, command, quick_car
 

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.contract.plan import GuardPlan, LimitPlan
 from shapechanger.robot.guard import supervisor
-from shapechanger.robot.guard.plan import GuardPlan, LimitPlan
 from shapechanger.robot.guard.serve_plan import ServePlan
 from shapechanger.robot.guard.supervisor import ProcessCommands, Supervisor
 from shapechanger.robot.hardware import Hardware

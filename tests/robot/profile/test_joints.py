@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import ProfileError
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile import load_profile, shipped_profiles, write_profile
 from shapechanger.robot.profile.edit import rewrite
 from tests.robot.profile.texts import changed, read

@@ -7,9 +7,9 @@ import math
 
 import pytest
 
+from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, StopPlan
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan, StopPlan
 from shapechanger.robot.profile import load_profile, shipped_profiles
 from tests.robot.profile.texts import EVERYTHING, changed, read
 

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import ProfileError
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile import load_profile, shipped_profiles
 from tests.robot.profile.texts import changed, finger_text, read
 

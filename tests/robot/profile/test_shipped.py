@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shapechanger.contract.plan import GuardPlan, output_values
 from shapechanger.errors import ProfileError
-from shapechanger.robot.guard.plan import GuardPlan, output_values
 from shapechanger.robot.profile import load_profile, shipped_profiles
 from tests.robot.profile.texts import HOVERCRAFT, changed, read
 

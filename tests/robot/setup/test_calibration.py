@@ -2,8 +2,8 @@
 
 import pytest
 
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.pulse import PulseRange
 from shapechanger.robot.setup.calibration import (
     JogResult,

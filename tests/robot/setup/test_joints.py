@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.computer import examine
 from shapechanger.robot.check.standing import StandingRobot
 from shapechanger.robot.drivers.as5600 import Magnet
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.zeros import find_joint_zeros
 from shapechanger.robot.twin.in_process import LocalBoard

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.setup.zeros import find_zeros
 from shapechanger.robot.twin.in_process import LocalBoard

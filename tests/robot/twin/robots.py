@@ -9,8 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
+from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan, SensorPlan
 from shapechanger.robot.hardware import Clock
 from shapechanger.robot.twin.board_client import BoardClient, GrantedClock, SteadyClock
 from shapechanger.robot.twin.hardware import TwinHardware

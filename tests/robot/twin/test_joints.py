@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from shapechanger.contract.plan import GuardPlan, SensorPlan
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.finger.anatomy import JOINTS
@@ -19,8 +20,6 @@ from shapechanger.robot.drivers.as5600 import (
     connect_encoders,
     open_driver,
 )
-from shapechanger.robot.drivers.plan import SensorPlan
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.twin.in_process import LocalBoard
 from shapechanger.robot.twin.wiring import TwinWiring
 from shapechanger.robot.twin.world.vehicle import DrivingWorld

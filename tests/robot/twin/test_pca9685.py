@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from gpiozero import DigitalOutputDevice
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import open_output
 from shapechanger.robot.drivers.pca9685 import SimulatedPca9685
 from shapechanger.robot.drivers.simulation import PwmChannel
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.signals import read_ledger

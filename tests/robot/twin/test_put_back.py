@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from gpiozero import DigitalOutputDevice
 
-from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator, Whereabouts

@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 from gpiozero import Motor
 
+from shapechanger.contract.plan import GuardPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SensorDriver, open_sensor
-from shapechanger.robot.drivers.plan import SensorPlan
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.twin.board_client import BoardClient
 from shapechanger.robot.twin.hardware import TwinHardware, connect
 from shapechanger.robot.twin.robot import Operator

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from shapechanger.contract.plan import GuardPlan, OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import open_output
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.simulation import Levels, Pulse
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.twin.hardware import connect
 from shapechanger.robot.twin.robot import Operator
 from shapechanger.robot.twin.start import start_board

@@ -7,12 +7,15 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 import pytest
 
+from scripts.lab_robots import lab_robots_json
 from shapechanger.contract.world import Pose
 from shapechanger.envs.catalogue import VEHICLE_ENVS
 from shapechanger.errors import (
@@ -23,8 +26,9 @@ from shapechanger.errors import (
     UnknownName,
     WorldError,
 )
+from shapechanger.robot.profile.load import find_profile
 from shapechanger.vehicles.courses.course import HELD_OUT, HOME
-from shapechanger.vehicles.envs import VehicleEnv
+from shapechanger.vehicles.envs import VehicleEnv, drive
 
 _AHEAD = np.array([0.0, 0.6], np.float32)
 
@@ -303,3 +307,28 @@ def test_no_module_for_pins_is_needed() -> None:
         [sys.executable, "-W", "error", "-c", script], check=True, capture_output=True, text=True
     )
     assert run.stdout == "[]\n"
+
+
+def test_the_numbers_of_the_lab_robots_are_those_of_their_profiles() -> None:
+    """Run `python -m scripts.lab_robots` after a change of a profile."""
+    file = Path(drive.__file__).with_name("lab_robots.json")
+    assert file.read_text("utf-8") == lab_robots_json()
+
+
+def test_a_shipped_profile_and_its_copy_give_the_same_robot(tmp_path: Path) -> None:
+    """A profile of the user's own is read by the robot's modules."""
+    copy = tmp_path / "mine.toml"
+    copy.write_bytes(find_profile("lab-car").read_bytes())
+    mine, lab = (drive.simulated_robot("car", robot) for robot in (copy, None))
+    assert mine == msgspec.structs.replace(lab, path=str(copy))
+
+
+@pytest.mark.parametrize(("env", "most"), [("CarRanges", 55), ("Car", 55)])
+def test_a_simulation_loads_no_module_of_the_robot(env: str, most: int) -> None:
+    """Making an env loads only what it simulates."""
+    script = f"import gymnasium, shapechanger, sys; gymnasium.make('shapechanger/{env}-v1')"
+    command = [sys.executable, "-c", f"{script}; print(*sys.modules)"]
+    loaded = subprocess.check_output(command, text=True).split()
+    ours = [name for name in loaded if name.partition(".")[0] == "shapechanger"]
+    assert len(ours) <= most
+    assert not [name for name in ours if name.startswith("shapechanger.robot")]

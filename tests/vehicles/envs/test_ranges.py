@@ -10,9 +10,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from shapechanger.contract.plan import ActionPlan, GuardPlan, LimitPlan, OutputPlan
 from shapechanger.errors import SpaceMismatch, UnknownName, WorldError
-from shapechanger.robot.drivers.plan import OutputPlan
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, LimitPlan
 from shapechanger.vehicles.courses.course import HELD_OUT, HOME
 from shapechanger.vehicles.envs import RangesEnv, VehicleEnv
 from shapechanger.vehicles.envs.ranges import (

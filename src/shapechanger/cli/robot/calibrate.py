@@ -19,11 +19,11 @@ from rich.text import Text
 
 from shapechanger.cli.console import plain_console, say
 from shapechanger.cli.robot.setup import change_profile, own_profile
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError, ShapechangerError
 from shapechanger.layout import Layout
 from shapechanger.robot.client.teleop import STOPS, Terminal
 from shapechanger.robot.drivers.chip import OUTPUTS
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.profile.load import load_profile
 from shapechanger.robot.profile.profile import Profile
 from shapechanger.robot.setup.calibration import (

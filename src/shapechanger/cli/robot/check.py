@@ -14,13 +14,13 @@ import tyro
 from shapechanger.cli.console import say
 from shapechanger.cli.robot.calibrate import ask_for_wheels_up
 from shapechanger.cli.robot.setup import require_port
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.check import MARKS
 from shapechanger.robot.check.lamps import lamps_of
 from shapechanger.robot.check.pins import check_jumper, plan_of_pins, require_pins
 from shapechanger.robot.check.report import facts, write_report
 from shapechanger.robot.check.standing import StandingRobot
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.profile.load import find_profile, load_profile
 
 if TYPE_CHECKING:  # Starts a tenth of a second sooner.

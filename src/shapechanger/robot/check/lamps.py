@@ -7,12 +7,11 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, contextmanager
 from typing import Final, NamedTuple
 
+from shapechanger.contract.plan import GuardPlan, OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.check import Finding, judged
 from shapechanger.robot.drivers.chip import open_output
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.guard.outputs import enable_device
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
 SHOWN_S: Final = 0.5

@@ -7,9 +7,9 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
+from shapechanger.contract.plan import GuardPlan, driven_pins
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.pins import BCM_OF_BOARD, HIGHEST_BCM
-from shapechanger.robot.guard.plan import GuardPlan, driven_pins
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.setup.computer import needs_pins
 

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from shapechanger.contract.plan import GuardPlan, SensorPlan
 from shapechanger.robot.cameras.camera import Camera, CameraPlan, open_camera
 from shapechanger.robot.check.check import CHECK_S
-from shapechanger.robot.drivers.plan import SensorPlan
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware, RealHardware
 from shapechanger.robot.profile.profile import Profile
 

@@ -11,15 +11,14 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from shapechanger.contract.plan import SensorPlan, driven_pins
 from shapechanger.errors import RobotError
 from shapechanger.robot.check.check import Check, Level, Results, judged
 from shapechanger.robot.check.standing import StandingRobot, servo_enables
 from shapechanger.robot.drivers.chip import open_sensor
 from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.plan import SensorPlan
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
 from shapechanger.robot.guard.outputs import OutputBank
-from shapechanger.robot.guard.plan import driven_pins
 from shapechanger.robot.hardware import Hardware
 
 if TYPE_CHECKING:  # The drivers need gpiozero, which may be missing.

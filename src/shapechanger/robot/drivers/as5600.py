@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Protocol, runt
 
 from msgspec import Meta
 
+from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import BusNumber, Claim, KeyMistake, Keys, i2c_claims
-from shapechanger.robot.drivers.plan import SensorPlan
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware, I2cBus
 

@@ -14,9 +14,9 @@ from importlib.metadata import entry_points
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
+from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.keys import Keys
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.simulation import (
     DutyOf,
     I2cChips,

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import FilePath, Keys
-from shapechanger.robot.drivers.plan import SensorPlan
 from shapechanger.robot.hardware import Hardware
 
 _PERIOD_NS: Final = 1_000_000_000

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from msgspec import Meta
 
+from shapechanger.contract.plan import SensorPlan
 from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.edges import EdgeInput
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import Keys
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin
-from shapechanger.robot.drivers.plan import SensorPlan
 from shapechanger.robot.drivers.simulation import Edge, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 

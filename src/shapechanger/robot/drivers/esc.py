@@ -8,9 +8,9 @@ from typing import Annotated, ClassVar, Final, Literal
 
 from msgspec import Meta
 
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.robot.drivers.chip import OutputChip
 from shapechanger.robot.drivers.errors import device_errors
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.pulse import (
     DEAD_BAND_US,
     PulsedKeys,

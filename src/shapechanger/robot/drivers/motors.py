@@ -9,12 +9,12 @@ from typing import Annotated, Any, Final
 
 from msgspec import Meta
 
+from shapechanger.contract.duty import Duty
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.robot.drivers.chip import OutputChip
-from shapechanger.robot.drivers.duty import Duty
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import KeyMistake, Keys
 from shapechanger.robot.drivers.pins import NO_PIN, OptionalPin, Pin
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
 from shapechanger.robot.hardware import Hardware
 

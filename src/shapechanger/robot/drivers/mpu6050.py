@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from msgspec import Meta
 
+from shapechanger.contract.plan import SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SensorChip
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import BusNumber, Claim, Keys, i2c_claims
-from shapechanger.robot.drivers.plan import SensorPlan
 from shapechanger.robot.drivers.simulation import SimulatedChip, SimulatedSensor
 from shapechanger.robot.hardware import Hardware
 

@@ -10,12 +10,12 @@ from typing import Annotated, Any, ClassVar, Final
 
 from msgspec import Meta
 
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, PulseChannel, PulseSource
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import Claim, KeyMistake, Keys
 from shapechanger.robot.drivers.pins import Pin
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, Pulse
 from shapechanger.robot.hardware import Hardware
 

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
+from shapechanger.contract.plan import GuardPlan, OutputPlan, output_values
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import (
     OUTPUTS,
@@ -17,8 +18,6 @@ from shapechanger.robot.drivers.chip import (
     SharedDevice,
     open_output,
 )
-from shapechanger.robot.drivers.plan import OutputPlan
-from shapechanger.robot.guard.plan import GuardPlan, output_values
 from shapechanger.robot.hardware import REAL, Hardware, load
 
 

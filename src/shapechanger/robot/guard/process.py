@@ -17,12 +17,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.guard.channel import DaemonChannel, GuardChannel, Heartbeat
 from shapechanger.robot.guard.log import log_to_stderr, shortened
 from shapechanger.robot.guard.messages import GuardState
 from shapechanger.robot.guard.outputs import Applied, OutputBank, Switches
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import GUARD, run_promptly
 from shapechanger.robot.guard.rules import OutputDecision, Rules
 from shapechanger.robot.guard.sensors import Sensors

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from shapechanger.robot.guard.limits import Persistence
-from shapechanger.robot.guard.plan import GuardPlan
+from shapechanger.contract.limits import Persistence
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.guard.sensors import Sensing
 
 # Time for which a battery must be low or a CPU hot. A noisy reading, or the dip when a motor

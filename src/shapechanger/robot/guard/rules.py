@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from shapechanger.contract.limits import MotionReflexes, aimed, clipped, slewed
+from shapechanger.contract.plan import ActionPlan, GuardPlan, StopPlan
 from shapechanger.errors import RobotError
-from shapechanger.robot.guard.limits import MotionReflexes, aimed, clipped, slewed
 from shapechanger.robot.guard.log import shortened
 from shapechanger.robot.guard.messages import Order
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan, StopPlan
 from shapechanger.robot.guard.reflexes import RobotHealth
 from shapechanger.robot.guard.sensors import SensedState, Sensing
 

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import SensorDriver, open_sensor
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
 # Larger is more cautious, and the most cautious reading wins: of two speeds the smaller, so that a

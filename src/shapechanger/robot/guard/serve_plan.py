@@ -16,8 +16,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.guard import start
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import REAL
 
 _DAEMON_SILENCE_MS: Final = 2000

@@ -9,11 +9,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
+from shapechanger.contract.plan import ActionPlan, GuardPlan, OutputPlan
 from shapechanger.layout import Element, Feature, Layout
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.chip import SENSORS
-from shapechanger.robot.drivers.plan import OutputPlan
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
 
 _INF: Final = math.inf
 # Unit, smallest and largest value of each quantity in `GuardState.quantities`, in the order of the

@@ -12,13 +12,12 @@ from typing import Any, Final, cast
 
 import msgspec
 
+from shapechanger.contract.plan import ActionPlan, LimitPlan, OutputPlan, SensorPlan, StopPlan
 from shapechanger.errors import ProfileError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.chip import OUTPUTS, PULSES, SENSORS
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.pulse import PulsedKeys
 from shapechanger.robot.drivers.servos.settings import ServoBusKeys
-from shapechanger.robot.guard.plan import ActionPlan, LimitPlan, StopPlan
 from shapechanger.robot.profile.mistakes import Place, Source, called, choice
 from shapechanger.robot.profile.profile import Profile, ResetStep
 from shapechanger.robot.profile.section import Section, fields_of

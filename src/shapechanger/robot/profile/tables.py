@@ -8,11 +8,11 @@ from typing import Annotated, Final, Literal
 
 from msgspec import Meta
 
+from shapechanger.contract.plan import ActionPlan, LimitPlan, StopPlan
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.keys import FilePath, Keys, Text
 from shapechanger.robot.drivers.pins import Pin
 from shapechanger.robot.drivers.servos.settings import ServoBusKeys
-from shapechanger.robot.guard.plan import ActionPlan, LimitPlan, StopPlan
 
 DRIVING_PARTS: Final = (
     "wheels",

@@ -6,16 +6,15 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
+from shapechanger.contract.plan import OutputPlan, SensorPlan, StopPlan
 from shapechanger.robot.drivers.keys import Claim, KeyMistake, Keys
 from shapechanger.robot.drivers.pins import NO_PIN
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.servos.settings import (
     DRIVER,
     ServoBusKeys,
     bus_settings,
     stops_itself,
 )
-from shapechanger.robot.guard.plan import StopPlan
 from shapechanger.robot.profile.mistakes import Place, Source, called
 
 _OF_A_CHIP: Final = ("hz", "output_enable")  # A PCA9685 has one of each for its 16 channels.

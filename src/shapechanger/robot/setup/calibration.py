@@ -6,9 +6,9 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OUTPUTS
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.pulse import PulseRange
 
 # A servo must not be driven against its stop while it is jogged. Makers state 500 to 2500 us as the

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.robot.drivers.servos.settings import DRIVER
-from shapechanger.robot.guard.plan import GuardPlan
 
 FAST_HZ: Final = 400_000
 """Speed of the I2C bus that encoders at joints need, bits per second."""

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import CameraPlan
 from shapechanger.robot.drivers.servos.settings import DRIVER
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.setup.computer import (
     FAST_HZ,
     boot_config,

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.as5600 import COUNTS_PER_TURN, connect_encoders
 from shapechanger.robot.drivers.servos.bus import ServoBus
 from shapechanger.robot.drivers.servos.homing import Homing
 from shapechanger.robot.drivers.servos.settings import DRIVER, bus_settings
 from shapechanger.robot.guard.outputs import Switches
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.hardware import Hardware
 
 _START_TICKS: Final = 50  # Half a second, in which servos start that get their power now.

@@ -19,11 +19,11 @@ from typing import Final, NamedTuple
 
 import msgspec
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import RESTING_V
 from shapechanger.errors import RobotError, WorldError
 from shapechanger.robot.drivers.hcsr04 import SimulatedHcsr04
 from shapechanger.robot.drivers.switch import SimulatedSwitch
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.priority import run_early
 from shapechanger.robot.twin.camera import FrontCameraPipe
 from shapechanger.robot.twin.messages import (

@@ -15,12 +15,12 @@ from typing import Any, Final
 import numpy as np
 import simplejpeg
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError
 from shapechanger.robot.cameras.camera import Frame
 from shapechanger.robot.daemon.observation import NumberedFrame, StateReader, build_observation
 from shapechanger.robot.guard.messages import GuardState, Order
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.guard.process import Guard
 from shapechanger.robot.link.card import card_of
 from shapechanger.robot.link.messages import Observation, Welcome

@@ -5,11 +5,11 @@ from __future__ import annotations
 import heapq
 from typing import Final, TypeVar
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import Readings, World
 from shapechanger.robot.drivers.chip import OUTPUTS, SENSORS
 from shapechanger.robot.drivers.servos.settings import DRIVER
 from shapechanger.robot.drivers.simulation import Edge, Levels, SimulatedSensor
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.twin.servos.rig import Rig
 from shapechanger.robot.twin.wiring import TwinWiring
 

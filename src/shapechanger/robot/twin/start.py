@@ -13,9 +13,9 @@ from typing import Final, Literal
 
 import msgspec
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import RobotError, check_seed
 from shapechanger.robot.cameras.camera import CameraPlan
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.twin.board_client import BoardClient
 from shapechanger.robot.twin.wiring import ONE_SHOT_MS, TwinWiring
 from shapechanger.robot.twin.world.place import Place

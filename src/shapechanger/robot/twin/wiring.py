@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from shapechanger.contract.plan import GuardPlan, OutputPlan, driven_pins
 from shapechanger.robot.drivers.chip import OUTPUTS
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.simulation import Levels, WiredOutput
-from shapechanger.robot.guard.plan import GuardPlan, driven_pins
 
 ONE_SHOT_MS: Final = 100.0
 """Time for which the one-shot of the enable line keeps the motors' power on after an edge."""

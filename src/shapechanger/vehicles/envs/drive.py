@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import json
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,14 +13,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, cast
 
 import gymnasium as gym
+import msgspec
 import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
 from shapechanger.contract.drive import DriveReward
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.errors import ProfileError, SpaceMismatch, UnknownName, WorldError, check_seed
 from shapechanger.layout import Layout
-from shapechanger.robot.profile.load import find_profile, load_profile
+from shapechanger.registry import ROBOTS
 from shapechanger.vehicles.bodies import require_fit, vehicle_model
 from shapechanger.vehicles.bodies.parts import CameraJitter
 from shapechanger.vehicles.courses.course import HELD_OUT, TRAINING, Look
@@ -34,34 +38,45 @@ _LEVELS: Final[dict[str, Literal["any", "three"]]] = {"proportional": "any", "ba
 _MAX_PIXELS: Final = 1920  # As in a profile.
 
 
-class SimulatedRobot(NamedTuple):
+class SimulatedRobot(msgspec.Struct, frozen=True):
     """Numbers of a robot's profile that its simulation and recordings of it need.
 
     Attributes:
-        robot: Name of the profile.
+        robot: Name of the robot.
         body: Kind of vehicle.
-        path: File of the profile.
-        plan: Actions, outputs, sensors and limits, a `GuardPlan`.
+        path: File of the profile, for messages.
+        plan: Actions, outputs, sensors and limits.
         control_hz: Actions per second.
         reward: Weights of the task.
         action_layout: Layout of its actions.
         state_layout: Layout of its state.
-        size: Width and height of its camera's frames, pixels.
+        size: Width and height of its camera's frames, pixels; (0, 0) without a camera.
         camera_pitch_deg: Angle of the camera's axis below the horizon, degrees; None if unknown.
         camera_fovy_deg: Vertical field of view, degrees; None if unknown.
     """
 
     robot: str
     body: str
-    path: Path
-    plan: Any
+    path: str
+    plan: GuardPlan
     control_hz: float
-    reward: Mapping[str, float]
+    reward: dict[str, float]
     action_layout: Layout
     state_layout: Layout
     size: tuple[int, int]
     camera_pitch_deg: float | None
     camera_fovy_deg: float | None
+
+
+@functools.cache
+def lab_robots() -> dict[str, SimulatedRobot]:
+    """Return the robots of the envs, keyed by the name of their profile.
+
+    `scripts/lab_robots.py` copies their numbers from the profiles, so that a simulation loads none
+    of the modules for real robots.
+    """
+    text = Path(__file__).with_name("lab_robots.json").read_text("utf-8")
+    return msgspec.convert(json.loads(text), dict[str, SimulatedRobot])
 
 
 def simulated_robot(
@@ -70,11 +85,11 @@ def simulated_robot(
     size: Sequence[int] | None = None,
     steering: Steering | None = None,
 ) -> SimulatedRobot:
-    """Load the profile of a vehicle, and set its steering and its camera's frame size.
+    """Return the robot of a vehicle, and set its steering and its camera's frame size.
 
     Args:
         vehicle: Name of the vehicle.
-        robot: Path or name of the profile; None for `lab-` followed by the vehicle.
+        robot: Path or name of its profile; None for `lab-` followed by the vehicle.
         size: Replaces the width and height of its frames, pixels; None to keep them.
         steering: Replaces the profile's steering; None to keep it.
 
@@ -84,22 +99,24 @@ def simulated_robot(
         SpaceMismatch: If the size is out of range.
     """
     vehicle_model(vehicle)  # An unknown vehicle is a better message than a missing profile.
-    profile = load_profile(find_profile(f"lab-{vehicle}" if robot is None else robot))
-    camera, actions = profile.camera, profile.actions
-    if camera is None:
-        raise ProfileError(f"{profile.path}: the robot has no camera, and this task needs one.")
-    if [action.name for action in actions] != ["steering", "throttle"]:
-        names = ", ".join(action.name for action in actions)
+    named = f"lab-{vehicle}" if robot is None else os.fspath(robot)
+    found = lab_robots().get(named) or ROBOTS.load("profile")(named)
+    plan: GuardPlan = found.plan
+    if found.size == (0, 0):
+        raise ProfileError(f"{found.path}: the robot has no camera, and this task needs one.")
+    if [action.name for action in plan.actions] != ["steering", "throttle"]:
+        names = ", ".join(action.name for action in plan.actions)
         raise ProfileError(
-            f"{profile.path}: a vehicle's actions must be steering and throttle, not {names}."
+            f"{found.path}: a vehicle's actions must be steering and throttle, not {names}."
         )
     if steering is not None:
         if steering not in _LEVELS:
             raise UnknownName("steering", steering, _LEVELS)
-        actions = (dataclasses.replace(actions[0], levels=_LEVELS[steering]), *actions[1:])
-    require_fit(vehicle, {output.part for output in profile.outputs})
+        turning = dataclasses.replace(plan.actions[0], levels=_LEVELS[steering])
+        plan = dataclasses.replace(plan, actions=(turning, *plan.actions[1:]))
+    require_fit(vehicle, {output.part for output in plan.outputs})
     try:
-        wide, high = map(operator.index, camera.size if size is None else size)
+        wide, high = map(operator.index, found.size if size is None else size)
     except (TypeError, ValueError):
         wide = high = 0
     if not (1 <= wide <= _MAX_PIXELS and 1 <= high <= _MAX_PIXELS):
@@ -107,20 +124,7 @@ def simulated_robot(
             f"The size of a frame is its width and height, each 1 to {_MAX_PIXELS} pixels, "
             f"got {size}."
         )
-    profile = dataclasses.replace(profile, actions=actions)
-    return SimulatedRobot(
-        robot=profile.name,
-        body=profile.body,
-        path=profile.path,
-        plan=profile.guard_plan(),
-        control_hz=profile.control_hz,
-        reward=profile.reward,
-        action_layout=profile.action_layout(),
-        state_layout=profile.state_layout(),
-        size=(wide, high),
-        camera_pitch_deg=camera.pitch_deg,
-        camera_fovy_deg=camera.fovy_deg,
-    )
+    return msgspec.structs.replace(found, plan=plan, size=(wide, high))
 
 
 Courses = Literal["training", "held-out"] | Sequence[int]

@@ -10,16 +10,16 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from numpy.typing import NDArray
 
-from shapechanger.contract.world import STANDING_MPS
-from shapechanger.layout import Feature, Layout
-from shapechanger.robot.guard.limits import (
+from shapechanger.contract.limits import (
     aimed,
     bump_blocks,
     bump_ends_ns,
     forward_actions,
     slewed,
 )
-from shapechanger.robot.guard.plan import GuardPlan, output_values
+from shapechanger.contract.plan import GuardPlan, output_values
+from shapechanger.contract.world import STANDING_MPS
+from shapechanger.layout import Feature, Layout
 from shapechanger.vehicles.envs.drive import Courses, DriveEnv, simulated_robot, space_of
 from shapechanger.vehicles.world import MujocoWorld
 

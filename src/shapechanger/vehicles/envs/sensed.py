@@ -1,6 +1,6 @@
 """A vehicle that moves within a robot's limits and senses what the robot would.
 
-Caps, slew and reflexes are the guard's own functions (`shapechanger.robot.guard.limits`), at its
+Caps, slew and reflexes are the guard's own functions (`shapechanger.contract.limits`), at its
 rate. Sensors measure as the drivers in `shapechanger.robot.drivers` do from the chips of a twin,
 with their rates and steps, and without noise. A CPU temperature is not simulated and stays absent.
 """
@@ -12,9 +12,9 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-from shapechanger.robot.drivers.duty import Duty
-from shapechanger.robot.guard.limits import MotionReflexes, aimed, clipped, slewed
-from shapechanger.robot.guard.plan import GuardPlan, OutputPlan, output_values
+from shapechanger.contract.duty import Duty
+from shapechanger.contract.limits import MotionReflexes, aimed, clipped, slewed
+from shapechanger.contract.plan import GuardPlan, OutputPlan, output_values
 from shapechanger.vehicles.world import MujocoWorld
 
 _STANDS_AFTER_S: Final = 0.5  # An encoder without an edge for this long stands.

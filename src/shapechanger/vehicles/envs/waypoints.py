@@ -126,7 +126,7 @@ class WaypointEnv(WaypointView, DriveEnv):
         EzPickle.__init__(self, vehicle, **arguments)
         body, profile = vehicle_model(vehicle), simulated_robot(vehicle, robot)
         rectifier = rectifier_of(
-            str(profile.path), profile.camera_pitch_deg, profile.camera_fovy_deg, profile.size,
+            profile.path, profile.camera_pitch_deg, profile.camera_fovy_deg, profile.size,
             ProfileError,
         )  # fmt: skip
         world = world or (FLOODED if body.floats else "corridor")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.robot.drivers.chip import OutputChip
 from shapechanger.robot.drivers.errors import device_errors
 from shapechanger.robot.drivers.keys import Keys
 from shapechanger.robot.drivers.pins import Pin
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.simulation import DutyOf, Levels, WiredOutput
 from shapechanger.robot.hardware import Hardware
 

@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
+from shapechanger.contract.plan import OutputPlan, SensorPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.chip import OutputChip, SensorChip
 from shapechanger.robot.drivers.keys import Keys
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 from shapechanger.robot.drivers.servos.bus import ServoBus
 from shapechanger.robot.drivers.servos.health import BusState
 from shapechanger.robot.drivers.servos.settings import ServoSettings, bus_settings, servo_settings

@@ -10,9 +10,9 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from msgspec import Meta
 
+from shapechanger.contract.plan import OutputPlan
 from shapechanger.errors import RobotError
 from shapechanger.robot.drivers.keys import Claim, FilePath, KeyMistake, Keys
-from shapechanger.robot.drivers.plan import OutputPlan
 from shapechanger.robot.drivers.servos.family import (
     COUNTS_PER_TURN,
     DYNAMIXEL,

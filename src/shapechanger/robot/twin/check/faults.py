@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, Literal
 
+from shapechanger.contract.plan import LimitPlan
 from shapechanger.errors import LinkError, RobotError, RobotRefused
 from shapechanger.layout import Layout
 from shapechanger.robot.client.client import RobotClient
-from shapechanger.robot.guard.plan import LimitPlan
 from shapechanger.robot.link.authentication import new_key
 from shapechanger.robot.link.messages import Role
 from shapechanger.robot.twin.camera import CameraFault

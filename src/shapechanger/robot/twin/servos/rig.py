@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, Literal, Protocol, get_args, runtime_checkable
 
+from shapechanger.contract.plan import GuardPlan
 from shapechanger.contract.world import World
 from shapechanger.errors import RobotError, UnknownName
 from shapechanger.robot.drivers.servos.settings import DRIVER, stops_itself
-from shapechanger.robot.guard.plan import GuardPlan
 from shapechanger.robot.twin.servos.bus import SimulatedBus
 from shapechanger.robot.twin.servos.motor import Load, Tendon
 from shapechanger.robot.twin.servos.servo import COUNTS_PER_RAD, ServoPlan, SimulatedServo

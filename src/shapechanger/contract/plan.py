@@ -1,8 +1,9 @@
-"""The guard's plan of a robot: its actions, outputs, sensors and limits.
+"""Plan of a robot: its actions, outputs, sensors and limits, as a profile states them.
 
-These are the tables of a profile (`shapechanger.robot.profile`), with the bounds that it checks, as
-plain dataclasses: the guard loads nothing but msgspec and its drivers. They cross from the command
-line to the guard as JSON.
+The guard of the robot and simulations of it move within the same plan. These are tables of a
+profile (`shapechanger.robot.profile`) as plain dataclasses, with the bounds that it checks: the
+guard loads nothing but msgspec and its drivers. They cross from the command line to the guard as
+JSON.
 """
 
 from __future__ import annotations
@@ -10,12 +11,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Final, Literal
 
 from msgspec import Meta
-
-from shapechanger.robot.drivers.plan import OutputPlan, SensorPlan
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +48,48 @@ class ActionPlan:
     one_sided: bool = False
     unit: Literal["1", "deg", "rad", "m", "m/s", "N", "N·m"] = "1"
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class OutputPlan:
+    """One motor, servo or controller, with its weight of each action.
+
+    Its value is `offset` plus the weighted sum of the actions, clipped to -1 to 1.
+
+    Attributes:
+        name: Name, such as "left".
+        driver: Name of its driver, such as "hbridge".
+        part: The part that it moves, such as "wheels" or "left track"; may be empty.
+        mix: Weight of each action.
+        offset: Value where all actions are 0.
+        settings: Settings of the driver, such as pins and pulse widths, with all defaults filled
+            in.
+    """
+
+    name: str
+    driver: str
+    part: str = ""
+    mix: dict[str, float] = field(default_factory=dict[str, float])
+    offset: float = 0.0
+    settings: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+@dataclass(frozen=True, slots=True)
+class SensorPlan:
+    """One sensor of the guard.
+
+    Attributes:
+        name: Name, such as "bumper".
+        driver: Name of its driver, such as "switch".
+        measures: What it measures: "speed", "bump", "distance", "imu", "battery",
+            "temperature", "tendons" or "joints".
+        settings: Settings of the driver, with all defaults filled in.
+    """
+
+    name: str
+    driver: str
+    measures: str
+    settings: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True, slots=True)

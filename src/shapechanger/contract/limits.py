@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from shapechanger.robot.guard.plan import ActionPlan, GuardPlan
+from shapechanger.contract.plan import ActionPlan, GuardPlan
 
 # Name of the turning action. It may propel, as a tank's does, but never forward.
 _STEERING = "steering"
