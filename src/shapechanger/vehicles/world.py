@@ -36,7 +36,8 @@ _CAMERA: Final = "vehicle/camera"
 _CHASSIS: Final = "vehicle/chassis"
 _INNER_OHM: Final = 0.12  # Of the battery and its leads.
 _IDLE_A: Final = 0.6  # Current of the computer.
-_CONE: Final = (-math.radians(7.0), 0.0, math.radians(7.0))  # An HC-SR04 hears 15 degrees.
+_CONE: Final = np.radians((-7.0, 0.0, 7.0))  # An HC-SR04 hears 15 degrees.
+_HEARD_M: Final = 10.0  # More than twice as far as it hears; rays to walls beyond would cost time.
 _SOLID_GROUP: Final = 3  # Group of the collision geoms; see `shapechanger.vehicles.courses.scene`.
 _COARSE_DT: Final = 2.0 * SIM_DT
 _ROUNDING_S: Final = 1e-9
@@ -271,7 +272,7 @@ class MujocoWorld:
 
     def distance_m(self) -> float:
         """Distance by the shortest of three rays; see `World.distance_m`."""
-        found = self._rays(0.0, np.array(_CONE), mujoco.mjMAXVAL)
+        found = self._rays(0.0, _CONE, _HEARD_M)
         return max(
             0.0, float(found.min(where=found >= 0.0, initial=math.inf)) - self.vehicle.nose_m
         )

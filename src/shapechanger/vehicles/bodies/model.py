@@ -210,6 +210,7 @@ class ContactTracker:
         names = [model.geom(i).name for i in range(model.ngeom)]
         self._hull = np.array([name.startswith("vehicle/") for name in names])
         self._solid = np.array([name.startswith(("world/wall", "world/thing")) for name in names])
+        self._solid_ids = frozenset(np.flatnonzero(self._solid).tolist())
         self.reset()
 
     def reset(self) -> None:
@@ -229,7 +230,7 @@ class ContactTracker:
         if data.ncon == 0:
             return
         pairs = data.contact.geom
-        if not self._solid[pairs].any():
+        if self._solid_ids.isdisjoint(pairs.ravel().tolist()):
             return  # Usual case: only the wheels touch the ground.
         first, second = pairs[:, 0], pairs[:, 1]
         hits = (self._hull[first] & self._solid[second]) | (self._hull[second] & self._solid[first])
