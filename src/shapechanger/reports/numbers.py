@@ -20,13 +20,7 @@ _SIGNIFICANT: Final = 4
 
 
 def number(value: float, decimals: int | None = None, *, signed: bool = False) -> str:
-    """Format a number with thousands separators, or in scientific notation where it is huge.
-
-    Args:
-        value: A finite number.
-        decimals: Digits after the point; None for four significant digits.
-        signed: Whether a number above zero gets a plus sign, as a difference should.
-    """
+    """Format a number with thousands separators, or in scientific notation where it is huge."""
     sign = "+" if signed and value > 0.0 else ""
     if abs(value) >= _HUGE:
         mantissa, exponent = f"{value:.3e}".split("e")

@@ -24,13 +24,6 @@ def render(template: str | Path, **values: Any) -> str:
     """Render a page from a template, which may use those in `shapechanger/reports/templates`.
 
     Values are escaped, except those of type `markupsafe.Markup`.
-
-    Args:
-        template: Its file, or the name of one in that folder.
-        **values: Variables of the template. A missing one is an error.
-
-    Raises:
-        MissingExtra: If Jinja2 is not installed.
     """
     path = _TEMPLATES / template
     return _environment(path.parent).get_template(path.name).render(values)

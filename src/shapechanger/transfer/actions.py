@@ -42,10 +42,6 @@ class ActionScale(NamedTuple):
 
         It is the identity where both are the same, as of policies that were trained without a
         scale, and for actions without a range on one of the sides.
-
-        Args:
-            space: The model's action space, a flat box.
-            layout: Layout of the same actions in the env.
         """
         box = cast("Box[Any]", space)
         # Bounds of a space are in single precision, those of a layout in double.
@@ -79,11 +75,7 @@ class ActionScale(NamedTuple):
         return ((actions - self.middle) / self.half).astype(actions.dtype)
 
     def of_squashed(self, space: Any) -> tuple[_Array, _Array]:
-        """Return the middle and half width, (n,), of the env's actions over a bounded model space.
-
-        Args:
-            space: The model's action space.
-        """
+        """Return middle and half width, (n,), of the env's actions over a bounded model space."""
         box = cast("Box[Any]", space)
         low, high = box.low.astype(np.float64), box.high.astype(np.float64)
         return (
@@ -93,25 +85,12 @@ class ActionScale(NamedTuple):
 
 
 def learners_space(space: Any) -> Box[np.float32]:
-    """Return the action space in which a learner acts: -1 to 1 for each action.
-
-    Args:
-        space: The action space of the env, a flat box.
-    """
+    """Return the action space in which a learner acts: -1 to 1 for each action."""
     return Box(-1.0, 1.0, space.shape, np.float32)
 
 
 def require_ranges(env: str, space: Any, layout: Layout) -> None:
-    """Refuse actions whose range is unknown, or is not the one that their layout states.
-
-    Args:
-        env: Name of the env, for messages.
-        space: Its action space, a flat box of the size of the layout.
-        layout: Its action layout.
-
-    Raises:
-        SpaceMismatch: If an action has no finite range, or its layout states another.
-    """
+    """Refuse actions whose range is unknown, or is not the one that their layout states."""
     box = cast("Box[Any]", space)
     names = [feature.name for feature in layout for _ in range(feature.size)]
     for name, low, high, stated_low, stated_high in zip(

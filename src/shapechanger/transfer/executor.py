@@ -66,9 +66,6 @@ class JobSchedule:
 
     A job that fails does not stop the others, except those that need its result. One whose process
     is lost is repeated.
-
-    Args:
-        jobs: The jobs; names that they wait for and that are not among them have ended before.
     """
 
     def __init__(self, jobs: Sequence[Job]) -> None:
@@ -93,15 +90,7 @@ class JobSchedule:
         self._ended.add(job.name)
 
     def fail(self, job: Job, error: ShapechangerError | str) -> None:
-        """Record that a job has failed.
-
-        Args:
-            job: The job.
-            error: What it raised, or a reason.
-
-        Raises:
-            OutputError: If it could not write its result: no other job could.
-        """
+        """Record that a job has failed."""
         if isinstance(error, OutputError):
             raise error
         reason = str(error).strip().rstrip(".")
@@ -110,12 +99,7 @@ class JobSchedule:
         _log.error("%s failed: %s", job.name, reason.rpartition("\n")[2])
 
     def lose(self, job: Job, how: str) -> None:
-        """Record that the process of a job has ended by itself; the job waits again, or has failed.
-
-        Args:
-            job: The job.
-            how: How its process ended, such as "exit code -9".
-        """
+        """Record that a job's process has ended by itself; the job waits again, or has failed."""
         self._lost[job.name] += 1
         if self._lost[job.name] < job.attempts:
             self._waiting.append(job)
@@ -124,11 +108,7 @@ class JobSchedule:
             self.fail(job, f"its process was lost {times} with {how}")
 
     def require_success(self) -> None:
-        """Raise if jobs have failed.
-
-        Raises:
-            FailedRuns: With the reason of each, and the jobs that need them.
-        """
+        """Raise if jobs have failed."""
         if not self._failed:
             return
         reasons = "; ".join(
@@ -143,12 +123,7 @@ class JobSchedule:
 
 
 def throttled(report: ReportSteps, every_s: float) -> ReportSteps:
-    """Return a callback that forwards only some of the numbers: a run makes thousands.
-
-    Args:
-        report: Called with the numbers that are forwarded.
-        every_s: Least time between two of them, s.
-    """
+    """Return a callback that forwards only some of the numbers: a run makes thousands."""
     last = 0.0
 
     def forward(steps: int) -> None:

@@ -32,44 +32,25 @@ def known(identities: Mapping[str, Identity]) -> Identities:
 
 
 def identify_learner(settings: object) -> Identity:
-    """Return the identity of a learner.
-
-    Args:
-        settings: Its settings, which may name an algorithm of the user's own.
-    """
+    """Return the identity of a learner."""
     return identify_code(texts_in(msgspec.to_builtins(settings)), settings)
 
 
 def identities_in(ref: EnvRef, made: gym.Env[Any, Any], settings: object) -> Identities:
-    """Return the identities of the env and the learner of a policy.
-
-    Args:
-        ref: The env.
-        made: The same, before its first reset, which may change its model.
-        settings: object of the learner.
-    """
+    """Return the identities of the env and the learner of a policy."""
     one = single_body(ref)
     env = steady(ref, identify_env(made, ref.id)) if one == ref else identify(ref)
     return known({ENV: env.identity, LEARNER: identify_learner(settings)})
 
 
 def identify(ref: EnvRef) -> IdentifiedEnv:
-    """Make an env, and return its identity.
-
-    Args:
-        ref: The env; one of many bodies has the identity of the unedited one.
-    """
+    """Make an env, and return its identity."""
     with closing(single_body(ref).make()) as made:
         return steady(ref, identify_env(made, ref.id))
 
 
 def steady(ref: EnvRef, found: IdentifiedEnv) -> IdentifiedEnv:
-    """Return an identity without its model if the env draws another one each time it is made.
-
-    Args:
-        ref: The env; only those of others may draw.
-        found: Its identity.
-    """
+    """Return an identity without its model if the env draws another one each time it is made."""
     if not found.numbers or ref.id.startswith(_OURS):
         return found
     with closing(single_body(ref).make()) as made:
@@ -87,17 +68,6 @@ def single_body(ref: EnvRef) -> EnvRef:
 def require_same_env(
     card: Mapping[str, Identity], ref: EnvRef, made: Identity, policy: object, remedy: str
 ) -> None:
-    """Refuse a policy whose env has changed since its training.
-
-    Args:
-        card: Identities of its card.
-        ref: The env.
-        made: Its present identity.
-        policy: The policy's file, for the message.
-        remedy: What the user can do, as the end of a sentence.
-
-    Raises:
-        ForeignStudy: If it has.
-    """
+    """Refuse a policy whose env has changed since its training."""
     if words := card.get(ENV, NOTHING).changes_to(made):
         raise ForeignStudy(f"{ref} has changed since {policy} was trained in it: {words}. {remedy}")

@@ -189,7 +189,6 @@ class Run(msgspec.Struct, frozen=True):
     """One training, or one evaluation: the unit of work, and of the statistics.
 
     Attributes:
-        kind: Its kind: the name of a method, `SOURCE`, or one of `NO_SKILL`.
         index: Index of its seed, from 0.
     """
 

@@ -75,12 +75,7 @@ class RayCluster:
 
 
 def _require_answer(address: str) -> None:
-    """Refuse an address at which no Ray answers; Ray itself would try for half a minute.
-
-    Raises:
-        StudyError: If it is not an address, nothing listens there within two seconds, or nothing
-            answers within eight more.
-    """
+    """Refuse an address at which no Ray answers; Ray itself would try for half a minute."""
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit() or "/" in host:
         raise StudyError(f"The address of a Ray cluster is HOST:PORT or auto, not {address!r}.")

@@ -55,27 +55,12 @@ class RunResult(msgspec.Struct, frozen=True):
 
 
 def learner_of(name: str, settings: LearnerSettings) -> Learner[Any]:
-    """Return the learner that the settings belong to.
-
-    Args:
-        name: Name of the learner.
-        settings: Its settings.
-    """
+    """Return the learner that the settings belong to."""
     return pkgutil.resolve_name(settings.learner)(name, settings)
 
 
 def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
-    """Load the result of a run; None if it has not ended, or its policy is missing.
-
-    Args:
-        plan: Plan of the study.
-        study: Folder of the study.
-        run: The run.
-
-    Raises:
-        CorruptStudy: If its file cannot be read or belongs to another run.
-        ForeignStudy: If it was made with other versions than the plan's.
-    """
+    """Load the result of a run; None if it has not ended, or its policy is missing."""
     path = run.folder(study) / _RESULT
     if not path.exists() or (plan.trains(run.kind) and not run.policy_file(study).exists()):
         return None
@@ -94,12 +79,7 @@ def load_result(plan: Plan, study: Path, run: Run) -> RunResult | None:
 
 
 def last_evaluation(study: Path, run: Run) -> Evaluation | None:
-    """Return the last evaluation of a run so far; None if there is none yet.
-
-    Args:
-        study: Folder of the study.
-        run: The run.
-    """
+    """Return the last evaluation of a run so far; None if there is none yet."""
     path = run.folder(study) / _CURVE
     try:
         # The last line may be half-written.
@@ -112,21 +92,7 @@ def last_evaluation(study: Path, run: Run) -> Evaluation | None:
 
 
 def perform_run(plan: Plan, run: Run, study: str, given: Path | None, report: ReportSteps) -> None:
-    """Perform a run; results of an earlier attempt are deleted, except what its method has saved.
-
-    Args:
-        plan: Plan of the study.
-        run: The run.
-        study: Folder of the study.
-        given: File of the given source policy; None if the study trains its own.
-        report: Called with the steps done.
-
-    Raises:
-        OutputError: If its files cannot be written.
-        StudyError: If the training diverges.
-        ForeignStudy: If the robot, the task, the method or the learner is not the planned one, or
-            has become another one during the run.
-    """
+    """Perform a run, deleting an earlier attempt except the parts that its method saved."""
     use_one_thread()
     require_planned(plan, run)
     folder = run.folder(Path(study))

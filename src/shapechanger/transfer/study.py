@@ -106,8 +106,6 @@ class TaskTraits(NamedTuple):
     """Properties of the two envs of a study.
 
     Attributes:
-        source: Traits of the source.
-        target: Traits of the target.
         certificate: The certificate of the shift as text, empty if the envs publish none; or the
             error that it was refused with.
     """
@@ -118,26 +116,14 @@ class TaskTraits(NamedTuple):
 
     @property
     def shift(self) -> str:
-        """The certificate of the shift.
-
-        Raises:
-            EmptyShift: If nothing changes between source and target.
-            MorphologyError: If the two cannot be compared.
-            StudyError: If an env cannot be stepped.
-        """
+        """The certificate of the shift."""
         if isinstance(self.certificate, ShapechangerError):
             raise self.certificate
         return self.certificate
 
 
 def inspect_task(task: TransferTask) -> TaskTraits:
-    """Make both envs of a task once, and read what a study needs to know.
-
-    Raises:
-        UnknownName: If an env does not exist.
-        LayoutError: If an env publishes no layouts.
-        StudyError: If an env does not take its arguments.
-    """
+    """Make both envs of a task once, and read what a study needs to know."""
     with closing(task.source.make()) as source, closing(task.target.make()) as target:
         traits = _traits(task.source, source), _traits(task.target, target)
         try:
@@ -288,11 +274,7 @@ def _identities(traits: TaskTraits, settings: LearnerSettings, arms: Sequence[st
 
 
 def _measure(env: EnvRef, target: EnvTraits, name: str) -> Measure:
-    """Return a measure of the target, or one of its reward terms; those of a robot are not checked.
-
-    Raises:
-        UnknownName: If there is none of this name.
-    """
+    """Return a measure of the target, or one of its reward terms; unchecked for a robot."""
     known = {measure.name: measure for measure in target.measures}
     if not name:
         return target.measures[0]
@@ -392,40 +374,17 @@ def _looks(plan: Plan, before: Path, elsewhere: Sequence[int]) -> tuple[int, ...
 
 
 def looks_in(path: Path) -> tuple[int, ...]:
-    """Return the numbers of seeds at which the study in a file was evaluated; none without a file.
-
-    Args:
-        path: A `study.json`.
-
-    Raises:
-        CorruptStudy: If it cannot be read.
-    """
+    """Return the numbers of seeds at which a study was evaluated; empty without a file."""
     return read_json(path, Study, f"delete {path}").looks if path.exists() else ()
 
 
 def unfinished_runs(plan: Plan, out: Path) -> tuple[Run, ...]:
-    """Return the runs of a plan that have not ended in `out`.
-
-    Args:
-        plan: The plan.
-        out: Folder of the study.
-
-    Raises:
-        CorruptStudy: If the file of a finished run cannot be read.
-    """
+    """Return the runs of a plan that have not ended in `out`."""
     return tuple(run for run in plan.runs() if load_result(plan, out, run) is None)
 
 
 def is_folder_of(plan: Plan, out: Path) -> bool:
-    """Return whether `out` is the folder of this study, or of a part of it.
-
-    Args:
-        plan: The plan.
-        out: The folder.
-
-    Raises:
-        CorruptStudy: If the plan in it cannot be read.
-    """
+    """Return whether `out` is the folder of this study, or of a part of it."""
     if not (out / PLAN_FILE).exists():
         return False
     found = _plan_in(out)
@@ -436,15 +395,6 @@ def claim_folder(plan: Plan, out: Path) -> None:
     """Make `out` the folder of this study, or check that it already is.
 
     A study can be resumed with more seeds or arms: no run depends on them.
-
-    Args:
-        plan: The plan.
-        out: The folder.
-
-    Raises:
-        OutputError: If it cannot be written.
-        ForeignStudy: If it holds another study, or something else.
-        CorruptStudy: If its plan cannot be read.
     """
     make_folder(out)
     path = out / PLAN_FILE
@@ -475,16 +425,7 @@ def _plan_in(out: Path) -> Plan:
 
 
 def read_plan(out: Path, remedy: str) -> Plan:
-    """Read the plan of the study in a folder.
-
-    Args:
-        out: The folder.
-        remedy: What the user can do if the file is damaged, as the end of a sentence.
-
-    Raises:
-        StudyError: If a method of the study is not found from here.
-        CorruptStudy: If the file cannot be read.
-    """
+    """Read the plan of the study in a folder."""
     path = out / PLAN_FILE
     for arm in read_json(path, _PlannedArms, remedy).arms:
         try:
@@ -499,11 +440,7 @@ def read_plan(out: Path, remedy: str) -> Plan:
 
 
 def planned_arms(out: Path) -> tuple[str, ...]:
-    """Return the names of the methods of the study in a folder, without importing them.
-
-    Raises:
-        CorruptStudy: If the plan cannot be read.
-    """
+    """Return the names of the methods of the study in a folder, without importing them."""
     return read_json(out / PLAN_FILE, _PlannedArms, f"{out} is kept as it is").arms
 
 

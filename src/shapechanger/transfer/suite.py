@@ -33,17 +33,8 @@ class StudyOutcome(msgspec.Struct, frozen=True):
     """Outcome of one study of a suite, in steps on the target.
 
     Attributes:
-        name: SOURCE-to-TARGET.
-        final: Measure of scratch at its end, mean over seeds.
         zero_shot: Measure of the source policy without training; None if that arm is missing.
-        arm_final: Measure of `arm` at its end, mean over seeds.
-        scratch_steps: Steps at which scratch first reaches `final`.
         arm_steps: Steps at which `arm` first reaches `final`; None if it never does.
-        unit: Unit of the gains, see `Summary`.
-        gains: Gains of `arm` over scratch, in target steps and with intervals: `jumpstart`,
-            `total_reward_gain` and `asymptotic_gain`.
-        measure: Name of the measure.
-        arm: The arm that is compared with scratch, see `Study.headline_arm`.
     """
 
     name: str
@@ -64,22 +55,7 @@ class StudyOutcome(msgspec.Struct, frozen=True):
 
 
 def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
-    """Make a study's folder below `out`, with the runs that other studies there share with it.
-
-    Args:
-        plan: The plan of the study.
-        out: Folder of the suite.
-        name: Name of the study, which is that of its folder.
-
-    Returns:
-        The folder of the study.
-
-    Raises:
-        ForeignStudy: If its folder holds another study, or a study there was run with another
-            version of what both name.
-        CorruptStudy: If a file in one cannot be read.
-        OutputError: If `out` cannot be written.
-    """
+    """Make a study's folder below `out`, with the runs that other studies there share with it."""
     make_folder(out)
     folder = out / name
     claim_folder(plan, folder)
@@ -90,20 +66,7 @@ def open_study_folder(plan: Plan, out: Path, name: str) -> Path:
 
 
 def merge_study(folders: Sequence[Path], out: Path) -> Plan:
-    """Copy the finished runs of one study, done in several folders, into one.
-
-    Args:
-        folders: Folders of the study, from other machines; they may differ in seeds and arms.
-        out: Folder of the whole study.
-
-    Returns:
-        Its plan, with all arms and the most seeds.
-
-    Raises:
-        ForeignStudy: If the folders hold different studies.
-        CorruptStudy: If one cannot be read, or two of them disagree on the result of a run.
-        OutputError: If `out` cannot be written.
-    """
+    """Copy the finished runs of one study, done in several folders, into one."""
     plans = [read_plan(one, f"leave out {one}") for one in folders]
     arms = tuple(dict.fromkeys(arm for plan in plans for arm in plan.arms))
     seeds = max(plan.seeds for plan in plans)
@@ -172,11 +135,7 @@ def _share(plan: Plan, folder: Path, sibling: Path) -> None:
 
 
 def _copy_atomic(theirs: Path, mine: Path) -> None:
-    """Copy the folder of a run atomically.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
+    """Copy the folder of a run atomically."""
     part = mine.with_name(f".{mine.name}.part")
     make_folder(mine.parent)
     try:
@@ -189,12 +148,7 @@ def _copy_atomic(theirs: Path, mine: Path) -> None:
 
 
 def study_outcome(name: str, study: Study) -> StudyOutcome:
-    """Return the outcome of a study.
-
-    Args:
-        name: Its name.
-        study: The study.
-    """
+    """Return the outcome of a study."""
     arm = study.headline_arm
     scratch, trained = study.curves("scratch"), study.curves(arm)
     final = float(scratch.returns[:, -1].mean())

@@ -33,12 +33,7 @@ _SETTINGS: Final = ("learner", "settings")
 
 
 def identities_of_code(settings: object, arms: Sequence[str] = ()) -> Identities:
-    """Return the identities of a learner and of methods.
-
-    Args:
-        settings: Settings of the learner, which may name an algorithm of the user's own.
-        arms: Names of methods.
-    """
+    """Return the identities of a learner and of methods."""
     methods = {f"{_METHOD}{arm}": identify_code([arm], load_method(arm)) for arm in arms}
     return known({LEARNER: identify_learner(settings), **methods})
 
@@ -72,13 +67,7 @@ def _pair(mine: Plan, part: str, theirs: Plan, other: str) -> tuple[Identity, Id
 
 
 def changes_between(old: Plan, new: Plan, *folders: Path) -> str:
-    """Return how what two plans name alike has changed; empty if it has not.
-
-    Args:
-        old: The older plan.
-        new: The newer one.
-        folders: Folders of the two studies, which may hold the numbers of their models.
-    """
+    """Return how what two plans name alike has changed; empty if it has not."""
     found = {
         title: before.changes_to(after, _numbers(before, after, new, folders))
         for title, after, before in shared(new, old)
@@ -122,15 +111,7 @@ def _model_file(folder: Path, identity: Identity) -> Path:
 
 
 def keep_models(folder: Path, *envs: IdentifiedEnv) -> None:
-    """Write the numbers of models beside a study, so that a later change can be named.
-
-    Args:
-        folder: Folder of the study.
-        envs: Its envs.
-
-    Raises:
-        OutputError: If they cannot be written.
-    """
+    """Write the numbers of models beside a study, so that a later change can be named."""
     for each in envs:
         file = _model_file(folder, each.identity)
         if each.numbers and not file.exists():
@@ -139,29 +120,13 @@ def keep_models(folder: Path, *envs: IdentifiedEnv) -> None:
 
 
 def require_versions(wanted: Plan, parts: Identities, found: Identities, remedy: str) -> None:
-    """Refuse parts that are no longer those of a plan.
-
-    Args:
-        wanted: The plan.
-        parts: The parts of it that count.
-        found: The present ones.
-        remedy: What the user can do, as the end of a sentence.
-
-    Raises:
-        ForeignStudy: If a part has changed.
-    """
+    """Refuse parts that are no longer those of a plan."""
     if words := differences(wanted, parts, found):
         raise ForeignStudy(f"What this study was planned with has changed. {words}. {remedy}")
 
 
 def differences(plan: Plan, old: Identities, new: Identities) -> str:
-    """Return how parts of a plan differ, in words; empty if they do not.
-
-    Args:
-        plan: The plan.
-        old: The parts.
-        new: The same of a newer version.
-    """
+    """Return how parts of a plan differ, in words; empty if they do not."""
     titles = {"source": f"{plan.task.source}", "target": f"{plan.task.target}"}
     changed = {
         titles.get(part, f"the {part}"): old.get(part, NOTHING).changes_to(new.get(part, NOTHING))
@@ -174,9 +139,6 @@ def require_planned(plan: Plan, run: Run) -> None:
     """Refuse a run whose robot, task, method or learner is not the planned one in this process.
 
     A file may be edited while a study runs, and another node of a cluster may have another version.
-
-    Raises:
-        ForeignStudy: If something has changed.
     """
     parts = parts_of(plan, run)
     arms = [run.kind] if _METHOD + run.kind in parts else []

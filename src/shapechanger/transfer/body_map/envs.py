@@ -144,16 +144,7 @@ class MappedEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstru
 
 
 def check_size(which: str, space: Any, layout: Layout) -> Box[Any]:
-    """Return the space if it is flat and of the size of its layout.
-
-    Args:
-        which: Name of the space in messages, such as "target observation".
-        space: The space.
-        layout: Its layout.
-
-    Raises:
-        SpaceMismatch: If it is not.
-    """
+    """Return the space if it is flat and of the size of its layout."""
     if not isinstance(space, Box) or space.shape != (layout.size,):
         raise SpaceMismatch(
             f"The layout of the {which} has {layout.size} numbers, so its space must be a Box of "

@@ -40,12 +40,7 @@ from shapechanger.transfer.body_map.symmetry import Symmetry, mirror
 
 
 def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tuple[MapEntry, ...]:
-    """Replace each feature that `outer` copies by its rule in `inner`.
-
-    Args:
-        outer: Entries of the second map.
-        inner: Entries of the first map.
-    """
+    """Replace each feature that `outer` copies by its rule in `inner`."""
     filled_by = {entry.feature: entry for entry in inner}
     result: list[MapEntry] = []
     for entry in outer:
@@ -62,16 +57,7 @@ def _compose_entries(outer: Sequence[MapEntry], inner: Sequence[MapEntry]) -> tu
 def _invert_entries(
     side: Side, entries: Sequence[MapEntry], otherwise: RuleLike
 ) -> tuple[MapEntry, ...]:
-    """Return for each feature of `side.over` a rule over `side.into`.
-
-    Args:
-        side: The half of the map.
-        entries: Its entries.
-        otherwise: The rule of a feature that no entry copies.
-
-    Raises:
-        MapError: If a feature is copied more than once, but not under its own name.
-    """
+    """Return for each feature of `side.over` a rule over `side.into`."""
     copies: dict[str, list[tuple[MapEntry, float]]] = {}
     for entry in entries:
         if isinstance(entry.rule, Copy):
@@ -99,14 +85,7 @@ def _backwards(
 
 
 class MapRow(NamedTuple):
-    """One line of `BodyMap.table`.
-
-    Attributes:
-        side: "observation" or "action".
-        entry: The feature that is filled.
-        rule: Its rule as text.
-        why: Origin of the rule.
-    """
+    """One line of `BodyMap.table`."""
 
     side: SideName
     entry: str

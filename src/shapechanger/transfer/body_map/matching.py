@@ -58,19 +58,7 @@ _SPELLED: Final[dict[str, Rule]] = {"zero": Zero(), "learn": Learn()}
 def resolve(
     side: Side, rules: Mapping[str, RuleLike], otherwise: RuleLike, units: Units
 ) -> tuple[MapEntry, ...]:
-    """Resolve the rule of each feature of `side.into`.
-
-    Args:
-        side: The half of the map.
-        rules: Rules by name or glob; the first glob that matches counts. A key that is the exact
-            name of a feature is not a glob.
-        otherwise: The rule of the remaining features: zero, hold or learn.
-        units: Treatment of scales and constants, see `BodyMap.between`.
-
-    Raises:
-        MapError: If a rule does not fit its feature, or nothing matches.
-        UnknownName: If a rule copies a feature that does not exist.
-    """
+    """Resolve the rule of each feature of `side.into`."""
     entries: list[MapEntry] = []
     for feature in side.into:
         matching = (pattern for pattern in rules if _matches(pattern, feature.name, side))
@@ -105,16 +93,7 @@ def _by_rule(pattern: str) -> str:
 def check_patterns(
     patterns: Iterable[str], halves: Sequence[tuple[Side, tuple[MapEntry, ...]]]
 ) -> None:
-    """Check that each pattern gave at least one feature its rule.
-
-    Args:
-        patterns: The patterns.
-        halves: The halves of the map that they apply to, with their resolved entries.
-
-    Raises:
-        UnknownName: If a pattern matches no feature of any side.
-        MapError: If each feature that it matches has its rule from elsewhere.
-    """
+    """Check that each pattern gave at least one feature its rule."""
     reasons = {entry.why for _, entries in halves for entry in entries}
     for pattern in patterns:
         if _by_rule(pattern) in reasons:
@@ -130,15 +109,7 @@ def check_patterns(
 
 
 def constant_rule(like: RuleLike, feature: Feature) -> Rule:
-    """Read a rule that copies nothing, for a remaining feature.
-
-    Args:
-        like: The rule.
-        feature: The feature.
-
-    Raises:
-        MapError: If it is not zero, hold or learn, or the constant is outside the range.
-    """
+    """Read a rule that copies nothing, for a remaining feature."""
     match like:
         case "hold":
             return Hold(feature.middle)
@@ -238,13 +209,7 @@ _Read = TypeVar("_Read")
 
 
 class MirrorText(NamedTuple):
-    """The symmetry of a map in TOML.
-
-    Attributes:
-        of: The body that is mirrored.
-        swap: Partner of each element on the other side.
-        flip: Globs of elements whose coordinate changes sign.
-    """
+    """The symmetry of a map in TOML."""
 
     of: Literal["source", "target"]
     swap: dict[str, str]
@@ -252,15 +217,7 @@ class MirrorText(NamedTuple):
 
 
 class MapText(NamedTuple):
-    """A map in TOML, before it is resolved for two bodies.
-
-    Attributes:
-        units: Treatment of scales and constants.
-        otherwise: The rule of the remaining features.
-        observation: Rules of source observation features.
-        action: Rules of target action features.
-        symmetry: The symmetry, if any.
-    """
+    """A map in TOML, before it is resolved for two bodies."""
 
     units: Units
     otherwise: RuleLike
@@ -270,11 +227,7 @@ class MapText(NamedTuple):
 
 
 def read_toml(text: str) -> MapText:
-    """Parse a map in TOML.
-
-    Raises:
-        MapError: If it is not valid TOML, or has an unknown key, word or type.
-    """
+    """Parse a map in TOML."""
     try:
         table = tomllib.loads(text.removeprefix("\ufeff"))  # Windows editors prepend a mark.
     except tomllib.TOMLDecodeError as error:
@@ -293,11 +246,7 @@ def read_toml(text: str) -> MapText:
 
 
 def write_toml(halves: Sequence[tuple[Side, tuple[MapEntry, ...]]]) -> str:
-    """Write rules as TOML; a partner of the same name has no line.
-
-    Args:
-        halves: The halves of the map, with their entries.
-    """
+    """Write rules as TOML; a partner of the same name has no line."""
     units = "same" if all(_is_plain(e, side) for side, each in halves for e in each) else "exact"
     lines = [f'units = "{units}"', 'otherwise = "zero"']
     for side, entries in halves:

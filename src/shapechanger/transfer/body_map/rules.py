@@ -93,12 +93,7 @@ def describe_rule(rule: Rule) -> str:
 
 
 def compose_rules(outer: Copy, inner: Rule) -> Rule:
-    """Return the rule that applies `inner` and then the scale of `outer`.
-
-    Args:
-        outer: The rule applied last.
-        inner: The rule of the feature that `outer` copies.
-    """
+    """Return the rule that applies `inner` and then the scale of `outer`."""
     match inner:
         case Copy(feature, scale):
             return Copy(feature, outer.scale * scale)
@@ -116,14 +111,6 @@ def expand_template(template: str, pattern: str, name: str) -> str:
 
     >>> expand_template("ankle_*/motor", "foot_*/motor", "foot_2/motor")
     'ankle_2/motor'
-
-    Args:
-        template: A name with stars; one without is returned unchanged.
-        pattern: A glob that matches `name`; `?` and `[...]` are wildcards too.
-        name: The name.
-
-    Raises:
-        MapError: If the template has stars, but not as many as the pattern has wildcards.
     """
     if "*" not in template:
         return template
@@ -174,13 +161,7 @@ class MapEntry:
 
 
 class Side(NamedTuple):
-    """One half of a map: a layout that is filled, and the one that it is filled from.
-
-    Attributes:
-        name: "observation" or "action".
-        into: The layout that is filled: the source's observation, or the target's action.
-        over: The layout that it is filled from: the target's observation, or the source's action.
-    """
+    """One half of a map: a layout that is filled, and the one that it is filled from."""
 
     name: SideName
     into: Layout
@@ -199,27 +180,14 @@ class Side(NamedTuple):
         return f"{owner} {self.name} feature"
 
     def copied(self, name: str) -> Feature:
-        """Return the feature of `over` that a rule copies.
-
-        Raises:
-            UnknownName: If there is none.
-        """
+        """Return the feature of `over` that a rule copies."""
         if name not in self.over:
             raise UnknownName(self.over_kind, name, self.over.names)
         return self.over[name]
 
 
 def check_entries(side: Side, entries: tuple[MapEntry, ...]) -> None:
-    """Check that each feature has one rule, in order, and that copied features exist and fit.
-
-    Args:
-        side: The half of the map.
-        entries: Its entries.
-
-    Raises:
-        MapError: If a feature has no rule, is out of order, or copies a block of another shape.
-        UnknownName: If a rule copies a feature that does not exist.
-    """
+    """Check that each feature has one rule, in order, and that copied features exist and fit."""
     filled = tuple(entry.feature for entry in entries)
     if filled != side.into.names:
         raise MapError(
@@ -241,10 +209,6 @@ def same_meaning(left: Layout, right: Layout) -> str:
 
     Ranges may differ, because a longer leg only widens them; names, order, units, shapes and gains
     may not.
-
-    Args:
-        left: One layout.
-        right: The other.
     """
     for place, (a, b) in enumerate(zip(left, right, strict=False)):
         for aspect in ("name", "unit", "shape", "gain", "gain_unit"):
@@ -263,8 +227,6 @@ class Gather:
     A number that is copied with scale 1 is bitwise equal.
 
     Attributes:
-        kind: Kind of the input vectors, for messages.
-        n_over: Size of the input.
         rows: Output indices that are copied, shape (n_copied,).
         columns: Their input indices, shape (n_copied,).
         scale: Their factors, shape (n_copied,).
@@ -280,12 +242,7 @@ class Gather:
 
     @classmethod
     def of(cls, side: Side, entries: Sequence[MapEntry]) -> Gather:
-        """Compile one half of a map.
-
-        Args:
-            side: The source's or the target's side.
-            entries: Entries of the map, in order of the target's features.
-        """
+        """Compile one half of a map."""
         into, over = side.into.slices, side.over.slices
         rows: list[int] = []
         columns: list[int] = []
@@ -322,9 +279,6 @@ class Gather:
         Returns:
             A new array of shape (..., n_into): float32 for float32, float64 for float64 and for
             integers that float32 cannot hold.
-
-        Raises:
-            SpaceMismatch: If the last axis has another length.
         """
         given = np.asarray(values)
         if given.shape[-1:] != (self.n_over,):

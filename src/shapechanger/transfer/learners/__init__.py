@@ -112,25 +112,14 @@ class LearnerSettings:
 
 
 class SharedFile(NamedTuple):
-    """File that the runs of a study share, such as demonstrations in one env.
-
-    Attributes:
-        path: The file.
-        seed: Seed of what is in it.
-    """
+    """File that the runs of a study share, such as demonstrations in one env."""
 
     path: Path
     seed: int
 
 
 class PolicyOrigin(NamedTuple):
-    """Origin of a stored policy.
-
-    Attributes:
-        env: The env that it was trained in.
-        steps: Training steps; demonstrated steps for a clone.
-        identity: Version of the env and of the learner, as in the policy's card.
-    """
+    """Origin of a stored policy."""
 
     env: EnvRef
     steps: int

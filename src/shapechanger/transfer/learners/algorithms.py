@@ -32,18 +32,7 @@ _GIVEN: Final = ("self", "policy", "env", "envs", "seed", "_init_setup_model")
 def build_model(
     settings: Sb3Settings, envs: VecEnv, seed: int, tensorboard: str | None = None
 ) -> BaseAlgorithm:
-    """Build an untrained model on the CPU.
-
-    Args:
-        settings: Settings of the learner.
-        envs: Its envs.
-        seed: Its seed.
-        tensorboard: Folder of TensorBoard's logs; None for none.
-
-    Raises:
-        StudyError: If a function of the user's returns something else, or refuses its arguments.
-        UnknownName: If the algorithm cannot be imported.
-    """
+    """Build an untrained model on the CPU."""
     made = _load(settings.algorithm)
     arguments = dict(settings.model_arguments)
     try:
@@ -73,13 +62,7 @@ def _is_class(algorithm: object) -> bool:
 
 
 def require_class(algorithm: str) -> None:
-    """Refuse the name of an algorithm that is not a class of models, before anything is imported.
-
-    Raises:
-        ValueError: If it is a function, or cannot be imported.
-        CorruptStudy: If it belongs to a module that is neither of Stable-Baselines3 or sb3-contrib
-            nor already imported.
-    """
+    """Refuse the name of an algorithm that is not a class of models, before importing it."""
     module = algorithm.partition(":")[0]
     own = algorithm not in _SHIPPED and module not in sys.modules
     if own and module.partition(".")[0] not in _FILES_MAY_IMPORT:
@@ -96,15 +79,7 @@ def require_class(algorithm: str) -> None:
 
 
 def checked_settings(settings: ImportedSettings) -> ImportedSettings:
-    """Import an algorithm, check its arguments by name, and fill in how often it updates.
-
-    Args:
-        settings: Settings as the user gave them.
-
-    Raises:
-        UnknownName: If it cannot be imported, or takes no argument of a name.
-        StudyError: If it can neither be called nor is a class of models.
-    """
+    """Import an algorithm, check its arguments by name, and fill in how often it updates."""
     made = _load(settings.algorithm)
     if not callable(made) or (isinstance(made, type) and not _is_class(made)):
         raise StudyError(
@@ -139,12 +114,7 @@ def _load(algorithm: str) -> Any:
 
 
 class SpacesOnly(gym.Env[Any, Any]):
-    """An env that has spaces and cannot be stepped, for models that only act.
-
-    Args:
-        observation_space: Space of an observation.
-        action_space: Space of an action.
-    """
+    """An env that has spaces and cannot be stepped, for models that only act."""
 
     def __init__(self, observation_space: gym.Space[Any], action_space: gym.Space[Any]) -> None:
         self.observation_space = observation_space

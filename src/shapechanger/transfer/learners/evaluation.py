@@ -74,10 +74,6 @@ def evaluation_seed(env: EnvRef, episodes: int) -> int:
     It is the same for all policies, so arms are compared on equal episodes. Each individual body,
     such as a finger of a gap, has episodes of its own, so that a mean over bodies is also one over
     many targets.
-
-    Args:
-        env: The env.
-        episodes: Number of episodes of an evaluation.
     """
     individual = int(env.kwargs.get(_INDIVIDUAL) or 0) % _MOST_INDIVIDUALS
     return EVALUATION_SEED + min(episodes, _MOST_EPISODES) * individual
@@ -86,16 +82,7 @@ def evaluation_seed(env: EnvRef, episodes: int) -> int:
 def evaluation_envs(
     env: EnvRef, episodes: int, limit: int | None = None
 ) -> list[gym.Env[Any, Any]]:
-    """Make the envs in which a learner's policies are evaluated, in held-out surroundings if any.
-
-    Args:
-        env: The env.
-        episodes: Number of episodes of an evaluation.
-        limit: Steps after which an episode is truncated; None for the env's own limit.
-
-    Returns:
-        One env for each episode; a single env if only one instance can exist.
-    """
+    """Make the envs that evaluate a learner's policies, in held-out surroundings if any."""
     more = {} if limit is None else {"max_episode_steps": limit}
     envs = [env.make(**more)]
     if not is_single_instance(envs[0]):
@@ -113,15 +100,7 @@ def evaluate(
     steps: int = 0,
     episodes: int | None = None,
 ) -> Evaluation:
-    """Average over episodes.
-
-    Args:
-        act: The policy.
-        envs: The envs; each ends its episodes by itself.
-        seed: Seed of the first episode; it increases by one per episode.
-        steps: Training steps so far, for the result.
-        episodes: Number of episodes, rounded up to a multiple of the envs; one per env by default.
-    """
+    """Average over episodes."""
     played: list[_Episode] = []
     for first in range(0, len(envs) if episodes is None else episodes, len(envs)):
         played += _play(act, envs, seed + first)
@@ -211,23 +190,13 @@ def _play(act: Act, envs: Sequence[gym.Env[Any, Any]], seed: int) -> list[_Episo
 
 
 def random_actions(space: gym.Space[Any], seed: int) -> Act:
-    """Return a policy that draws actions uniformly.
-
-    Args:
-        space: Bounded space of the actions.
-        seed: Seed of the draws.
-    """
+    """Return a policy that draws actions uniformly."""
     space.seed(seed)
     return lambda observations: np.stack([space.sample() for _ in observations])
 
 
 def zero_actions(space: gym.Space[Any], seed: int) -> Act:
-    """Return a policy that always takes the action nearest to zero; `seed` is not used.
-
-    Args:
-        space: A box.
-        seed: Unused.
-    """
+    """Return a policy that always takes the action nearest to zero; `seed` is not used."""
     del seed
     box = cast("gym.spaces.Box", space)
     action = np.clip(np.zeros(box.shape, box.dtype), box.low, box.high)

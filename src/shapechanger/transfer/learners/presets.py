@@ -56,11 +56,7 @@ LEARNERS: Final[Mapping[str, LearnerSettings]] = _Presets()
 
 
 def in_many_bodies(name: str) -> str:
-    """Return the preset that learns in many bodies as another one does in one.
-
-    Args:
-        name: The other one, which is returned where there is none.
-    """
+    """Return the preset that learns in many bodies as another one does in one."""
     return _tables().get(name, {}).get("in_many_bodies", name)
 
 
@@ -70,12 +66,7 @@ def tuned_on(name: str) -> tuple[str, ...]:
 
 
 def tuning_text(learner: str, env: str) -> str:
-    """State whether the settings of a learner were tuned on an env.
-
-    Args:
-        learner: Name of the learner.
-        env: Id of the env.
-    """
+    """State whether the settings of a learner were tuned on an env."""
     if not (names := tuned_on(learner)):
         return "It is not stated what these settings were tuned on."
     name = env.rpartition("/")[2].removesuffix("-v1")
@@ -86,11 +77,7 @@ def tuning_text(learner: str, env: str) -> str:
 
 
 def learner_settings(name: str) -> LearnerSettings:
-    """Return the shipped settings of a learner.
-
-    Raises:
-        UnknownName: If no learner has this name.
-    """
+    """Return the shipped settings of a learner."""
     if name not in LEARNERS:
         raise UnknownName("learner", name, LEARNERS)
     return LEARNERS[name]

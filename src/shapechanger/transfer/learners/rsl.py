@@ -155,15 +155,7 @@ class RslLearner(Sb3Learner):
         on_steps: Callable[[int], None] = lambda steps: None,
         callback: Any = None,
     ) -> TrainedPolicy:
-        """Train a policy, evaluating it before the first step, along the way, and at the end.
-
-        Raises:
-            StudyError: If `steps` is smaller than one evaluation, there are more bodies than
-                worlds, or the training diverges.
-            TransplantError: If the source policy is of another family than the bodies.
-            UnknownName: If there is no such device.
-            VectorEnvError: If the task has no functions for a device.
-        """
+        """Train a policy, evaluating it before the first step, along the way, and at the end."""
         if callback is not None:
             raise StudyError(f"{self.name} takes no callback of Stable-Baselines3.")
         settings = self.settings
@@ -243,12 +235,6 @@ class _Returns:
     """Discounted returns of worlds, by whose deviation rewards are divided as in `VecNormalize`.
 
     Everything stays on the device, in the precision and order of `RunningMeanStd`.
-
-    Args:
-        count: How many worlds.
-        device: Name of the device.
-        statistics: The statistics to begin with and to write back to; None leaves rewards alone.
-        gamma: Discount of a step.
     """
 
     def __init__(
@@ -294,14 +280,7 @@ class _Returns:
 
 
 class RslTraining:
-    """rsl-rl's PPO with the weights and statistics of a model of Stable-Baselines3.
-
-    Args:
-        envs: The worlds.
-        model: The model, which `write_back` updates.
-        statistics: Envs with its statistics, or without any.
-        settings: The settings.
-    """
+    """rsl-rl's PPO with the weights and statistics of a model of Stable-Baselines3."""
 
     def __init__(self, envs: RslVecEnv, model: Any, statistics: Any, settings: Any) -> None:
         self._envs = envs
@@ -361,12 +340,7 @@ class RslTraining:
         return actor, cast("Any", MLPModel)(seen, groups, "critic", 1, **shape)
 
     def update(self, done: int, on_steps: Callable[[int], None]) -> None:
-        """Collect the steps of an update, and learn from them.
-
-        Args:
-            done: Steps before this update.
-            on_steps: Called with the steps so far.
-        """
+        """Collect the steps of an update, and learn from them."""
         with torch.inference_mode():
             for step in range(self._settings.n_steps):
                 actions = self._ppo.act(self._seen)

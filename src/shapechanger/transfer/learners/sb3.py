@@ -90,10 +90,6 @@ class Sb3Learner(Learner[Sb3Settings]):
 
         `steps` are rounded up to whole updates, `on_steps` is called after each step of all envs,
         and `callback` is one of Stable-Baselines3's for the training.
-
-        Raises:
-            StudyError: If `steps` is smaller than one evaluation, or the training diverges.
-            TransplantError: If the source policy is of a kind that cannot be transplanted.
         """
         settings = self.settings
         settings.require_budget(steps)
@@ -172,11 +168,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         return TrainedPolicy.load(path, self.settings.algorithm)
 
     def origin(self, path: Path) -> PolicyOrigin:
-        """Read where a policy comes from.
-
-        Raises:
-            StudyError: If it is a clone, or another algorithm trained it.
-        """
+        """Read where a policy comes from."""
         if kind_of(path):
             raise StudyError(
                 f"{path} is a clone, and {self.name} does not learn from pictures: give "
@@ -221,11 +213,7 @@ class Sb3Learner(Learner[Sb3Settings]):
         env: EnvRef,
         observation: Layout,
     ) -> tuple[BaseAlgorithm, tuple[float, ...] | None]:
-        """Return the model that a training begins with.
-
-        Returns:
-            The model, and what `_explore` returns if it begins with the weights of a policy.
-        """
+        """Return the model that a training begins with."""
         logs = None if self.tensorboard is None else str(self.tensorboard)
         if start is None or body_map is None:
             return build_model(settings, envs, seed, logs), None
@@ -362,13 +350,7 @@ class _PeriodicEvaluation(BaseCallback):
                 self._restart_episode()
 
     def evaluate(self, model: BaseAlgorithm, envs: VecEnv, steps: int = 0) -> Evaluation:
-        """Evaluate a model.
-
-        Args:
-            model: The model.
-            envs: Its training envs, for their statistics.
-            steps: Training steps so far.
-        """
+        """Evaluate a model."""
         return evaluate(
             actor(model, statistics_of(envs), self._action),
             self._envs,

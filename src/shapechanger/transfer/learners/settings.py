@@ -16,16 +16,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
     """Settings that all learners of Stable-Baselines3 share.
 
     Attributes:
-        algorithm: The class that learns: "PPO", "SAC", "TQC", or `module:name`.
-        n_envs: Number of parallel envs.
-        net_arch: Widths of the hidden layers, of actor and critic each.
-        normalise: Whether observations and rewards are divided by running estimates of their
-            standard deviation (`VecNormalize`).
-        steps: Default env steps of a training.
-        source_steps: Default env steps of a source policy; 0 for half as many as on the target, so
-            that total steps leave something to compare.
         eval_every: Target steps between two evaluations, at least `update_steps`.
-        eval_episodes: Episodes of an evaluation, with the policy's mean actions.
     """
 
     algorithm: str
@@ -73,11 +64,7 @@ class Sb3Settings(LearnerSettings, msgspec.Struct, frozen=True, kw_only=True):
         return -(-steps // self.update_steps) * self.update_steps
 
     def for_one_env(self) -> Self:
-        """Return settings with as many steps per update in a single env.
-
-        Raises:
-            StudyError: If that is not possible.
-        """
+        """Return settings with as many steps per update in a single env."""
         changed: dict[str, Any] = {"n_envs": 1, self._steps_per_update: self.update_steps}
         return msgspec.structs.replace(self, **changed)
 
@@ -284,17 +271,7 @@ class ImportedSettings(Sb3Settings, frozen=True, kw_only=True, tag="imported"):
 def study_budgets(
     settings: LearnerSettings, steps: int | None, source_steps: int | None, *, is_given: bool
 ) -> tuple[int, int]:
-    """Return the budgets in the target and in the source, as whole updates.
-
-    Args:
-        settings: Settings of the learner.
-        steps: Steps in the target; None for those of the settings.
-        source_steps: Steps in the source; None for those of the settings, or half of the target's.
-        is_given: Whether the source policy is given, and not trained.
-
-    Raises:
-        StudyError: If one ends before the first evaluation.
-    """
+    """Return the budgets in the target and in the source, as whole updates."""
     wanted = settings.steps if steps is None else steps
     settings.require_budget(wanted, "target")
     budget = settings.whole_updates(wanted)

@@ -87,12 +87,7 @@ class ThreadVecEnv(DummyVecEnv):
 
 
 class ScaledActions(VecEnvWrapper):
-    """Envs that take actions from -1 to 1, whatever the units of their actuators.
-
-    Args:
-        envs: The envs.
-        scale: Scale of their actions.
-    """
+    """Envs that take actions from -1 to 1, whatever the units of their actuators."""
 
     def __init__(self, envs: VecEnv, scale: ActionScale) -> None:
         space = learners_space(cast("Any", envs).action_space)
@@ -117,16 +112,7 @@ class ScaledActions(VecEnvWrapper):
 
 
 def with_scaled_actions(envs: VecEnv, layout: Layout, name: str) -> VecEnv:
-    """Return envs that take actions from -1 to 1; the envs themselves if they already do.
-
-    Args:
-        envs: The envs, with flat actions.
-        layout: Layout of an action.
-        name: Name of the env, for messages.
-
-    Raises:
-        SpaceMismatch: If an action has no finite range, or its layout states another.
-    """
+    """Return envs that take actions from -1 to 1; the envs themselves if they already do."""
     space = cast("Any", envs).action_space
     require_ranges(name, space, layout)
     scale = ActionScale.between(learners_space(space), layout)
@@ -138,11 +124,6 @@ def training_vec_env(env: EnvRef, num_envs: int, threads: int | None) -> VecEnv:
 
     Envs of the catalogue are stepped by threads. Those of others may share state, so they are
     stepped one after another; the numbers would be the same.
-
-    Args:
-        env: The env.
-        num_envs: Number of envs.
-        threads: As in `shapechanger.make_vec`.
     """
     spec = gym.registry.get(env.id.rpartition(":")[2])
     if spec is not None and str(spec.vector_entry_point).startswith("shapechanger."):

@@ -29,13 +29,6 @@ class DeviceRows:
 
     Where a body has fewer limbs than others its last rows are empty, so that all worlds share one
     tensor.
-
-    Args:
-        envs: The worlds.
-        each: The rows of each world's body, all with the same room.
-
-    Attributes:
-        room: Limbs that there are rows for.
     """
 
     def __init__(self, envs: Any, each: Sequence[LimbRows]) -> None:
@@ -48,11 +41,7 @@ class DeviceRows:
         ]
 
     def of(self, observations: Any) -> Tensor:
-        """Return the rows of all worlds, flattened, shape (n, (room + 1) * width).
-
-        Args:
-            observations: Those of the vector env: one tensor, or one per batch.
-        """
+        """Return the rows of all worlds, flattened, shape (n, (room + 1) * width)."""
         parts = [
             batch.rows(observations[i] if self._apart else observations[batch.numbers])
             for i, batch in enumerate(self._batches)
@@ -78,12 +67,7 @@ class DeviceRows:
 
 
 class _Batch:
-    """Rows of worlds whose bodies have arrays of the same shapes, and so numbers in the same order.
-
-    Args:
-        numbers: The number of each world, shape (k,).
-        each: The rows of each world's body.
-    """
+    """Rows of worlds whose bodies have arrays of the same shapes, and numbers in one order."""
 
     def __init__(self, numbers: Tensor, each: Sequence[LimbRows]) -> None:
         def stacked(name: str) -> Tensor:
@@ -112,13 +96,7 @@ class _Batch:
 
 
 class LimbModel(MLPModel):
-    """A network of a policy of limbs as rsl-rl's actor or critic.
-
-    Args:
-        policy: The policy.
-        net: One of its networks, of which this has a copy.
-        acts: Whether it is the actor.
-    """
+    """A network of a policy of limbs as rsl-rl's actor or critic."""
 
     def __init__(self, policy: LimbPolicy, net: nn.Module, *, acts: bool) -> None:
         # Not that of MLPModel, which builds a network.

@@ -85,16 +85,7 @@ def limb_spaces(rows: LimbRows) -> tuple[gym.spaces.Box, gym.spaces.Box]:
 
 
 def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]:
-    """Return envs as rows, all of the same spaces.
-
-    Args:
-        env: The env; they have its bodies in turn, see `each_body`.
-        count: Number of envs.
-        room: Limbs to have rows for; 0 for as many as the bodies have.
-
-    Raises:
-        StudyError: If a body has more limbs than room, or an env does not describe its tree.
-    """
+    """Return envs as rows, all of the same spaces."""
     bodies = each_body(env)
     # Room for all bodies, also where there are fewer envs.
     room = rows_of_each(bodies, room)[0].room
@@ -102,17 +93,7 @@ def limb_envs(env: EnvRef, count: int, room: int = 0) -> list[gym.Env[Any, Any]]
 
 
 def fitted(env: gym.Env[Any, Any], rows: Layout, room: int = 0) -> LimbEnv:
-    """Return an env as a policy of limbs senses it.
-
-    Args:
-        env: The env, of any body of the policy's family.
-        rows: Layout of the policy's observations.
-        room: Limbs that the policy has room for; 0 for any number.
-
-    Raises:
-        TransplantError: If the body belongs to another family.
-        StudyError: If it has more limbs than room.
-    """
+    """Return an env as a policy of limbs senses it."""
     limbs = LimbEnv(env, room)
     name = env.spec.id if env.spec else type(env.unwrapped).__name__
     require_same_columns(rows, limbs.observation_layout, name)
@@ -217,14 +198,7 @@ class LimbVecEnv(VecEnv):
 
 
 class _Group:
-    """Envs whose bodies have equal spaces.
-
-    Args:
-        numbers: Their numbers among all envs.
-        bodies: The env of each.
-        each: The rows of each.
-        threads: Threads that step them.
-    """
+    """Envs whose bodies have equal spaces."""
 
     def __init__(
         self,
@@ -254,16 +228,7 @@ class _Group:
 def bodies_in_turn(
     env: EnvRef, num_envs: int, room: int = 0
 ) -> tuple[list[EnvRef], list[LimbRows]]:
-    """Return the body of each of many envs, which have those of one env in turn, and its rows.
-
-    Args:
-        env: The env; its argument `bodies` says which bodies, see `each_body`.
-        num_envs: Number of envs, at least one of each body.
-        room: Limbs to have rows for; 0 for as many as the bodies have.
-
-    Raises:
-        StudyError: If there are more bodies than envs, or a body has more limbs than room.
-    """
+    """Return the body of each of many envs, which have those of one env in turn, and its rows."""
     bodies = each_body(env)
     if len(bodies) > num_envs:
         raise StudyError(
@@ -276,11 +241,7 @@ def bodies_in_turn(
 
 
 def together(bodies: Sequence[EnvRef]) -> EnvRef:
-    """Return envs of different bodies as the one that `shapechanger.make_vec` makes of them.
-
-    Args:
-        bodies: The envs, equal but for their bodies.
-    """
+    """Return envs of different bodies as the one that `shapechanger.make_vec` makes of them."""
     first = bodies[0]
     kwargs = {name: value for name, value in first.kwargs.items() if name != "body"}
     if "body" in first.kwargs:
@@ -289,15 +250,7 @@ def together(bodies: Sequence[EnvRef]) -> EnvRef:
 
 
 def rows_of_each(bodies: Sequence[EnvRef], room: int = 0) -> list[LimbRows]:
-    """Return the rows of the bodies of some envs, all with the same room.
-
-    Args:
-        bodies: The envs.
-        room: Limbs to have rows for; 0 for as many as the bodies have.
-
-    Raises:
-        StudyError: If a body has more limbs than room, or senses other things of its limbs.
-    """
+    """Return the rows of the bodies of some envs, all with the same room."""
     own: list[LimbRows] = []
     for body in bodies:
         made = body.make()

@@ -41,12 +41,7 @@ def _layers(*widths: int) -> nn.Sequential:
 
 
 class LimbNetwork(nn.Module):
-    """From rows of a trunk and any number of limbs to one number a limb, or to one in all.
-
-    Args:
-        width: Numbers of a row.
-        per_limb: Whether it returns a number for each limb.
-    """
+    """From rows of a trunk and any number of limbs to one number a limb, or to one in all."""
 
     def __init__(self, width: int, *, per_limb: bool) -> None:
         super().__init__()
@@ -80,14 +75,7 @@ class LimbNetwork(nn.Module):
 
 
 class PaddedNetwork(nn.Module):
-    """A plain network on all rows, flattened, with zeros where a body has no limb.
-
-    Args:
-        rows: Rows that it takes, the trunk's and those of the limbs.
-        width: Numbers of a row.
-        per_limb: Whether it returns a number for each limb.
-        hidden: Widths of its hidden layers.
-    """
+    """A plain network on all rows, flattened, with zeros where a body has no limb."""
 
     def __init__(self, rows: int, width: int, *, per_limb: bool, hidden: Sequence[int]) -> None:
         super().__init__()
@@ -105,16 +93,7 @@ class PaddedNetwork(nn.Module):
 
 
 class LimbPolicy(ActorCriticPolicy):
-    """Actor and critic on rows; the probability of an action leaves out limbs without a motor.
-
-    Args:
-        observation_space: Rows, flattened.
-        action_space: A number for each limb.
-        lr_schedule: Learning rate over the training.
-        network: "limbs" for a network that fits any number of limbs; "padded" for a plain one.
-        hidden: Widths of the hidden layers of the plain network.
-        **arguments: Those of `ActorCriticPolicy`.
-    """
+    """Actor and critic on rows; the probability of an action leaves out limbs without a motor."""
 
     def __init__(
         self,

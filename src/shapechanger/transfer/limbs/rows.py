@@ -32,14 +32,7 @@ _SCALES: Final = {"rad/s": 0.1, "m/s": 0.3}
 
 
 class Columns(msgspec.Struct, frozen=True):
-    """The columns of a row, the same for all bodies of a family.
-
-    Attributes:
-        trunk: Names of what a trunk senses.
-        limb: Names of what a limb senses.
-        trunk_numbers: Names of the numbers that describe a trunk.
-        limb_numbers: Names of the numbers that describe a limb.
-    """
+    """The columns of a row, the same for all bodies of a family."""
 
     trunk: tuple[str, ...]
     limb: tuple[str, ...]
@@ -59,16 +52,10 @@ class LimbRows:
     Rows are `(observations * scale + offset) @ selection + constant`, flattened.
 
     Attributes:
-        columns: The columns of each row.
-        limbs: Names of the joints, in the order of the rows.
-        names: Names of the body's own observations and actions.
         scale: Shape (observations,).
         offset: Shape (observations,).
         selection: Shape (observations, (room + 1) * width), of zeros and ones.
         constant: Shape ((room + 1) * width,).
-        actuators: For each action the limb that takes it.
-        low: Smallest of each action.
-        high: Largest of each action.
     """
 
     columns: Columns
@@ -134,16 +121,7 @@ class LimbRows:
 
 
 def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
-    """Return the rows of an env's body.
-
-    Args:
-        env: The env.
-        room: Limbs to have rows for; 0 for as many as the body has.
-
-    Raises:
-        StudyError: If the env does not describe its kinematic tree, or has more limbs than room.
-        LayoutError: If an observation or an action belongs to no part of the body.
-    """
+    """Return the rows of an env's body."""
     inner = env.unwrapped
     name = env.spec.id if env.spec else type(inner).__name__
     if not isinstance(inner, HasTree):
@@ -204,16 +182,7 @@ def rows_of(env: gym.Env[Any, Any], room: int = 0) -> LimbRows:
 
 
 def require_same_columns(trained: Layout, present: Layout, env: str) -> None:
-    """Refuse a body whose rows mean something else than those that a policy has learned from.
-
-    Args:
-        trained: Layout of the rows of the policy.
-        present: Layout of the rows of the body.
-        env: Id of the body's env, for the message.
-
-    Raises:
-        TransplantError: If the bodies belong to different families.
-    """
+    """Refuse a body whose rows mean something else than those that a policy has learned from."""
     learned, own = _meanings(trained), _meanings(present)
     if learned != own:
         strange = [name for name in own if name not in learned] or list(own)

@@ -204,15 +204,7 @@ def register(method: type[Method]) -> type[Method]:
 
 
 def load_method(name: str) -> Method:
-    """Return a method by its name.
-
-    Args:
-        name: Its name, or `module:name` to import a module first.
-
-    Raises:
-        UnknownName: If there is no such method or module.
-        StudyError: If a method that is installed cannot be loaded.
-    """
+    """Return a method by its name."""
     method: Any = METHODS.load(name)
     if not (isinstance(method, type) and issubclass(method, Method)):
         raise StudyError(f"The method {name} is {method!r}, not a subclass of Method.")

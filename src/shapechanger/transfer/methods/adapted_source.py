@@ -39,13 +39,7 @@ class AdaptedSource(Method):
 
     @abstractmethod
     def arguments(self, source: Any, target: Any, seed: int) -> dict[str, Any]:
-        """Return the arguments that make the source more like the target.
-
-        Args:
-            source: The source env.
-            target: The target env.
-            seed: Seed of what is random.
-        """
+        """Return the arguments that make the source more like the target."""
 
 
 class Randomised(AdaptedSource):

@@ -59,16 +59,7 @@ class Evolution(Method):
 
 
 def bodies_between(source: EnvRef, target: EnvRef, count: int) -> list[EnvRef]:
-    """Return envs whose bodies lie at equal distances between two others.
-
-    Args:
-        source: An env of a family of bodies.
-        target: Another one of the same family.
-        count: Number of envs, without the two ends.
-
-    Raises:
-        StudyError: If the bodies are not of one family.
-    """
+    """Return envs whose bodies lie at equal distances between two others."""
     with closing(source.make()) as first, closing(target.make()) as last:
         start, end = first.unwrapped, last.unwrapped
         if not (

@@ -48,15 +48,7 @@ class Kickstart(Method):
 
 
 class MappedTeacher:
-    """The actions of a source policy on the target, through the body map.
-
-    Attributes:
-        taught: (n,) whether an action of the target follows from the source policy.
-
-    Args:
-        act: The source policy.
-        body_map: Map between its body and the target's.
-    """
+    """The actions of a source policy on the target, through the body map."""
 
     def __init__(self, act: Act, body_map: BodyMap) -> None:
         self._act = act
@@ -72,12 +64,7 @@ class MappedTeacher:
 
 
 class _Distillation(BaseCallback):
-    """Collects the teacher's actions during a rollout, and learns from them after the update.
-
-    Args:
-        teacher: The teacher, which acts in the env's units.
-        action: Layout of the actions.
-    """
+    """Collects the teacher's actions during a rollout, and learns from them after the update."""
 
     def __init__(self, teacher: MappedTeacher, action: Layout) -> None:
         super().__init__()

@@ -113,14 +113,7 @@ class OffDynamics(Method):
 
 
 def collect(env: EnvRef, policy: TrainedPolicy, steps: int, seed: int) -> Transitions:
-    """Let a policy act in an env with its exploration noise.
-
-    Args:
-        env: The env.
-        policy: The policy.
-        steps: Number of steps.
-        seed: Seed of the first start; it increases by one per episode.
-    """
+    """Let a policy act in an env with its exploration noise."""
     act = actor(policy.model, policy.normalisation, policy.card.action, deterministic=False)
     rows: list[tuple[Any, ...]] = []
     with closing(env.make()) as made:
@@ -153,12 +146,7 @@ def _mapped(seen: Transitions, body_map: BodyMap) -> Transitions:
 
 
 class _Prefill(BaseCallback):
-    """Fills the replay buffer before the first step.
-
-    Args:
-        transitions: Transitions of the target, with actions in the env's units.
-        action: Layout of the actions.
-    """
+    """Fills the replay buffer before the first step."""
 
     def __init__(self, transitions: Transitions, action: Layout) -> None:
         super().__init__()
@@ -185,13 +173,7 @@ class _Prefill(BaseCallback):
 
 
 class DomainClassifiers(nn.Module):
-    """Two classifiers that tell source from target, by (s, a, s') and by (s, a).
-
-    Args:
-        n_observations: Size of an observation.
-        n_actions: Size of an action.
-        learning_rate: Learning rate of Adam.
-    """
+    """Two classifiers that tell source from target, by (s, a, s') and by (s, a)."""
 
     def __init__(self, n_observations: int, n_actions: int, learning_rate: float = 3e-4) -> None:
         super().__init__()  # pyright: ignore[reportUnknownMemberType]

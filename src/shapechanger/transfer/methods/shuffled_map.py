@@ -36,12 +36,7 @@ class ShuffledMap(Method):
 
 
 def shuffle(body_map: BodyMap, rng: np.random.Generator) -> BodyMap:
-    """Return a body map with the same rules, each at another entry.
-
-    Args:
-        body_map: The map.
-        rng: Draws the order.
-    """
+    """Return a body map with the same rules, each at another entry."""
     return msgspec.structs.replace(
         body_map,
         observation=_shuffled(body_map.observation, body_map.source_observation, rng),

@@ -157,15 +157,7 @@ def in_total_steps(curves: LearningCurves, source_steps: float, floor: float) ->
 
 
 def check_comparable(arm: LearningCurves, scratch: LearningCurves) -> None:
-    """Refuse two sets of curves that cannot be compared point by point.
-
-    Args:
-        arm: Curves of the arm, in target steps or in total steps. One evaluation at step 0 will do.
-        scratch: Curves of the baseline, which has no source.
-
-    Raises:
-        StudyError: If the evaluations differ, or scratch counts source steps.
-    """
+    """Refuse two sets of curves that cannot be compared point by point."""
     if scratch.source_steps > 0.0:
         raise StudyError("Scratch learns on the target only, so it cannot count source steps.")
     if arm.n_evals > 1 and not np.array_equal(arm.steps, scratch.steps):

@@ -69,9 +69,6 @@ def estimate_difference(
         arm: One number for each seed, shape (n_arm,).
         scratch: The same, shape (n_scratch,).
         confidence: Share of such intervals that contain the truth, between 0 and 1.
-
-    Raises:
-        StudyError: If `confidence` is not between 0 and 1.
     """
     _check_confidence(confidence)
     value = float(arm.mean() - scratch.mean())
@@ -118,9 +115,6 @@ def estimate_ratio(
             the truth it is with few seeds is measured in docs/statistics.md.
         n_resamples: How many resamples to draw: at least one for each tail, thousands for an
             interval that holds still.
-
-    Raises:
-        StudyError: If `confidence` is not between 0 and 1 or there are too few resamples for it.
     """
     _check_confidence(confidence)
     # A little less, because 1 - 0.9 is not 0.1.

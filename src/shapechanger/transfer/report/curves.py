@@ -89,11 +89,6 @@ def learning_curves(study: Study, *countings: Counting) -> dict[Counting, str]:
     of fewer than three seeds each evaluation is a point, because an interval of two says nothing. A
     horizontal level is a policy that is not trained on the target. Both ways of counting share the
     limits of the y axis.
-
-    Args:
-        study: The study.
-        *countings: "target" counts target steps; "total" shifts the arms that start from the source
-            to the right by its source steps.
     """
     # Here, because `charts` says which extra is missing.
     from matplotlib.ticker import EngFormatter, FuncFormatter, MaxNLocator
@@ -196,10 +191,6 @@ def sweep_chart(studies: Mapping[float, Study], xlabel: str) -> str:
     """Plot the end of each arm over a number in which the targets of several studies differ.
 
     A point is one seed; a line joins the means over seeds.
-
-    Args:
-        studies: The studies by that number.
-        xlabel: What the number is.
     """
     first = next(iter(studies.values()))
 

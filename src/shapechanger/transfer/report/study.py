@@ -43,17 +43,7 @@ def study_html(
     picture_note: str = "",
     found: Findings | None = None,
 ) -> str:
-    """Render the report of a study.
-
-    Args:
-        study: The study.
-        pictures: The two bodies; None if there are none.
-        picture_note: Why there are no pictures, or what they show.
-        found: What it has found; None to compute it.
-
-    Raises:
-        MissingExtra: If matplotlib or Jinja2 is not installed.
-    """
+    """Render the report of a study."""
     from shapechanger.transfer.report.curves import learning_curves
 
     plan = study.plan

@@ -41,24 +41,14 @@ _LEAST_RUNS: Final = 3
 
 
 class FilmStrip(NamedTuple):
-    """One policy's behaviour as a row of pictures.
-
-    Attributes:
-        caption: Whose it is, and how well it did.
-        jpeg: The row as one JPEG file.
-    """
+    """One policy's behaviour as a row of pictures."""
 
     caption: str
     jpeg: bytes
 
 
 class Sweep(NamedTuple):
-    """The number in which the targets of a suite differ.
-
-    Attributes:
-        name: What it is.
-        values: Its value in each study, by name of the study.
-    """
+    """The number in which the targets of a suite differ."""
 
     name: str
     values: Mapping[str, float]
@@ -73,20 +63,7 @@ def suite_html(
     films: Mapping[str, str] | None = None,
     sweep: Sweep | None = None,
 ) -> str:
-    """Render the page of a suite.
-
-    Args:
-        name: Name of the suite.
-        studies: Its studies by name; at least one.
-        seeds: Number of seeds that the suite's file declares.
-        strips: Film strips of a study, by its name.
-        films: Film of a study, relative to the page, by the study's name.
-        sweep: The number in which targets differ; None if they differ in more.
-
-    Raises:
-        StudyError: If there is no study.
-        MissingExtra: If matplotlib or Jinja2 is not installed.
-    """
+    """Render the page of a suite."""
     if not studies:
         raise StudyError(f"The suite {name} has no finished study to make a page of.")
     from shapechanger.transfer.report.curves import learning_curves, sweep_chart
@@ -139,9 +116,6 @@ def gain_over_scratch(study: Study) -> Estimate:
     """Advantage of the headline arm over scratch, averaged over the budget, in the measure's unit.
 
     That of an arm that is not trained on the target is its advantage at the start.
-
-    Args:
-        study: The study.
     """
     arm = study.curves(study.headline_arm)
     if arm.n_evals > 1:

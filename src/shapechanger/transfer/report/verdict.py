@@ -60,27 +60,12 @@ EXPLANATIONS: Final[dict[str, str]] = {
 
 
 def estimate_text(estimate: Estimate, *, signed: bool = False) -> str:
-    """Format an estimate, with or without a value and an interval.
-
-    Args:
-        estimate: The estimate.
-        signed: Whether numbers above zero get a plus sign.
-    """
+    """Format an estimate, with or without a value and an interval."""
     return interval_text(estimate.value, estimate.low, estimate.high, signed=signed)
 
 
 class MeasureRow(NamedTuple):
-    """One measure of one arm against scratch, in target steps and in total steps.
-
-    Attributes:
-        arm: The arm.
-        measure: Name of the measure.
-        unit: "score", "value", "steps" or "pure number".
-        target: Value and interval, counted in target steps.
-        total: Value and interval, counted in total steps.
-        method: Kind of interval, or "none"; both, where the two ways of counting differ.
-        note: A remark; may be empty.
-    """
+    """One measure of one arm against scratch, in target steps and in total steps."""
 
     arm: str
     measure: str
@@ -92,17 +77,7 @@ class MeasureRow(NamedTuple):
 
 
 class Findings(NamedTuple):
-    """All that a study has found, as text.
-
-    Attributes:
-        verdict: See `verdict`.
-        other_arms: See `other_arms`.
-        weak: See `weak_individuals`.
-        measures: See `measure_rows`.
-        arms: See `arm_rows`.
-        caveats: See `caveats`.
-        machine: See `machine_text`.
-    """
+    """All that a study has found, as text."""
 
     verdict: str
     other_arms: str
@@ -224,19 +199,10 @@ class ArmRow(NamedTuple):
     """Summary of the runs of one kind.
 
     Attributes:
-        kind: The arm; "random" or "zero-action" for these actions on the target; or "source" for
-            the source policies, in the source.
-        seeds: Number of runs.
-        first: Mean of the measure at the first evaluation, with its t-interval over seeds.
-        final: Mean of the measure at the end, with its t-interval over seeds.
-        final_return: Mean return at the end, with its t-interval over seeds.
-        length: Mean length of the episodes at the end, in steps.
         success: Share of successful episodes at the end, with its t-interval over seeds; empty
             where the env does not report success.
         good: Number of runs that covered 90 % of the way from what takes no skill to the best run
             on the target; empty for source policies, and where no run learned.
-        per_seed: Measure of each run at the end.
-        terms: For each reward term its mean sum over an episode at the end.
     """
 
     kind: str
@@ -263,12 +229,7 @@ def arm_rows(study: Study) -> tuple[ArmRow, ...]:
 
 
 def successes(study: Study, kind: str) -> NDArray[np.float64]:
-    """Success rate of each run at the end, shape (n_seeds,); (0,) if unknown.
-
-    Args:
-        study: The study.
-        kind: Kind of the runs, such as "scratch".
-    """
+    """Success rate of each run at the end, shape (n_seeds,); (0,) if unknown."""
     ends = [[e.success for e in _end(study, result)] for result in study.of(kind)]
     if any(share is None for end in ends for share in end):
         return np.empty(0)
@@ -280,9 +241,6 @@ def weak_individuals(study: Study) -> list[str]:
 
     A mean over individuals hides the weak ones. Empty where all seeds share one body, or the env
     does not report success.
-
-    Args:
-        study: The study.
     """
     sentences: list[str] = []
     if not study.plan.individual:
@@ -301,12 +259,7 @@ def weak_individuals(study: Study) -> list[str]:
 
 
 def finals(study: Study, kind: str) -> NDArray[np.float64]:
-    """Final value of each run, shape (n_seeds,).
-
-    Args:
-        study: The study.
-        kind: Kind of the runs, such as "scratch".
-    """
+    """Final value of each run, shape (n_seeds,)."""
     ends = (_end(study, result) for result in study.of(kind))
     return np.array([float(np.mean([_value(study, e) for e in end])) for end in ends])
 
@@ -476,11 +429,7 @@ def source_takes_all(summary: Summary) -> bool:
 
 
 def devices_of(study: Study) -> dict[str, list[str]]:
-    """Return the kinds of runs that learned on each device; runs of old studies name none.
-
-    Args:
-        study: The study.
-    """
+    """Return the kinds of runs that learned on each device; runs of old studies name none."""
     devices: dict[str, list[str]] = {}
     for result in study.runs:
         if result.device and result.run.kind not in devices.setdefault(result.device, []):

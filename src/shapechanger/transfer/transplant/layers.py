@@ -46,7 +46,6 @@ class Scaling:
     Attributes:
         mean: Shape (n,).
         sigma: Shape (n,), above zero: the square root of variance plus epsilon.
-        clip: Largest magnitude of z.
     """
 
     mean: Array
@@ -60,13 +59,7 @@ class Scaling:
 
     @classmethod
     def of(cls, statistics: RunningMeanStd, epsilon: float, clip: float) -> Scaling:
-        """Return the normalisation by statistics of a training.
-
-        Args:
-            statistics: Mean and variance.
-            epsilon: Added to the variance.
-            clip: Largest magnitude of z.
-        """
+        """Return the normalisation by statistics of a training."""
         return cls(np.asarray(statistics.mean, np.float64), np.sqrt(statistics.var + epsilon), clip)
 
 
@@ -79,11 +72,6 @@ def observation_affine(body_map: BodyMap, source: Scaling, target: Scaling) -> A
 
     The clipping of z_t replaces that of z_s, which is the same where a number keeps its statistics.
     A constant number is clipped here.
-
-    Args:
-        body_map: Map between the bodies.
-        source: Normalisation of the source.
-        target: Normalisation of the target.
     """
     matrix = body_map.observation_matrix * target.sigma / source.sigma[:, np.newaxis]
     seen = body_map.observation_matrix @ target.mean + body_map.observation_offset
@@ -157,13 +145,7 @@ class OutputMap(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PolicyOutputs:
-    """The output layers of a Gaussian policy.
-
-    Attributes:
-        mean: Mean of each action, before squashing.
-        log_std: Logarithm of its standard deviation. Where the mean is constant it is the mean of
-            those of the source.
-    """
+    """The output layers of a Gaussian policy."""
 
     mean: OutputMap
     log_std: OutputMap
@@ -174,11 +156,6 @@ def gaussian_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
 
     The map is in the units of the layouts, a_t = N a_s + d, and the outputs are in those of the
     models, a = middle + half y.
-
-    Args:
-        body_map: Map between the bodies.
-        source: The source model's action space.
-        target: The target model's action space.
     """
     ours = ActionScale.between(source, body_map.source_action)
     theirs = ActionScale.between(target, body_map.target_action)
@@ -198,14 +175,6 @@ def squashed_outputs(body_map: BodyMap, source: Box[Any], target: Box[Any]) -> P
 
     With u = tanh(mean) in [-1, 1] the action is middle + half u. Since tanh is odd, a sign can move
     inside, but no other scale.
-
-    Args:
-        body_map: Map between the bodies.
-        source: The source's action space, bounded.
-        target: The target's action space, bounded.
-
-    Raises:
-        TransplantError: If an action is copied at another scale than that of the ranges.
     """
     matrix = body_map.action_matrix
     signs, squashed = np.zeros_like(matrix), np.zeros(len(matrix))
@@ -245,11 +214,6 @@ def critic_actions(body_map: BodyMap, outputs: PolicyOutputs, source: Box[Any]) 
     of the same name represents it, or else their mean: both are exact for the policy's actions. A
     target action without an origin has no weight until trained, and a source action without a copy
     counts as the action 0.
-
-    Args:
-        body_map: Map between the bodies.
-        outputs: The squashed outputs of the same map.
-        source: The source's action space, bounded.
     """
     signs = outputs.mean.matrix
     source_names, target_names = _names(body_map.source_action), _names(body_map.target_action)
@@ -286,26 +250,14 @@ def _spread(matrix: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """The layers of a network that depend on the body.
-
-    Attributes:
-        inputs: Map of the inputs of a linear layer, by its name.
-        outputs: Map of the outputs of a linear layer, or of a vector of parameters, by its name. A
-            layer may have both, in a network without hidden layers.
-    """
+    """The layers of a network that depend on the body."""
 
     inputs: dict[str, Affine] = field(default_factory=dict[str, Affine])
     outputs: dict[str, OutputMap] = field(default_factory=dict[str, OutputMap])
 
 
 def first_linear(network: nn.Module, name: str, otherwise: Iterable[str] = ()) -> list[str]:
-    """Return the name of the first linear layer of a network, or other names if it has none.
-
-    Args:
-        network: The network.
-        name: Its name.
-        otherwise: The other names.
-    """
+    """Return the name of the first linear layer of a network, or other names if it has none."""
     for child, module in network.named_children():
         if isinstance(module, nn.Linear):
             return [f"{name}.{child}"]
@@ -316,15 +268,6 @@ def move_parameters(source: nn.Module, target: nn.Module, edges: Edges) -> dict[
     """Compute the parameters with which `target` computes what `source` computes.
 
     Everything is computed in float64 and stored as the source stores it.
-
-    Args:
-        source: The trained network.
-        target: A new network of the same architecture, in the shapes of the target; outputs to be
-            learned keep its parameters.
-        edges: The layers that change. All others are copied.
-
-    Raises:
-        TransplantError: If other parameters differ in shape.
     """
     trained, new = source.state_dict(), target.state_dict()
     moved = {name: tensor.detach().clone() for name, tensor in trained.items()}

@@ -93,12 +93,7 @@ def _undo_set_up(model: BaseAlgorithm, kept: dict[str, Any]) -> None:
 
 
 def check_supported(model: object) -> None:
-    """Refuse a model whose weights cannot be transplanted.
-
-    Raises:
-        TransplantError: If its policy is not the `MlpPolicy` of PPO, SAC or TQC, on flat
-            observations and with plain Gaussian exploration.
-    """
+    """Refuse a model whose weights cannot be transplanted."""
     problem = _problem(model)
     if problem:
         raise TransplantError(
