@@ -28,7 +28,6 @@ from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row, asked
 from benchmarks.vehicles import counted
 from shapechanger.cli.demos.train import Shrinking
-from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.learn import clone, learn
 from shapechanger.demos.cloning.policy import CameraPolicy
@@ -45,6 +44,7 @@ from shapechanger.vehicles.envs import VehicleEnv, WaypointEnv
 from shapechanger.vehicles.envs.demonstrators import CLONES
 from shapechanger.vehicles.envs.waypoints import waypoint_demonstrator
 from shapechanger.vehicles.remote.waypoints import RemoteWaypointEnv
+from shapechanger.vehicles.waypoint_demonstrations import CanonicalView, as_waypoints
 
 VEHICLES: Final = ("car", "tank", "truck")
 SEEDS: Final = 3

@@ -20,15 +20,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from shapechanger.cli.films import film_study, view_distance
-from shapechanger.cli.pictures import write_film
 from shapechanger.cli.transfer import Transfer
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.envs.study_films import film_study, view_distance
 from shapechanger.files import read_json
 from shapechanger.finger.controller import FingerController
 from shapechanger.finger.policies import POLICIES
 from shapechanger.policy import load_policy
+from shapechanger.reports.films import write_film
 from shapechanger.transfer.references import reference_policy
 from shapechanger.transfer.study import STUDY_FILE, Study
 from shapechanger.vehicles.courses.course import FLOODED

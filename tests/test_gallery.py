@@ -14,7 +14,7 @@ from imageio_ffmpeg import count_frames_and_secs
 
 from scripts.draw_pictures import CLIPS, PICTURES, STILLS, film_bodies, main
 from scripts.site_hooks import on_page_markdown
-from shapechanger.cli.pictures import require_film
+from shapechanger.reports.films import require_film
 
 GALLERY = PICTURES.parent / "gallery.md"
 

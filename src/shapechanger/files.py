@@ -67,6 +67,17 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"Cannot write to {folder}: {error.strerror or error}.") from error
 
 
+def require_file(path: Path) -> None:
+    """Check that a file can be written, and make its folder.
+
+    Raises:
+        OutputError: If the path is a folder, or its folder cannot be made or written to.
+    """
+    if path.is_dir():
+        raise OutputError(f"Cannot write {path}: it is a folder.")
+    make_folder(path.parent)
+
+
 def write_atomic(path: Path, content: bytes) -> None:
     """Write a file completely and flush it to disk, or leave the old one in place.
 

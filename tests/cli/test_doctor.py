@@ -43,7 +43,6 @@ def test_an_extra_that_is_not_installed_is_named_with_its_command() -> None:
 
 
 def test_versions_out_of_range_are_to_be_mended() -> None:
-    """A package that is too old or too new."""
     results = findings({"core-package": "1.9", "learner": "3.0"})
     assert results["core"].level == "bad"
     assert "core-package is 1.9 and not >=2" in results["core"].sentence
@@ -56,12 +55,10 @@ def test_packages_of_another_system_are_not_asked_for() -> None:
 
 
 def test_the_extra_of_all_is_not_listed() -> None:
-    """It only repeats the others."""
     assert "extra all" not in findings({"core-package": "2"})
 
 
 def test_pins_that_may_not_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The user is not in the group of the pins."""
     (tmp_path / "gpiochip0").touch()
     assert findings({}, tmp_path)["pins"].level == "good"
     monkeypatch.setattr("os.access", lambda path, mode: False)
@@ -89,7 +86,6 @@ def test_the_reason_of_a_renderer_is_passed_on(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.gl
 def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
-    """The development environment has all extras, and draws."""
     main(["doctor"])
     lines = capsys.readouterr().out.splitlines()
     assert any(
@@ -102,7 +98,6 @@ def test_this_machine_is_well(capsys: pytest.CaptureFixture[str]) -> None:
 def test_something_to_mend_is_an_exit_status(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Scripts can rely on it."""
     broken: list[Any] = [Finding("core", "bad", "Gone.")]
     monkeypatch.setattr("shapechanger.cli.doctor.examine_machine", lambda: broken)
     with pytest.raises(SystemExit) as stop:
@@ -112,6 +107,5 @@ def test_something_to_mend_is_an_exit_status(
 
 
 def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:
-    """`shapechanger --version`."""
     main(["--version"])
     assert capsys.readouterr().out == f"shapechanger {version('shapechanger')}\n"

@@ -34,7 +34,6 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 
 def test_list_names_every_env(capsys: pytest.CaptureFixture[str]) -> None:
-    """Each id of the catalogue is listed."""
     text = output_of(capsys, "envs", "list")
     assert all(env_id in text for env_id in (*CATALOGUE, *VEHICLE_ENVS))
 
@@ -49,7 +48,6 @@ def test_show_prints_the_layout_as_a_table(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_compare_prints_the_certificate(capsys: pytest.CaptureFixture[str]) -> None:
-    """The changes of the body, with values."""
     text = output_of(capsys, "envs", "compare", "Ant", "AmputatedAnt")
     assert "shank_4: length 0.5657 m -> 0.1414 m (x0.25)" in text
 
@@ -62,13 +60,11 @@ def test_compare_refuses_a_shift_that_changes_nothing(capsys: pytest.CaptureFixt
 
 
 def test_check_lists_each_promise(capsys: pytest.CaptureFixture[str]) -> None:
-    """Each check that passes is a line."""
     assert output_of(capsys, "envs", "check", "SmallInvertedPendulum").count("kept") == 7
 
 
 @pytest.mark.gl
 def test_render_writes_an_image(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """The PNG has the requested size."""
     out = tmp_path / "new" / "ant.png"
     output_of(
         capsys, "envs", "render", "Ant", "--out", str(out), "--width", "160", "--height", "120"
@@ -80,7 +76,6 @@ def test_render_writes_an_image(capsys: pytest.CaptureFixture[str], tmp_path: Pa
 def test_render_refuses_a_place_that_cannot_be_written(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """A file in place of a folder raises an error."""
     (tmp_path / "file").touch()
     out = str(tmp_path / "file" / "ant.png")
     assert "Cannot write" in refused(capsys, "envs", "render", "Ant", "--out", out)
@@ -99,7 +94,6 @@ class Bracketed(gym.Env[np.ndarray, np.ndarray]):
 
 
 def test_names_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
-    """Names are not interpreted as markup."""
     gym.register("Bracketed-v0", Bracketed, disable_env_checker=True)
     try:
         text = output_of(capsys, "envs", "show", "Bracketed-v0")
@@ -149,7 +143,6 @@ def test_mistakes_give_one_sentence(
 
 
 def test_an_unknown_command_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
-    """The exit code is 2."""
     assert "compare" in refused(capsys, "envs", "shwo")
     assert "transfer" in refused(capsys, "trasnfer")
 

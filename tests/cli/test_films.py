@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shapechanger.cli.env_arguments import driven, env_ref
-from shapechanger.cli.films import film_study
+from shapechanger.envs.study_films import film_study
 from shapechanger.transfer.executor import Serial
 from shapechanger.transfer.learners.presets import learner_settings, resolve_learner
 from shapechanger.transfer.plan import TransferTask
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 @pytest.fixture(autouse=True)
 def short_films(monkeypatch: pytest.MonkeyPatch) -> None:
     """Films of half a second."""
-    monkeypatch.setattr("shapechanger.cli.films._FILM_S", 0.5)
+    monkeypatch.setattr("shapechanger.envs.study_films._FILM_S", 0.5)
 
 
 def test_every_policy_is_filmed(tmp_path: Path) -> None:

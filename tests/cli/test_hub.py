@@ -190,7 +190,6 @@ def test_the_hub_refuses(run: Run, hub: FakeHub, tmp_path: Path) -> None:
 
 
 def test_no_hub(environment: dict[str, str], tmp_path: Path) -> None:
-    """A Hub that cannot be reached."""
     with serve_hub() as gone:
         address = gone.address
     done = subprocess.run(
@@ -248,7 +247,6 @@ def test_files_that_are_refused(
 
 
 def test_a_cut_transfer(run: Run, hub: FakeHub, tmp_path: Path) -> None:
-    """A transfer that ends early is refused."""
     repository = hub.repositories["models/ada/x"] = Repository()
     content = POLICY.read_bytes()
     repository.commit({NAME: content, "shapechanger.json": listing({NAME: (len(content), ZERO)})})
@@ -287,7 +285,6 @@ def test_episodes_that_are_refused(
 
 
 def test_a_recording_that_is_too_large(run: Run, hub: FakeHub, tmp_path: Path) -> None:
-    """Nothing of it is fetched."""
     drive(tmp_path / "data", 3)
     assert run("demos", "push", tmp_path / "data", "ada/drive")[0] == 0
     hub.requests.clear()
@@ -300,7 +297,6 @@ def test_a_recording_that_is_too_large(run: Run, hub: FakeHub, tmp_path: Path) -
 def test_an_interrupted_pull_leaves_nothing(
     run: Run, hub: FakeHub, environment: dict[str, str], tmp_path: Path
 ) -> None:
-    """Ctrl-C during a transfer."""
     drive(tmp_path / "data", 3)
     assert run("demos", "push", tmp_path / "data", "ada/drive")[0] == 0
     hub.stalled.update(

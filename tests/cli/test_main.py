@@ -25,7 +25,6 @@ sys.meta_path.insert(0, CtrlC())
 
 @pytest.mark.parametrize("name", ["tyro", "shapechanger.cli.train", "mujoco"])
 def test_ctrl_c_while_loading_is_one_word(name: str) -> None:
-    """Exit code 130, no traceback."""
     code = INTERRUPTED.format(name=name) + COMMAND.format(arguments=["envs", "show", "Ant"])
     done = run_python(code)
     assert done.returncode == 130
@@ -33,7 +32,6 @@ def test_ctrl_c_while_loading_is_one_word(name: str) -> None:
 
 
 def test_ascii_output_replaces_missing_letters() -> None:
-    """Tables are ASCII, with question marks for missing characters."""
     arguments = ["envs", "show", "InvertedPendulum"]
     done = run_python(COMMAND.format(arguments=arguments), PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
@@ -76,7 +74,6 @@ def test_rendering_failures_give_one_sentence(
     tmp_path: os.PathLike[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """No traceback, and no abort by GLFW."""
     monkeypatch.chdir(tmp_path)
     done = run_python(COMMAND.format(arguments=arguments), **variables)
     assert done.returncode == 2, done.stderr
@@ -100,7 +97,6 @@ def test_a_missing_pygame_gives_one_sentence(tmp_path: os.PathLike[str]) -> None
 
 
 def test_an_option_that_is_given_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    """Only the last one would count."""
     with pytest.raises(SystemExit) as stop:
         main(["train", "Ant", "--set", "gamma=0.9", "--set", "n_epochs=5"])
     assert stop.value.code == 2
@@ -123,7 +119,6 @@ def test_an_option_that_is_given_twice_is_refused(capsys: pytest.CaptureFixture[
 def test_a_misspelt_command_has_a_nearest_spelling(
     capsys: pytest.CaptureFixture[str], arguments: list[str], hint: str
 ) -> None:
-    """Commands and subcommands alike are refused in one sentence."""
     with pytest.raises(SystemExit) as stopped:
         main(arguments)
     assert stopped.value.code == 2
@@ -168,7 +163,6 @@ def test_an_option_that_is_unknown_or_lacks_its_value_is_one_sentence(
 def test_flags_and_help_are_options(
     capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
-    """They take no value, and flags have a form with `no`."""
     with suppress(SystemExit):  # Help exits.
         main(arguments)
     said = capsys.readouterr()

@@ -61,7 +61,6 @@ def test_it_is_evaluated_in_any_body(policy: Path, capsys: pytest.CaptureFixture
 
 
 def test_it_is_exported_for_one_body(policy: Path, tmp_path: Path) -> None:
-    """The file has the layouts of the body that is named."""
     out = tmp_path / "ant.onnx"
     main(["policies", "export", str(policy), "--env", "ExtendedAnt", "--out", str(out)])
     card = OnnxPolicy(out).card
@@ -106,7 +105,6 @@ def test_mistakes_give_one_sentence(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Each is refused before anything is trained."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit):
         main([str(policy) if word == "POLICY" else word for word in command.split()])

@@ -79,7 +79,6 @@ def test_a_module_of_the_current_folder_is_found(
 
 
 def test_a_suite_finds_one_too(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The file of the suite names it."""
     (folder / "suite_method.py").write_text(METHOD)
     (folder / "mine.toml").write_text(
         "envs = ['Ant', 'BigAnt']\narms = ['scratch', 'suite_method:reluctant']\n"
@@ -126,7 +125,6 @@ gym.register("Wall-v0", Wall)
 def test_playing_says_why_an_episode_ended(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A vehicle gives the reason of its stop."""
     (folder / "wall.py").write_text(WALL)
     main(["play", "wall:Wall-v0", "--episodes", "2", "--out", "film.mp4"])
     output = capsys.readouterr().out

@@ -38,7 +38,6 @@ def test_a_card_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_clone_is_shown_and_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    """Clones are shown and listed like other policies."""
     main(["policies", "show", str(CLONES["car"])])
     output = capsys.readouterr().out
     assert "steering, throttle" in output
@@ -69,7 +68,6 @@ def test_a_zip_of_stable_baselines3_is_converted(
 
 @pytest.mark.parametrize("kind", [SAC, TQC])
 def test_zips_of_off_policy_learners_are_converted(kind: type[SAC], tmp_path: Path) -> None:
-    """The actions and the critics stay the same."""
     env = gym.make("shapechanger/InvertedPendulum-v1")
     networks = {"net_arch": {"pi": [8, 8], "qf": [8, 8]}}
     model = kind("MlpPolicy", env, seed=3, train_freq=4, buffer_size=100, policy_kwargs=networks)
@@ -111,7 +109,6 @@ def test_other_zips_are_refused(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """With one sentence, before a file is written."""
     make: Any = kind
     make("MlpPolicy", gym.make("InvertedPendulum-v5"), **arguments).save(tmp_path / "mine.zip")
     out = tmp_path / "mine.safetensors"
@@ -147,7 +144,6 @@ def test_unsuitable_policies_give_one_sentence(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """No file is written."""
     if arguments is not None:
         _zip(tmp_path / "mine.zip", **arguments)
     out = tmp_path / "mine.safetensors"
@@ -222,7 +218,6 @@ def test_clones_are_evaluated_and_played(
 def test_an_exported_policy_evaluates_the_same(
     trained: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In its own env and in another."""
     exported = trained.with_suffix(".onnx")
     main(["policies", "export", str(trained), "--out", str(exported)])
     capsys.readouterr()

@@ -10,7 +10,6 @@ from shapechanger.cli.console import StudyProgress
 
 
 def test_a_terminal_shows_a_bar_with_the_time_left() -> None:
-    """Completed runs, steps and remaining time."""
     screen = io.StringIO()
     console = Console(force_terminal=True, file=screen, width=120, legacy_windows=False)
     with StudyProgress({"scratch-0": 100, "scratch-1": 100}, console) as progress:
@@ -26,7 +25,6 @@ def test_a_terminal_shows_a_bar_with_the_time_left() -> None:
 
 
 def test_without_a_terminal_it_prints_lines() -> None:
-    """Lines have no control characters, and names are not markup."""
     file = io.StringIO()
     with StudyProgress({"[/x]": 100, "b": 300}, Console(file=file, markup=False)) as progress:
         progress("[/x]", 100, True)

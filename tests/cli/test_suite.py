@@ -112,7 +112,6 @@ def test_a_suite_is_one_command(complete_suite: tuple[Path, _Counting, str]) -> 
 
 
 def test_suite_json_matches_the_table(complete_suite: tuple[Path, _Counting, str]) -> None:
-    """suite.json has the values of each study."""
     out, _, output = complete_suite
     found = json.loads((out / "suite.json").read_text())
     assert [crossing["name"] for crossing in found] == _PAIRS
@@ -285,7 +284,6 @@ def test_a_suite_can_be_watched(
 def test_another_suite_in_the_folder_is_refused(
     complete_suite: tuple[Path, _Counting, str],
 ) -> None:
-    """One sentence, and no job is run."""
     counting = _Counting()
     code, _, errors = _run(complete_suite[0], counting, "--seed", "1")
     assert code == 2

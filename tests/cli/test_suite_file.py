@@ -14,7 +14,6 @@ from shapechanger.transfer.plan import TransferTask
 
 
 def test_an_unknown_suite_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    """The error lists the suites and suggests the nearest."""
     with pytest.raises(SystemExit) as stop:
         main(["suite", "run", "vehicle"])
     assert stop.value.code == 2
@@ -29,7 +28,6 @@ def _pairs(name: str) -> list[tuple[str, str, str]]:
 
 
 def test_the_shipped_suites_are_those_of_the_docs() -> None:
-    """The number of pairs in each shipped suite."""
     counts = {name: len(_pairs(name)) for name in shipped_suites()}
     assert counts == {
         "ants": 12,

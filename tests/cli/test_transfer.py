@@ -15,9 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from shapechanger.cli import main, pictures
+from shapechanger.cli import main
 from shapechanger.errors import OutputError
 from shapechanger.policy import load_policy
+from shapechanger.reports import films
 from tests.envs.own_robots import DOG
 
 pytestmark = pytest.mark.system
@@ -147,7 +148,6 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 
 def test_training_writes_a_policy_and_logs(trained: tuple[Path, str]) -> None:
-    """The policy file and TensorBoard logs exist."""
     policy, text = trained
     assert f"wrote {policy}" in text
     assert "train InvertedPendulum --steps 3072" in load_policy(policy).card.command
@@ -159,7 +159,6 @@ def test_training_writes_a_policy_and_logs(trained: tuple[Path, str]) -> None:
 def test_a_policy_is_played_in_its_body_and_in_another(
     trained: tuple[Path, str], env: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A film is written."""
     film = tmp_path / "film.mp4"
     main(["play", env, "--policy", str(trained[0]), "--max-steps", "5", "--out", str(film)])
     assert "episode 0: return" in capsys.readouterr().out
@@ -168,7 +167,6 @@ def test_a_policy_is_played_in_its_body_and_in_another(
 
 @pytest.mark.slow
 def test_a_given_source_policy_is_used(trained: tuple[Path, str], tmp_path: Path) -> None:
-    """No source policy is trained."""
     out = tmp_path / "study"
     arguments = ["--source-policy", str(trained[0]), "--steps", "3072", "--seeds", "2"]
     done = run("transfer", "InvertedPendulum", "BigInvertedPendulum", *arguments, "--out", str(out))
@@ -180,7 +178,6 @@ def test_a_given_source_policy_is_used(trained: tuple[Path, str], tmp_path: Path
 def test_another_study_in_the_folder_is_refused(
     quick: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
-    """Its runs are not counted as complete."""
     done = run(*QUICK, "--seed", "1", "--out", str(quick[0]))
     assert done.returncode == 2
     assert "holds another study" in done.stderr
@@ -188,7 +185,6 @@ def test_another_study_in_the_folder_is_refused(
 
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
-    """The error does not offer to resume."""
     (tmp_path / "file").touch()
     done = run(*QUICK, "--out", str(tmp_path / "file"))
     assert done.returncode == 2
@@ -200,7 +196,6 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
 def test_play_writes_a_film_without_a_display(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The return of the episode is printed."""
     film = tmp_path / "ant.mp4"
     main(["play", "Ant", "--max-steps", "5", "--out", str(film)])
     assert film.stat().st_size > 0
@@ -294,7 +289,6 @@ def test_a_file_where_a_folder_should_be_is_refused_before_the_work(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The error comes before training or playing."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     with pytest.raises(SystemExit) as stop:
@@ -310,15 +304,13 @@ def test_a_file_where_a_folder_should_be_is_refused_before_the_work(
 def test_only_the_first_line_of_an_encoder_error_is_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """FFmpeg appends its command and settings."""
-
     def fail(*arguments: object, **options: object) -> None:
         raise OSError("\nNo space left.\n\nFFMPEG COMMAND:\nffmpeg -y")
 
-    monkeypatch.setattr(pictures.iio, "imwrite", fail)
+    monkeypatch.setattr(films.iio, "imwrite", fail)
     film = tmp_path / "film.mp4"
     with pytest.raises(OutputError) as caught:
-        pictures.write_film([], film, 20.0)
+        films.write_film([], film, 20.0)
     assert str(caught.value) == f"Cannot write {film}: No space left."
 
 
@@ -349,7 +341,6 @@ main({arguments})
 def test_a_missing_extra_is_named_with_its_command(
     missing: str, extra: str, arguments: list[str]
 ) -> None:
-    """One sentence names the extra and its install command."""
     code = BLOCKED.format(names={missing}, arguments=arguments)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode != 0

@@ -89,7 +89,6 @@ def test_the_unit_of_an_actuator_does_not_change_learning(
 
 
 def test_a_range_that_is_not_symmetric_changes_only_rounding(tmp_path: Path) -> None:
-    """A motor that takes 0 to 255."""
     _, curve = _trained(tmp_path, "ppo-balance", "share", _UNITS["share"])
     policy, also = _trained(tmp_path, "ppo-balance", "bytes", _BYTES)
     for mine, theirs in zip(curve, also, strict=True):
@@ -141,7 +140,6 @@ def test_a_transplant_keeps_the_units_of_the_map(tmp_path: Path) -> None:
     seed=st.integers(0, 100),
 )
 def test_scales_are_inverse_and_stay_in_the_range(bounds: list[_Range], seed: int) -> None:
-    """The ends of a range are the ends of -1 to 1."""
     layout = Layout(tuple(Feature(f"a{i}", "N·m", *pair) for i, pair in enumerate(bounds)))
     space = gym.spaces.Box(
         layout.low.astype(np.float32), layout.high.astype(np.float32), dtype=np.float32
@@ -175,7 +173,6 @@ def test_scales_are_inverse_and_stay_in_the_range(bounds: list[_Range], seed: in
 def test_actions_without_a_known_range_are_refused(
     low: float, high: float, stated: _Range, sentence: str
 ) -> None:
-    """With the name of the action."""
     space = gym.spaces.Box(np.float32(low), np.float32(high), (1,), np.float32)
     with pytest.raises(SpaceMismatch, match=sentence):
         require_ranges("env", space, Layout((Feature("a", "1", *stated),)))

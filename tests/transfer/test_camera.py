@@ -18,7 +18,6 @@ from tests.transfer.studies import BIG
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_envs_without_a_demonstrator_are_refused(order: int) -> None:
-    """Envs without a camera or a demonstrator are refused when a study is planned."""
     task = TransferTask(*(LANE, BIG)[::order])
     with pytest.raises(
         StudyError, match=r"InvertedPendulum-v1 has no camera and no demonstrator, and cloning"

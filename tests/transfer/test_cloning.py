@@ -68,7 +68,6 @@ def test_demonstrations_pair_images_with_intended_actions() -> None:
 
 
 def test_fewer_demonstrations_are_the_first_of_more() -> None:
-    """A shorter recording is the start of a longer one."""
     more, fewer = (record_demonstrations(LANE, steps, 20, 3, _FRAMING) for steps in (50, 30))
     first = more.first(30)
     np.testing.assert_array_equal(first.pictures, fewer.pictures)
@@ -79,7 +78,6 @@ def test_fewer_demonstrations_are_the_first_of_more() -> None:
 
 
 def test_an_env_without_a_demonstrator_is_refused() -> None:
-    """The message names the env."""
     with pytest.raises(StudyError, match="BigInvertedPendulum-v1 has no demonstrator"):
         record_demonstrations(BIG, 10, 20, 3, _FRAMING)
 
@@ -110,7 +108,6 @@ def test_a_clone_improves_with_each_budget(tmp_path: Path) -> None:
 
 
 def test_only_the_last_budget_gives_the_same_clone(tmp_path: Path) -> None:
-    """The clone of a budget does not depend on earlier budgets."""
     _, found = _cloned(tmp_path, 60)
     _, last = _cloned(tmp_path, 60, only_last=True)
     assert [one.steps for one in last] == [0, 60]
@@ -118,7 +115,6 @@ def test_only_the_last_budget_gives_the_same_clone(tmp_path: Path) -> None:
 
 
 def test_a_clone_can_start_from_another(tmp_path: Path) -> None:
-    """The first evaluation is that of the start, which is not changed."""
     policy, found = _cloned(tmp_path)
     _, tuned = _cloned(tmp_path, 30, start=policy)
     assert tuned[0].mean_return == found[-1].mean_return
@@ -172,7 +168,6 @@ def test_demonstrations_are_recorded_once(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_clones_are_evaluated_on_held_out_courses() -> None:
-    """Evaluations are on held-out courses, with the settings' number of steps."""
     envs = _LEARNER.evaluation_envs(LANE)
     try:
         assert len(envs) == 2
@@ -206,7 +201,6 @@ def test_a_study_of_clones(finished: tuple[Study, Path]) -> None:
 
 
 def test_arms_learn_from_the_same_demonstrations(finished: tuple[Study, Path]) -> None:
-    """Each seed has one recording of the target and one of the source."""
     names = sorted(path.name for path in (finished[1] / "demonstrations").iterdir())
     assert names == ["scratch-0.npz", "scratch-1.npz", "source-0.npz", "source-1.npz"]
 
@@ -214,7 +208,6 @@ def test_arms_learn_from_the_same_demonstrations(finished: tuple[Study, Path]) -
 def test_a_study_that_was_killed_ends_with_the_same_numbers(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:
-    """Incomplete runs and recordings are repeated."""
     study, out = finished
     cut = tmp_path / "cut"
     shutil.copytree(out, cut)
@@ -231,7 +224,6 @@ def test_a_study_that_was_killed_ends_with_the_same_numbers(
 
 
 def test_the_report_of_a_study_of_clones(finished: tuple[Study, Path]) -> None:
-    """The report has the learner and the curves."""
     page = study_html(finished[0])
     assert "cloning" in page
     assert "tests/Lane-v0" in page
@@ -249,7 +241,6 @@ def test_settings_that_contradict_themselves_are_refused() -> None:
 
 
 def test_steps_are_rounded_up_to_a_budget() -> None:
-    """Steps are rounded up to a budget, or to the largest."""
     assert [TINY_CLONING.whole_updates(steps) for steps in (1, 30, 31, 120, 500)] == [
         30,
         30,

@@ -99,7 +99,6 @@ def test_each_env_gets_the_action_for_its_own_observation() -> None:
 
 
 def test_random_actions_come_from_the_seed() -> None:
-    """Equal seeds draw equal actions, within the space."""
     observations = np.zeros((4, 1))
     first = random_actions(Countdown().action_space, 1)(observations)
     np.testing.assert_array_equal(first, random_actions(Countdown().action_space, 1)(observations))
@@ -169,7 +168,6 @@ def test_a_fallen_runner_stands_still_for_the_rest() -> None:
     ["Ant", "HalfCheetah", "Hopper", "InvertedDoublePendulum", "InvertedPendulum", "Finger"],
 )
 def test_reward_terms_of_an_evaluation_add_up_to_its_return(name: str) -> None:
-    """Every reward term is counted, whatever its type."""
     env = gym.make(f"shapechanger/{name}-v1")
     result = evaluate(random_actions(env.action_space, 0), [env], 0)
     assert sum(result.terms.values()) == pytest.approx(result.mean_return, rel=1e-5)

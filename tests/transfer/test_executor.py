@@ -48,7 +48,6 @@ def test_jobs_wait_for_those_before_them(executor: Executor, tmp_path: Path) -> 
 
 
 def test_in_this_process_an_error_comes_back_as_it_was() -> None:
-    """For debugging, the error of a job is raised itself."""
     with pytest.raises(UnknownName, match="No thing matches 'this'"):
         Serial().run([Job("refuse", jobs.refuse, ())], lambda *_: None)
 
@@ -124,13 +123,11 @@ def test_a_script_without_a_guarded_start_is_reported(tmp_path: Path) -> None:
 
 
 def test_no_workers_are_refused() -> None:
-    """Zero workers are refused."""
     with pytest.raises(StudyError, match="at least one worker, got 0"):
         Processes(0)
 
 
 def test_processes_end_with_their_parent(tmp_path: Path) -> None:
-    """Workers end when their parent is killed."""
     pid_file = tmp_path / "pid"
     code = f"from tests.transfer import jobs; jobs.run_for_ever({str(pid_file)!r})"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}

@@ -78,12 +78,10 @@ def test_it_never_explores_more_than_a_new_policy() -> None:
 
 
 def test_a_new_policy_has_no_such_start() -> None:
-    """Nothing was reset."""
     assert _source(-4.0).card.start_log_std is None
 
 
 def test_evaluations_that_nobody_reads_are_left_out() -> None:
-    """The policy is the same without them."""
     learner = Sb3Learner("tiny", TINY)
     steps: list[int] = []
     seen = learner.train(SMALL, 96, 0, on_evaluation=lambda e: steps.append(e.steps))

@@ -70,7 +70,6 @@ def test_a_study_starts_from_a_given_clone(clone_file: Path, tmp_path: Path) -> 
 
 
 def test_a_study_resumes_with_its_planned_clone_only(clone_file: Path, tmp_path: Path) -> None:
-    """Another file than the planned one is refused."""
     other = tmp_path / "other.safetensors"
     CameraPolicy.load(clone_file).described(command="again").save(other)
     with pytest.raises(StudyError, match="not the one that this study was planned with"):
@@ -84,14 +83,12 @@ def test_a_clone_of_another_body_is_refused(clone_file: Path) -> None:
 
 
 def test_a_clone_of_the_same_env_with_other_arguments_is_refused(clone_file: Path) -> None:
-    """Other arguments of the env are another source."""
     slippery = msgspec.structs.replace(DRY, kwargs={"grip": 0.1})
     with pytest.raises(SpaceMismatch, match=r"the source is .*Dry-v1 \(grip=0\.1\)"):
         _plan(clone_file, task=TransferTask(slippery, ICY))
 
 
 def test_ppo_refuses_a_clone(clone_file: Path) -> None:
-    """The message names the learners that take it."""
     with pytest.raises(
         StudyError, match=r"dry\.safetensors is a clone, and tiny does not learn from pict"
     ):
@@ -99,7 +96,6 @@ def test_ppo_refuses_a_clone(clone_file: Path) -> None:
 
 
 def test_cloning_refuses_a_policy_of_ppo(ppo_file: Path) -> None:
-    """The message names the learner that trained it."""
     with pytest.raises(
         StudyError, match=r"pole\.safetensors was trained with tiny, and cloning starts"
     ):
@@ -107,7 +103,6 @@ def test_cloning_refuses_a_policy_of_ppo(ppo_file: Path) -> None:
 
 
 def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
-    """Clones that take other pictures are refused."""
     framing = Framing(height=10, width=20, top=0.0)
     settings = msgspec.structs.replace(
         QUICK_CLONING, clone=msgspec.structs.replace(QUICK_CLONING.clone, framing=framing)
@@ -118,7 +113,6 @@ def test_a_clone_with_another_framing_is_refused(clone_file: Path) -> None:
 
 @pytest.mark.parametrize("data", [{}, {"env": DRY.id, "arguments": {}}, {"env": 5}])
 def test_a_clone_without_provenance_is_refused(tmp_path: Path, data: dict[str, Any]) -> None:
-    """Clones without an env and demonstrated steps on the card are refused."""
     path = tmp_path / "found.safetensors"
     CameraPolicy.fresh(QUICK_CLONING.clone, 0).described(**data).save(path)
     with pytest.raises(StudyError, match=r"card of .*found\.safetensors lacks the demonstrations"):
@@ -126,7 +120,6 @@ def test_a_clone_without_provenance_is_refused(tmp_path: Path, data: dict[str, A
 
 
 def test_invalid_policy_files_are_refused(clone_file: Path, tmp_path: Path) -> None:
-    """Missing, foreign, truncated and damaged files are refused."""
     with pytest.raises(CorruptStudy, match=r"There is no policy file .*none\.safetensors"):
         _plan(tmp_path / "none.safetensors")
     (tmp_path / "text.safetensors").write_text("not at all")

@@ -116,7 +116,6 @@ def test_policies_round_trip(learner: str, tmp_path: Path) -> None:
 
 
 def test_a_file_alone_calls_no_function(tmp_path: Path) -> None:
-    """A file may not name a function to call."""
     policy, _, _ = trained(f"{HERE}:narrow_sac")
     path = tmp_path / "policy.safetensors"
     save_policy(policy, path)
@@ -162,7 +161,6 @@ def test_a_transplanted_policy_acts_as_the_source(learner: str) -> None:
 
 
 def test_a_transplanted_policy_is_kept_until_updates_start() -> None:
-    """Without updates the policy does not change."""
     policy, _, settings = trained("sac")
     assert isinstance(settings, OffPolicySettings)
     plan = tiny_plan(settings)
@@ -219,7 +217,6 @@ def test_a_file_of_settings(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_file_of_settings_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    """The message names the file."""
     path = tmp_path / "mine.toml"
     path.write_text(text)
     with pytest.raises(StudyError, match=words):
@@ -227,19 +224,16 @@ def test_a_wrong_file_of_settings_is_refused(tmp_path: Path, text: str, words: s
 
 
 def test_a_missing_file_of_settings_is_refused() -> None:
-    """The message lists the presets."""
     with pytest.raises(UnknownName, match="sac"):
         resolve_learner("none.toml", {})
 
 
 def test_a_function_that_builds_something_else_is_refused() -> None:
-    """The message names the returned type."""
     with pytest.raises(StudyError, match="returned str"):
         trained(f"{HERE}:not_a_model")
 
 
 def test_arguments_refused_by_a_class_give_one_sentence() -> None:
-    """Errors of the class become a StudyError."""
     _, settings = resolve_learner("stable_baselines3:A2C", {"learning_rate": "fast"})
     assert isinstance(settings, ImportedSettings)
     with pytest.raises(StudyError, match="A2C refuses its arguments"):
@@ -247,6 +241,5 @@ def test_arguments_refused_by_a_class_give_one_sentence() -> None:
 
 
 def test_a_training_that_diverges_is_refused() -> None:
-    """Weights of NaN raise a StudyError."""
     with pytest.raises(StudyError, match="diverged after"):
         trained(f"{HERE}:Unstable")

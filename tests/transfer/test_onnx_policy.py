@@ -47,7 +47,6 @@ def test_actions_are_those_of_pytorch(files: tuple[Path, Path]) -> None:
 
 
 def test_names_are_in_the_file(files: tuple[Path, Path]) -> None:
-    """The metadata has the names of the features and the card."""
     model = onnx.load(str(files[1]))
     facts = {entry.key: entry.value for entry in model.metadata_props}
     card = load_policy(files[0]).card
@@ -71,7 +70,6 @@ def test_it_runs_without_pytorch(files: tuple[Path, Path]) -> None:
 
 
 def test_other_observations_are_refused(files: tuple[Path, Path]) -> None:
-    """The message states the shape."""
     with pytest.raises(StudyError, match=r"shape \(n, 4\), got \(1, 5\)"):
         OnnxPolicy(files[1]).act(np.zeros((1, 5)))
 
@@ -80,7 +78,6 @@ def test_other_observations_are_refused(files: tuple[Path, Path]) -> None:
 def test_invalid_files_give_one_sentence(
     files: tuple[Path, Path], tmp_path: Path, how: str
 ) -> None:
-    """Missing, truncated and foreign files are refused in one sentence."""
     path = tmp_path / "mine.onnx"
     content = files[1].read_bytes()
     if how == "cut":
@@ -97,7 +94,6 @@ def test_invalid_files_give_one_sentence(
 
 
 def test_a_card_of_another_size_is_refused(files: tuple[Path, Path], tmp_path: Path) -> None:
-    """Layouts that do not fit the network are refused."""
     model = onnx.load(str(files[1]))
     for entry in model.metadata_props:
         if entry.key == "shapechanger":

@@ -124,6 +124,5 @@ def test_a_study_runs_with_a_learner_and_a_method_of_others(
 def test_methods_refuse_learners_without_what_they_need(
     arm: str, installed: None, tmp_path: Path
 ) -> None:
-    """Before anything is trained."""
     with pytest.raises(StudyError, match=f"{arm} needs .*: leave this arm out"):
         _study(tmp_path / "study", ("scratch", arm))

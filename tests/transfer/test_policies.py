@@ -23,7 +23,6 @@ from shapechanger.vehicles.envs.demonstrators import CLONES
 def test_trained_policies_and_clones_load_from_text_and_path(
     kind: type[str] | type[Path], tmp_path: Path
 ) -> None:
-    """Each has a card and acts on observations of its env."""
     trained = shapechanger.load_policy(kind(reference_policy("shapechanger/Ant-v1")))
     assert isinstance(trained, TrainedPolicy)
     seen = np.zeros((2, trained.card.observation.size))
@@ -51,7 +50,6 @@ def test_exported_policies_load_too(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_exported_clones_load_too(tmp_path: Path) -> None:
-    """A clone as ONNX acts as the clone."""
     pytest.importorskip("onnxruntime")
     pytest.importorskip("onnxscript")
     clone = CameraPolicy.load(CLONES["car"])
@@ -73,14 +71,12 @@ def test_a_policy_on_a_state_acts_on_states(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["no.safetensors", "no.onnx"])
 def test_a_missing_file_is_named(name: str) -> None:
-    """As for every kind."""
     with pytest.raises(CorruptStudy, match=r"no\."):
         shapechanger.load_policy(name)
 
 
 @pytest.mark.parametrize("name", ["x.safetensors", "x.onnx"])
 def test_something_else_is_refused(name: str, tmp_path: Path) -> None:
-    """With the reason."""
     (tmp_path / name).write_bytes(b"nothing")
     with pytest.raises(CorruptStudy, match="is not a policy"):
         shapechanger.load_policy(str(tmp_path / name))

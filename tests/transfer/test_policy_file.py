@@ -36,7 +36,6 @@ def trained(settings: PpoSettings, seed: int = 0) -> tuple[TrainedPolicy, list[E
 
 @pytest.mark.parametrize("settings", [TINY, TINY_NORMALISED], ids=["plain", "normalised"])
 def test_a_policy_round_trips(settings: PpoSettings, tmp_path: Path) -> None:
-    """Actions, statistics and card round trip."""
     policy, curve = trained(settings)
     save_policy(policy, tmp_path / "policy.safetensors")
     again = load_policy(tmp_path / "policy.safetensors")
@@ -62,7 +61,6 @@ def test_actions_are_those_of_the_model() -> None:
 
 
 def test_normalised_policies_take_plain_observations(tmp_path: Path) -> None:
-    """The policy normalises observations itself."""
     policy, _ = trained(TINY_NORMALISED)
     assert policy.normalisation is not None
     near, far = policy.act(np.zeros((1, 4))), policy.act(np.full((1, 4), 0.05))
@@ -70,7 +68,6 @@ def test_normalised_policies_take_plain_observations(tmp_path: Path) -> None:
 
 
 def test_the_seed_decides_the_training() -> None:
-    """Equal seeds give equal weights."""
     observations = np.random.default_rng(0).normal(size=(5, 4))
     first, again, other = (trained(TINY, seed)[0].act(observations) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
@@ -79,7 +76,6 @@ def test_the_seed_decides_the_training() -> None:
 
 @pytest.mark.parametrize("kind", ["missing", "text", "zip"])
 def test_invalid_files_are_refused(tmp_path: Path, kind: str) -> None:
-    """A missing file, a text and a zip are refused."""
     path = tmp_path / "policy.safetensors"
     if kind == "text":
         path.write_text("not a policy")
@@ -95,7 +91,6 @@ SHIPPED = Path(shapechanger.__file__).parent / "vehicles" / "envs"
 
 @pytest.mark.parametrize("path", POLICIES.values(), ids=POLICIES)
 def test_shipped_policies_load(path: Path) -> None:
-    """Actions of the shipped policies are within the bounds."""
     policy = load_policy(path)
     seen = np.random.default_rng(0).normal(size=(3, policy.card.observation.size))
     assert np.abs(policy.act(seen)).max() <= 1.0
@@ -103,12 +98,10 @@ def test_shipped_policies_load(path: Path) -> None:
 
 @pytest.mark.parametrize("path", sorted(SHIPPED.glob("clones/*.safetensors")), ids=lambda p: p.stem)
 def test_shipped_clones_load(path: Path) -> None:
-    """Shipped clones load without unpickling."""
     assert CameraPolicy.load(path).card.framing.width > 0
 
 
 def test_loading_leaves_random_numbers_alone() -> None:
-    """Loading keeps the states of all random generators."""
     random.seed(5)
     before = random.getstate()
     load_policy(POLICIES["reach"])
@@ -117,7 +110,6 @@ def test_loading_leaves_random_numbers_alone() -> None:
 
 @pytest.mark.parametrize("at", [3, 200, -1])
 def test_a_changed_file_is_refused(at: int, tmp_path: Path) -> None:
-    """Changes of the length, the header or the numbers are refused."""
     content = bytearray(POLICIES["reach"].read_bytes())
     content[at] ^= 0x01
     (tmp_path / "bad.safetensors").write_bytes(content)
@@ -134,7 +126,6 @@ def test_a_changed_card_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_truncated_file_is_refused(tmp_path: Path) -> None:
-    """Any truncation raises a PolicyError."""
     content = POLICIES["reach"].read_bytes()
     for size in (0, 4, 500, len(content) - 1):
         (tmp_path / "half.safetensors").write_bytes(content[:size])
@@ -154,7 +145,6 @@ def _changed(tmp_path: Path, card: dict[str, Any]) -> Path:
 
 
 def test_a_card_of_another_body_is_refused(tmp_path: Path) -> None:
-    """Layouts must have the sizes of the spaces."""
     card = load_policy(POLICIES["track"]).card
     path = _changed(tmp_path, {"observation": msgspec.to_builtins(card.observation)})
     with pytest.raises(CorruptStudy, match="its observation has 38 numbers, and its layout"):
@@ -162,7 +152,6 @@ def test_a_card_of_another_body_is_refused(tmp_path: Path) -> None:
 
 
 def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
-    """Weights of other shapes are refused in one sentence."""
     settings = msgspec.structs.replace(load_policy(POLICIES["reach"]).card.settings, net_arch=(8,))
     path = _changed(tmp_path, {"settings": msgspec.to_builtins(settings)})
     with pytest.raises(CorruptStudy, match=r"other\.safetensors is not a policy") as refusal:

@@ -78,7 +78,6 @@ def test_a_study_has_the_numbers_of_this_machine(cluster: Any, tmp_path: Path) -
 
 @pytest.mark.slow
 def test_a_job_of_a_killed_node_is_done_on_another(cluster: Any, tmp_path: Path) -> None:
-    """A job whose node is killed is repeated on another."""
     doomed = cluster.add_node(num_cpus=1, object_store_memory=_MEMORY)
     marks = [tmp_path / f"job-{i}" for i in range(2)]
     killed, since = False, 0
@@ -140,14 +139,12 @@ def test_a_failed_job_is_reported_and_others_continue(cluster: Any, tmp_path: Pa
     ],
 )
 def test_an_address_that_does_not_answer_is_one_sentence(address: str, words: str) -> None:
-    """An address without an answer is refused, and not waited for."""
     with pytest.raises(StudyError, match=re.escape(words)):
         RayCluster(address).run([], lambda *_: None)
 
 
 @pytest.mark.timeout(60)
 def test_what_listens_but_is_no_ray_is_one_sentence() -> None:
-    """Another program at the address is refused."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         with pytest.raises(StudyError, match="does not answer"):

@@ -16,7 +16,6 @@ REFERENCES = load_references()
 
 
 def test_every_env_of_the_catalogue_has_one() -> None:
-    """Every env has a reference with a policy, and every policy a reference."""
     assert set(REFERENCES) == set(CATALOGUE)
     assert {path for path in FOLDER.glob("*.safetensors")} == {
         reference_policy(env) for env in REFERENCES
@@ -53,7 +52,6 @@ def test_a_policy_has_the_skill_of_its_numbers(env_id: str) -> None:
 
 
 def test_other_bodies_have_none() -> None:
-    """Envs with arguments have no reference."""
     assert reference_of(EnvRef("shapechanger/Ant-v1")) is not None
     assert reference_of(EnvRef("shapechanger/Ant-v1", {"body": "BigAnt"})) is None
     assert reference_of(EnvRef("Ant-v5")) is None

@@ -40,7 +40,6 @@ def test_some_settings_change_and_others_stay() -> None:
 def test_wrong_settings_are_refused(
     changed: dict[str, Any], kind: type[Exception], words: str
 ) -> None:
-    """The message names the setting."""
     with pytest.raises(kind, match=words):
         resolve_learner("ppo-run", changed)
 
@@ -55,7 +54,6 @@ def test_wrong_settings_are_refused(
     ],
 )
 def test_a_wrong_file_has_a_line(text: str, words: str, tmp_path: Path) -> None:
-    """Where the message is about one of its lines."""
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(StudyError, match=words):
         resolve_learner(str(tmp_path / "mine.toml"), {})

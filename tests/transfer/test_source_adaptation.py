@@ -59,7 +59,6 @@ def test_every_arm_is_evaluated(study: tuple[Study, Path, list[Any]]) -> None:
 
 
 def test_each_seed_has_another_target(study: tuple[Study, Path, list[Any]]) -> None:
-    """Each seed has another finger as its target."""
     made, _, moved = study
     assert made.plan.individual == "finger_seed"
     fingers = [made.plan.target_of(Run("zero-shot", i)).kwargs["finger_seed"] for i in range(2)]
@@ -101,7 +100,6 @@ def test_success_is_reported(study: tuple[Study, Path, list[Any]]) -> None:
 def test_a_failed_study_keeps_finished_runs(
     study: tuple[Study, Path, list[Any]],
 ) -> None:
-    """Finished runs are kept when a later one fails."""
     made, out, moved = study
     before = len(moved)
     again = run_study(made.plan, out, executor=Serial())
@@ -150,7 +148,6 @@ def test_default_arms() -> None:
 
 
 def test_a_target_that_cannot_adapt_its_source_is_refused() -> None:
-    """It is refused when the study is planned."""
     with pytest.raises(StudyError, match=r"identified needs a target that can adapt"):
         tiny_plan(arms=("scratch", "identified"))
 
@@ -162,7 +159,6 @@ def test_only_what_is_needed_is_trained() -> None:
 
 
 def test_an_exclusive_env_is_used_by_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The plan of an exclusive env says so."""
     task = TransferTask(FINGER, REAL_LIKE)
     assert not tiny_plan(task=task).exclusive
     monkeypatch.setattr(FingerReachEnv, "exclusive", True, raising=False)

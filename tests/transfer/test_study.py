@@ -78,7 +78,6 @@ def test_zero_shot_is_where_fine_tuning_starts(finished: tuple[Study, Path]) -> 
 
 
 def test_the_study_file_reads_back(finished: tuple[Study, Path]) -> None:
-    """study.json round trips."""
     study, out = finished
     assert read_json(out / STUDY_FILE, Study, "") == study
     assert json.loads((out / STUDY_FILE).read_text())["command"] == "test"
@@ -95,21 +94,18 @@ def test_curves_are_written_as_they_grow(finished: tuple[Study, Path]) -> None:
 
 
 def test_seeds_make_different_runs(finished: tuple[Study, Path]) -> None:
-    """No two runs share a seed."""
     study, _ = finished
     seeds = [result.seed for result in study.runs]
     assert len(set(seeds)) == len(seeds)
 
 
 def test_studies_are_reproducible(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """Equal plans give equal numbers."""
     again = run_study(tiny_plan(), tmp_path / "again", executor=Serial())
     assert curves(again) == curves(finished[0])
     assert again.summaries == finished[0].summaries
 
 
 def test_incomplete_runs_are_repeated(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """The numbers are the same."""
     study, out = finished
     cut = tmp_path / "cut"
     shutil.copytree(out, cut)
@@ -125,7 +121,6 @@ def test_incomplete_runs_are_repeated(finished: tuple[Study, Path], tmp_path: Pa
 
 
 def test_a_finished_study_runs_nothing(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """A complete study is only summarised again."""
     study, out = finished[0], tmp_path / "study"
     shutil.copytree(finished[1], out)
     before = (out / "runs" / "scratch-0" / "run.json").stat().st_mtime_ns
@@ -146,7 +141,6 @@ def test_normalised_learners_carry_their_statistics(tmp_path: Path) -> None:
 
 
 def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
-    """Ant to ExtendedAnt, whose spaces differ."""
     task = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
     plan = tiny_plan(
         TINY_NORMALISED, task=task, rules={"foot_*/motor": "copy ankle_*/motor"}, steps=32
@@ -160,7 +154,6 @@ def test_ants_of_different_spaces_can_be_studied(tmp_path: Path) -> None:
 
 
 def test_a_source_policy_can_be_given(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """With a given policy no source is trained, and every seed starts from it."""
     policy = Run("source", 0).policy_file(finished[1])
     plan = tiny_plan(source_policy=policy)
     study = run_study(plan, tmp_path / "study", source_policy=policy, executor=Serial())
@@ -178,7 +171,6 @@ def test_a_source_policy_can_be_given(finished: tuple[Study, Path], tmp_path: Pa
 
 
 def test_a_policy_of_another_body_is_refused(finished: tuple[Study, Path]) -> None:
-    """A policy of another env is refused as the source policy."""
     ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/BigAnt-v1"))
     policy = Run("source", 0).policy_file(finished[1])
     with pytest.raises(SpaceMismatch, match=r"was trained in .*Small.*the source is .*/Ant"):
@@ -193,14 +185,12 @@ def test_a_shift_that_changes_nothing_is_refused(tmp_path: Path) -> None:
 
 
 def test_spaces_that_cannot_be_mapped_are_refused() -> None:
-    """Bodies without a common name are refused."""
     with pytest.raises(MapError, match="cannot be mapped"):
         tiny_plan(task=TransferTask(SMALL, EnvRef("shapechanger/Ant-v1")))
 
 
 @pytest.mark.parametrize("steps", [1, 31])
 def test_a_budget_below_one_evaluation_is_refused(steps: int) -> None:
-    """The message states the smallest budget."""
     with pytest.raises(
         StudyError, match=f"{steps} target steps is smaller than one evaluation.*32"
     ):
@@ -217,7 +207,6 @@ def test_the_default_of_the_source_is_named_where_it_is_too_small() -> None:
 
 
 def test_one_seed_is_refused() -> None:
-    """A study needs two seeds."""
     with pytest.raises(StudyError, match="at least 2 seeds"):
         tiny_plan(seeds=1)
 
@@ -230,7 +219,6 @@ def test_a_seed_of_a_study_fits_every_generator(seed: Any) -> None:
 
 
 def test_unknown_arms_and_scratch_left_out_are_refused() -> None:
-    """Unknown arms, and studies without scratch, are refused."""
     with pytest.raises(UnknownName, match="'fine-tune'"):
         tiny_plan(arms=("scratch", "fine-tun"))
     with pytest.raises(StudyError, match="named once"):
@@ -247,7 +235,6 @@ def test_a_measure_is_one_of_the_target() -> None:
 
 
 def test_unknown_envs_are_refused() -> None:
-    """The message lists the known envs."""
     with pytest.raises(UnknownName, match="shapechanger/BigAnt-v1"):
         tiny_plan(task=TransferTask(EnvRef("shapechanger/BigAnd-v1"), BIG))
 
@@ -262,7 +249,6 @@ def test_a_folder_of_another_study_is_refused(finished: tuple[Study, Path], tmp_
 
 
 def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
-    """A folder with other files is refused."""
     (tmp_path / "thesis.tex").write_text("precious")
     with pytest.raises(ForeignStudy, match="holds other files"):
         run_study(tiny_plan(), tmp_path, executor=Serial())
@@ -272,7 +258,6 @@ def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
 def test_a_policy_that_was_deleted_is_made_again(
     finished: tuple[Study, Path], tmp_path: Path
 ) -> None:
-    """A run whose policy is missing is repeated."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     (out / "runs" / "source-1" / "policy.safetensors").unlink()
@@ -303,7 +288,6 @@ def test_runs_of_a_robot_wait_for_one_another(tmp_path: Path) -> None:
 def test_a_result_that_is_not_the_runs_own_is_refused(
     finished: tuple[Study, Path], tmp_path: Path, how: str
 ) -> None:
-    """The result of another run, or a truncated one, is refused with the remedy."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     path = out / "runs" / "scratch-0" / "run.json"
@@ -318,7 +302,6 @@ def test_a_result_that_is_not_the_runs_own_is_refused(
 
 
 def test_other_versions_are_another_study(finished: tuple[Study, Path], tmp_path: Path) -> None:
-    """A study cannot be resumed with other versions of packages."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     plan = tiny_plan()
@@ -331,7 +314,6 @@ def test_other_versions_are_another_study(finished: tuple[Study, Path], tmp_path
 def test_a_corrupt_file_is_named_and_nothing_is_lost(
     finished: tuple[Study, Path], tmp_path: Path, name: str
 ) -> None:
-    """A corrupt file is refused before anything is written."""
     out = tmp_path / "study"
     shutil.copytree(finished[1], out)
     (out / name).write_text('{"not": "it"')
@@ -342,7 +324,6 @@ def test_a_corrupt_file_is_named_and_nothing_is_lost(
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
-    """A file in place of the folder is refused and kept."""
     (tmp_path / "file").write_text("here")
     with pytest.raises(OutputError, match="Cannot write to"):
         run_study(tiny_plan(), tmp_path / "file" / "study", executor=Serial())
@@ -371,14 +352,12 @@ def test_a_full_disk_loses_nothing(
 
 
 def test_a_study_of_an_env_without_layouts_is_refused() -> None:
-    """Envs without layouts are refused."""
     bare = EnvRef("CartPole-v1")
     with pytest.raises(Exception, match="publishes no observation_layout"):
         tiny_plan(task=TransferTask(bare, BIG))
 
 
 def test_evaluations_are_not_more_frequent_than_updates(finished: tuple[Study, Path]) -> None:
-    """Such settings are refused."""
     with pytest.raises(StudyError, match="more often than an update"):
         msgspec.structs.replace(TINY, eval_every=31)
     with pytest.raises(StudyError, match="at least one env"):
@@ -401,7 +380,6 @@ class Misnamed(gym.Env[Any, Any]):
 def test_a_layout_that_does_not_fit_its_space_is_refused(
     order: int, kwargs: dict[str, Any]
 ) -> None:
-    """It is refused when the study is planned."""
     gym.register("tests/Misnamed-v0", Misnamed)
     try:
         task = TransferTask(*(SMALL, EnvRef("tests/Misnamed-v0", kwargs))[::order])
@@ -412,7 +390,6 @@ def test_a_layout_that_does_not_fit_its_space_is_refused(
 
 
 def test_an_argument_refused_by_a_foreign_env_is_named() -> None:
-    """A TypeError of a constructor becomes a StudyError."""
     with pytest.raises(StudyError, match=r"CartPole-v1 cannot be made with these opt.*'colour'"):
         EnvRef("CartPole-v1", {"colour": "red"}).make()
 
@@ -434,14 +411,12 @@ def test_an_env_that_fails_in_the_rollout_is_refused() -> None:
 
 
 def test_an_argument_that_does_not_exist_is_refused() -> None:
-    """The envs of the package refuse unknown arguments."""
     task = TransferTask(EnvRef(SMALL.id, {"colour": "red"}), BIG)
     with pytest.raises(UnknownName, match="No argument of InvertedPendulum matches 'colour'"):
         tiny_plan(task=task)
 
 
 def test_each_env_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planning and certifying share one instance of each env."""
     made: list[str] = []
     make = EnvRef.make
 

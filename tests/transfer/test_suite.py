@@ -104,7 +104,6 @@ def _requested(plan: Plan, out: Path) -> set[str]:
 
 
 def test_runs_of_a_source_are_shared(out: Path) -> None:
-    """Studies of one source share its policies and demonstrations."""
     plan = _plan(DRY, ICY)
     assert _requested(plan, out) == _names(
         "random", "zero-action", "scratch", "zero-shot", "fine-tune"
@@ -135,18 +134,15 @@ def test_runs_of_a_target_are_shared(out: Path) -> None:
 
 
 def test_nothing_is_shared_by_studies_of_other_bodies(out: Path) -> None:
-    """Studies with another source and target share nothing."""
     assert _requested(_plan(WET, DRY), out) == _names(*_KINDS)
 
 
 @pytest.mark.parametrize("differs", [{"seed": 1}, {"steps": 20}, {"source_steps": 40}])
 def test_studies_with_other_plans_share_nothing(out: Path, differs: dict[str, int]) -> None:
-    """Studies with other seeds or budgets share nothing."""
     assert _requested(_plan(DRY, ICY, **differs), out) == _names(*_KINDS)
 
 
 def test_more_seeds_add_to_those_that_are_done(out: Path) -> None:
-    """With more seeds, finished runs are reused."""
     assert _requested(_plan(DRY, WET, seeds=3), out) == {
         f"{kind}-2" for kind in _KINDS if kind != "zero-action"
     }
@@ -157,14 +153,12 @@ def test_more_seeds_add_to_those_that_are_done(out: Path) -> None:
 
 
 def test_studies_of_other_versions_share_nothing(out: Path) -> None:
-    """Versions of packages are part of the plan."""
     plan = _plan(DRY, ICY)
     other = msgspec.structs.replace(plan, versions={**plan.versions, "torch": "0.1"})
     assert _requested(other, out) == _names(*_KINDS)
 
 
 def test_incomplete_runs_are_not_shared(out: Path) -> None:
-    """They are repeated."""
     (out / "Dry-to-Wet" / "runs" / "source-1" / "run.json").unlink()
     assert _requested(_plan(DRY, ICY), out) & _names("source") == {"source-1"}
 
@@ -203,14 +197,12 @@ def test_partial_copies_are_removed(out: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_an_unreadable_study_is_named(out: Path) -> None:
-    """A corrupt study of the suite is named with the remedy."""
     (out / "Dry-to-Wet" / "plan.json").write_text('{"half": ')
     with pytest.raises(CorruptStudy, match=r"to-Wet/plan\.json .*delete .*to-Wet to repeat"):
         _run(_plan(DRY, ICY), out, executor=_Recording(refuses=True))
 
 
 def test_a_folder_of_another_study_is_refused(out: Path) -> None:
-    """The seed differs."""
     before = files_of(out)
     with pytest.raises(ForeignStudy, match="differs in seed"):
         _run(_plan(DRY, WET, seed=1), out, executor=Serial())
@@ -233,7 +225,6 @@ def _crossing(
 
 
 def test_a_crossing_is_found_along_a_line() -> None:
-    """Crossings are interpolated between evaluations of the mean."""
     found = _crossing(np.array([0.0, 500.0, 1500.0, *[900.0] * 8]))
     assert list(found.gains) == ["jumpstart", "total_reward_gain", "asymptotic_gain"]
     assert found.gains["jumpstart"].value is not None
@@ -258,14 +249,12 @@ def test_scratch_may_come_to_its_end_before_it() -> None:
 
 
 def test_a_policy_that_is_as_good_at_once_needs_no_step() -> None:
-    """A policy that starts above the level needs 0 steps."""
     found = _crossing(np.full(11, 1200.0))
     assert found.arm_steps == 0.0
     assert found.halves
 
 
 def test_never_reaching_the_level_does_not_count() -> None:
-    """Fine-tuning that never reaches the level has no steps."""
     found = _crossing(np.full(11, 400.0))
     assert found.arm_steps is None
     assert not found.halves
@@ -280,7 +269,6 @@ def test_exactly_half_does_not_count() -> None:
 
 
 def test_zero_shot_may_be_left_out() -> None:
-    """Without that arm its value is None."""
     assert study_outcome("first", make_study(arms=("scratch", "fine-tune"))).zero_shot is None
     assert study_outcome("second", make_study()).zero_shot is not None
 

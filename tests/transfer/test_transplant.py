@@ -258,7 +258,6 @@ def test_the_transplanted_policy_does_the_same(
 
 @each_class
 def test_the_identity_changes_no_bit(kind: type[Model]) -> None:
-    """The identity map keeps all parameters bitwise."""
     source = trained(kind, MAPS["identity"], normalised=True)
     env = envs(ant_observation(), ant_action(), normalised=True)
     target = transplant(source, MAPS["identity"], env)
@@ -270,7 +269,6 @@ def test_the_identity_changes_no_bit(kind: type[Model]) -> None:
 
 @each_class
 def test_there_and_back_is_bitwise_identical(kind: type[Model]) -> None:
-    """To an ant with feet and back keeps all parameters bitwise."""
     there = MAPS["growth"]
     source = trained(kind, there, normalised=True)
     away = transplant(
@@ -328,7 +326,6 @@ def test_new_inputs_can_be_trained(kind: type[Model]) -> None:
 @pytest.mark.parametrize("net_arch", [([16], [16]), ([], [])], ids=["[16]", "[]"])
 @each_class
 def test_learned_actions_have_fresh_weights(kind: type[Model], net_arch: Any) -> None:
-    """Learned actions have the weights of an untrained policy of the seed."""
     body_map = ant_map(False, True, rules={"foot_*": "learn"})
     source = trained(kind, body_map, net_arch, policy={"log_std_init": -1.5})
 
@@ -349,7 +346,6 @@ def test_learned_actions_have_fresh_weights(kind: type[Model], net_arch: Any) ->
 
 
 def test_constant_actions_are_explored() -> None:
-    """A held action has its constant as mean and the mean spread of the others."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     places = body_map.target_action.slices
@@ -372,7 +368,6 @@ def test_constant_actions_are_explored() -> None:
 
 
 def test_a_constant_at_the_bound_is_finite() -> None:
-    """A constant at the bound of SAC gives finite weights."""
     body_map = ant_map(False, True, rules={"foot_*": Hold(1.0)})
     env = envs(body_map.target_observation, body_map.target_action)
     target = transplant(trained(SAC, body_map), body_map, env)
@@ -381,7 +376,6 @@ def test_a_constant_at_the_bound_is_finite() -> None:
 
 
 def test_ppo_scales_its_actions_and_their_spread() -> None:
-    """A scale of PPO's action scales mean and standard deviation."""
     body_map = BodyMap.between(
         pendulum_observation(),
         pendulum_observation(),
@@ -399,7 +393,6 @@ def test_ppo_scales_its_actions_and_their_spread() -> None:
 
 @pytest.mark.parametrize(("low", "high"), [(-0.5, 0.5), (-1.0, 3.0)])
 def test_sac_cannot_scale_or_shift_its_actions(low: float, high: float) -> None:
-    """Scales and shifts are refused for SAC, because of tanh."""
     wide = Layout((Feature("slide/motor", "1", low, high, gain=100.0, gain_unit="N"),))
     sensing = pendulum_observation(), pendulum_observation()
     body_map = BodyMap.between(*sensing, pendulum_action(), wide)
@@ -486,7 +479,6 @@ def test_statistics_go_with_their_names() -> None:
 
 
 def test_a_constant_is_clipped_like_any_number() -> None:
-    """A constant number is clipped after its normalisation."""
     body_map = MAPS["shrink"]
     source = trained(PPO, body_map, normalised=True)
     normalize = source.get_vec_normalize_env()
@@ -527,7 +519,6 @@ def test_statistics_can_be_folded_into_the_weights(kind: type[Model]) -> None:
 
 
 def test_statistics_can_be_named_for_a_model_without_an_env(tmp_path: Any) -> None:
-    """The normalisation can be given for a model without its env."""
     body_map = MAPS["growth"]
     source = trained(PPO, body_map, normalised=True)
     source.save(tmp_path / "model")
@@ -600,7 +591,6 @@ def test_settings_are_kept_or_changed() -> None:
 
 
 def test_the_entropy_coefficient_is_moved() -> None:
-    """The coefficient moves whether it is learned or constant."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     source = trained(SAC, body_map, ent_coef="auto_0.1")
@@ -616,7 +606,6 @@ def test_the_entropy_coefficient_is_moved() -> None:
 
 
 def test_action_noise_is_not_guessed() -> None:
-    """A source with action noise needs an explicit noise."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     noise = NormalActionNoise(np.zeros(8), np.ones(8))
@@ -645,14 +634,12 @@ def test_a_transplanted_model_can_be_trained(kind: type[Model]) -> None:
 
 
 def test_a_plain_env_is_accepted() -> None:
-    """An env that is not vectorised is accepted."""
     body_map = MAPS["growth"]
     env = Box(body_map.target_observation, body_map.target_action)
     assert transplant(trained(PPO, body_map), body_map, env, device="cpu").n_envs == 1
 
 
 def test_activations_with_parameters_are_copied() -> None:
-    """Parameters between first and last layer are copied."""
     body_map = MAPS["growth"]
     source = trained(PPO, body_map, policy={"activation_fn": nn.PReLU})
     source.policy.double()
@@ -661,7 +648,6 @@ def test_activations_with_parameters_are_copied() -> None:
 
 
 def test_feature_extractors_need_not_be_shared() -> None:
-    """Separate flattening extractors are accepted."""
     body_map = MAPS["growth"]
     env = envs(body_map.target_observation, body_map.target_action)
     for kind, share in ((PPO, False), (SAC, True)):
@@ -723,7 +709,6 @@ def test_other_policies_are_refused(make: Callable[[BodyMap], Any], message: str
 
 
 def test_unknown_parameters_are_refused() -> None:
-    """Other parameters that depend on the body are refused."""
     body_map = MAPS["identity"]
     source = trained(PPO, body_map)
     source.policy.extra = Extra(3)
@@ -733,7 +718,6 @@ def test_unknown_parameters_are_refused() -> None:
 
 @pytest.mark.parametrize("wrong", ["source", "target"])
 def test_spaces_must_be_those_of_the_map(wrong: str) -> None:
-    """A map for other bodies is refused."""
     there, stay = MAPS["growth"], MAPS["identity"]
     source = trained(PPO, stay)
     with pytest.raises(SpaceMismatch, match=f"layout of the {wrong} observation has 59"):
@@ -745,7 +729,6 @@ def test_spaces_must_be_those_of_the_map(wrong: str) -> None:
 
 
 def test_without_torch_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The message has the command that installs the extra."""
     spec = importlib.util.find_spec("shapechanger.transfer.transplant")
     assert spec is not None
     assert spec.loader is not None

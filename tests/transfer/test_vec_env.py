@@ -50,7 +50,6 @@ def test_results_equal_those_of_sb3(env_id: str, threads: int) -> None:
 
 
 def test_options_are_each_envs_own() -> None:
-    """Options are per env and used once."""
     ours, theirs = _pair("shapechanger/Ant-v1", 2)
     for one in (ours, theirs):
         one.seed(1)
@@ -63,7 +62,6 @@ def test_options_are_each_envs_own() -> None:
 
 
 def test_envs_are_reached_one_by_one() -> None:
-    """Attributes and methods of single envs can be reached."""
     ours, theirs = _pair(_PENDULUM, 1)
     for one in (ours, theirs):
         one.set_attr("mood", "good", indices=[0, 2])
@@ -78,7 +76,6 @@ def test_envs_are_reached_one_by_one() -> None:
 
 @pytest.mark.gl
 def test_pictures_are_tiled() -> None:
-    """`render` tiles the pictures of all envs."""
     if not any(draws(library) for library in ("egl", "osmesa", "glfw")):
         missing("Neither EGL nor OSMesa nor a display works here")
     envs = ThreadVecEnv(_PENDULUM, 4, render_mode="rgb_array", width=32, height=32)
@@ -90,7 +87,6 @@ def test_pictures_are_tiled() -> None:
 
 
 def test_foreign_envs_use_dummy_vec_env() -> None:
-    """Envs of other packages are stepped by DummyVecEnv."""
     for env_id, kind in ((_PENDULUM, ThreadVecEnv), ("CartPole-v1", DummyVecEnv)):
         envs = training_vec_env(EnvRef(env_id), 2, 1)
         assert type(envs) is kind

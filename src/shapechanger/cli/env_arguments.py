@@ -29,13 +29,11 @@ from shapechanger.envs.catalogue import (
 )
 from shapechanger.errors import (
     MorphologyError,
-    OutputError,
     StudyError,
     UnknownName,
     check_seed,
     no_policy_file,
 )
-from shapechanger.files import make_folder
 from shapechanger.rendering import require_known_gl
 from shapechanger.transfer.executor import Executor, Processes
 from shapechanger.transfer.references import reference_policy
@@ -300,20 +298,6 @@ def settings_of(given: Sequence[str]) -> dict[str, Any]:
             raise StudyError(f"--set names {name} more than once.")
         settings[name] = parsed["value"]
     return settings
-
-
-def require_file(path: Path) -> None:
-    """Make the folder of a file that is to be written.
-
-    Args:
-        path: The file.
-
-    Raises:
-        OutputError: If it is a folder, or its folder cannot be made or written to.
-    """
-    if path.is_dir():
-        raise OutputError(f"Cannot write {path}: it is a folder.")
-    make_folder(path.parent)
 
 
 def require_seed(seed: int) -> None:

@@ -149,7 +149,7 @@ class Render:
 
     def run(self) -> None:
         """Write the image."""
-        from shapechanger.cli.pictures import write_picture
+        from shapechanger.reports.films import write_picture
 
         with opened(_env(self.env, self.body, self.options)) as env:
             picture = asked(env, "picture")(self.width, self.height)

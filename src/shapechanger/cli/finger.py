@@ -12,10 +12,10 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import print_table, say
-from shapechanger.cli.env_arguments import EnvId, env_ref, options_of, require_file, require_seed
+from shapechanger.cli.env_arguments import EnvId, env_ref, options_of, require_seed
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.errors import FingerError, OutputError, UnknownName
-from shapechanger.files import write_atomic
+from shapechanger.files import require_file, write_atomic
 
 if TYPE_CHECKING:
     from shapechanger.finger.identify import IdentifiedFinger

@@ -11,11 +11,10 @@ from typing import Annotated, Any, Final
 import tyro
 
 from shapechanger.cli.console import counted, say
-from shapechanger.cli.env_arguments import require_file
 from shapechanger.demos.episodes import Episode, episodes_of, read_episode
 from shapechanger.demos.episodes.files import FRAMES, HEADER, STEPS
 from shapechanger.errors import HubError, StudyError
-from shapechanger.files import write_atomic
+from shapechanger.files import require_file, write_atomic
 from shapechanger.layout import Layout
 from shapechanger.reports.numbers import duration_text, shares_text
 

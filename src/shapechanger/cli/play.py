@@ -60,7 +60,7 @@ class Watching:
             raise StudyError("Playing takes at least one episode of one step.")
         out = self.out or (None if has_screen() else Path("play.mp4"))
         if out is not None:
-            from shapechanger.cli.pictures import require_film
+            from shapechanger.reports.films import require_film
 
             require_film(out)
         frames: list[NDArray[Any]] = []
@@ -83,7 +83,7 @@ class Watching:
                         frames.append(cast("NDArray[Any]", env.render()))
                 say(f"episode {episode}: return {worth:.1f} in {steps} steps{why}")
             if out is not None:
-                from shapechanger.cli.pictures import write_film
+                from shapechanger.reports.films import write_film
 
                 write_film(frames, out, float(env.metadata["render_fps"]))
                 say(f"wrote {out}")

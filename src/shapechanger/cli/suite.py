@@ -482,7 +482,7 @@ class _Page:
 
     def add(self, name: str, study: Study) -> None:
         """Add a study that has ended, or replace it; write its report and the page."""
-        from shapechanger.cli.films import film_study
+        from shapechanger.envs.study_films import film_study
         from shapechanger.files import write_atomic
         from shapechanger.transfer.report.suite import Sweep, suite_html
 

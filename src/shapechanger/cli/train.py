@@ -19,13 +19,12 @@ from shapechanger.cli.env_arguments import (
     driven,
     env_ref,
     opened,
-    require_file,
     require_seed,
     settings_of,
 )
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_traits
 from shapechanger.errors import MissingExtra, StudyError
-from shapechanger.files import make_folder
+from shapechanger.files import make_folder, require_file
 from shapechanger.transfer.learners.presets import in_many_bodies, resolve_learner, tuning_text
 
 if TYPE_CHECKING:

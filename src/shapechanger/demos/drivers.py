@@ -19,6 +19,9 @@ from shapechanger.demos.episodes import Driver
 from shapechanger.demos.recording import RecordEpisodes
 from shapechanger.errors import DemosError
 
+EXPERT: Final = "expert"
+"""Name of the expert of an env as a driver."""
+
 _ROUNDING: Final = 1e-9
 
 

@@ -70,13 +70,11 @@ def test_list(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_episode_that_is_not_closed_is_marked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It may be recording at present."""
     recorded(tmp_path / "data", close=False)
     assert "not closed" in output_of(capsys, "list", tmp_path / "data")
 
 
 def test_show_as_text(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Without `--out`, the statistics are printed."""
     printed = output_of(capsys, "show", data)
     assert "driven by policy 50 %, expert 50 %" in printed
     assert "steering: 0.1 to 0.1, median 0.1" in printed
@@ -112,7 +110,6 @@ def test_a_damaged_frame_is_shown_as_damaged(
 
 
 def test_cut_bad_good(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """`good` restores all steps."""
     first, _ = episodes(data)
     assert "11 of 30 steps" in output_of(capsys, "cut", first, "--from", 5, "--to", 15)
     assert [s.index for s in read_episode(first).kept] == list(range(5, 16))
@@ -123,7 +120,6 @@ def test_cut_bad_good(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_mark(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A step is marked with or without a text."""
     first, _ = episodes(data)
     output_of(capsys, "mark", first, 4, "a stone")
     output_of(capsys, "mark", first, 6)
@@ -161,7 +157,6 @@ def test_repair_skips_a_running_recording(data: Path, capsys: pytest.CaptureFixt
 
 
 def test_one_episode_must_be_named(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The error lists episodes and valid steps."""
     first, second = episodes(data)
     assert f"has 2 episodes: name one of them, such as {first}" in refused(capsys, "bad", data)
     near = data / f"{second.name[:-1]}9"
@@ -186,7 +181,6 @@ def test_replay_needs_one_target(data: Path, capsys: pytest.CaptureFixture[str])
 def test_an_unknown_robot_is_refused(
     data: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The error names the robot."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(data))
     assert "nobody" in refused(capsys, "replay", episodes(data)[0], "--robot", "nobody")
 
@@ -207,7 +201,6 @@ def test_a_film(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 def test_an_env_with_other_actions_is_refused(
     data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The error names the actions of both."""
     first, _ = episodes(data)
     sentence = refused(capsys, "replay", first, "--env", "Ant")
     assert "hip_1/motor" in sentence

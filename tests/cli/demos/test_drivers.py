@@ -10,11 +10,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from shapechanger.cli.demos.record import corrected_pilot, pilot_of
 from shapechanger.demos.cloning.card import CloneCard
 from shapechanger.demos.cloning.pictures import Framing, PolicyError
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.drivers import Act, CorrectedPilot
+from shapechanger.demos.pilots import corrected_pilot, pilot_of
 from shapechanger.errors import DemosError
 from shapechanger.layout import Feature, Layout
 from shapechanger.vehicles.envs import RangesEnv
@@ -54,7 +54,6 @@ def test_a_policy_gets_its_part_of_the_observation(shows: Shows, tmp_path: Path)
 
 
 def test_a_corrected_policy_uses_the_expert_of_the_env(tmp_path: Path) -> None:
-    """An env that reports no distances has no danger."""
     env = CorridorEnv("both")
     pilot = pilot_of(env, clone(tmp_path / "policy.safetensors"), "expert", 0)
     assert isinstance(pilot, CorrectedPilot)
@@ -85,7 +84,6 @@ def test_a_slow_driver_is_not_corrected(share: float) -> None:
 
 
 def test_danger_and_standing_are_corrected() -> None:
-    """A driver that never steers is corrected, and so is one that never moves."""
     with closing(RangesEnv("car", put_back=True)) as env:
         pilot, remarks = _corrected(env, lambda right: right * np.float32([0.0, 1.0]), 300)
         assert 0.05 * pilot.steps < pilot.corrected < pilot.steps
@@ -97,7 +95,6 @@ def test_danger_and_standing_are_corrected() -> None:
 
 
 def test_a_policy_with_other_inputs_is_refused(tmp_path: Path) -> None:
-    """The error names both sides."""
     other = Layout((Feature("way", "m"), Feature("heat", "K")))
     policy = clone(tmp_path / "other.safetensors", state_layout=other)
     with pytest.raises(PolicyError, match=r"heat.*battery"):

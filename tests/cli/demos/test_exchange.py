@@ -14,7 +14,6 @@ from tests.demos.exchange.small import drive, keys_folder, tub_folder
 
 
 def test_import_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Format, episodes, steps and images."""
     Import(keys_folder(tmp_path / "keys"), tmp_path / "data").run()
     assert capsys.readouterr().out == (
         f"read {tmp_path / 'keys'} (csv): 1 episode, 3 steps, 3 pictures\n"
@@ -74,7 +73,6 @@ def test_export_prints_a_summary_and_how_to_load(
 
 
 def test_an_unknown_format(tmp_path: Path) -> None:
-    """The error suggests the nearest format."""
     with pytest.raises(UnknownName, match="Did you mean 'minari'"):
         Export(drive(tmp_path / "data"), tmp_path / "out", "mniari").run()
 

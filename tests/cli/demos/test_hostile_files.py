@@ -216,7 +216,6 @@ PICTURES = {
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_a_hostile_picture_is_refused(tmp_path: Path, jail: Jail, name: str) -> None:
-    """By each command that decodes it."""
     framed(PICTURES[name])(drive(tmp_path / "data"))
     for command in (
         ("train", tmp_path / "data", "--out", tmp_path / "policy.safetensors"),

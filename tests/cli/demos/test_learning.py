@@ -73,7 +73,6 @@ def test_a_recording_becomes_a_policy_with_a_report(
 def test_regression_prints_errors_and_accuracy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Whole episodes are the test set with `split="episode"`."""
     data = _record(tmp_path / "drive", 90, 0, STEERS)
     _record(data, 30, 1, STEERS)
     out = tmp_path / "policy.safetensors"
@@ -86,7 +85,6 @@ def test_regression_prints_errors_and_accuracy(
 
 
 def test_invalid_arguments_are_refused_before_training(tmp_path: Path) -> None:
-    """No file is written."""
     data = _record(tmp_path / "drive", 20, 0)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match="it is a folder"):
@@ -103,7 +101,6 @@ def test_invalid_arguments_are_refused_before_training(tmp_path: Path) -> None:
 
 
 def test_a_policy_for_another_layout_is_refused(tmp_path: Path) -> None:
-    """The error names both layouts."""
     policy = CameraPolicy.fresh(QUICK, 0)
     policy.save(tmp_path / "p.safetensors")
     with pytest.raises(PolicyError, match=r"policy are steering, throttle, but .* forward"):

@@ -88,7 +88,6 @@ def test_invalid_arguments_give_one_sentence(
     capsys: pytest.CaptureFixture[str],
     gl: None,
 ) -> None:
-    """No file is written."""
     monkeypatch.chdir(tmp_path)
     Path("text.safetensors").write_text("text")
     assert words in refused(capsys, "record", *arguments, "--out", "data")
@@ -100,7 +99,6 @@ def test_invalid_arguments_give_one_sentence(
 def test_ctrl_c_leaves_whole_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit code 130, and the episode is closed."""
     from shapechanger.vehicles.envs.demonstrators import Demonstrator
 
     acts = Demonstrator.act

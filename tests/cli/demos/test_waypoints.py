@@ -14,7 +14,6 @@ import simplejpeg
 
 from shapechanger.cli import main
 from shapechanger.cli.demos.train import Evaluate, TrainClone
-from shapechanger.cli.demos.waypoints import CanonicalView, as_waypoints
 from shapechanger.demos.cloning.policy import CameraPolicy
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.demos.episodes import EpisodeHeader, EpisodeWriter, Step
@@ -24,6 +23,7 @@ from shapechanger.transfer.learners import presets
 from shapechanger.transfer.learners.presets import LEARNERS
 from shapechanger.vehicles.cloning import CloningSettings
 from shapechanger.vehicles.envs import WaypointEnv
+from shapechanger.vehicles.waypoint_demonstrations import CanonicalView, as_waypoints
 from shapechanger.vehicles.waypoints import ACTION_LAYOUT, SteeringResponse
 
 _ACTIONS = Layout((Feature("steering", "1", -1.0, 1.0), Feature("throttle", "1", -1.0, 1.0)))
@@ -152,7 +152,6 @@ def test_cameras_that_differ_are_warped_each_by_its_own_geometry(tmp_path: Path)
 
 
 def test_a_recording_without_motion_needs_the_response(tmp_path: Path) -> None:
-    """With it, wheels need no speed, and tracks do."""
     data = _loaded(_record(tmp_path, state=None))
     with pytest.raises(DemosError, match=r"lacks steering/applied, speed, yaw_rate: give --resp"):
         as_waypoints(data)
@@ -197,7 +196,6 @@ def test_unsuitable_recordings_are_refused(
 
 
 def test_several_bodies_are_refused(tmp_path: Path) -> None:
-    """They turn differently."""
     _record(tmp_path)
     _record(tmp_path, body="truck")
     with pytest.raises(DemosError, match="several bodies, car, truck"):
@@ -212,7 +210,6 @@ def test_a_camera_that_sees_too_little_is_refused(tmp_path: Path) -> None:
 
 
 def test_recordings_without_pictures_are_refused(tmp_path: Path) -> None:
-    """A way is seen in pictures."""
     header = EpisodeHeader(action_layout=_ACTIONS.to_json(), clock="none")
     with EpisodeWriter.create(tmp_path, header) as writer:
         writer.add(Step(action=(0.0, 0.5), driver="person"))

@@ -49,7 +49,6 @@ def test_a_finger_is_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_invalid_recordings_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Unsuitable envs, options and durations."""
     out = ("--out", tmp_path / "log.npz")
     assert "is not a finger env" in refused(capsys, "record", "Ant", *out)
     assert "Did you mean" in refused(capsys, "record", "Fingr", *out)

@@ -44,7 +44,6 @@ def copied() -> BodyMap:
 
 
 def test_there_and_back_is_the_identity() -> None:
-    """Mapping an ant to an ant with feet and back is the identity."""
     there = grown(rules={"foot_*": "learn"})
     assert there.then(there.inverse()) == BodyMap.identity(ant_observation(), ant_action())
 
@@ -89,7 +88,6 @@ def test_composition_multiplies_scales_and_joins_reasons() -> None:
 
 
 def test_a_composition_adapts_actions() -> None:
-    """The composition adapts actions as the two maps in a row."""
     first, second = grown(rules={"foot_*/motor": "copy ankle_*/motor"}), grown().inverse()
     second = second.then(grown(rules={"foot_*/motor": "copy hip_*/motor"}))
     action = np.random.default_rng(0).uniform(-1.0, 1.0, size=8)
@@ -107,7 +105,6 @@ def test_a_composition_adapts_actions() -> None:
     ],
 )
 def test_maps_of_different_middle_bodies_are_refused(middle: Layout, message: str) -> None:
-    """Maps with different bodies in the middle are refused, with the first difference."""
     here = Layout((Feature("z", "m"), Feature("y", "m")))
     first = BodyMap.identity(here, pendulum_action())
     second = BodyMap.identity(middle, pendulum_action())
@@ -117,7 +114,6 @@ def test_maps_of_different_middle_bodies_are_refused(middle: Layout, message: st
 
 
 def test_maps_with_different_gains_are_refused() -> None:
-    """Maps whose gains differ in the middle body are refused."""
     first = BodyMap.identity(pendulum_observation(), pendulum_action(100.0))
     second = BodyMap.identity(pendulum_observation(), pendulum_action(200.0))
     with pytest.raises(MapError, match=r"action of the first .* gain is 100\.0 and 200\.0"):
@@ -125,14 +121,12 @@ def test_maps_with_different_gains_are_refused() -> None:
 
 
 def test_the_inverse_divides_by_the_scale() -> None:
-    """The inverse of a scale of 1/4 is 4."""
     motors = pendulum_action(100.0), pendulum_action(400.0)
     there = BodyMap.between(pendulum_observation(), pendulum_observation(), *motors, units="torque")
     assert there.inverse().action[0].rule == Copy("slide/motor", 4.0)
 
 
 def test_the_inverse_prefers_the_copy_of_the_same_name() -> None:
-    """Other copies are ignored."""
     back = copied().inverse()
     assert [entry.rule for entry in back.action] == [Copy("ankle/motor")]
     assert [entry.rule for entry in back.observation] == [Copy("z")]
@@ -152,7 +146,6 @@ def test_ambiguous_copies_have_no_inverse() -> None:
 
 
 def test_the_inverse_uses_otherwise() -> None:
-    """The inverse fills features that were not copied by `otherwise`."""
     for otherwise, rule in (("learn", Learn()), ("zero", Zero())):
         rules = {e.feature: e.rule for e in grown().inverse(otherwise).observation}
         assert rules["foot_1/velocity"] == rule

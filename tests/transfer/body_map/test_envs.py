@@ -54,14 +54,12 @@ class Silent(Recorder):
 
 
 def test_envs_are_mapped_by_their_layouts() -> None:
-    """`body_map` reads the layouts of both envs."""
     built = body_map(Recorder(), gym.wrappers.TimeLimit(Recorder(feet=True), 5), otherwise="learn")
     assert built.source_action == ant_action()
     assert built.target_action == ant_action(feet=True)
 
 
 def test_an_env_without_layouts_is_refused() -> None:
-    """The message names the properties to add."""
     with pytest.raises(LayoutError, match="publishes no observation_layout and action_layout"):
         body_map(Recorder(), Silent())
 
@@ -84,7 +82,6 @@ def test_a_mapped_env_adapts_observations_and_actions() -> None:
 
 
 def test_a_mapped_env_has_the_source_spaces() -> None:
-    """Spaces are derived from the layouts unless given."""
     source, target = Recorder(), Recorder(feet=True)
     built = body_map(source, target)
     env = MappedEnv(target, built)
@@ -102,7 +99,6 @@ def test_a_mapped_env_has_the_source_spaces() -> None:
 
 
 def test_a_mapped_env_publishes_the_source_layouts() -> None:
-    """A mapped env can be mapped again, from the layouts of the wrapper."""
     source, target = Recorder(), Recorder(feet=True)
     env = MappedEnv(target, body_map(source, target))
     assert (env.observation_layout, env.action_layout) == (ant_observation(), ant_action())

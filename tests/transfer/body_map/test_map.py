@@ -44,12 +44,10 @@ def test_values_are_reordered_by_name() -> None:
 
 
 def test_actions_are_clipped_to_the_target() -> None:
-    """Scaled actions are clipped to the target's bounds."""
     np.testing.assert_array_equal(small().adapt_action([3.0, -0.7]), [-0.7, 1.0, 0.0, 1.0])
 
 
 def test_batches_of_any_shape_are_accepted() -> None:
-    """Leading axes are kept."""
     values = np.random.default_rng(0).normal(size=(4, 5, 2))
     adapted = small().adapt_observation(values)
     assert adapted.shape == (4, 5, 3)
@@ -62,14 +60,12 @@ def test_batches_of_any_shape_are_accepted() -> None:
     [(np.float32, np.float32), (np.float64, np.float64), (np.int64, np.float64)],
 )
 def test_the_dtype_is_kept(given: type, result: type) -> None:
-    """float32 in gives float32 out."""
     assert small().adapt_observation(np.ones(2, given)).dtype == result
     assert small().adapt_action(np.ones(2, given)).dtype == result
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_matched_values_are_copied_bitwise(dtype: type) -> None:
-    """A map of equal names is a bitwise permutation."""
     built = BodyMap.between(
         ant_observation(), ant_observation(feet=True), ant_action(), ant_action(feet=True)
     )
@@ -82,19 +78,16 @@ def test_matched_values_are_copied_bitwise(dtype: type) -> None:
 
 
 def test_values_that_are_not_copied_may_be_nan() -> None:
-    """They do not affect the result."""
     np.testing.assert_array_equal(small().adapt_observation([np.nan, 3.0]), [3.0, 0.0, 0.25])
 
 
 def test_the_result_is_a_new_array() -> None:
-    """The result does not share memory with the input."""
     built = BodyMap.identity(pendulum_observation(), pendulum_action())
     values = np.zeros(4)
     assert not np.may_share_memory(values, built.adapt_observation(values))
 
 
 def test_blocks_keep_their_order() -> None:
-    """A block is copied as a whole."""
     eye = Feature("eye", "1", 0.0, 1.0, shape=(2, 2))
     ear = Feature("ear", "1", 0.0, 1.0, shape=(2,))
     built = BodyMap.between(
@@ -109,7 +102,6 @@ def test_blocks_keep_their_order() -> None:
 
 
 def test_the_affine_form_is_the_map() -> None:
-    """Matrix and offset compute the same as the map."""
     rng = np.random.default_rng(2)
     built = small()
     sensed, moved = rng.normal(size=2), rng.uniform(-0.3, 0.3, size=2)
@@ -134,7 +126,6 @@ def test_a_vector_of_another_body_is_refused() -> None:
 
 
 def test_the_table_states_each_rule() -> None:
-    """The table has the rule and the reason of each entry."""
     assert small().table() == (
         MapRow("observation", "z", "z", "same name"),
         MapRow("observation", "lost", "zero", "default"),
@@ -151,14 +142,12 @@ def test_the_table_states_each_rule() -> None:
 
 
 def test_the_short_form_counts_the_rules() -> None:
-    """`repr` counts rules instead of listing them."""
     assert repr(small()) == (
         "BodyMap(observation: 1 Copy, 1 Zero, 1 Hold; action: 3 Copy, 1 Learn)"
     )
 
 
 def test_each_feature_needs_its_rule_in_order() -> None:
-    """Entries given to the constructor are checked."""
     good = small()
     with pytest.raises(MapError, match=r"in the order of the layout: z, lost, rest; .* lost, z"):
         msgspec.structs.replace(
@@ -171,7 +160,6 @@ def test_each_feature_needs_its_rule_in_order() -> None:
 
 
 def test_entries_are_equal_if_they_do_the_same() -> None:
-    """Equality of entries ignores `why`."""
     assert MapEntry("a", Zero(), "default") == MapEntry("a", Zero(), "rule 'a'")
     assert hash(MapEntry("a", Zero(), "default")) == hash(MapEntry("a", Zero(), "rule 'a'"))
     assert MapEntry("a", Zero()) != MapEntry("a", Learn())
@@ -188,7 +176,6 @@ def test_a_map_can_be_pickled() -> None:
 
 
 def test_json_round_trip_keeps_the_layouts() -> None:
-    """JSON round trips with all layouts."""
     again = BodyMap.from_json(small().to_json())
     assert again == small()
     assert again.table() == small().table()
@@ -196,6 +183,5 @@ def test_json_round_trip_keeps_the_layouts() -> None:
 
 @pytest.mark.parametrize("text", ["{", "{}", small().to_json().replace("0.25", "null")])
 def test_invalid_json_is_refused(text: str) -> None:
-    """Invalid JSON raises a MapError."""
     with pytest.raises(MapError, match="This is not a body map"):
         BodyMap.from_json(text)

@@ -47,7 +47,6 @@ def rules_of(built: BodyMap) -> dict[str, object]:
 
 
 def test_features_of_one_name_are_partners() -> None:
-    """An ant with feet has every feature of an ant."""
     built = grown()
     assert all(entry.rule == Copy(entry.feature) for entry in built.observation)
     assert {entry.why for entry in built.observation} == {"same name"}
@@ -67,33 +66,28 @@ def test_features_of_one_name_are_partners() -> None:
     ],
 )
 def test_rules_have_a_short_form(like: RuleLike, rule: object) -> None:
-    """The short form of a rule equals its object."""
     built = grown(rules={"foot_2/motor": like})
     assert rules_of(built)["foot_2/motor"] == rule
     assert {e.feature: e.why for e in built.action}["foot_2/motor"] == "rule 'foot_2/motor'"
 
 
 def test_hold_is_the_middle_of_the_range() -> None:
-    """Applies to "hold" without a value."""
     held = rules_of(shrunk(rules={"foot_*/angle": "hold"}))["foot_1/angle"]
     assert isinstance(held, Hold)
     assert held.value == pytest.approx(65 * DEGREE)
 
 
 def test_the_first_glob_that_fits_counts() -> None:
-    """Globs are tried in order."""
     rules = rules_of(grown(rules={"foot_[12]/*": "learn", "foot_*": "hold"}))
     assert [rules[f"foot_{leg}/motor"] for leg in (1, 2, 3)] == [Learn(), Learn(), Hold(0.0)]
 
 
 def test_an_exact_name_comes_before_a_glob() -> None:
-    """An exact name takes precedence wherever it is written."""
     rules = rules_of(grown(rules={"foot_*": "learn", "foot_3/motor": "zero"}))
     assert rules["foot_3/motor"] == Zero()
 
 
 def test_only_an_exact_name_overrides_an_equal_name() -> None:
-    """A glob does not override a partner of the same name."""
     rules = rules_of(grown(rules={"*/motor": "learn", "hip_1/motor": "zero"}))
     assert rules["hip_1/motor"] == Zero()
     assert rules["hip_2/motor"] == Copy("hip_2/motor")
@@ -126,7 +120,6 @@ def test_rules_can_be_for_one_side_only() -> None:
 
 
 def test_unmatched_features_get_otherwise() -> None:
-    """Features without a partner or rule get `otherwise`."""
     assert rules_of(grown(otherwise="learn"))["foot_2/motor"] == Learn()
     assert rules_of(grown(otherwise=Hold(0.5)))["foot_2/motor"] == Hold(0.5)
     with pytest.raises(MapError, match=r"'zero', 'hold' or 'learn', not 'copy hip_1/motor'"):
@@ -134,7 +127,6 @@ def test_unmatched_features_get_otherwise() -> None:
 
 
 def test_a_constant_outside_the_range_is_refused() -> None:
-    """A constant outside the range is refused."""
     with pytest.raises(MapError, match=r"'foot_4/motor' cannot hold 3: it reaches from -1 to 1"):
         grown(rules={"foot_*": Hold(3.0)})
     with pytest.raises(MapError, match="cannot hold 3"):
@@ -142,31 +134,26 @@ def test_a_constant_outside_the_range_is_refused() -> None:
 
 
 def test_a_pattern_without_matches_is_refused() -> None:
-    """A pattern that matches no feature is refused."""
     with pytest.raises(UnknownName, match=r"matches 'fot_1/motor'\. Did you mean 'foot_1/motor'"):
         grown(rules={"fot_1/motor": "learn"})
 
 
 def test_a_pattern_that_changes_nothing_is_refused() -> None:
-    """A pattern whose features all have other rules is refused."""
     with pytest.raises(MapError, match=r"The rule 'hip_\*' changes nothing"):
         grown(rules={"hip_*": "learn"})
 
 
 def test_an_unknown_rule_is_refused() -> None:
-    """The message suggests the nearest word."""
     with pytest.raises(MapError, match=r"No rule matches 'lern'. Did you mean 'learn'"):
         grown(rules={"foot_*": "lern"})
 
 
 def test_an_unknown_partner_is_refused() -> None:
-    """The message suggests the nearest name."""
     with pytest.raises(UnknownName, match=r"No source action feature .* Did you mean 'ankle_1/mot"):
         grown(rules={"foot_1/motor": "copy ankle_1/moter"})
 
 
 def test_units_are_not_mixed() -> None:
-    """Features with different units need a scale."""
     sides = pendulum_observation(), pendulum_observation(unit="deg")
     motors = pendulum_action(), pendulum_action()
     with pytest.raises(MapError, match=r"hinge/angle \[rad\] cannot copy .* hinge/angle \[deg\]"):
@@ -184,7 +171,6 @@ def test_units_are_not_mixed() -> None:
 
 
 def test_blocks_of_different_shapes_do_not_match() -> None:
-    """Blocks of different shapes are refused."""
     small = Layout((Feature("eye", "1", 0.0, 1.0, shape=(2, 3)),))
     large = Layout((Feature("eye", "1", 0.0, 1.0, shape=(4, 3)),))
     with pytest.raises(MapError, match=r"'eye' has the shape \(2, 3\) and cannot copy"):
@@ -203,7 +189,6 @@ def test_bodies_with_nothing_in_common_are_refused() -> None:
 
 
 def test_a_body_without_motors_is_refused_too() -> None:
-    """Without features to copy, the example is "hold"."""
     with pytest.raises(MapError, match=r"source action features are none.*: 'hold'"):
         BodyMap.between(
             pendulum_observation(), pendulum_observation(), Layout(()), pendulum_action()
@@ -211,7 +196,6 @@ def test_a_body_without_motors_is_refused_too() -> None:
 
 
 def test_unrelated_bodies_can_be_mapped_by_rules() -> None:
-    """Bodies without a common name can be mapped by explicit rules."""
     built = BodyMap.between(
         pendulum_observation(),
         pendulum_observation(),
@@ -236,14 +220,12 @@ def test_equal_torque_is_a_scale() -> None:
 
 
 def test_forces_and_torques_are_not_converted() -> None:
-    """Only gains of one unit can be converted."""
     sides = pendulum_observation(), pendulum_observation()
     with pytest.raises(MapError, match="gives 100 N and one of 'slide/motor' 100 N·m"):
         BodyMap.between(*sides, pendulum_action(), pendulum_action(unit="N·m"), units="torque")
 
 
 def test_unknown_gains_are_not_scaled() -> None:
-    """Where both gains are unknown, the scale is 1."""
     silent = Layout((motor("slide", 1.0, ""),))
     sides = pendulum_observation(), pendulum_observation()
     built = BodyMap.between(*sides, silent, silent, units="torque")
@@ -252,7 +234,6 @@ def test_unknown_gains_are_not_scaled() -> None:
 
 @pytest.mark.parametrize("rule", [{"hold": 1.0}, {"take": "ankle_1/motor"}, 0.5, None])
 def test_a_rule_of_another_type_is_refused(rule: Any) -> None:
-    """A dictionary is not a rule."""
     with pytest.raises(MapError, match=r"The rule 'foot_1/motor' is .*: give 'zero', 'hold'"):
         BodyMap.between(
             ant_observation(),

@@ -19,7 +19,6 @@ LEGS = {"front_left_leg": "right_back_leg", "front_right_leg": "back_leg"}
 
 @pytest.mark.parametrize("name", ["Ant", "BigAnt", "ExtendedAnt"])
 def test_the_mirror_is_a_symmetry_of_the_ant(name: str) -> None:
-    """A step of the mirrored ant, mirrored back, equals a step of the ant."""
     env = gym.make(f"shapechanger/{name}-v1")
     ant: Any = env.unwrapped
     layouts = ant.observation_layout, ant.action_layout

@@ -21,13 +21,11 @@ from shapechanger.transfer.body_map.rules import (
 
 @pytest.mark.parametrize("scale", [0.0, math.nan, math.inf])
 def test_an_invalid_scale_is_refused(scale: float) -> None:
-    """Scales of zero, infinity and NaN are refused."""
     with pytest.raises(MapError, match="'hip/angle' must be finite and not zero"):
         Copy("hip/angle", scale)
 
 
 def test_a_non_finite_constant_is_refused() -> None:
-    """Constants must be finite."""
     with pytest.raises(MapError, match="must be finite, got nan"):
         Hold(math.nan)
 
@@ -43,7 +41,6 @@ def test_a_non_finite_constant_is_refused() -> None:
     ],
 )
 def test_each_rule_has_a_description(rule: Rule, words: str) -> None:
-    """`describe_rule` returns a text for each rule."""
     assert describe_rule(rule) == words
 
 
@@ -57,7 +54,6 @@ def test_each_rule_has_a_description(rule: Rule, words: str) -> None:
     ],
 )
 def test_rules_compose(inner: Rule, result: Rule) -> None:
-    """Scales multiply, and constants are scaled."""
     assert compose_rules(Copy("shin", -2.0), inner) == result
 
 
@@ -73,7 +69,6 @@ def test_rules_compose(inner: Rule, result: Rule) -> None:
     ],
 )
 def test_stars_take_the_matched_text(template: str, pattern: str, name: str, result: str) -> None:
-    """Stars of a template are replaced in order."""
     assert expand_template(template, pattern, name) == result
 
 

@@ -71,7 +71,6 @@ def test_a_mirrored_quaternion_is_the_mirrored_rotation() -> None:
 
 
 def test_mirroring_twice_is_the_identity() -> None:
-    """Holds for the ant."""
     once = BodyMap.identity(ant_observation(), ant_action()).with_symmetry(ant_mirror())
     assert once.then(once) == BodyMap.identity(ant_observation(), ant_action())
     assert ant_mirror().inverse() == ant_mirror()
@@ -130,7 +129,6 @@ def test_only_signed_permutations_are_accepted(changes: Mapping[str, Copy], mess
 
 
 def test_names_and_numbers_of_a_symmetry_are_checked() -> None:
-    """Unknown names and missing rules are refused."""
     with pytest.raises(UnknownName, match="No feature matches 'hip'"):
         Symmetry.of(legs("hop"), legs("a"), observation={"hip": Copy("hop")})
     with pytest.raises(UnknownName, match="No action feature matches 'b'"):
@@ -162,7 +160,6 @@ def test_a_body_whose_ranges_differ_is_not_symmetric() -> None:
     ],
 )
 def test_unknown_elements_are_refused(swap: dict[str, str], flip: list[str], message: str) -> None:
-    """Errors suggest the nearest name."""
     with pytest.raises(UnknownName, match=message):
         mirror(ant_observation(), ant_action(), swap=swap, flip=flip)
 
@@ -187,7 +184,6 @@ def test_contradictory_mirrors_are_refused(
 
 
 def test_blocks_have_no_mirror() -> None:
-    """Blocks cannot be mirrored."""
     seeing = Layout((Feature("eye", "1", shape=(2, 2)),))
     with pytest.raises(MapError, match="'eye' is a block of numbers"):
         mirror(seeing, pendulum_action())

@@ -34,7 +34,6 @@ otherwise = { hold = 0.1 }
 
 
 def test_a_person_can_write_a_map() -> None:
-    """The example of the documentation has the documented rules."""
     built = BodyMap.from_toml(EXAMPLE, *GROWN)
     rules = {entry.feature: entry.rule for entry in (*built.observation, *built.action)}
     assert rules["torso/vx"] == Copy("torso/vx", 0.5)
@@ -45,12 +44,10 @@ def test_a_person_can_write_a_map() -> None:
 
 
 def test_an_empty_text_matches_by_name() -> None:
-    """All keys have defaults."""
     assert BodyMap.from_toml("", *GROWN) == BodyMap.between(*GROWN)
 
 
 def test_units_come_from_the_text() -> None:
-    """`units = "torque"` scales actions by the gains."""
     sides = pendulum_observation(), pendulum_observation()
     built = BodyMap.from_toml(
         'units = "torque"', *sides, pendulum_action(100.0), pendulum_action(200.0)
@@ -68,7 +65,6 @@ def test_units_come_from_the_text() -> None:
     ],
 )
 def test_toml_round_trip(built: BodyMap) -> None:
-    """TOML round trips bitwise."""
     layouts = (
         built.source_observation,
         built.target_observation,
@@ -96,7 +92,6 @@ def test_exact_rules_are_not_checked() -> None:
 
 
 def test_the_text_is_short() -> None:
-    """Partners of the same name have no line."""
     text = BodyMap.between(*GROWN, rules={"foot_1/motor": "learn"}).to_toml()
     assert text.splitlines() == [
         'units = "same"',
@@ -111,7 +106,6 @@ def test_the_text_is_short() -> None:
 
 
 def test_special_characters_are_escaped() -> None:
-    """Quotes, backslashes, umlauts and control characters are escaped."""
     names = ('a"b', "a\\b", "Größe µ", "tab\t", "del\x7f", "x[0]")
     layout = Layout(tuple(Feature(name, "1") for name in (*names, "z")))
     less = Layout((Feature("z", "1"),))
@@ -121,7 +115,6 @@ def test_special_characters_are_escaped() -> None:
 
 @pytest.mark.parametrize(("of", "feet"), [("", (False, True)), ('of = "target"', (True, False))])
 def test_a_text_can_ask_for_the_mirror_image(of: str, feet: tuple[bool, bool]) -> None:
-    """`[symmetry]` mirrors the source or the target."""
     layouts = (
         *(ant_observation(feet=f) for f in feet),
         *(ant_action(feet=f) for f in feet),
@@ -162,7 +155,6 @@ def test_wrong_text_is_explained(text: str, message: str) -> None:
 
 
 def test_unknown_names_are_refused() -> None:
-    """Errors suggest the nearest name."""
     with pytest.raises(UnknownName, match="Did you mean 'foot_1/motor'"):
         BodyMap.from_toml('[action]\n"fot_1/motor" = "zero"', *GROWN)
     with pytest.raises(UnknownName, match="No target action feature"):

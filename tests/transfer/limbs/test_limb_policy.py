@@ -99,7 +99,6 @@ def test_limbs_without_a_motor_count_in_no_probability(policy: TrainedPolicy) ->
 
 
 def test_probabilities_of_drawn_actions(policy: TrainedPolicy) -> None:
-    """What is drawn has the probability that the update sees."""
     (env,) = limb_envs(ANT, 1)
     rows = torch.as_tensor(env.reset(seed=0)[0][None])
     net = _net(policy)
@@ -247,7 +246,6 @@ def test_a_generalist_needs_limbs_and_a_family() -> None:
 
 
 def test_the_env_of_a_policy_is_many_bodies() -> None:
-    """Envs of evaluations have the bodies in turn, and one space."""
     envs = limb_envs(FEW, 3)
     bodies = [env.unwrapped.spec.kwargs["body"] for env in envs]  # pyright: ignore[reportOptionalMemberAccess]
     assert bodies[0] == bodies[2] != bodies[1]

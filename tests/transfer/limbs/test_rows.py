@@ -99,7 +99,6 @@ def test_envs_of_many_bodies_equal_single_ones() -> None:
 
 
 def test_the_last_observation_of_an_episode_is_a_row() -> None:
-    """What the learner bootstraps from has the shape of its observations."""
     envs = LimbVecEnv(EnvRef("shapechanger/HalfCheetah-v1", {"max_episode_steps": 2, **SOME}), 12)
     envs.reset()
     for _ in range(2):
@@ -131,7 +130,6 @@ def test_bodies_by_name_or_drawn() -> None:
 
 
 def test_what_does_not_fit_is_refused() -> None:
-    """Each error is a sentence that says what to do."""
     with pytest.raises(StudyError, match="a body of 12 limbs, and the policy has room for 8"):
         _limb_env(EnvRef("shapechanger/ExtendedAnt-v1"), room=8)
     with pytest.raises(StudyError, match="CartPole-v1 has no kinematic tree"):

@@ -44,7 +44,6 @@ def _weights(study: tuple[Study, Path], kind: str) -> dict[str, Any]:
 
 
 def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
-    """Every arm is evaluated at the steps of scratch and has a summary."""
     made, _ = study
     for kind in ("scratch", *_LEARNING):
         assert [e.steps for e in made.of(kind)[0].curve] == [0, 32, 64, 96, 128], kind
@@ -52,7 +51,6 @@ def test_curves_have_the_steps_of_scratch(study: tuple[Study, Path]) -> None:
 
 
 def test_methods_start_with_the_source_policy(study: tuple[Study, Path]) -> None:
-    """All methods but kickstart start with the source policy."""
     made, _ = study
     starts = {kind: made.of(kind)[0].curve[0].mean_return for kind in _LEARNING}
     assert starts["frozen-trunk"] == starts["evolution"] == starts["fine-tune"]
@@ -95,7 +93,6 @@ def test_a_kickstarted_policy_imitates(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_learned_actions_are_not_distilled() -> None:
-    """Actions with the rule Learn are not distilled."""
     source, target = ANT.make(), EXTENDED.make()
     layouts = [
         getattr(env.unwrapped, f"{side}_layout")
@@ -122,7 +119,6 @@ def test_intermediate_bodies_grow() -> None:
 
 
 def test_intermediate_bodies_may_have_other_spaces() -> None:
-    """Bodies between an ant and an ant with feet have feet."""
     (between,) = bodies_between(ANT, EXTENDED, 1)
     made = between.make()
     assert made.action_space.shape == (12,)
@@ -149,7 +145,6 @@ def test_the_path_may_cross_spaces(tmp_path: Path) -> None:
 
 
 def test_bodies_of_two_families_are_refused() -> None:
-    """Envs of two families, or of none, are refused."""
     with pytest.raises(StudyError, match="not of one family"):
         bodies_between(ANT, BIG, 1)
     finger = EnvRef("shapechanger/Finger-v1")
@@ -174,7 +169,6 @@ def test_clones_are_refused(arm: str, needs: str) -> None:
 
 
 def test_learners_by_trial_are_refused() -> None:
-    """Rehearsal needs demonstrations."""
     with pytest.raises(StudyError, match="rehearsal needs a learner that clones demonstrations"):
         tiny_plan(TINY, arms=("scratch", "rehearsal"))
 
@@ -205,7 +199,6 @@ def test_a_shuffled_map_has_the_same_rules() -> None:
 
 
 def test_a_shuffled_map_starts_worse(study: tuple[Study, Path], tmp_path: Path) -> None:
-    """shuffled-map does not start where fine-tuning does."""
     made, _ = study
     plan = tiny_plan(_DEEP, arms=("scratch", "shuffled-map"), steps=32, source_steps=32)
     shuffled = run_study(plan, tmp_path / "study", executor=Serial())

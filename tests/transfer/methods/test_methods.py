@@ -56,7 +56,6 @@ def plugin(
 
 @pytest.mark.parametrize("name", METHODS.names())
 def test_shipped_methods_have_their_names(name: str) -> None:
-    """Each shipped method loads under its name and has a docstring."""
     method = load_method(name)
     assert method.name == name
     assert type(method).__doc__
@@ -130,7 +129,6 @@ def test_a_custom_method_is_an_arm(plugin: str, tmp_path: Path) -> None:
 
 
 def test_a_study_can_gain_arms(tmp_path: Path) -> None:
-    """A study can be resumed with more arms, and not with fewer."""
     first = tiny_plan(steps=32)
     run_study(first, tmp_path / "study", executor=Serial())
     grown = tiny_plan(steps=32, arms=(*ARMS, "kickstart"))
@@ -140,7 +138,6 @@ def test_a_study_can_gain_arms(tmp_path: Path) -> None:
 
 
 def test_seeds_do_not_depend_on_other_arms() -> None:
-    """Seeds follow from the name of a method, not from the other arms."""
     small, large = tiny_plan(), tiny_plan(arms=("scratch", "kickstart", "fine-tune"))
     assert small.seed_of(Run("fine-tune", 1)) == large.seed_of(Run("fine-tune", 1))
     kinds = ("scratch", "fine-tune", "kickstart", "evolution", "a:b")
@@ -148,7 +145,6 @@ def test_seeds_do_not_depend_on_other_arms() -> None:
 
 
 def test_a_method_must_implement_learn() -> None:
-    """`Method.learn` raises NotImplementedError."""
     run: Any = None
     with pytest.raises(NotImplementedError):
         Method().learn(run)

@@ -60,7 +60,6 @@ def test_a_study_with_both(tmp_path: Path) -> None:
 
 
 def test_corrections_reward_target_like_steps() -> None:
-    """Steps of the source alone are penalised, of the target alone rewarded."""
     torch.manual_seed(0)
     classifiers = DomainClassifiers(1, 1, learning_rate=3e-3)
 
@@ -95,7 +94,6 @@ def test_transitions_are_those_of_the_env() -> None:
 
 
 def test_mapped_transitions_are_those_of_the_target() -> None:
-    """Mapped transitions have the target's sizes, matched by name."""
     bodies = [EnvRef(f"shapechanger/{name}-v1").make() for name in ("Ant", "ExtendedAnt")]
     (seen, acts), (sees, does) = (layouts_of(body) for body in bodies)
     for body in bodies:
@@ -120,13 +118,11 @@ def test_mapped_transitions_are_those_of_the_target() -> None:
 
 @pytest.mark.parametrize("arm", ["prefilled-replay", "off-dynamics"])
 def test_learners_without_a_replay_buffer_are_refused(arm: str) -> None:
-    """Both methods refuse PPO."""
     with pytest.raises(StudyError, match=f"{arm} needs a learner with a replay buffer"):
         tiny_plan(TINY, arms=("scratch", arm))
 
 
 def test_off_dynamics_needs_equal_spaces_and_plain_observations() -> None:
-    """off-dynamics refuses other spaces and normalisation."""
     ants = TransferTask(EnvRef("shapechanger/Ant-v1"), EnvRef("shapechanger/ExtendedAnt-v1"))
     with pytest.raises(StudyError, match="the same spaces"):
         tiny_plan(short(), task=ants, arms=("scratch", "off-dynamics"))

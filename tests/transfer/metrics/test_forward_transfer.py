@@ -33,7 +33,6 @@ SCRATCH = curves((0.0, 0.1, 0.2), (0.1, 0.3, 0.5))
 
 
 def test_forward_transfer() -> None:
-    """(0.5 - 0.2) / (1 - 0.2)."""
     assert transfer(ARM, SCRATCH).value == pytest.approx(0.375)
 
 
@@ -67,7 +66,6 @@ def test_perfect_from_the_start_is_1() -> None:
     ("height", "is_defined"), [(1.0, False), (0.995, False), (0.98, True), (0.0, True)]
 )
 def test_headroom_is_needed(height: float, is_defined: bool) -> None:
-    """Without headroom it is undefined, with a note."""
     estimate = transfer(ARM, curves((height, height, height)))
     assert (estimate.value is not None) is is_defined
     if not is_defined:
@@ -84,7 +82,6 @@ def test_scores_must_be_clipped(outside: float) -> None:
 
 
 def test_zero_shot_has_no_forward_transfer() -> None:
-    """One evaluation spans no area."""
     estimate = transfer(LearningCurves(np.array([0.0]), np.array([[0.5]])), SCRATCH)
     assert estimate.value is None
     assert "one evaluation only" in estimate.note

@@ -35,7 +35,6 @@ def coverage(estimates: list[Estimate], truth: float) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("spread", [0.1, 0.3], ids=["equal spread", "threefold spread"])
 def test_welch_covers_95_percent_at_five_seeds(spread: float) -> None:
-    """A 95 % Welch interval over five seeds covers 95 ± 2 %."""
     arms, scratches = draw(n_seeds=5, seed=0)
     arms = ARM[0] + (arms - ARM[0]) * spread / ARM[1]
     estimates = [estimate_difference(a, b) for a, b in zip(arms, scratches, strict=True)]
@@ -44,7 +43,6 @@ def test_welch_covers_95_percent_at_five_seeds(spread: float) -> None:
 
 @pytest.mark.slow
 def test_percentile_bootstrap_covers_87_percent_at_five_seeds() -> None:
-    """A 95 % percentile bootstrap over five seeds covers 87 %."""
     arms, scratches = draw(n_seeds=5, seed=1)
     interval = stats.bootstrap(
         (arms, scratches),
@@ -75,7 +73,6 @@ def table() -> dict[Case, list[Measured]]:
 
 
 def test_the_table_holds_every_case() -> None:
-    """The table has a row for each case."""
     assert list(table()) == CASES
 
 

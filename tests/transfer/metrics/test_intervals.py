@@ -118,7 +118,6 @@ def test_many_seeds_make_the_ratio_normal() -> None:
 
 
 def test_same_generator_same_interval() -> None:
-    """The given generator determines the resamples."""
     assert ratio(ARM, SCRATCH, seed=3) == ratio(ARM, SCRATCH, seed=3)
     assert ratio(ARM, SCRATCH, seed=3) != ratio(ARM, SCRATCH, seed=4)
 
@@ -180,7 +179,6 @@ def test_unusable_resamples_are_not_dropped(
 
 @pytest.mark.parametrize("confidence", [0.0, 1.0, 95.0, np.nan])
 def test_confidence_is_a_share(confidence: float) -> None:
-    """Confidences outside (0, 1) are refused."""
     with pytest.raises(StudyError, match=r"such as 0\.95"):
         estimate_difference(ARM, SCRATCH, confidence=confidence)
     with pytest.raises(StudyError, match=r"such as 0\.95"):
@@ -189,14 +187,12 @@ def test_confidence_is_a_share(confidence: float) -> None:
 
 @pytest.mark.parametrize(("confidence", "fewest"), [(0.9, 20), (0.95, 40), (0.99, 200)])
 def test_each_tail_needs_a_resample(confidence: float, fewest: int) -> None:
-    """Too few resamples for the confidence are refused."""
     assert ratio(ARM, SCRATCH, confidence=confidence, n_resamples=fewest).value is not None
     with pytest.raises(StudyError, match=f"at least {fewest} resamples, got {fewest - 1}"):
         ratio(ARM, SCRATCH, confidence=confidence, n_resamples=fewest - 1)
 
 
 def test_estimates_survive_json() -> None:
-    """Undefined values are null in JSON, not NaN."""
     for estimate in (undefined("Undefined: because."), estimate_difference(ARM, SCRATCH)):
         assert msgspec.json.decode(msgspec.json.encode(estimate), type=Estimate) == estimate
     assert b'"value":null' in msgspec.json.encode(undefined("Undefined: because."))

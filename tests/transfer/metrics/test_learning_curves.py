@@ -36,27 +36,23 @@ RISING = LearningCurves(STEPS, np.array([[0.0, 0.5, 1.0], [1.0, 0.5, 0.0]]))
     ],
 )
 def test_bad_curves_are_refused(steps: object, returns: object, message: str) -> None:
-    """Wrong shapes and values are refused with the reason."""
     with pytest.raises(StudyError, match=message):
         LearningCurves(steps, returns)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("source_steps", [-1.0, np.nan, np.inf])
 def test_source_steps_must_be_a_count(source_steps: float) -> None:
-    """Negative and infinite source steps are refused."""
     with pytest.raises(StudyError, match="source_steps"):
         in_total_steps(RISING, source_steps, 0.0)
 
 
 @pytest.mark.parametrize("floor", [np.nan, -np.inf])
 def test_floor_must_be_finite(floor: float) -> None:
-    """An infinite floor is refused."""
     with pytest.raises(StudyError, match="floor"):
         in_total_steps(RISING, 10, floor)
 
 
 def test_errors_are_also_value_errors() -> None:
-    """StudyError is also a ValueError."""
     with pytest.raises(ShapechangerError):
         LearningCurves(np.array([1.0]), np.array([[1.0]]))
     with pytest.raises(ValueError, match="start at 0"):
@@ -94,12 +90,10 @@ def test_curves_cannot_be_written_to(copied: LearningCurves) -> None:
 
 
 def test_sizes_have_names() -> None:
-    """Rows are seeds and columns are evaluations."""
     assert (RISING.n_seeds, RISING.n_evals, RISING.horizon) == (2, 3, 100.0)
 
 
 def test_last_steps() -> None:
-    """`last_steps` returns the steps of the last evaluations."""
     np.testing.assert_array_equal(RISING.last_steps(2), [50.0, 100.0])
 
 
@@ -128,7 +122,6 @@ def test_area_weighs_uneven_evaluations() -> None:
 
 
 def test_one_evaluation_spans_no_area() -> None:
-    """The area of one evaluation is refused."""
     with pytest.raises(StudyError, match="no area"):
         LearningCurves(np.array([0.0]), np.array([[1.0]])).auc()
 
@@ -160,13 +153,11 @@ def test_total_steps_jump_without_a_slope() -> None:
     ],
 )
 def test_area_in_total_steps_is_exact(source_steps: int, rising: float, falling: float) -> None:
-    """The area is a rectangle and a trapezoid, wherever the jump is."""
     total = in_total_steps(RISING, source_steps, floor=-1.0)
     np.testing.assert_allclose(total.auc(), [rising, falling], rtol=1e-12)
 
 
 def test_area_in_total_steps_agrees_with_a_fine_sum() -> None:
-    """The area equals a fine midpoint sum over the curve."""
     rng = np.random.default_rng(0)
     steps = np.array([0.0, 7.0, 20.0, 64.0])
     total = in_total_steps(LearningCurves(steps, rng.normal(size=(3, 4))), 13, floor=0.5)
@@ -175,13 +166,11 @@ def test_area_in_total_steps_agrees_with_a_fine_sum() -> None:
 
 
 def test_source_steps_count_once() -> None:
-    """Curves that already count source steps are refused."""
     with pytest.raises(StudyError, match="already count 30"):
         in_total_steps(in_total_steps(RISING, 30, 0.0), 30, 0.0)
 
 
 def test_comparison_needs_the_same_evaluations() -> None:
-    """Other evaluations are refused, except a single one."""
     other = LearningCurves(np.array([0.0, 50.0, 99.0]), np.zeros((1, 3)))
     with pytest.raises(StudyError, match="the steps must be the same"):
         check_comparable(other, RISING)
@@ -189,6 +178,5 @@ def test_comparison_needs_the_same_evaluations() -> None:
 
 
 def test_scratch_has_no_source() -> None:
-    """Scratch with source steps is refused."""
     with pytest.raises(StudyError, match="cannot count source steps"):
         check_comparable(RISING, in_total_steps(RISING, 30, 0.0))

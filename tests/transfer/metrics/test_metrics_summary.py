@@ -79,14 +79,12 @@ def test_total_steps_by_hand() -> None:
 
 
 def test_thresholds_are_reported_in_order() -> None:
-    """Both ways of counting have all thresholds in order."""
     for measured in (summary().in_target_steps, summary().in_total_steps):
         assert tuple(t.threshold for t in measured.times_to_threshold) == DEFAULT_THRESHOLDS
         assert all(t.arm is not None for t in measured.times_to_threshold)
 
 
 def test_summary_states_its_settings() -> None:
-    """Budget, seeds, k and confidence are in the summary."""
     result = summary()
     assert (result.unit, result.reference) == ("score", REFERENCE)
     assert (result.horizon, result.source_steps) == (20.0, 10.0)
@@ -101,7 +99,6 @@ def test_without_source_steps_both_counts_agree() -> None:
 
 
 def test_same_generator_same_summary() -> None:
-    """Equal generators give equal summaries."""
     assert summary() == summary()
 
 
@@ -149,13 +146,11 @@ def test_summaries_survive_json(result: Summary) -> None:
 
 
 def test_other_evaluations_are_refused() -> None:
-    """Curves with other evaluations are refused."""
     shorter = LearningCurves(STEPS[:2], ARM.returns[:, :2])
     with pytest.raises(StudyError, match="must be the same"):
         summary(shorter)
 
 
 def test_every_exported_name_exists_once_and_in_order() -> None:
-    """`__all__` is sorted, unique and importable."""
     assert len(set(metrics.__all__)) == len(metrics.__all__)
     assert all(hasattr(metrics, name) for name in metrics.__all__)

@@ -67,13 +67,11 @@ def test_intervals_hold_over_many_studies() -> None:
 
 @pytest.mark.parametrize("groups", [[], [np.empty(0)]])
 def test_no_runs_are_refused(groups: _Groups) -> None:
-    """Studies without runs are refused."""
     with pytest.raises(StudyError, match="at least one run"):
         interquartile_mean(groups, rng=_rng())
 
 
 def test_the_number_of_studies_must_match() -> None:
-    """Different numbers of studies are refused."""
     one = np.ones(2)
     with pytest.raises(StudyError, match="1 studies of the arm and 2 of scratch"):
         probability_of_improvement([one], [one, one], rng=_rng())

@@ -35,7 +35,6 @@ def test_a_shipped_reference_overrides_the_best_arm() -> None:
 
 
 def test_clipped_scores_stay_between_0_and_1() -> None:
-    """Clipped scores are in [0, 1]."""
     reference = Reference(zero=-100.0, one=300.0)
     curves = LearningCurves(STEPS, np.array([[-200.0, 100.0, 500.0]]))
     np.testing.assert_allclose(reference.scores(curves, clip=True).returns, [[0.0, 0.5, 1.0]])
@@ -51,14 +50,12 @@ def test_the_floor_is_scored_too() -> None:
 
 
 def test_a_reference_is_the_best_floor_and_the_best_end() -> None:
-    """Zero is the highest floor, and one the highest end."""
     floors = {"random actions": -10.0, "the zero action": 997.0, "untrained policies": 994.0}
     reference = Reference.of(floors, {"scratch": 1100.0, "fine-tune": 1500.0})
     assert reference == Reference(997.0, 1500.0, "the zero action", "fine-tune")
 
 
 def test_a_reference_needs_both_ends() -> None:
-    """A reference without floors or ends is refused."""
     with pytest.raises(StudyError, match="needs a floor"):
         Reference.of({}, {"scratch": 1.0})
     with pytest.raises(StudyError, match="needs a floor"):
@@ -67,7 +64,6 @@ def test_a_reference_needs_both_ends() -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_reference_is_finite(bad: float) -> None:
-    """Infinite values and NaN are refused."""
     with pytest.raises(StudyError, match="finite"):
         Reference(zero=bad, one=1.0)
     with pytest.raises(StudyError, match="finite"):
@@ -94,6 +90,5 @@ def test_scores_exist_only_if_an_arm_learned(zero: float, one: float, defined: b
 
 
 def test_reference_survives_json() -> None:
-    """A reference round trips through JSON."""
     reference = Reference(-325.6, 5139.8)
     assert msgspec.json.decode(msgspec.json.encode(reference), type=Reference) == reference

@@ -107,20 +107,17 @@ def test_auc_ratio_in_total_steps() -> None:
 
 @pytest.mark.parametrize("height", [0.0, -0.5])
 def test_auc_ratio_needs_an_area_above_zero(height: float) -> None:
-    """It is undefined unless scratch's area is above zero."""
     estimate = ratio(ARM, LearningCurves(STEPS, np.full((2, 4), height)))
     assert estimate.value is None
     assert "not above zero" in estimate.note
 
 
 def test_auc_ratio_moves_with_an_offset() -> None:
-    """A constant added to the returns changes the ratio."""
     shifted = [LearningCurves(STEPS, curves.returns + 1.0) for curves in (ARM, SCRATCH)]
     assert ratio(*shifted).value == pytest.approx((30.0 + 40.0) / (16.5 + 40.0))
 
 
 def test_zero_shot_has_a_start_and_an_end() -> None:
-    """The one evaluation stands for the end, and a note states it."""
     assert jumpstart(ZERO_SHOT, SCRATCH).value == pytest.approx(0.45)
     end = asymptotic_gain(ZERO_SHOT, SCRATCH, last_k=2)
     assert end.value == pytest.approx(0.55 - 0.6)
@@ -139,7 +136,6 @@ def test_zero_shot_of_one_seed_keeps_both_reasons() -> None:
 
 
 def test_zero_shot_has_no_curve() -> None:
-    """Measures of a curve are undefined for one evaluation, with a note."""
     for estimate in (total_reward_gain(ZERO_SHOT, SCRATCH), ratio(ZERO_SHOT, SCRATCH)):
         assert estimate.value is None
         assert "one evaluation only" in estimate.note
@@ -160,7 +156,6 @@ def test_zero_shot_has_no_curve() -> None:
 def test_every_measure_refuses_other_evaluations(
     measure: Callable[[LearningCurves, LearningCurves], object],
 ) -> None:
-    """Curves with different steps are refused."""
     shorter = LearningCurves(STEPS[:3], ARM.returns[:, :3])
     with pytest.raises(StudyError, match="must be the same"):
         measure(shorter, SCRATCH)

@@ -43,7 +43,6 @@ def test_source_steps_delay_and_censor() -> None:
 
 
 def test_a_floor_above_the_threshold_is_there_at_once() -> None:
-    """A threshold below the floor is reached at step 0."""
     assert not steps_to_reach(in_total_steps(ARM, 10, 0.6), 0.5).any()
     np.testing.assert_allclose(steps_to_reach(ARM, -1.0), np.zeros(4))
 
@@ -82,7 +81,6 @@ def test_total_steps_can_cost_more_than_they_save() -> None:
 
 
 def test_zero_shot_has_no_times() -> None:
-    """Times are undefined for one evaluation."""
     times = time_to_threshold(LearningCurves(np.array([0.0]), np.array([[0.9]])), SCRATCH, 0.5)
     assert (times.arm, times.scratch, times.steps_saved.value) == (None, None, None)
     assert "one evaluation only" in times.steps_saved.note
@@ -90,6 +88,5 @@ def test_zero_shot_has_no_times() -> None:
 
 @pytest.mark.parametrize("threshold", [math.nan, math.inf])
 def test_threshold_is_a_number(threshold: float) -> None:
-    """Thresholds that are not finite are refused."""
     with pytest.raises(StudyError, match="finite"):
         time_to_threshold(ARM, SCRATCH, threshold)

@@ -87,7 +87,6 @@ def test_rows_match_the_summary(study: Study) -> None:
 
 
 def test_undefined_measures_have_a_reason() -> None:
-    """Undefined measures have a note with the reason."""
     rows = by_name(make_study(arms=("scratch", "zero-shot")), "zero-shot")
     assert rows["Area ratio"].target == rows["Area ratio"].total == "undefined"
     assert rows["Area ratio"].method == "none"
@@ -100,7 +99,6 @@ def test_undefined_measures_have_a_reason() -> None:
 
 
 def test_notes_name_their_way_of_counting() -> None:
-    """If only one way of counting lacks an interval, the note names it."""
     row = by_name(make_study(source_steps=10_240), "fine-tune")["Area ratio"]
     assert row.total == "0 (no interval)"
     assert row.method.endswith("/ none")
@@ -133,19 +131,16 @@ def test_the_source_ends_with_its_last_evaluation(study: Study) -> None:
 
 
 def test_reward_terms_are_final_means(study: Study) -> None:
-    """Each synthetic term is half of the return."""
     rows = {row.kind: row for row in arm_rows(study)}
     assert set(rows["zero-shot"].terms) == {"reward_forward", "reward_survive"}
     assert rows["zero-shot"].terms["reward_forward"] == pytest.approx(200.0)
 
 
 def test_no_run_is_good_where_none_learned() -> None:
-    """Without learning, the number of good runs is empty."""
     low = rising(-900.0, -900.0, 1e3)
     study = make_study(scratch=low, fine_tune=low, zero_shot=low[:, :1])
     assert {row.good for row in arm_rows(study)} == {""}
 
 
 def test_a_given_policy_has_no_source_row() -> None:
-    """A given source policy has no runs in the study."""
     assert "source" not in [row.kind for row in arm_rows(make_study(given=True))]

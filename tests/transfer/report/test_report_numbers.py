@@ -36,7 +36,6 @@ def test_numbers_are_short(value: float, text: str) -> None:
 
 
 def test_the_sign_is_that_of_the_rounded_number() -> None:
-    """A positive number gets a plus; one that is rounded to zero gets no sign."""
     assert number(0.25, 2, signed=True) == "+0.25"
     assert number(0.001, 2, signed=True) == "0.00"
     assert number(-0.001, 2, signed=True) == "0.00"
@@ -44,7 +43,6 @@ def test_the_sign_is_that_of_the_rounded_number() -> None:
 
 
 def test_steps_are_whole() -> None:
-    """Steps are rounded to integers."""
     assert count(12_345.4) == "12,345"
 
 
@@ -68,14 +66,12 @@ def test_intervals_have_two_significant_digits(
 
 
 def test_missing_values_and_intervals_are_stated() -> None:
-    """Estimates without a value or an interval are labelled."""
     assert estimate_text(undefined("Why not.")) == "undefined"
     assert estimate_text(Estimate(0.5), signed=True) == "+0.5000 (no interval)"
     assert estimate_text(Estimate(0.3, 0.2, 0.4), signed=True) == "+0.30 [+0.20, +0.40]"
 
 
 def test_numbers_of_a_list_share_their_digits() -> None:
-    """All numbers of a list have the same decimals."""
     assert list_text([5.0, 7.5, 15.0]) == "5.0; 7.5; 15.0"
     assert list_text([1000.0, 1000.0]) == "1,000; 1,000"
 

@@ -87,7 +87,6 @@ def test_sections_come_in_order(page: str) -> None:
 
 
 def test_the_page_is_self_contained(page: str) -> None:
-    """The page has no scripts and loads no other files."""
     read = Reader(page)
     assert {"script", "link", "iframe", "object"}.isdisjoint(read.tags)
     sources = [value for name, value in read.attributes if name in {"src", "href", "srcset"}]
@@ -100,7 +99,6 @@ def test_the_page_is_self_contained(page: str) -> None:
 
 
 def test_numbers_match_the_table(study: Study, page: str) -> None:
-    """The page has the texts of the table in the terminal."""
     read = Reader(page)
     assert verdict(study) in read.words
     for row in measure_rows(study):
@@ -156,7 +154,6 @@ def test_matching_bodies_have_no_list() -> None:
 
 
 def test_one_action_is_singular() -> None:
-    """A single action is written without a plural."""
     pictures = (np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2, 3), np.uint8))
     read = Reader(study_html(make_study(the_map=same_body()), pictures))
     assert "Target: BigAnt-v1, 1 observation, 1 action" in read.words
@@ -169,7 +166,6 @@ def test_reward_terms_have_a_table(page: str) -> None:
 
 
 def test_names_are_escaped() -> None:
-    """Names of envs, terms, commands and certificates are escaped."""
     study = make_study(
         source=EnvRef("evil/" + EVIL, {"body": EVIL * 9}),
         command=EVIL,
@@ -207,7 +203,6 @@ def test_pictures_are_embedded(study: Study) -> None:
 
 
 def test_without_pictures_a_note_is_shown(page: str, study: Study) -> None:
-    """The given note is shown, or a default one."""
     assert "No picture can be drawn here." in Reader(page).words
     assert "There are no pictures." in Reader(study_html(study)).words
 

@@ -87,7 +87,6 @@ def test_declared_seeds_are_stated() -> None:
 
 
 def test_a_sweep_has_a_chart() -> None:
-    """A sweep over one number has a chart in place of the matrix."""
     studies = {
         f"Ant-{factor:g}": make_study(target=EnvRef("shapechanger/Ant-v1", {"body": str(factor)}))
         for factor in (0.5, 1.5, 2.0)
@@ -99,7 +98,6 @@ def test_a_sweep_has_a_chart() -> None:
 
 
 def test_strips_are_embedded_and_films_linked() -> None:
-    """Film strips are embedded, and films are linked."""
     strips = {"Ant-to-BigAnt": [FilmStrip("zero-shot: 0.1 m/s", b"\xff\xd8jpeg")]}
     films = {"Ant-to-BigAnt": "a/film.mp4"}
     reader = Reader(suite_html("ants", _pairs(), seeds=5, strips=strips, films=films))
@@ -111,13 +109,11 @@ def test_strips_are_embedded_and_films_linked() -> None:
 
 
 def test_names_are_escaped() -> None:
-    """Names are escaped."""
     page = suite_html(EVIL, {EVIL: make_study(command=EVIL)}, seeds=5)
     assert "<script" not in page
 
 
 def test_arms_of_some_studies_are_listed() -> None:
-    """Arms that some studies lack are listed and not compared over all."""
     studies = _pairs()
     studies["Ant-to-BigAnt"] = make_study(
         source=ANTS[0], target=ANTS[1], arms=("scratch", "fine-tune")
@@ -144,7 +140,6 @@ def test_a_page_needs_a_study() -> None:
 
 
 def test_missing_pairs_are_marked() -> None:
-    """A pair that has not run is marked as such."""
     studies = _pairs()
     del studies["Ant-to-BigAnt"]
     words = Reader(suite_html("ants", studies, seeds=5)).words

@@ -61,7 +61,6 @@ def test_direction_follows_the_interval(estimate: Estimate, expected: Direction)
     ids=["helped", "hurt", "unclear", "zero-shot", "flat"],
 )
 def test_the_verdict_is_one_short_sentence(study: Study, words: str) -> None:
-    """The verdict is one sentence of at most 25 words."""
     text = verdict(study)
     assert text.startswith(words)
     assert text.endswith(".")
@@ -93,12 +92,10 @@ def test_seeds_without_spread_are_not_called_unclear() -> None:
 
 
 def test_a_flat_study_says_nothing_of_its_arms() -> None:
-    """Neither does the sentence on the other arms."""
     assert other_arms(make_study(scratch=FLAT, fine_tune=FLAT, zero_shot=FLAT[:, :1])) == ""
 
 
 def test_a_study_is_flat_only_if_no_arm_learns() -> None:
-    """A flat scratch arm is a result if another arm rises."""
     low = rising(0.0, 1.0, 3000.0, noise=0.1)
     assert not is_flat(make_study(scratch=low))
     assert is_flat(make_study(scratch=low + 100.0, fine_tune=low + 101.0, zero_shot=low[:, :1]))

@@ -16,7 +16,6 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import counted, plain_console, say
-from shapechanger.cli.env_arguments import require_file
 from shapechanger.demos.episodes import (
     Episode,
     Repair,
@@ -29,7 +28,7 @@ from shapechanger.demos.episodes import (
 )
 from shapechanger.demos.statistics import summary
 from shapechanger.errors import DemosError, UnknownName
-from shapechanger.files import write_atomic
+from shapechanger.files import require_file, write_atomic
 from shapechanger.reports.numbers import duration_text, shares_text
 
 _WIDEST: Final = 400

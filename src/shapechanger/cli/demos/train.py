@@ -13,19 +13,19 @@ import tyro
 from numpy.typing import NDArray
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
-from shapechanger.cli.env_arguments import require_file, require_seed
+from shapechanger.cli.env_arguments import require_seed
 from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.dataset import count_steps, load_dataset
 from shapechanger.demos.episodes import EpisodeHeader
 from shapechanger.errors import DemosError, OutputError
-from shapechanger.files import write_atomic
+from shapechanger.files import require_file, write_atomic
 
 if TYPE_CHECKING:
-    from shapechanger.cli.demos.waypoints import CanonicalView
     from shapechanger.demos.cloning.judge import Judgement
     from shapechanger.demos.cloning.learn import MemberCheck
     from shapechanger.demos.cloning.policy import CameraPolicy
     from shapechanger.vehicles.cloning import CloningSettings
+    from shapechanger.vehicles.waypoint_demonstrations import CanonicalView
     from shapechanger.vehicles.waypoints import SteeringResponse
 
 
@@ -84,7 +84,7 @@ class TrainClone:
         data = load_dataset(self.data, shrink=shrinking)
         origin: dict[str, Any] = {}
         if view is not None:
-            from shapechanger.cli.demos.waypoints import as_waypoints
+            from shapechanger.vehicles.waypoint_demonstrations import as_waypoints
 
             shown = as_waypoints(data, _response(self.response))
             for note in (view.note(), *shown.notes):
@@ -177,7 +177,7 @@ class TrainClone:
 
 def _view(camera: tuple[float, float] | None) -> CanonicalView:
     """Return how pictures are warped to the virtual camera, from pitch and field of view given."""
-    from shapechanger.cli.demos.waypoints import CanonicalView, camera_geometry
+    from shapechanger.vehicles.waypoint_demonstrations import CanonicalView, camera_geometry
 
     return CanonicalView(None if camera is None else camera_geometry(*camera))
 
@@ -292,7 +292,7 @@ class Evaluate:
         shrinking = Shrinking(policy.card.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
         if view is not None and view.rectifiers:
-            from shapechanger.cli.demos.waypoints import as_waypoints
+            from shapechanger.vehicles.waypoint_demonstrations import as_waypoints
 
             shown = as_waypoints(data, _response(self.response))
             for note in (view.note(), *shown.notes):

@@ -10,9 +10,9 @@ import imageio.v3 as iio
 import numpy as np
 from numpy.typing import NDArray
 
-from shapechanger.cli.pictures import write_film
 from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, measures_of
 from shapechanger.envs.catalogue import CATALOGUE
+from shapechanger.reports.films import write_film
 from shapechanger.transfer.body_map import BodyMap, MappedEnv
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, Act
 from shapechanger.transfer.plan import SOURCE, Run

@@ -1,4 +1,4 @@
-"""Write images and videos."""
+"""Images and videos as files."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any, Final, cast
 
 from numpy.typing import NDArray
 
-from shapechanger.cli.env_arguments import require_file
 from shapechanger.errors import MissingExtra, OutputError
+from shapechanger.files import require_file
 
 try:
     import imageio.v3 as iio
@@ -25,46 +25,20 @@ _VP9: Final = {
 
 
 def require_film(path: Path) -> None:
-    """Check that a video can be written to a path.
-
-    Raises:
-        OutputError: If it is a folder, its folder is not writable, or its suffix is not that of a
-            video.
-    """
+    """Raise OutputError unless a video can be written to a path, whose suffix is a video's."""
     if path.suffix.lower() not in _FILMS and not path.is_dir():
         raise OutputError(f"Cannot write {path}: a film ends with one of {', '.join(_FILMS)}.")
     require_file(path)
 
 
-def write_picture(picture: NDArray[Any], path: Path) -> None:
-    """Write an image in the format of the file's suffix.
-
-    Args:
-        picture: Shape (height, width, 3).
-        path: The file.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
-    _write(path, picture)
-
-
 def write_film(frames: list[NDArray[Any]], path: Path, fps: float) -> None:
-    """Write frames as a video.
-
-    Args:
-        frames: Pictures, each of shape (height, width, 3).
-        path: The file.
-        fps: Frames per second.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
+    """Write frames, each of shape (height, width, 3), as a video."""
     encoding = _VP9 if path.suffix.lower() == _WEBM else {}
-    _write(path, frames, fps=fps, macro_block_size=1, **encoding)
+    write_picture(frames, path, fps=fps, macro_block_size=1, **encoding)
 
 
-def _write(path: Path, content: Any, **options: Any) -> None:
+def write_picture(content: Any, path: Path, **options: Any) -> None:
+    """Write an image of shape (height, width, 3) in the format of the file's suffix."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         cast("Any", iio).imwrite(path, content, **options)

@@ -1,0 +1,156 @@
+"""Replay of an episode in an env, with the differences, and as a video."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Any, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.demos.episodes import Episode, Step
+from shapechanger.demos.jpeg import blank, decode_picture, overlay
+from shapechanger.demos.recording import EncodedObservation, ObservationEncoder
+from shapechanger.errors import DemosError
+from shapechanger.layout import Layout
+
+
+def play_in_env(episode: Episode, ref: EnvRef) -> list[str]:
+    """Replay an episode in an env from the recorded seed, and return sentences on the differences.
+
+    The applied actions are replayed where they are known, because the frames follow from them; the
+    expert's intended actions may differ.
+    """
+    header = episode.header
+    kept = episode.kept
+    apart = _Apart()
+    # With the recorded arguments if it is the recorded env.
+    kwargs = header.env_kwargs if ref.id == header.env else {}
+    made = EnvRef(ref.id, {**kwargs, **ref.kwargs}).make(max_episode_steps=-1)
+    with closing(made) as env:
+        encoder = ObservationEncoder(env, 95)
+        recorded = Layout.from_json(header.action_layout)
+        if [(f.name, f.unit, f.shape) for f in encoder.action_layout] != [
+            (f.name, f.unit, f.shape) for f in recorded
+        ]:
+            raise DemosError(
+                f"{ref} moves {', '.join(encoder.action_layout.names)}, and {episode.path.name} "
+                f"was recorded with {', '.join(recorded.names)}."
+            )
+        states = encoder.state_layout
+        compares = states is not None and states.to_json() == header.state_layout
+        observation, info = env.reset(
+            seed=header.seed, options=cast("Any", header.notes.get("reset_options"))
+        )
+        played, ended = 0, ""
+        for step in kept:
+            apart.look(episode, step, encoder.encode(observation, info), states=compares)
+            values = step.action if step.applied is None else step.applied
+            observation, reward, terminated, truncated, info = env.step(
+                np.array(values, np.float32)
+            )
+            played += 1
+            apart.earn(step, float(reward))
+            if terminated or truncated:
+                ended = "; the episode ended there" if played < len(kept) else ""
+                break
+    return [
+        f"played {played} of {len(kept)} steps in {ref}{ended}",
+        *_caveats(episode),
+        *apart.lines(states if compares else None),
+    ]
+
+
+def _caveats(episode: Episode) -> list[str]:
+    """Return reasons why a replay cannot be identical."""
+    caveats: list[str] = []
+    if episode.header.seed is None:
+        caveats.append("it was recorded without a seed, so it starts elsewhere")
+    kept = episode.kept
+    if kept[0].index != 0 or kept[-1].index - kept[0].index != len(kept) - 1:
+        caveats.append("dropped steps were not played, so later steps start elsewhere")
+    if any(step.applied is None for step in kept):
+        caveats.append("applied actions are unknown, so the decided ones were played")
+    return caveats
+
+
+class _Apart:
+    """Differences between a replay and its recording."""
+
+    def __init__(self) -> None:
+        self._states: list[NDArray[np.float64]] = []
+        self._pictures: list[float] = []
+        self._rewards: list[tuple[float, float]] = []
+
+    def look(self, episode: Episode, step: Step, seen: EncodedObservation, *, states: bool) -> None:
+        """Compare the observation before a step with the recorded one."""
+        if states:
+            self._states.append(np.abs(np.array(seen.state) - np.array(step.state)))
+        jpeg = episode.jpeg(step)
+        if jpeg is None or seen.jpeg is None:
+            return
+        old, new = decode_picture(jpeg, step.frame), decode_picture(seen.jpeg, "the env's picture")
+        if old.shape == new.shape:
+            self._pictures.append(float(np.abs(old.astype(float) - new).mean()))
+
+    def earn(self, step: Step, reward: float) -> None:
+        """Compare the reward of a step with the recorded one."""
+        if step.reward is not None:
+            self._rewards.append((step.reward, reward))
+
+    def lines(self, layout: Layout | None) -> list[str]:
+        """Describe the differences, one per line."""
+        lines: list[str] = []
+        if self._pictures and not any(self._pictures):
+            lines.append("the pictures are the same in every step")
+        elif self._pictures:
+            lines.append(
+                f"pictures differ by {np.mean(self._pictures):.1f} of 255 on average, "
+                f"{self._pictures[-1]:.1f} at the end"
+            )
+        if layout is not None and self._states:
+            gaps = np.array(self._states)
+            if not np.nanmax(gaps, initial=0.0):
+                lines.append("the state is the same in every step")
+            for name, place in layout.slices.items():
+                of_one = gaps[:, place]
+                if np.nanmax(of_one, initial=0.0):
+                    lines.append(
+                        f"{layout[name]} differs by {np.nanmean(of_one):.3g} on average, "
+                        f"{np.nanmax(of_one):.3g} at most"
+                    )
+        if self._rewards:
+            then, now = np.sum(self._rewards, axis=0)
+            lines.append(f"return {then:.2f} when recorded, {now:.2f} now")
+        return lines or ["nothing to compare"]
+
+
+_WITHOUT_CAMERA: Final = (480, 40)
+
+
+def write_episode_film(episode: Episode, path: Path) -> str:
+    """Write the kept steps of an episode as a video, and return a sentence on it."""
+    from shapechanger.reports.films import require_film, write_film
+
+    require_film(path)
+    layout = Layout.from_json(episode.header.action_layout)
+    frames: list[NDArray[Any]] = []
+    size = None
+    for step in episode.kept:
+        jpeg = episode.jpeg(step)
+        picture = (
+            blank(_WITHOUT_CAMERA)
+            if jpeg is None
+            else decode_picture(jpeg, f"{episode.path}/frames/{step.frame}")
+        )
+        frame = overlay(picture, step, layout)
+        size = size or frame.shape
+        if frame.shape == size:  # A video has one frame size; other frames are skipped.
+            frames.append(frame)
+    write_film(frames, path, episode.header.control_hz)
+    left = len(episode.kept) - len(frames)
+    rest = f"; {left} pictures of another size are left out" if left else ""
+    seconds = len(frames) / episode.header.control_hz
+    return f"wrote {path}: {len(frames)} steps, {seconds:.1f} s{rest}"
