@@ -36,7 +36,7 @@ def pairs():
 def test_the_atlas_names_each_pair_whose_interval_excludes_zero(pairs, arm):
     found = {}
     for pair, runs in pairs.items():
-        mean, low, high = difference(at_the_end(runs[arm]), at_the_end(runs["fine-tune"]))
+        _, low, high = difference(at_the_end(runs[arm]), at_the_end(runs["fine-tune"]))
         if low > 0.0 or high < 0.0:
             found[pair] = f"[{low:+.2f}, {high:+.2f}]"
     expected = {
