@@ -24,20 +24,7 @@ if TYPE_CHECKING:
 def acting_in(
     env: gym.Env[Any, Any], file: Path, learner: str = "", trained_in: EnvRef | None = None
 ) -> tuple[gym.Env[Any, Any], Act]:
-    """Return an env as a policy senses it, and the policy.
-
-    Args:
-        env: The env.
-        file: A policy, a clone, or a policy that was exported as ONNX.
-        learner: An algorithm of the user's own that the file may name, as `module:name`.
-        trained_in: The env of the policy's training, if this is meant to be that env.
-
-    Raises:
-        CorruptStudy: If the file cannot be read.
-        ForeignStudy: If the env has changed since the training, and is meant to be the same.
-        MapError: If there is no body map of same names between the layouts.
-        PolicyError: If the clone's layouts are not those of the env.
-    """
+    """Return an env as a policy senses it, and the policy."""
     policy = load_any_policy(file, learner)
     card: Any = policy.card
     if trained_in is not None and ENV in card.identity:
@@ -55,15 +42,7 @@ def acting_in(
 
 
 def load_any_policy(file: Path, learner: str = "") -> Any:
-    """Load a policy of any kind, which may name a learner of the user's own.
-
-    Args:
-        file: The file.
-        learner: An algorithm of the user's own that the file may name, as `module:name`.
-
-    Raises:
-        CorruptStudy: If it cannot be read.
-    """
+    """Load a policy of any kind, which may name a learner of the user's own."""
     allow_own_modules(learner)
     return load_policy(file, learner)
 

@@ -20,42 +20,22 @@ from rich.table import Table
 
 
 def plain_console(*, stderr: bool = False, width: int | None = None) -> Console:
-    """Return a console without markup or emoji, so that `a[b]` and `:a:` print verbatim.
-
-    Args:
-        stderr: Whether to print on the standard error.
-        width: Columns; None for those of the terminal.
-    """
+    """Return a console without markup or emoji, so that `a[b]` and `:a:` print verbatim."""
     return Console(stderr=stderr, width=width, markup=False, emoji=False, highlight=False)
 
 
 def say(text: str, *, stderr: bool = False) -> None:
-    """Print text verbatim; only the terminal wraps its lines.
-
-    Args:
-        text: One or more lines.
-        stderr: Whether to print on the standard error.
-    """
+    """Print text verbatim; only the terminal wraps its lines."""
     plain_console(stderr=stderr).print(text, soft_wrap=True)
 
 
 def print_table(table: Table, file_width: int | None = None) -> None:
-    """Print a table, as wide as the terminal.
-
-    Args:
-        table: The table.
-        file_width: Columns where the output is a file, which has no width; None for 80.
-    """
+    """Print a table, as wide as the terminal."""
     plain_console(width=None if sys.stdout.isatty() else file_width).print(table)
 
 
 def counted(number: int, what: str) -> str:
-    """Format a count, such as "1 step" or "2 steps".
-
-    Args:
-        number: The count.
-        what: What is counted, in the singular.
-    """
+    """Format a count, such as "1 step" or "2 steps"."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 

@@ -57,14 +57,7 @@ def examine_machine(
     version_of: Callable[[str], str] = importlib.metadata.version,
     dev: Path = Path("/dev"),
 ) -> Iterator[Finding]:
-    """Check what Shapechanger can do on this machine.
-
-    Args:
-        requirements: Requirements of Shapechanger with their extras, as in its metadata; None for
-            those of the installed package.
-        version_of: Returns the installed version of a package, or raises `PackageNotFoundError`.
-        dev: Folder of the devices.
-    """
+    """Check what Shapechanger can do on this machine."""
     if requirements is None:
         requirements = importlib.metadata.requires(_PACKAGE) or []
     try:

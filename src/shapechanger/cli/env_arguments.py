@@ -73,18 +73,7 @@ _MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
 
 
 def env_ref(env_id: str, body: str = "") -> EnvRef:
-    """Return a reference to an env, optionally with another body.
-
-    Args:
-        env_id: An id of the catalogue, its name alone, any id registered with Gymnasium, or a robot
-            of the user's own as FILE or FILE@TASK.
-        body: Name of a body of the env's family, or edits as JSON; empty for the env's own.
-
-    Raises:
-        UnknownName: If the id is unknown.
-        MorphologyError: If the env has no bodies.
-        RenderError: If `MUJOCO_GL` prevents every env from being made.
-    """
+    """Return a reference to an env, optionally with another body."""
     require_known_gl()
     file, at, own_task = env_id.partition("@")
     if file.endswith(_MODEL_FILES):
@@ -108,11 +97,7 @@ def env_ref(env_id: str, body: str = "") -> EnvRef:
 
 
 def short_name(env_id: str) -> str:
-    """Return the name of an env as a part of a folder's name.
-
-    Args:
-        env_id: As of `env_ref`.
-    """
+    """Return the name of an env as a part of a folder's name."""
     file, _, own_task = env_id.partition("@")
     if file.endswith(_MODEL_FILES):
         return "-".join(filter(None, (Path(file).stem, own_task.rpartition(":")[2])))
@@ -124,9 +109,6 @@ def allow_own_modules(*names: str | None) -> None:
 
     Only names that the user gives may do so: the name of a class in a policy's file must not find a
     module that lies beside it.
-
-    Args:
-        names: Names of envs, learners or methods; learners may be TOML files.
     """
     here = str(Path.cwd())
     own = any(name and (":" in name or name.endswith(".toml")) for name in names)
@@ -149,15 +131,7 @@ def default_learner(env: EnvRef) -> str:
 
 
 def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
-    """Return a vehicle's env as studies use it, which resets the vehicle after a collision.
-
-    Args:
-        env: Any env; those without vehicles are returned unchanged.
-        lenses: Disturbances of its camera.
-
-    Raises:
-        StudyError: If it has no camera.
-    """
+    """Return a vehicle's env as studies use it, which resets the vehicle after a collision."""
     if lenses and env.id not in VEHICLE_ENVS:
         raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
     if env.id not in {*VEHICLE_ENVS, *WAYPOINT_ENVS, *RANGES_ENVS}:
@@ -172,15 +146,7 @@ def name_of(env: gym.Env[Any, Any]) -> str:
 
 
 def asked(env: gym.Env[Any, Any], ability: str) -> Any:
-    """Return a method that an env offers beyond Gymnasium's.
-
-    Args:
-        env: The env.
-        ability: Name of the method, such as "picture".
-
-    Raises:
-        MorphologyError: If it does not offer it.
-    """
+    """Return a method that an env offers beyond Gymnasium's."""
     offered = getattr(env.unwrapped, ability, None)
     if offered is None:
         raise MorphologyError(
@@ -191,15 +157,7 @@ def asked(env: gym.Env[Any, Any], ability: str) -> Any:
 
 @contextmanager
 def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
-    """Make an env and close it afterwards.
-
-    Args:
-        env: The env.
-        more: Arguments besides its own.
-
-    Raises:
-        UnknownName: If the id, or a name in its body, is unknown.
-    """
+    """Make an env and close it afterwards."""
     made = env.make(**more)
     try:
         yield made
@@ -208,15 +166,7 @@ def opened(env: EnvRef, **more: Any) -> Generator[gym.Env[Any, Any]]:
 
 
 def options_of(given: str, flag: str) -> dict[str, Any]:
-    """Parse further arguments of an env.
-
-    Args:
-        given: A JSON object; empty for none.
-        flag: Name of the option, for messages.
-
-    Raises:
-        StudyError: If it is not a JSON object.
-    """
+    """Parse further arguments of an env."""
     if not given:
         return {}
     try:
@@ -237,10 +187,6 @@ def executor_of(kind: str, workers: int | None, address: str | None) -> Executor
         kind: "processes" or "ray".
         workers: Number of processes; None for one per core.
         address: Address of the Ray cluster; None to start Ray on this machine.
-
-    Raises:
-        StudyError: If an option belongs to the other kind, or there are no workers.
-        MissingExtra: If Ray is not installed.
     """
     if kind == "ray":
         if workers is not None:
@@ -255,16 +201,7 @@ def executor_of(kind: str, workers: int | None, address: str | None) -> Executor
 
 
 def policy_file(given: Path, env: EnvRef) -> Path:
-    """Return a policy's file: the one given, or the one that ships for an env.
-
-    Args:
-        given: A file, or the word "reference".
-        env: The env.
-
-    Raises:
-        StudyError: If there is no such file.
-        UnknownName: If no reference policy ships for the env.
-    """
+    """Return a policy's file: the one given, or the one that ships for an env."""
     if given.exists():
         return given
     if str(given) == _REFERENCE:
@@ -274,14 +211,7 @@ def policy_file(given: Path, env: EnvRef) -> Path:
 
 
 def settings_of(given: Sequence[str]) -> dict[str, Any]:
-    """Parse settings of a learner.
-
-    Args:
-        given: Each as NAME=VALUE, with the value as in TOML: 3e-4, true or [64, 64].
-
-    Raises:
-        StudyError: If one has another form, or is given twice.
-    """
+    """Parse settings of a learner."""
     settings: dict[str, Any] = {}
     for text in given:
         name, equals, value = text.partition("=")
@@ -301,11 +231,7 @@ def settings_of(given: Sequence[str]) -> dict[str, Any]:
 
 
 def require_seed(seed: int) -> None:
-    """Refuse a seed that a random generator does not accept.
-
-    Raises:
-        StudyError: If it is negative or too large.
-    """
+    """Refuse a seed that a random generator does not accept."""
     check_seed(seed, StudyError)
 
 

@@ -101,13 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def parse(arguments: Sequence[str]) -> Any:
-    """Return the command that a command line names, which its `run` executes.
-
-    Raises:
-        UnknownName: If there is no such command or option.
-        StudyError: If an option lacks its value, or is given twice.
-        SystemExit: If an argument is missing or has another type, or help was asked for.
-    """
+    """Return the command that a command line names, which its `run` executes."""
     said, leaf_class = find_command(arguments)
     if leaf_class is not None:
         _require_options(arguments, said, leaf_class)
@@ -123,11 +117,7 @@ def parse(arguments: Sequence[str]) -> Any:
 
 
 def find_command(arguments: Sequence[str]) -> tuple[str, type | None]:
-    """Return the words of the command and its class; None if it has no subcommand yet.
-
-    Raises:
-        UnknownName: If there is no such command.
-    """
+    """Return the words of the command and its class; None if it has no subcommand yet."""
     said, kinds = "shapechanger", _commands(_Command)
     for word in arguments:
         name = word.replace("_", "-")  # As tyro.
@@ -156,12 +146,7 @@ def options_of(kind: type) -> dict[str, Any]:
 
 
 def _require_options(arguments: Sequence[str], said: str, kind: type) -> None:
-    """Raise an error of one sentence for an option that no parser can read.
-
-    Raises:
-        UnknownName: If the command has no such option.
-        StudyError: If its value is missing.
-    """
+    """Raise an error of one sentence for an option that no parser can read."""
     named = options_of(kind)
     flags = [name for name, hint in named.items() if hint is bool]
     options = [*named, *(name.replace("--", "--no-", 1) for name in flags), "--help"]

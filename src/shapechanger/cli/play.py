@@ -39,19 +39,7 @@ class Watching:
     learner: OwnLearner = ""
 
     def show(self, ref: EnvRef, policy: Path | None, *, trained_in: bool = False) -> None:
-        """Show episodes in a window or write them as a film, and print the returns.
-
-        Args:
-            ref: The env.
-            policy: File of the policy; None for random actions.
-            trained_in: Whether the env is meant to be that of the policy's training.
-
-        Raises:
-            StudyError: If there is nothing to play.
-            OutputError: If the film cannot be written.
-            MapError: If the policy's layouts do not fit the env.
-            ForeignStudy: If the env has changed since the policy's training.
-        """
+        """Show episodes in a window or write them as a film, and print the returns."""
         from shapechanger.cli.acting import acting_in
         from shapechanger.transfer.learners.evaluation import random_actions
 

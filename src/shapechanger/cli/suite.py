@@ -84,19 +84,10 @@ class SuiteFile(msgspec.Struct, forbid_unknown_fields=True):
     """Contents of a suite's file; one of `envs`, `pairs`, or `sources` with `targets` or `sweep`.
 
     Attributes:
-        envs: All ordered pairs of different ones of these.
-        pairs: Sources with their targets.
-        sources: Sources, each with every target.
-        targets: Targets.
-        sweep: Targets that differ in one number of one edit of their body.
         learner: Name of the learner; empty for the one tuned on the target.
-        settings: Settings of the learner that replace its own.
         arms: Arms of each study; empty for scratch, zero-shot and fine-tune.
-        measure: As in `make_plan`.
-        seeds: Runs of each arm.
         steps: Target steps of a run; None for the learner's own number.
         source_steps: Source steps of a source policy; None for the learner's own number.
-        seed: The seed from which the seeds of all runs are drawn.
     """
 
     envs: tuple[_Env, ...] = ()
@@ -120,15 +111,7 @@ def shipped_suites() -> tuple[str, ...]:
 
 
 def load_suite(name: str) -> SuiteFile:
-    """Load a suite.
-
-    Args:
-        name: A TOML file, or the name of a shipped suite.
-
-    Raises:
-        UnknownName: If there is no such file or suite.
-        StudyError: If the file is not valid TOML, or a key or value of it is wrong; with its line.
-    """
+    """Load a suite."""
     path = _SHIPPED / f"{name}.toml" if name in shipped_suites() else Path(name)
     try:
         text = read_text(path)
@@ -169,12 +152,7 @@ def _placed(name: str) -> Generator[None]:
 
 
 def suite_tasks(suite: SuiteFile) -> list[tuple[str, TransferTask]]:
-    """Return the name and the task of each study of a suite.
-
-    Raises:
-        StudyError: If the suite has no pairs, or names them in two ways.
-        UnknownName: If an env, or a name in a body, does not exist.
-    """
+    """Return the name and the task of each study of a suite."""
     ways = [bool(suite.envs), bool(suite.pairs), bool(suite.sources)]
     if sum(ways) != 1 or bool(suite.sources) != bool(suite.targets or suite.sweep):
         raise StudyError(
@@ -460,11 +438,7 @@ def _print_outcomes(found: list[StudyOutcome]) -> None:
 
 
 class _Page:
-    """The page of a suite, written again whenever a study has ended.
-
-    Attributes:
-        path: The page.
-    """
+    """The page of a suite, written again whenever a study has ended."""
 
     def __init__(
         self, suite: SuiteFile, name: str, out: Path, tasks: dict[str, TransferTask]

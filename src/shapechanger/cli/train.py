@@ -85,11 +85,7 @@ class Train:
         say(f"wrote {out}")
 
     def _of_many(self, env: EnvRef) -> EnvRef:
-        """Return the env with bodies to draw from its family.
-
-        Raises:
-            StudyError: If the number is negative, or one body is named too.
-        """
+        """Return the env with bodies to draw from its family."""
         if self.bodies < 0 or self.body:
             raise StudyError("--bodies takes a number above 0, and no --body beside it.")
         draw = BodyDraw(count=self.bodies, seed=self.seed)

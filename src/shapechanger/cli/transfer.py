@@ -235,16 +235,7 @@ class Methods:
 
 
 def write_study_report(study: Study, out: Path, found: Findings | None = None) -> Path:
-    """Write the report of a study, without pictures of the bodies if they cannot be rendered.
-
-    Args:
-        study: The study.
-        out: Its folder.
-        found: What it has found; None to compute it.
-
-    Returns:
-        The page.
-    """
+    """Write the report of a study, without pictures of the bodies if they cannot be rendered."""
     from shapechanger.files import write_atomic
     from shapechanger.transfer.report.study import study_html
 
@@ -259,12 +250,7 @@ def write_study_report(study: Study, out: Path, found: Findings | None = None) -
 
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
-    """Return the number of steps of each run for the progress; an evaluation counts as one.
-
-    Args:
-        plan: The plan of the study.
-        runs: The runs.
-    """
+    """Return the number of steps of each run for the progress; an evaluation counts as one."""
     return {run.name: max(1, plan.steps_of(run.kind)) for run in runs}
 
 

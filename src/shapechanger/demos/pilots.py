@@ -32,18 +32,7 @@ _CRAWLS_MPS: Final = 0.05  # Below this speed a vehicle does not collide.
 
 
 def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) -> EpisodeDriver:
-    """Return the requested driver.
-
-    Args:
-        env: The env.
-        driver: "expert", or a policy file.
-        corrected_by: "expert" to correct the policy, or "".
-        seed: Seed of the expert's errors.
-
-    Raises:
-        DemosError: If the driver is unknown, or the env has no expert.
-        PolicyError: If the file is not a policy.
-    """
+    """Return the requested driver."""
     if corrected_by not in ("", EXPERT):
         raise DemosError(f"A policy is corrected by {EXPERT}, and not by {corrected_by!r}.")
     if driver == EXPERT:
@@ -59,13 +48,7 @@ def pilot_of(env: gym.Env[Any, Any], driver: str, corrected_by: str, seed: int) 
 
 
 def corrected_pilot(env: gym.Env[Any, Any], act: Act, expert: TaskExpert) -> CorrectedPilot:
-    """Return a policy that an expert corrects where it is dangerous.
-
-    Args:
-        env: The env.
-        act: The policy.
-        expert: The expert of the env.
-    """
+    """Return a policy that an expert corrects where it is dangerous."""
     rule = GateRule()
     period_s = 1.0 / float(env.metadata.get("render_fps") or 20.0)
     layout: Layout | None = getattr(env.unwrapped, "action_layout", None)
@@ -108,14 +91,7 @@ def _name_of(env: gym.Env[Any, Any]) -> str:
 
 
 class _Dangers:
-    """Describes the danger in the env's world, if it has one.
-
-    Args:
-        env: The env.
-        rest: Value of the last action at which a vehicle brakes or rolls to rest; None for 0.
-        rule: Thresholds of the gate.
-        period_s: Time between steps, s.
-    """
+    """Describes the danger in the env's world, if it has one."""
 
     def __init__(
         self, env: gym.Env[Any, Any], rest: float | None, rule: GateRule, period_s: float

@@ -53,24 +53,7 @@ def film_study(
     source_policy: Path | None = None,
     shadows: bool = False,
 ) -> list[FilmStrip]:
-    """Play each arm's median seed for ten seconds, from the same start.
-
-    Args:
-        study: The study.
-        folder: Its folder, with the policies.
-        film: A film to write with all of them side by side; None for none.
-        source_policy: File of the source policy that the study was given; without it, neither the
-            source nor zero-shot is filmed in such a study.
-        shadows: Whether bodies of the catalogue have shadows; without a GPU these take ten times as
-            long as all the rest of a frame.
-
-    Returns:
-        A strip for each; none if the envs draw nothing.
-
-    Raises:
-        RenderError: If frames cannot be drawn here.
-        OutputError: If the film cannot be written.
-    """
+    """Play each arm's median seed for ten seconds, from the same start."""
     strips: list[FilmStrip] = []
     rows: list[NDArray[np.uint8]] = []
     fps = 0.0

@@ -144,16 +144,7 @@ def _overview(episodes: Sequence[Episode]) -> list[str]:
 
 
 def episode_at(path: Path) -> Episode:
-    """Load one episode.
-
-    Args:
-        path: Its folder, or that of a recording with a single episode.
-
-    Raises:
-        BrokenEpisode: If it is incomplete.
-        DemosError: If there is none, or more than one, or it has no steps.
-        UnknownName: If the recording has no episode of this name.
-    """
+    """Load one episode."""
     if not path.exists() and path.parent.is_dir():
         known = [episode.name for episode in episodes_of(path.parent)]
         raise UnknownName("episode", path.name, known)

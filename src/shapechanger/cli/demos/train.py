@@ -193,10 +193,7 @@ class Shrinking:
     """Convert frames to a policy's view while they are read, and record their digests.
 
     Attributes:
-        framing: Framing of the policy's view.
         view: How frames are warped before; None for not at all.
-        size: Rows and columns of the frames after that; None before the first.
-        seen: Digest of each frame.
     """
 
     framing: Framing
