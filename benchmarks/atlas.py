@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from playwright.sync_api import sync_playwright
 
 from benchmarks.row import Row
-from shapechanger.cli.suite import RunSuite, load_suite, suite_tasks
+from shapechanger.cli.suite import RunSuite
+from shapechanger.envs.suite_file import load_suite, suite_tasks
 from shapechanger.errors import StudyError
 from shapechanger.files import read_json, write_json
 from shapechanger.transfer.metrics import (

@@ -16,8 +16,8 @@ from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 import pytest
 
 from benchmarks.run import SUITES
-from shapechanger.cli.env_arguments import env_ref
 from shapechanger.cli.main import find_command, options_of, parse
+from shapechanger.envs.naming import env_ref
 from shapechanger.errors import ShapechangerError
 
 ROOT: Final = Path(__file__).parents[1]

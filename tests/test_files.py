@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from shapechanger.cli.suite import load_suite
+from shapechanger.envs.suite_file import load_suite
 from shapechanger.errors import CorruptStudy, OutputError, ShapechangerError
 from shapechanger.files import (
     append_line,

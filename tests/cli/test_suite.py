@@ -16,7 +16,7 @@ import pytest
 
 from shapechanger.cli import env_arguments, main
 from shapechanger.cli import suite as suite_command
-from shapechanger.cli.suite import SuiteFile
+from shapechanger.envs.suite_file import SuiteFile
 from shapechanger.errors import FailedRuns
 from shapechanger.transfer.executor import Job, OnProgress, Serial
 from shapechanger.transfer.learners import presets

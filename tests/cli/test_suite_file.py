@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from shapechanger.cli import main
-from shapechanger.cli.env_arguments import driven, env_ref, short_name
-from shapechanger.cli.suite import load_suite, shipped_suites, suite_tasks
+from shapechanger.envs.naming import driven, env_ref, short_name
+from shapechanger.envs.suite_file import load_suite, shipped_suites, suite_tasks
 from shapechanger.transfer.plan import TransferTask
 
 

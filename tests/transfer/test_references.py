@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from shapechanger.cli.env_arguments import default_learner
 from shapechanger.contract.env_ref import EnvRef, measures_of
 from shapechanger.envs.catalogue import CATALOGUE
+from shapechanger.envs.naming import default_learner
 from shapechanger.errors import UnknownName
 from shapechanger.policy import load_policy
 from shapechanger.transfer.learners.evaluation import EVALUATION_SEED, evaluate

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 
 from shapechanger.cli.console import say
-from shapechanger.cli.env_arguments import allow_own_modules
 from shapechanger.contract.env_ref import EnvRef, layouts_of
+from shapechanger.envs.naming import allow_own_modules
 from shapechanger.identity import identify_env
 from shapechanger.policy import load_policy
 from shapechanger.transfer.body_map import BodyMap, Copy, MappedEnv

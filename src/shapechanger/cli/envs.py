@@ -11,15 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from shapechanger.cli.console import plain_console, print_table, say
-from shapechanger.cli.env_arguments import (
-    Body,
-    EnvId,
-    EnvOptions,
-    asked,
-    env_ref,
-    opened,
-    options_of,
-)
+from shapechanger.cli.env_arguments import Body, EnvId, EnvOptions, asked, opened, options_of
 from shapechanger.contract.env_ref import EnvRef, layouts_of
 from shapechanger.envs.catalogue import (
     CATALOGUE,
@@ -30,6 +22,7 @@ from shapechanger.envs.catalogue import (
     VEHICLE_ENVS,
     WAYPOINT_ENVS,
 )
+from shapechanger.envs.naming import env_ref
 from shapechanger.layout import Layout
 
 

@@ -12,8 +12,9 @@ import tyro
 from rich.table import Table
 
 from shapechanger.cli.console import print_table, say
-from shapechanger.cli.env_arguments import EnvId, env_ref, options_of, require_seed
+from shapechanger.cli.env_arguments import EnvId, options_of, require_seed
 from shapechanger.contract.env_ref import EnvRef
+from shapechanger.envs.naming import env_ref
 from shapechanger.errors import FingerError, OutputError, UnknownName
 from shapechanger.files import require_file, write_atomic
 

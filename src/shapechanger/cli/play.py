@@ -14,12 +14,12 @@ from shapechanger.cli.env_arguments import (
     Body,
     EnvId,
     OwnLearner,
-    env_ref,
     opened,
     policy_file,
     require_seed,
 )
 from shapechanger.contract.env_ref import EnvRef
+from shapechanger.envs.naming import env_ref
 from shapechanger.errors import StudyError
 from shapechanger.rendering import has_screen
 

@@ -13,25 +13,17 @@ from rich.table import Table
 
 from shapechanger.cli.acting import acting_in, load_any_policy
 from shapechanger.cli.console import command_line, print_table, say
-from shapechanger.cli.env_arguments import (
-    Body,
-    EnvId,
-    OwnLearner,
-    allow_own_modules,
-    driven,
-    env_ref,
-    opened,
-)
+from shapechanger.cli.env_arguments import Body, EnvId, OwnLearner, opened
 from shapechanger.cli.hub import PullPolicy, PushPolicy
 from shapechanger.cli.play import Watching
 from shapechanger.contract.env_ref import EnvRef, HasHeldOutStarts, layouts_of, measures_of
 from shapechanger.envs.catalogue import VEHICLE_ENVS, WAYPOINT_ENVS
-from shapechanger.errors import CorruptStudy, ShapechangerError, StudyError, no_policy_file
+from shapechanger.envs.naming import allow_own_modules, driven, env_ref
+from shapechanger.errors import ShapechangerError, StudyError
 from shapechanger.identity import identify_env
 from shapechanger.own_modules import texts_in
 from shapechanger.transfer.body_map.envs import check_size
 from shapechanger.transfer.identities import ENV, known, single_body
-from shapechanger.transfer.learners.settings import OffPolicySettings, PpoSettings, Sb3Settings
 from shapechanger.transfer.references import load_references
 
 if TYPE_CHECKING:
@@ -314,6 +306,7 @@ class Convert:
     def run(self) -> None:
         """Convert the policy."""
         import shapechanger
+        from shapechanger.transfer.learners.convert import load_zip, settings_of_model
         from shapechanger.transfer.learners.policy_file import PolicyCard, TrainedPolicy
         from shapechanger.transfer.transplant.model import check_supported
 
@@ -322,7 +315,7 @@ class Convert:
                 f"{self.file} may run code when it is loaded, because Stable-Baselines3 pickles: "
                 "give --trust if you trust its author."
             )
-        model = _load_zip(self.file)
+        model = load_zip(self.file)
         check_supported(model)
         env = env_ref(self.env, self.body)
         with opened(env) as made:
@@ -335,7 +328,7 @@ class Convert:
             observation,
             action,
             "converted",
-            _settings(model),
+            settings_of_model(model),
             int(model.num_timesteps),
             int(model.seed or 0),
             shapechanger.__version__,
@@ -344,79 +337,6 @@ class Convert:
         )
         TrainedPolicy(model, None, card).save(self.out)
         say(f"wrote {self.out}")
-
-
-def _load_zip(path: Path) -> Any:
-    """Load a model with the class of Stable-Baselines3 or sb3-contrib that wrote it."""
-    from sb3_contrib import TQC
-    from stable_baselines3 import PPO, SAC
-    from stable_baselines3.common.save_util import load_from_zip_file
-
-    try:
-        data: Any = load_from_zip_file(path, device="cpu")[0]
-        # A2C has PPO's policy, and no clipping.
-        kinds: tuple[Any, ...] = (PPO,) if "clip_range" in data else (SAC, TQC)
-        for kind in kinds:
-            if data["policy_class"] is kind.policy_aliases["MlpPolicy"]:
-                return kind.load(path, device="cpu")
-    except FileNotFoundError:
-        raise CorruptStudy(no_policy_file(path)) from None
-    except Exception as error:  # A damaged pickle can raise anything.
-        raise CorruptStudy(
-            f"{path} is not a zip of Stable-Baselines3's PPO, SAC or TQC ({error})."
-        ) from error
-    raise StudyError(
-        f"{path} is of another algorithm or policy class: the MlpPolicy of PPO, SAC and TQC can be "
-        "converted."
-    )
-
-
-def _settings(model: Any) -> Sb3Settings:
-    """Return the settings of a model, whose networks must be those that the settings describe."""
-    from stable_baselines3.common.vec_env import DummyVecEnv
-    from torch import nn
-
-    from shapechanger.transfer.learners.algorithms import SpacesOnly, build_model
-
-    on_policy = hasattr(model, "clip_range")
-    activation = nn.Tanh if on_policy else nn.ReLU
-    widths = model.policy.net_arch
-    of_each: Any = widths if "pi" in widths else {"pi": widths, "critic": widths}
-    actor, critic = (list(layers) for layers in of_each.values())
-    if actor != critic or model.policy.activation_fn is not activation:
-        raise StudyError(
-            f"The actor has layers {actor} and the critic {critic}, with "
-            f"{model.policy.activation_fn.__name__}: both must be the same, with "
-            f"{activation.__name__}."
-        )
-    kind: type[PpoSettings | OffPolicySettings]
-    if on_policy:
-        kind, update = PpoSettings, model.n_envs * model.n_steps
-        same = ("n_envs", "n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "ent_coef")
-        own: dict[str, Any] = {"clip_range": float(model.clip_range(1.0))}
-    else:
-        frequency, unit = model.train_freq
-        if unit.value != "step":
-            raise StudyError("This model updates after episodes: only updates after steps fit.")
-        kind, update = OffPolicySettings, model.n_envs * frequency
-        same = ("n_envs", "batch_size", "buffer_size", "learning_starts", "gradient_steps", "gamma")
-        same = (*same, "tau", "ent_coef")
-        own = {"algorithm": type(model).__name__, "train_freq": frequency}
-    settings = kind(
-        **{name: getattr(model, name) for name in same},
-        **own,
-        learning_rate=float(model.lr_schedule(1.0)),
-        net_arch=tuple(actor),
-        steps=max(int(model.num_timesteps), update),
-        eval_every=update,
-        eval_episodes=5,
-    )
-    spaces = SpacesOnly(model.observation_space, model.action_space)
-    built = build_model(settings, DummyVecEnv([lambda: spaces] * model.n_envs), 0).policy
-    shapes = {name: weight.shape for name, weight in model.policy.state_dict().items()}
-    if shapes != {name: weight.shape for name, weight in built.state_dict().items()}:
-        raise StudyError(f"These policy_kwargs change the networks: {model.policy_kwargs}.")
-    return settings
 
 
 @dataclass(frozen=True)

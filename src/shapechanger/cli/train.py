@@ -11,18 +11,9 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
-from shapechanger.cli.env_arguments import (
-    Body,
-    EnvId,
-    allow_own_modules,
-    default_learner,
-    driven,
-    env_ref,
-    opened,
-    require_seed,
-    settings_of,
-)
+from shapechanger.cli.env_arguments import Body, EnvId, opened, require_seed, settings_of
 from shapechanger.contract.env_ref import BodyDraw, EnvRef, each_body, env_traits
+from shapechanger.envs.naming import allow_own_modules, default_learner, driven, env_ref
 from shapechanger.errors import MissingExtra, StudyError
 from shapechanger.files import make_folder, require_file
 from shapechanger.transfer.learners.presets import in_many_bodies, resolve_learner, tuning_text

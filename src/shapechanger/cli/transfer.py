@@ -15,10 +15,6 @@ from shapechanger.cli.console import Interrupted, StudyProgress, command_line, p
 from shapechanger.cli.env_arguments import (
     ClusterAddress,
     ExecutorKind,
-    allow_own_modules,
-    default_learner,
-    driven,
-    env_ref,
     executor_of,
     opened,
     options_of,
@@ -28,6 +24,7 @@ from shapechanger.cli.env_arguments import (
 )
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import OWN_ROBOT
+from shapechanger.envs.naming import allow_own_modules, default_learner, driven, env_ref
 from shapechanger.errors import MapError, OutputError, RenderError, StudyError
 from shapechanger.files import read_text
 from shapechanger.registry import METHODS

@@ -11,17 +11,11 @@ import gymnasium as gym
 from gymnasium.wrappers import TimeLimit
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, counted, say
-from shapechanger.cli.env_arguments import (
-    Body,
-    EnvId,
-    driven,
-    env_ref,
-    options_of,
-    require_seed,
-)
+from shapechanger.cli.env_arguments import Body, EnvId, options_of, require_seed
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.drivers import EXPERT
 from shapechanger.envs.catalogue import VEHICLE_ENVS
+from shapechanger.envs.naming import driven, env_ref
 from shapechanger.errors import DemosError
 
 

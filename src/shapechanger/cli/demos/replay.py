@@ -10,7 +10,7 @@ import tyro
 
 from shapechanger.cli.console import say
 from shapechanger.cli.demos.recordings import episode_at
-from shapechanger.cli.env_arguments import env_ref
+from shapechanger.envs.naming import env_ref
 from shapechanger.errors import DemosError
 
 

@@ -1,0 +1,105 @@
+"""Envs as users name them: ids, short names, files of robots, and the learner tuned for each."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import gymnasium as gym
+
+from shapechanger.contract.env_ref import EnvRef
+from shapechanger.envs.catalogue import (
+    CATALOGUE,
+    FINGER_ENVS,
+    ODRL_ENVS,
+    OWN_ROBOT,
+    RANGES_ENVS,
+    REMOTE_FINGER,
+    REMOTE_FINGER_TRACK,
+    VEHICLE_ENVS,
+    WAYPOINT_ENVS,
+    find,
+    find_task,
+)
+from shapechanger.errors import MorphologyError, StudyError, UnknownName
+from shapechanger.rendering import require_known_gl
+
+# Suffixes of files of users' robots.
+_MODEL_FILES: Final = (".xml", ".mjcf", ".urdf")
+
+
+def env_ref(env_id: str, body: str = "") -> EnvRef:
+    """Return a reference to an env, optionally with another body."""
+    require_known_gl()
+    file, at, own_task = env_id.partition("@")
+    if file.endswith(_MODEL_FILES):
+        allow_own_modules(own_task)
+        more = {"task": own_task} if at else {}
+        return EnvRef(OWN_ROBOT, {"path": file, **more, **({"body": body} if body else {})})
+    task = find_task(env_id)
+    if task and not body:
+        return EnvRef(task)
+    try:
+        full = task or find(env_id).id
+    except UnknownName:
+        # Third-party envs count too, as `module:id` or once registered; `make` checks again.
+        if not _has_module(env_id) and env_id not in gym.registry:
+            raise
+        allow_own_modules(env_id)
+        full = env_id
+    if body and full not in {*CATALOGUE, *ODRL_ENVS, OWN_ROBOT}:
+        raise MorphologyError(f"{full} takes no body; these do: {', '.join(CATALOGUE)}.")
+    return EnvRef(full, {"body": body} if body else {})
+
+
+def short_name(env_id: str) -> str:
+    """Return the name of an env as a part of a folder's name."""
+    file, _, own_task = env_id.partition("@")
+    if file.endswith(_MODEL_FILES):
+        return "-".join(filter(None, (Path(file).stem, own_task.rpartition(":")[2])))
+    return env_id.replace("odrl/", "odrl-").rpartition("/")[2].removesuffix("-v1")
+
+
+def allow_own_modules(*names: str | None) -> None:
+    """Let names such as `my_methods:warm-start` import modules of the current folder.
+
+    Only names that the user gives may do so: the name of a class in a policy's file must not find a
+    module that lies beside it.
+    """
+    here = str(Path.cwd())
+    own = any(name and (":" in name or name.endswith(".toml")) for name in names)
+    if own and here not in sys.path:
+        sys.path.append(here)  # Worker processes take over the path.
+
+
+def default_learner(env: EnvRef) -> str:
+    """Return the learner tuned on the env's family; for other envs, that of the ant."""
+    if env.id in VEHICLE_ENVS:
+        return "cloning"
+    if env.id in WAYPOINT_ENVS:
+        return "waypoint"
+    if env.id in RANGES_ENVS:
+        return "ppo-drive"
+    if env.id in (REMOTE_FINGER, REMOTE_FINGER_TRACK):
+        return "ppo-rig"
+    entry = CATALOGUE.get(env.id) or ODRL_ENVS.get(env.id) or FINGER_ENVS.get(env.id)
+    return entry.learner if entry else "ppo-run"
+
+
+def driven(env: EnvRef, lenses: Sequence[str] = ()) -> EnvRef:
+    """Return a vehicle's env as studies use it, which resets the vehicle after a collision."""
+    if lenses and env.id not in VEHICLE_ENVS:
+        raise StudyError(f"{env} has no camera; these have one: {', '.join(VEHICLE_ENVS)}.")
+    if env.id not in {*VEHICLE_ENVS, *WAYPOINT_ENVS, *RANGES_ENVS}:
+        return env
+    more: dict[str, Any] = {"lenses": list(lenses)} if lenses else {}
+    return EnvRef(env.id, {**env.kwargs, "put_back": True, **more})
+
+
+def _has_module(env_id: str) -> bool:
+    """Return whether an id has the form `module:id`."""
+    module, _, name = env_id.partition(":")
+    named = all(part.isidentifier() for part in module.split("."))
+    return named and bool(name) and ":" not in name
