@@ -23,7 +23,6 @@ from benchmarks.finger_learned import CIRCLE, TRACKS, played, trained
 from benchmarks.finger_reach import FINGERS, TARGETS, Statics, held_by_controller
 from benchmarks.row import Row, asked
 from shapechanger.cli import main
-from shapechanger.cli.transfer import write_study_report
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.files import read_json
 from shapechanger.finger.env import SMOOTHNESS
@@ -36,6 +35,7 @@ from shapechanger.transfer.learners.evaluation import evaluation_seed
 from shapechanger.transfer.learners.policy_file import TrainedPolicy
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.plan import ARMS, Plan, Run, TransferTask
+from shapechanger.transfer.report.study import write_study_report
 from shapechanger.transfer.runs import RunResult, load_result
 from shapechanger.transfer.study import STUDY_FILE, Study, make_plan, run_study
 

@@ -27,10 +27,10 @@ from benchmarks.driving import DriveResult, DriveScore, drive
 from benchmarks.remote_drive import drive_remote
 from benchmarks.row import Row, asked
 from benchmarks.vehicles import counted
-from shapechanger.cli.demos.train import Shrinking
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.demos.cloning.learn import clone, learn
 from shapechanger.demos.cloning.policy import CameraPolicy
+from shapechanger.demos.cloning.shrinking import ShrunkFrames
 from shapechanger.demos.dataset import Dataset, load_dataset
 from shapechanger.demos.drivers import DriverDecision, ExpertPilot, record_steps
 from shapechanger.demos.recording import RecordEpisodes
@@ -447,7 +447,7 @@ def _labelled(seed: int, labels: str) -> Dataset:
     """Return the recording of a seed with labels of one kind."""
     folder = _record(seed)
     framing = cast("CloningSettings", LEARNERS["waypoint"]).clone.framing
-    shown = as_waypoints(load_dataset(folder, shrink=Shrinking(framing, CanonicalView())))
+    shown = as_waypoints(load_dataset(folder, shrink=ShrunkFrames(framing, CanonicalView())))
     if labels == "steering":
         return shown.data
     return replace(shown.data, actions=np.load(folder.with_suffix(".npy"))[shown.kept])

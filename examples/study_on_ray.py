@@ -12,10 +12,10 @@ from pathlib import Path
 import tyro
 
 from shapechanger import TransferTask, make_plan, run_study
-from shapechanger.cli.transfer import write_study_report
 from shapechanger.transfer import EnvRef
 from shapechanger.transfer.learners.presets import learner_settings
 from shapechanger.transfer.ray_executor import RayCluster
+from shapechanger.transfer.report.study import write_study_report
 from shapechanger.transfer.report.verdict import verdict
 
 

@@ -109,7 +109,11 @@ def parse(arguments: Sequence[str]) -> Any:
     command = tyro.cli(
         _Command,
         prog="shapechanger",
-        description="Learn a skill in one body, move it to another, and measure the gain.",
+        description=(
+            "Learn a skill in one body, move it to another, and measure the gain. Begin with "
+            "`shapechanger doctor`, then `shapechanger transfer InvertedPendulum "
+            "BigInvertedPendulum --quick`; each command has --help."
+        ),
         args=arguments,
         config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
     )

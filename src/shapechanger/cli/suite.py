@@ -23,7 +23,7 @@ from shapechanger.cli.console import (
     say,
 )
 from shapechanger.cli.env_arguments import ClusterAddress, ExecutorKind, executor_of, require_seed
-from shapechanger.cli.transfer import run_steps, write_study_report
+from shapechanger.cli.transfer import run_steps
 from shapechanger.envs.naming import allow_own_modules, default_learner
 from shapechanger.envs.suite_file import (
     SuiteFile,
@@ -315,6 +315,7 @@ class _Page:
         """Add a study that has ended, or replace it; write its report and the page."""
         from shapechanger.envs.study_films import film_study
         from shapechanger.files import write_atomic
+        from shapechanger.transfer.report.study import write_study_report
         from shapechanger.transfer.report.suite import Sweep, suite_html
 
         write_study_report(study, self._out / name)

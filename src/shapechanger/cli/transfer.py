@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import tyro
 from rich.table import Table
@@ -16,7 +16,6 @@ from shapechanger.cli.env_arguments import (
     ClusterAddress,
     ExecutorKind,
     executor_of,
-    opened,
     options_of,
     policy_file,
     require_seed,
@@ -25,7 +24,7 @@ from shapechanger.cli.env_arguments import (
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.envs.catalogue import OWN_ROBOT
 from shapechanger.envs.naming import allow_own_modules, default_learner, driven, env_ref
-from shapechanger.errors import MapError, OutputError, RenderError, StudyError
+from shapechanger.errors import MapError, OutputError, StudyError
 from shapechanger.files import read_text
 from shapechanger.registry import METHODS
 from shapechanger.transfer.learners import LearnerSettings
@@ -36,7 +35,7 @@ from shapechanger.transfer.plan import Plan, Run, TransferTask
 
 if TYPE_CHECKING:
     from shapechanger.transfer.report.verdict import Findings
-    from shapechanger.transfer.study import Study, TaskTraits
+    from shapechanger.transfer.study import TaskTraits
 
 # Divisor of the budget and number of seeds of --quick: enough to see that everything works.
 _QUICK_DIVISOR: Final = 8
@@ -123,6 +122,7 @@ class Transfer:
 
         # The report comes last; check its requirements before the work.
         import_module("shapechanger.reports.charts")
+        from shapechanger.transfer.report.study import write_study_report
         from shapechanger.transfer.report.verdict import findings
 
         traits = inspect_task(task)
@@ -219,7 +219,7 @@ class Transfer:
 
 @dataclass(frozen=True)
 class Methods:
-    """List the transfer methods that a study can compare: shipped ones and those of plug-ins."""
+    """List the transfer methods that a study can compare."""
 
     def run(self) -> None:
         """Print a table."""
@@ -229,21 +229,6 @@ class Methods:
             about = (type(method).__doc__ or "").strip().partition("\n")[0]
             table.add_row(name, about, method.paper)
         print_table(table)
-
-
-def write_study_report(study: Study, out: Path, found: Findings | None = None) -> Path:
-    """Write the report of a study, without pictures of the bodies if they cannot be rendered."""
-    from shapechanger.files import write_atomic
-    from shapechanger.transfer.report.study import study_html
-
-    path = out / "report.html"
-    pictures, note = None, ""
-    try:
-        pictures = _pictures(study.plan.task.source, study.plan.task.target)
-    except RenderError as error:
-        note = str(error)
-    write_atomic(path, study_html(study, pictures, note, found).encode())
-    return path
 
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
@@ -265,16 +250,6 @@ def _read(path: Path) -> str:
         return read_text(path)
     except (OSError, ValueError) as error:
         raise MapError(f"The body map {path} cannot be read: {error}.") from error
-
-
-def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
-    """Render both bodies in their start poses at one scale; None if the envs cannot."""
-    with opened(source) as one, opened(target) as other:
-        both: list[Any] = [one.unwrapped, other.unwrapped]
-        if not all(hasattr(env, "picture") for env in both):
-            return None
-        reach = max(env.reach for env in both)
-        return both[0].picture(reach=reach), both[1].picture(reach=reach)
 
 
 def _name(env: EnvRef) -> str:

@@ -20,6 +20,7 @@ from shapechanger.demos.episodes import (
     Episode,
     Repair,
     drop,
+    episode_at,
     episodes_of,
     keep,
     mark,
@@ -27,7 +28,7 @@ from shapechanger.demos.episodes import (
     repair,
 )
 from shapechanger.demos.statistics import summary
-from shapechanger.errors import DemosError, UnknownName
+from shapechanger.errors import DemosError
 from shapechanger.files import require_file, write_atomic
 from shapechanger.reports.numbers import duration_text, shares_text
 
@@ -141,20 +142,6 @@ def _overview(episodes: Sequence[Episode]) -> list[str]:
         ended = ", ".join(f"{outcome} {count}" for outcome, count in outcomes.most_common())
         lines.append(f"ended by: {ended}")
     return lines
-
-
-def episode_at(path: Path) -> Episode:
-    """Load one episode."""
-    if not path.exists() and path.parent.is_dir():
-        known = [episode.name for episode in episodes_of(path.parent)]
-        raise UnknownName("episode", path.name, known)
-    found = episodes_of(path)
-    if len(found) > 1:
-        raise DemosError(f"{path} has {len(found)} episodes: name one of them, such as {found[0]}.")
-    episode = read_episode(next(iter(found)))
-    if not episode.steps:
-        raise DemosError(f"{episode.path} has no steps.")
-    return episode
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from shapechanger.cli.console import say
-from shapechanger.cli.demos.recordings import episode_at
+from shapechanger.demos.episodes import episode_at
 from shapechanger.envs.naming import env_ref
 from shapechanger.errors import DemosError
 

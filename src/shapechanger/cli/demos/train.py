@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import io
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from shapechanger.cli.console import Interrupted, StudyProgress, command_line, say
 from shapechanger.cli.env_arguments import require_seed
-from shapechanger.demos.cloning.pictures import Framing, prepare
 from shapechanger.demos.dataset import count_steps, load_dataset
-from shapechanger.demos.episodes import EpisodeHeader
 from shapechanger.errors import DemosError, OutputError
 from shapechanger.files import require_file, write_atomic
 
@@ -71,6 +68,7 @@ class TrainClone:
         from shapechanger.demos.cloning.learn import learn
         from shapechanger.demos.cloning.report import clone_html, write_numbers
         from shapechanger.demos.cloning.settings import settings_for
+        from shapechanger.demos.cloning.shrinking import ShrunkFrames
         from shapechanger.transfer.learners.presets import LEARNERS
         from shapechanger.transfer.learners.sb3 import use_one_thread
 
@@ -80,7 +78,7 @@ class TrainClone:
             settings = cast("CloningSettings", LEARNERS["waypoint"]).clone
         if settings.members > 1:
             use_one_thread()  # More threads slow down networks this small.
-        shrinking = Shrinking(settings.framing, view)
+        shrinking = ShrunkFrames(settings.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
         origin: dict[str, Any] = {}
         if view is not None:
@@ -188,37 +186,6 @@ def _response(given: tuple[float, float] | None) -> SteeringResponse | None:
     return None if given is None else SteeringResponse(*given)
 
 
-@dataclass
-class Shrinking:
-    """Convert frames to a policy's view while they are read, and record their digests.
-
-    Attributes:
-        view: How frames are warped before; None for not at all.
-    """
-
-    framing: Framing
-    view: CanonicalView | None = None
-    size: tuple[int, int] | None = None
-    seen: list[bytes] = field(default_factory=list[bytes])
-
-    def __call__(self, picture: NDArray[np.uint8], header: EpisodeHeader) -> NDArray[np.uint8]:
-        """Return the policy's view of a frame of an episode."""
-        import hashlib
-
-        if self.view is not None:
-            picture = self.view(picture, header)
-        self.size = picture.shape[0], picture.shape[1]
-        small = prepare(picture[None], self.framing)[0]
-        self.seen.append(hashlib.sha256(picture.tobytes()).digest())
-        return small
-
-    def digest(self, actions: NDArray[np.float32]) -> str:
-        """Return a digest of the demonstrations."""
-        import hashlib
-
-        return hashlib.sha256(b"".join(self.seen) + actions.tobytes()).hexdigest()
-
-
 class _Progress(StudyProgress):
     """Progress of each network."""
 
@@ -281,12 +248,13 @@ class Evaluate:
         """Evaluate and print."""
         from shapechanger.demos.cloning.judge import judge
         from shapechanger.demos.cloning.policy import CameraPolicy
+        from shapechanger.demos.cloning.shrinking import ShrunkFrames
 
         policy = CameraPolicy.load(self.policy)
         layout = policy.card.action_layout
         has_waypoints = layout is not None and layout.names[0].startswith("waypoint/")
         view = _view(self.camera) if has_waypoints else None
-        shrinking = Shrinking(policy.card.framing, view)
+        shrinking = ShrunkFrames(policy.card.framing, view)
         data = load_dataset(self.data, shrink=shrinking)
         if view is not None and view.rectifiers:
             from shapechanger.vehicles.waypoint_demonstrations import as_waypoints

@@ -37,7 +37,7 @@ from shapechanger.demos.episodes.records import (
     encode_line,
     split_lines,
 )
-from shapechanger.errors import BrokenEpisode, DemosError, OutputError
+from shapechanger.errors import BrokenEpisode, DemosError, OutputError, UnknownName
 from shapechanger.files import cannot_write, write_atomic
 
 # Such a name cannot lead out of the folder.
@@ -269,6 +269,20 @@ def episodes_of(data: Path) -> tuple[Path, ...]:
     if not found:
         raise DemosError(f"There is no episode in {data}: no folder in it has {HEADER}.")
     return tuple(found)
+
+
+def episode_at(path: Path) -> Episode:
+    """Load the episode of a folder, which may be a recording with a single one."""
+    if not path.exists() and path.parent.is_dir():
+        known = [episode.name for episode in episodes_of(path.parent)]
+        raise UnknownName("episode", path.name, known)
+    found = episodes_of(path)
+    if len(found) > 1:
+        raise DemosError(f"{path} has {len(found)} episodes: name one of them, such as {found[0]}.")
+    episode = read_episode(next(iter(found)))
+    if not episode.steps:
+        raise DemosError(f"{episode.path} has no steps.")
+    return episode
 
 
 def _assemble(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -10,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapechanger.contract.env_ref import EnvRef
+from shapechanger.errors import RenderError
+from shapechanger.files import write_atomic
 from shapechanger.reports.numbers import UNDEFINED, count, number
 from shapechanger.reports.page import render
 from shapechanger.transfer.body_map import BodyMap, Copy, MapRow
@@ -92,6 +95,28 @@ def study_html(
             for result in study.runs
         ],
     )
+
+
+def write_study_report(study: Study, out: Path, found: Findings | None = None) -> Path:
+    """Write the report of a study, without pictures of the bodies if they cannot be rendered."""
+    path = out / "report.html"
+    pictures, note = None, ""
+    try:
+        pictures = _pictures(study.plan.task.source, study.plan.task.target)
+    except RenderError as error:
+        note = str(error)
+    write_atomic(path, study_html(study, pictures, note, found).encode())
+    return path
+
+
+def _pictures(source: EnvRef, target: EnvRef) -> tuple[Any, Any] | None:
+    """Render both bodies in their start poses at one scale; None if the envs cannot."""
+    with closing(source.make()) as one, closing(target.make()) as other:
+        both: list[Any] = [one.unwrapped, other.unwrapped]
+        if not all(hasattr(env, "picture") for env in both):
+            return None
+        reach = max(env.reach for env in both)
+        return both[0].picture(reach=reach), both[1].picture(reach=reach)
 
 
 def _short_name(env: EnvRef) -> str:
