@@ -56,18 +56,12 @@ ClusterAddress = Annotated[
 _REFERENCE: Final = "reference"
 
 
-def name_of(env: gym.Env[Any, Any]) -> str:
-    """Return the id of an env, or the name of its class."""
-    return env.spec.id if env.spec else type(env.unwrapped).__name__
-
-
 def asked(env: gym.Env[Any, Any], ability: str) -> Any:
     """Return a method that an env offers beyond Gymnasium's."""
     offered = getattr(env.unwrapped, ability, None)
     if offered is None:
-        raise MorphologyError(
-            f"{name_of(env)} offers no {ability}; these envs do: {', '.join(CATALOGUE)}."
-        )
+        name = env.spec.id if env.spec else type(env.unwrapped).__name__
+        raise MorphologyError(f"{name} offers no {ability}; these envs do: {', '.join(CATALOGUE)}.")
     return offered
 
 

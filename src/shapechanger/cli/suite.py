@@ -82,12 +82,7 @@ class RunSuite:
         from shapechanger.transfer.suite import open_study_folder
 
         suite = load_suite(self.name)
-        given = {
-            "seeds": self.seeds,
-            "steps": self.steps,
-            "source_steps": self.source_steps,
-            "seed": self.seed,
-        }
+        given = {name: getattr(self, name) for name in ("seeds", "steps", "source_steps", "seed")}
         chosen = msgspec.structs.replace(
             suite, **{name: value for name, value in given.items() if value is not None}
         )

@@ -198,6 +198,10 @@ class Transfer:
         """The plan of the study."""
         from shapechanger.transfer.study import default_arms, make_plan
 
+        try:
+            map_text = read_text(self.map) if self.map else ""
+        except (OSError, ValueError) as error:
+            raise MapError(f"The body map {self.map} cannot be read: {error}.") from error
         seeds = _QUICK_SEEDS if self.quick and self.seeds is None else self.seeds
         return make_plan(
             task,
@@ -210,7 +214,7 @@ class Transfer:
             arms=self.arms or default_arms(traits),
             seed=self.seed,
             rules=dict(_split_rule(rule) for rule in self.rule),
-            map_text=_read(self.map) if self.map else "",
+            map_text=map_text,
             units=self.units,
             measure=self.measure,
             traits=traits,
@@ -232,7 +236,7 @@ class Methods:
 
 
 def run_steps(plan: Plan, runs: Iterable[Run]) -> dict[str, int]:
-    """Return the number of steps of each run for the progress; an evaluation counts as one."""
+    """Return the steps of each run for the progress; an evaluation counts as one."""
     return {run.name: max(1, plan.steps_of(run.kind)) for run in runs}
 
 
@@ -242,14 +246,6 @@ def _split_rule(text: str) -> tuple[str, str]:
     if not (name and equals and rule):
         raise MapError(f"A rule is written NAME=RULE, as in 'foot_*/motor=learn', not {text!r}.")
     return name, rule
-
-
-def _read(path: Path) -> str:
-    """Read a text file."""
-    try:
-        return read_text(path)
-    except (OSError, ValueError) as error:
-        raise MapError(f"The body map {path} cannot be read: {error}.") from error
 
 
 def _name(env: EnvRef) -> str:

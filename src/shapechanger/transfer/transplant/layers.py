@@ -249,7 +249,7 @@ def _spread(matrix: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Edges:
+class BoundaryLayers:
     """The layers of a network that depend on the body."""
 
     inputs: dict[str, Affine] = field(default_factory=dict[str, Affine])
@@ -264,7 +264,9 @@ def first_linear(network: nn.Module, name: str, otherwise: Iterable[str] = ()) -
     return list(otherwise)
 
 
-def move_parameters(source: nn.Module, target: nn.Module, edges: Edges) -> dict[str, torch.Tensor]:
+def move_parameters(
+    source: nn.Module, target: nn.Module, boundary: BoundaryLayers
+) -> dict[str, torch.Tensor]:
     """Compute the parameters with which `target` computes what `source` computes.
 
     Everything is computed in float64 and stored as the source stores it.
@@ -275,17 +277,17 @@ def move_parameters(source: nn.Module, target: nn.Module, edges: Edges) -> dict[
     def replace(name: str, values: Array) -> None:
         moved[name] = torch.as_tensor(values).to(trained[name])
 
-    for layer in dict.fromkeys((*edges.inputs, *edges.outputs)):
+    for layer in dict.fromkeys((*boundary.inputs, *boundary.outputs)):
         if layer in trained:  # A vector of parameters.
-            replace(layer, _biases(_array(trained, layer), edges.outputs[layer], new, layer))
+            replace(layer, _biases(_array(trained, layer), boundary.outputs[layer], new, layer))
             continue
         at_weight, at_bias = f"{layer}.weight", f"{layer}.bias"
         weight, bias = _array(trained, at_weight), _array(trained, at_bias)
-        if layer in edges.inputs:  # W (A x + e) + b, as a layer of x.
-            matrix, offset = edges.inputs[layer]
+        if layer in boundary.inputs:  # W (A x + e) + b, as a layer of x.
+            matrix, offset = boundary.inputs[layer]
             weight, bias = weight @ matrix, bias + weight @ offset
-        if layer in edges.outputs:
-            output = edges.outputs[layer]
+        if layer in boundary.outputs:
+            output = boundary.outputs[layer]
             fresh = output.fresh[:, np.newaxis]
             weight = np.where(fresh, _array(new, at_weight), output.matrix @ weight)
             bias = _biases(bias, output, new, at_bias)

@@ -30,7 +30,7 @@ from shapechanger.transfer.transplant.layers import (
     CLIP,
     EPSILON,
     Affine,
-    Edges,
+    BoundaryLayers,
     PolicyOutputs,
     Scaling,
     critic_actions,
@@ -197,10 +197,14 @@ def transplant(
     )
     if _is_squashed(source_model):
         judged = critic_actions(body_map, outputs, source_space)
-        edges = _squashed_edges(cast("SACPolicy", source_model.policy), sensed, outputs, judged)
+        boundary = _squashed_boundary(
+            cast("SACPolicy", source_model.policy), sensed, outputs, judged
+        )
     else:
-        edges = _gaussian_edges(cast("ActorCriticPolicy", source_model.policy), sensed, outputs)
-    parameters = move_parameters(source_model.policy, model.policy, edges)
+        boundary = _gaussian_boundary(
+            cast("ActorCriticPolicy", source_model.policy), sensed, outputs
+        )
+    parameters = move_parameters(source_model.policy, model.policy, boundary)
     model.policy.to(dtype=next(source_model.policy.parameters()).dtype)
     model.policy.load_state_dict(parameters)
     if _is_squashed(source_model):
@@ -249,26 +253,28 @@ def _statistics(source: RunningMeanStd | VecNormalize | None) -> RunningMeanStd 
     return source
 
 
-def _gaussian_edges(policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs) -> Edges:
+def _gaussian_boundary(
+    policy: ActorCriticPolicy, sensed: Affine, outputs: PolicyOutputs
+) -> BoundaryLayers:
     """Layers of PPO's policy and value network that depend on the body."""
     extractor = policy.mlp_extractor
-    edges = Edges(outputs={"action_net": outputs.mean, "log_std": outputs.log_std})
+    boundary = BoundaryLayers(outputs={"action_net": outputs.mean, "log_std": outputs.log_std})
     for layer in (
         *first_linear(extractor.policy_net, "mlp_extractor.policy_net", ["action_net"]),
         *first_linear(extractor.value_net, "mlp_extractor.value_net", ["value_net"]),
     ):
-        edges.inputs[layer] = sensed
-    return edges
+        boundary.inputs[layer] = sensed
+    return boundary
 
 
-def _squashed_edges(
+def _squashed_boundary(
     policy: SACPolicy, sensed: Affine, outputs: PolicyOutputs, judged: Affine
-) -> Edges:
+) -> BoundaryLayers:
     """Layers of the actor and the critics of SAC and TQC that depend on the body."""
     heads = {"actor.mu": outputs.mean, "actor.log_std": outputs.log_std}
-    edges = Edges(outputs=dict(heads))
+    boundary = BoundaryLayers(outputs=dict(heads))
     for layer in first_linear(policy.actor.latent_pi, "actor.latent_pi", heads):
-        edges.inputs[layer] = sensed
+        boundary.inputs[layer] = sensed
     both = Affine(
         np.block(
             [
@@ -281,8 +287,8 @@ def _squashed_edges(
     for index, network in enumerate(policy.critic.q_networks):
         for name in ("critic", "critic_target"):
             for layer in first_linear(network, f"{name}.qf{index}"):
-                edges.inputs[layer] = both
-    return edges
+                boundary.inputs[layer] = both
+    return boundary
 
 
 def _move_entropy_coefficient(source: Any, target: Any) -> None:
