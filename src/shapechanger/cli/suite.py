@@ -183,13 +183,8 @@ class MergeSuites:
 
     def run(self) -> None:
         """Copy what has ended, and report the studies that are complete."""
-        from shapechanger.transfer.study import (
-            PLAN_FILE,
-            STUDY_FILE,
-            looks_in,
-            run_study,
-            unfinished_runs,
-        )
+        from shapechanger.transfer.plan import PLAN_FILE
+        from shapechanger.transfer.study import STUDY_FILE, looks_in, run_study, unfinished_runs
         from shapechanger.transfer.suite import merge_study
 
         suite = load_suite(self.name)
@@ -249,8 +244,8 @@ class Suite:
 
 def _progress_table(out: Path) -> tuple[Table, bool]:
     """A row for each study in a suite's folder, and whether all are complete."""
+    from shapechanger.transfer.plan import PLAN_FILE, planned_arms, read_plan
     from shapechanger.transfer.runs import last_evaluation, load_result
-    from shapechanger.transfer.study import PLAN_FILE, planned_arms, read_plan
 
     table = Table("study", "runs", "steps", "at work", box=None)
     complete = True

@@ -12,12 +12,15 @@ import numpy as np
 
 from shapechanger.contract.env_ref import EnvRef
 from shapechanger.contract.measure import RETURN
-from shapechanger.errors import StudyError, check_seed
+from shapechanger.errors import StudyError, UnknownName, check_seed
+from shapechanger.files import read_json
 from shapechanger.identity import Identity
 from shapechanger.transfer.body_map import BodyMap
 from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.methods import load_method
 
+PLAN_FILE: Final = "plan.json"
+"""Name of the file of a plan in the folder of its study."""
 ARMS: Final = ("scratch", "zero-shot", "fine-tune")
 """Arms that every pair of envs can be compared by."""
 SOURCE: Final = "source"
@@ -207,3 +210,29 @@ class Run(msgspec.Struct, frozen=True):
     def policy_file(self, study: Path) -> Path:
         """The file of its policy in the folder of a study."""
         return self.folder(study) / "policy.safetensors"
+
+
+class _PlannedArms(msgspec.Struct):
+    """The arms of a plan, read before their methods are imported."""
+
+    arms: tuple[str, ...] = ()
+
+
+def read_plan(out: Path, remedy: str) -> Plan:
+    """Read the plan of the study in a folder."""
+    path = out / PLAN_FILE
+    for arm in read_json(path, _PlannedArms, remedy).arms:
+        try:
+            load_method(arm)
+        except UnknownName as error:
+            raise StudyError(
+                f"{out} compares the method {arm}, whose module is not found from {Path.cwd()}: go "
+                "to the folder that the study was started in, or install the method; nothing was "
+                f"changed. {error}"
+            ) from error
+    return read_json(path, Plan, remedy)
+
+
+def planned_arms(out: Path) -> tuple[str, ...]:
+    """Return the names of the methods of the study in a folder, without importing them."""
+    return read_json(out / PLAN_FILE, _PlannedArms, f"{out} is kept as it is").arms

@@ -38,7 +38,16 @@ from shapechanger.transfer.learners import LearnerSettings
 from shapechanger.transfer.learners.settings import study_budgets
 from shapechanger.transfer.methods import load_method
 from shapechanger.transfer.metrics import LearningCurves, Reference, Summary, summarise
-from shapechanger.transfer.plan import ARMS, NO_SKILL, SOURCE, Plan, Run, TransferTask
+from shapechanger.transfer.plan import (
+    ARMS,
+    NO_SKILL,
+    PLAN_FILE,
+    SOURCE,
+    Plan,
+    Run,
+    TransferTask,
+    read_plan,
+)
 from shapechanger.transfer.references import reference_of
 from shapechanger.transfer.runs import RunResult, learner_of, load_result, perform_run
 from shapechanger.transfer.versions import (
@@ -48,7 +57,6 @@ from shapechanger.transfer.versions import (
     require_versions,
 )
 
-PLAN_FILE: Final = "plan.json"
 STUDY_FILE: Final = "study.json"
 
 # Arms for a target that can adapt its source.
@@ -422,32 +430,6 @@ def claim_folder(plan: Plan, out: Path) -> None:
 def _plan_in(out: Path) -> Plan:
     remedy = "give another --out, or delete that folder to start again; nothing was changed"
     return read_plan(out, remedy)
-
-
-def read_plan(out: Path, remedy: str) -> Plan:
-    """Read the plan of the study in a folder."""
-    path = out / PLAN_FILE
-    for arm in read_json(path, _PlannedArms, remedy).arms:
-        try:
-            load_method(arm)
-        except UnknownName as error:
-            raise StudyError(
-                f"{out} compares the method {arm}, whose module is not found from {Path.cwd()}: go "
-                "to the folder that the study was started in, or install the method; nothing was "
-                f"changed. {error}"
-            ) from error
-    return read_json(path, Plan, remedy)
-
-
-def planned_arms(out: Path) -> tuple[str, ...]:
-    """Return the names of the methods of the study in a folder, without importing them."""
-    return read_json(out / PLAN_FILE, _PlannedArms, f"{out} is kept as it is").arms
-
-
-class _PlannedArms(msgspec.Struct):
-    """The arms of a plan, read before their methods are imported."""
-
-    arms: tuple[str, ...] = ()
 
 
 def _digest(policy: Path) -> str:

@@ -19,9 +19,9 @@ from shapechanger.contract.measure import RETURN
 from shapechanger.errors import CorruptStudy, ForeignStudy, OutputError
 from shapechanger.files import make_folder
 from shapechanger.transfer.metrics import Estimate, LearningCurves, steps_to_reach
-from shapechanger.transfer.plan import SOURCE, Plan
+from shapechanger.transfer.plan import PLAN_FILE, SOURCE, Plan, read_plan
 from shapechanger.transfer.runs import load_result
-from shapechanger.transfer.study import PLAN_FILE, Study, claim_folder, read_plan
+from shapechanger.transfer.study import Study, claim_folder
 from shapechanger.transfer.versions import changes_between
 
 _OF_TARGET: Final = ("random", "zero-action", "scratch")

@@ -100,7 +100,10 @@ def evaluate(
     steps: int = 0,
     episodes: int | None = None,
 ) -> Evaluation:
-    """Average over episodes."""
+    """Average a policy's episodes, of which the first has the seed `seed` and each later one the next.
+
+    Their number is rounded up to a multiple of the envs, with one for each env if it is not given.
+    """
     played: list[_Episode] = []
     for first in range(0, len(envs) if episodes is None else episodes, len(envs)):
         played += _play(act, envs, seed + first)
