@@ -100,7 +100,7 @@ def evaluate(
     steps: int = 0,
     episodes: int | None = None,
 ) -> Evaluation:
-    """Average a policy's episodes, of which the first has the seed `seed` and each later one the next.
+    """Average a policy's episodes, of which the first has the seed `seed` and later ones the next.
 
     Their number is rounded up to a multiple of the envs, with one for each env if it is not given.
     """
