@@ -70,10 +70,6 @@ def picture_size(jpeg: bytes, name: str) -> tuple[int, int]:
     Args:
         jpeg: Its bytes.
         name: How to name the picture in errors.
-
-    Raises:
-        DemosError: If the data is not a JPEG, or claims more than `MAX_PIXELS`.
-        MissingExtra: If simplejpeg is not installed.
     """
     if jpeg.count(_SCAN) > _MAX_SCANS:
         raise DemosError(

@@ -74,11 +74,7 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
     identity: dict[str, Identity] = {}
 
     def __post_init__(self) -> None:
-        """Validate the architecture.
-
-        Raises:
-            CloningError: If a size is not positive, or fields contradict each other.
-        """
+        """Validate the architecture."""
         if not self.channels or min(self.features, *self.channels, *self.nerves) < 1:
             raise CloningError("channels, features and nerves must be positive.")
         if not 1 <= self.members <= _MAX_MEMBERS:
@@ -153,23 +149,12 @@ class CloneCard(msgspec.Struct, frozen=True, kw_only=True):
         return (None, values) if self.eyes == "none" else (values, None)
 
     def require_picture(self, picture: object) -> None:
-        """Refuse a missing picture.
-
-        Raises:
-            CloningError: If the policy sees, and there is no picture.
-        """
+        """Refuse a missing picture."""
         if self.eyes != "none" and picture is None:
             raise CloningError("This policy needs a picture, but there is none.")
 
     def known_states(self, states: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
-        """Return states as the network takes them; None for a policy without a state.
-
-        Args:
-            states: Shape (n, k), NaN for unknown values.
-
-        Raises:
-            CloningError: If they are missing or have another shape.
-        """
+        """Return states as the network takes them; None for a policy without a state."""
         layout = self.state_layout
         if layout is None:
             return None

@@ -66,11 +66,7 @@ STEERING: Final = Mirror((0, 1), (-1.0, 1.0), (1.0, 0.0))
 
 
 def mirror_of(layout: Layout) -> Mirror:
-    """Return the mirror of a layout: steering changes its sign, left and right are swapped.
-
-    Raises:
-        CloningError: If the mirror image of a value is unknown; the message is part of a sentence.
-    """
+    """Return the mirror of a layout: steering changes its sign, left and right are swapped."""
     values: list[tuple[int, float, float]] = []
     names = layout.names
     for place, feature in enumerate(layout):
@@ -129,9 +125,6 @@ def steering_examples(
         pictures: Shape (n, H, W, 3), raw or prepared.
         actions: Shape (n, 2), in [-1, 1].
         framing: Crop and resolution.
-
-    Raises:
-        CloningError: If there are no examples, or an array is invalid.
     """
     if actions.ndim != 2 or actions.shape[1] != 2:
         raise CloningError(

@@ -333,12 +333,7 @@ class _Lesson:
     def member(
         self, card: CloneCard, kept_back: NDArray[np.bool_], seed: int, member: int
     ) -> tuple[CameraNetwork, list[MemberCheck], int, Tensor, Tensor]:
-        """Train one member of several.
-
-        Returns:
-            The network, its validations, the step at which it was best, and its outputs and targets
-            on the stretch that it did not learn from.
-        """
+        """Train one member of several."""
         seed = seed * self.settings.members + member
         policy = CameraPolicy.blank(card, seed)
         self.begin(policy, ~kept_back)
@@ -387,18 +382,7 @@ class _Lesson:
         member: int,
         error: Callable[[CameraNetwork, Examples], float],
     ) -> tuple[list[MemberCheck], int]:
-        """Train the network of a policy in place, and restore its best weights at the end.
-
-        Args:
-            policy: The policy.
-            kept_back: Mask of the examples that validate it.
-            seed: Seed of everything random.
-            member: Index of the network.
-            error: Validates a network on examples.
-
-        Returns:
-            The validations in order, and the step of the best one.
-        """
+        """Train the network of a policy in place, and restore its best weights at the end."""
         network, settings = policy.network, self.settings
         batches = Batches(self.shown, ~kept_back, self.rehearsal, settings, seed)
         validation = self.shown.part(kept_back)
@@ -487,9 +471,6 @@ def best_temperature(logits: Tensor, wanted: Tensor) -> float:
     Args:
         logits: Shape (n, classes).
         wanted: Class indices, shape (n,).
-
-    Returns:
-        1 with fewer than 20 steps.
     """
     if len(wanted) < _MIN_CALIBRATION_STEPS:
         return 1.0

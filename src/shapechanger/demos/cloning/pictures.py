@@ -43,11 +43,7 @@ class Framing(msgspec.Struct, frozen=True, kw_only=True):
     top: float = 0.2
 
     def __post_init__(self) -> None:
-        """Validate the sizes.
-
-        Raises:
-            CloningError: If a size is not positive, or nothing is left below the cut.
-        """
+        """Validate the sizes."""
         if min(self.height, self.width) < 1 or not 0.0 <= self.top < 1.0:
             raise CloningError(
                 f"Invalid framing of {self.width} x {self.height} pixels below a cut of "

@@ -142,15 +142,7 @@ class CameraPolicy:
     def logits(
         self, pictures: NDArray[np.uint8] | None, states: NDArray[np.floating] | None = None
     ) -> Tensor:
-        """Return the outputs of the last layer, from which `outputs` are computed.
-
-        Args:
-            pictures: As in `predict_many`.
-            states: As in `predict_many`.
-
-        Raises:
-            CloningError: If an input is missing or has another shape.
-        """
+        """Return the outputs of the last layer, from which `outputs` are computed."""
         small, known = self._prepared(pictures), self._state_tensor(states)
         n = len(small) if small is not None else len(known) if known is not None else 0
         found = torch.empty(n, self.network.hands.in_features)

@@ -176,12 +176,7 @@ def calibration_chart(bins: tuple[Bin, ...]) -> str:
 
 
 def scatter_chart(judgement: Judgement, place: int) -> str:
-    """Plot one number of each action: the policy's over the driver's.
-
-    Args:
-        judgement: The evaluation of a clone.
-        place: Index of the number in an action.
-    """
+    """Plot one number of each action: the policy's over the driver's."""
 
     def draw(_: Figure, axes: Axes) -> None:
         wanted = [row[place] for row in judgement.wanted]

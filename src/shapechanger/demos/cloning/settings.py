@@ -33,11 +33,7 @@ class Augmentation(msgspec.Struct, frozen=True, kw_only=True):
     blurred: float = 0.2
 
     def __post_init__(self) -> None:
-        """Validate the ranges.
-
-        Raises:
-            CloningError: If a value is out of range.
-        """
+        """Validate the ranges."""
         for name in ("mirror", "noisy", "blurred"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise CloningError(f"{name} must be in [0, 1], got {getattr(self, name)}.")
@@ -106,11 +102,7 @@ class CloneSettings(msgspec.Struct, frozen=True, kw_only=True):
     averaging: float = 0.0
 
     def __post_init__(self) -> None:
-        """Validate the ranges.
-
-        Raises:
-            CloningError: If a value is out of range.
-        """
+        """Validate the ranges."""
         counts = (self.features, self.batch, self.fewest_steps, self.checks, self.patience)
         if not self.channels or min(*counts, *self.channels) < 1:
             raise CloningError(

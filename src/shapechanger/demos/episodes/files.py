@@ -61,18 +61,7 @@ def read_file(path: Path, most: int) -> bytes:
 
 
 def free_path(folder: Path, stem: str, ending: str = "") -> Path:
-    """Return a path in `folder` that does not exist, with the next free number where needed.
-
-    Args:
-        folder: The folder.
-        stem: Wanted name without its ending, such as "steps"; if it ends with four digits after a
-            dash, such as "20261124-0001", counting goes on there. No other end of a name is a
-            number that was counted.
-        ending: Ending of the name, such as ".jsonl".
-
-    Raises:
-        OutputError: If all numbers are taken.
-    """
+    """Return a path in `folder` that does not exist, with the next free number where needed."""
     path = folder / f"{stem}{ending}"
     counted = re.fullmatch(r"(.*)-([0-9]{4})", stem, re.DOTALL)
     begun, number = (counted[1], int(counted[2])) if counted else (stem, 0)
@@ -135,14 +124,6 @@ def write_all(fd: int, data: bytes) -> None:
 
 
 def write_header(folder: Path, content: dict[str, Any]) -> None:
-    """Write the header of an episode atomically.
-
-    Args:
-        folder: Folder of the episode.
-        content: The header, as JSON can hold it.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
+    """Write the header of an episode atomically."""
     text = json.dumps(content, indent=1, ensure_ascii=False)
     write_atomic(folder / HEADER, f"{text}\n".encode())

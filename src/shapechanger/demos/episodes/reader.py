@@ -61,13 +61,7 @@ class StepLine(NamedTuple):
 
 
 def _scan(path: Path, header: EpisodeHeader, *, thorough: bool) -> list[StepLine]:
-    """Check every line of an episode, and the picture that it names.
-
-    Args:
-        path: Folder of the episode.
-        header: Its header.
-        thorough: Whether to verify the checksum of each picture, not only its size.
-    """
+    """Check every line of an episode, and the picture that it names."""
     try:
         content = read_file(path / STEPS, MAX_TEXT_BYTES)
     except OSError as error:

@@ -332,11 +332,7 @@ _CHECK_SIZE: Final = len(_CHECK % 0)
 
 
 def encode_line(fields: dict[str, Any]) -> bytes:
-    """Encode one line of `steps.jsonl`, with the CRC-32 of what precedes it as its last key.
-
-    Args:
-        fields: A non-empty object that JSON can hold.
-    """
+    """Encode one line of `steps.jsonl`, with the CRC-32 of what precedes it as its last key."""
     text = json.dumps(fields, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     # A lone surrogate has no UTF-8 encoding.
     body = text.encode(errors="replace")[:-1]

@@ -20,13 +20,7 @@ _NS_PER_S: Final = 1e9
 def exchange_episode(
     episode: Episode, *, dropped: bool = False, part: range | None = None
 ) -> ExchangeEpisode:
-    """Return an episode for export; its pictures are read step by step.
-
-    Args:
-        episode: The episode.
-        dropped: Whether to include excluded steps.
-        part: Indices of the steps to include; None for all.
-    """
+    """Return an episode for export; its pictures are read step by step."""
     rows = _rows(episode, dropped=dropped, part=part)
     return ExchangeEpisode(
         header=episode.header, rows=rows, name=episode.path.name, outcome=episode.outcome
@@ -36,16 +30,7 @@ def exchange_episode(
 def consecutive_parts(
     episodes: Sequence[Episode], form: Format, *, dropped: bool = False
 ) -> tuple[list[ExchangeEpisode], list[str]]:
-    """Split episodes where steps are excluded or missing, and at pauses.
-
-    Args:
-        episodes: The episodes.
-        form: A format that takes each step for the successor of the one before.
-        dropped: Whether to include excluded steps.
-
-    Returns:
-        The parts, and what differs from the recording, as sentences.
-    """
+    """Split episodes where steps are excluded or missing, and at pauses."""
     parts: list[ExchangeEpisode] = []
     off_s: list[float] = []
     pauses_s: list[float] = []
@@ -127,12 +112,7 @@ def value_names(layout: Layout) -> list[str]:
 
 
 def require_alike(episodes: Sequence[ExchangeEpisode], dataset: str) -> None:
-    """Refuse episodes that do not fit into one dataset.
-
-    Args:
-        episodes: The episodes.
-        dataset: How to name the dataset in errors, such as "a Minari dataset".
-    """
+    """Refuse episodes that do not fit into one dataset."""
     first, *others = episodes
     for episode in others:
         theirs = _kind(episode.header)

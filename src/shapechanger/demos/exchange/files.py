@@ -148,15 +148,7 @@ def read_text(path: Path) -> str:
 
 
 def read_table(path: Path, columns: int = 1) -> tuple[str, list[tuple[int, list[str]]]]:
-    """Read a CSV file, also as spreadsheets write it: with semicolons or tabs, and blank lines.
-
-    Args:
-        path: The file.
-        columns: Least number of its columns.
-
-    Returns:
-        What separates the cells, and the number and the cells of each line that is not blank.
-    """
+    """Read a CSV file, also as spreadsheets write it: with semicolons or tabs, and blank lines."""
     text = read_text(path)
     first = next((line for line in text.splitlines() if line.strip()), "")
     stated = _SEPARATOR_LINE.fullmatch(first.strip())
@@ -191,12 +183,7 @@ def read_json_object(path: Path) -> dict[str, Any]:
 
 
 def own_headers(section: object, where: object) -> list[dict[str, Any]]:
-    """Return the headers of the episodes of a data set that Shapechanger exported.
-
-    Args:
-        section: Shapechanger's part of the metadata.
-        where: The file that it is in.
-    """
+    """Return the headers of the episodes of a data set that Shapechanger exported."""
     fields = cast("dict[str, Any]", section) if isinstance(section, dict) else {}
     headers = fields.get("episodes")
     if fields.get("format") != 1 or not isinstance(headers, list):
@@ -324,12 +311,7 @@ def _batches(file: Any, columns: Sequence[str], groups: Sequence[int] | None = N
 
 
 def all_rows(path: Path, columns: set[str] | None) -> list[dict[str, Any]]:
-    """Return the rows of a small Parquet table.
-
-    Args:
-        path: The file.
-        columns: Names of the columns to read, if they are there; None for all.
-    """
+    """Return the rows of a small Parquet table."""
     found: list[dict[str, Any]] = []
     with _open_parquet(path) as file:
         known = set(file.schema_arrow.names)
@@ -379,14 +361,7 @@ def number_columns(
 def rows_at(
     path: Path, rows: NDArray[np.int64], sizes: Mapping[str, int], stored: Sequence[str]
 ) -> Iterator[dict[str, Any]]:
-    """Yield some rows of a Parquet file, in its order: vectors, and pictures as stored.
-
-    Args:
-        path: The file.
-        rows: Positions of the rows, in ascending order.
-        sizes: Number of values of each column of numbers.
-        stored: Names of other columns.
-    """
+    """Yield some rows of a Parquet file, in its order: vectors, and pictures as stored."""
     with _open_parquet(path) as file:
         wanted = [*sizes, *stored]
         if missing := [key for key in wanted if key not in file.schema_arrow.names]:

@@ -164,13 +164,7 @@ class ImportContext:
         self.notes: list[str] = []
 
     def leave_out(self, what: str, reason: str, name: object) -> None:
-        """Note that a part is left out.
-
-        Args:
-            what: What it is, in the singular, such as "record".
-            reason: Why it is left out, such as "without a picture"; it must fit the plural, too.
-            name: The part's name or number in the source.
-        """
+        """Note that a part is left out."""
         self.left_out.setdefault((what, reason), []).append(str(name))
 
     def warn(self, sentence: str) -> None:
@@ -195,11 +189,7 @@ class ImportContext:
         ]
 
     def require_whole(self, source: object) -> None:
-        """Refuse a source of which something is left out, or which contradicts itself.
-
-        Raises:
-            DemosError: If there is such a finding; it names all of them.
-        """
+        """Refuse a source of which something is left out, or which contradicts itself."""
         findings = [f"left out: {line}" for line in self.left_out_lines()]
         findings += [warning.removesuffix(".") for warning in self.warnings]
         if findings:

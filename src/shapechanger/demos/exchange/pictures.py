@@ -100,11 +100,7 @@ def as_jpeg(data: bytes, name: object) -> bytes:
 
 
 def read_picture(path: Path) -> tuple[bytes, bool]:
-    """Read a picture as JPEG.
-
-    Returns:
-        The JPEG, and whether it was encoded now. It is not decoded otherwise.
-    """
+    """Read a picture as JPEG."""
     try:
         data = read_file(path, MAX_PICTURE_BYTES)
     except FileNotFoundError as error:
@@ -122,14 +118,6 @@ def check_pictures(
     """Decode each picture once, and leave out the records whose pictures are not whole.
 
     All pictures of a data set have one size, which is the most frequent one.
-
-    Args:
-        pictures: File and name of each record.
-        what: What a record is called, in the singular.
-        context: Findings of the import.
-
-    Returns:
-        Whether each picture can be imported, and their width and height; None without any.
     """
     sizes: list[tuple[int, int] | None] = []
     encoded = 0

@@ -57,16 +57,7 @@ class TimedDrive:
 def choose_rates(
     drives: Sequence[TimedDrive], context: ImportContext, stated_hz: float | None = None
 ) -> tuple[list[float], bool]:
-    """Measure the rates of drives, or take a stated one, and report what is odd about them.
-
-    Args:
-        drives: The drives of one source.
-        context: Options and findings of the import; its `hz` counts before anything else.
-        stated_hz: Steps per second that the source states; None if it does not.
-
-    Returns:
-        Steps per second of each drive, and whether the times of the records can be believed.
-    """
+    """Measure the rates of drives, or take a stated one, and report what is odd about them."""
     periods = [drive.periods_ns() for drive in drives]
     pooled = measured_hz([period for part in periods for period in part])
     if (hz := context.hz or stated_hz) is not None:
@@ -114,9 +105,6 @@ def measured_hz(periods_ns: Sequence[float]) -> float | None:
 
     Args:
         periods_ns: Times from step to step, ns.
-
-    Returns:
-        None if no time passes.
     """
     positive = [period for period in periods_ns if period > 0.0]
     if not positive:
@@ -146,14 +134,7 @@ def split_at_jumps(
     rates: Sequence[float],
     context: ImportContext,
 ) -> list[list[slice]]:
-    """Split drives at each long pause, and wherever time runs backwards, and report all jumps.
-
-    Args:
-        drives: The drives; those without times stay whole.
-        names: How to name each record of each drive.
-        rates: Steps per second of each drive.
-        context: Findings of the import.
-    """
+    """Split drives at each long pause, and wherever time runs backwards, and report all jumps."""
     pauses_s: list[float] = []
     backwards: list[tuple[float, str]] = []
     found: list[list[slice]] = []
